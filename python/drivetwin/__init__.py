@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""drivetwin: from gear-shift logs to validated driveline models."""

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: MIT
+"""One tree of exceptions. Each says what is wrong, where, and what to do about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where a fault sits: file, channel, time [s] or key path; any part may be unknown."""
+
+    file: str | None = None
+    channel: str | None = None
+    time: float | None = None
+    key: str | None = None
+
+    def __str__(self) -> str:
+        parts = [
+            self.file,
+            f"channel {self.channel!r}" if self.channel is not None else None,
+            f"t = {self.time:.6g} s" if self.time is not None else None,
+            f"key {self.key!r}" if self.key is not None else None,
+        ]
+        return ", ".join(part for part in parts if part)
+
+
+@dataclass
+class DrivetwinError(Exception):
+    """Base of all errors raised on purpose.
+
+    `what` states the fault with its numbers, `where` its place, `remedy` what to do.
+    """
+
+    what: str
+    remedy: str
+    where: Where = field(default_factory=Where)
+
+    exit_code = 2
+
+    def __str__(self) -> str:
+        place = str(self.where)
+        head = f"{place}: {self.what}" if place else self.what
+        return f"{head}\n  -> {self.remedy}" if self.remedy else head
+
+
+class InputError(DrivetwinError):
+    """Something handed in by the user cannot be used as it is."""
+
+
+class FileFormatError(InputError):
+    """The file is empty, binary where text is expected, cut, or not of the format it claims."""
+
+
+class MissingChannelError(InputError):
+    """A quantity that is needed has no channel in the log, or more than one candidate."""
+
+
+class UnitError(InputError):
+    """A unit is missing, unknown, or of another quantity than the channel's."""
+
+
+class TimeError(InputError):
+    """Time stamps do not increase or are not plausible."""
+
+
+class DamagedChannelError(InputError):
+    """A channel holds NaN runs, is constant throughout, saturated or stuck."""
+
+
+class PlausibilityError(InputError):
+    """Values contradict physics or the vehicle card, e.g. a pressure 1e5 times too large."""
+
+
+class MappingError(InputError):
+    """The channel mapping file is wrong or ambiguous."""
+
+
+class CardError(InputError):
+    """The vehicle card has unknown keys, wrong types or impossible values."""
+
+
+class ResultFileError(InputError):
+    """A twin or result file cannot be read or has an unknown schema."""
+
+
+class NoShiftError(DrivetwinError):
+    """No usable gear shift was found; the text lists the rejected candidates and why."""
+
+
+class IdentificationError(DrivetwinError):
+    """The data cannot carry the identification that was asked for."""
+
+
+class SimulationError(DrivetwinError):
+    """A simulation ended with a status other than `completed`."""
+
+
+class MissingExtraError(DrivetwinError):
+    """An optional dependency is not installed; the text names the install command."""

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""What an identification returns: estimates with intervals, curves, fits, evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.parameters import spec_of
+from drivetwin.shifts.shift import RejectedShift, Shift
+
+FloatArray = NDArray[np.float64]
+
+_Z95 = 1.959963984540054
+
+
+class Verdict(StrEnum):
+    """What may be concluded about a parameter."""
+
+    IDENTIFIED = "identified"
+    WEAK = "weak"
+    NOT_IDENTIFIABLE = "not identifiable"
+
+
+class Method(StrEnum):
+    """Which estimator family answers."""
+
+    PAPER = "paper"
+    INTEGRAL = "integral"
+    LIKELIHOOD = "likelihood"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter's value and uncertainty, SI.
+
+    `std_noise` comes from the sensors' noise; `std_systematic` from the gain and offset
+    tolerances on the card. `value` is None exactly when the verdict is `not identifiable`.
+    `reason` says why a verdict is not `identified` and which experiment would help.
+    """
+
+    id: str
+    value: float | None
+    std_noise: float | None
+    verdict: Verdict
+    method: str
+    std_systematic: float | None = None
+    reason: str = ""
+
+    @property
+    def unit(self) -> str:
+        """SI unit from the parameter table."""
+        return spec_of(self.id).unit
+
+    @property
+    def std_total(self) -> float | None:
+        """Noise and systematic part together; None if the noise part is unknown."""
+        if self.std_noise is None:
+            return None
+        return float(np.hypot(self.std_noise, self.std_systematic or 0.0))
+
+    def _interval(self, std: float | None) -> tuple[float, float] | None:
+        if self.value is None or std is None:
+            return None
+        return (self.value - _Z95 * std, self.value + _Z95 * std)
+
+    @property
+    def ci95(self) -> tuple[float, float] | None:
+        """95 % interval from noise alone."""
+        return self._interval(self.std_noise)
+
+    @property
+    def ci95_total(self) -> tuple[float, float] | None:
+        """95 % interval with sensor tolerances included; the one to show first."""
+        return self._interval(self.std_total)
+
+
+@dataclass(frozen=True)
+class FrictionCurve:
+    """μ over |slip| of one element, over the slip range seen; arrays (n,), slip in rad/s.
+
+    `mu_lo`, `mu_hi` bound the 95 % band (total). `points_slip`, `points_mu` are the raw points
+    behind it. `stribeck` holds mu_c, mu_s, v_s [rad/s], mu_v [s/rad] of the fitted law, or is None.
+    """
+
+    slip: FloatArray
+    mu: FloatArray
+    mu_lo: FloatArray
+    mu_hi: FloatArray
+    points_slip: FloatArray
+    points_mu: FloatArray
+    stribeck: dict[str, float] | None
+    method: str
+    stribeck_covariance: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class SignalFit:
+    """Agreement of simulation and measurement in one phase of one signal (THEORY section 4)."""
+
+    rmse: float
+    fit_percent: float
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Everything one `identify` run found. Immutable; the twin, report and exports read it.
+
+    `fit[signal][phase]` with signals `output_torque`, `input_speed`, `output_speed` and phases
+    `all`, `before`, `torque`, `inertia`, `after`. `evidence[stage]` is the stage's own dataclass
+    (see the estimator files); the report draws from it. `correlation` is over `correlation_ids`.
+    """
+
+    estimates: dict[str, Estimate]
+    friction: dict[str, FrictionCurve]
+    shifts: tuple[Shift, ...]
+    rejected: tuple[RejectedShift, ...]
+    fit: dict[str, dict[str, SignalFit]]
+    method: Method
+    loss_law: str
+    validity: dict[str, tuple[float, float]]
+    inputs: dict[str, str]
+    """File name -> SHA-256 of every input."""
+    settings: dict[str, Any]
+    evidence: dict[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    correlation_ids: tuple[str, ...] = ()
+    correlation: FloatArray | None = None

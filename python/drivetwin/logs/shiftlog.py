@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""A log in memory: named channels, each on its own time base, SI inside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.errors import MissingChannelError, Where
+
+FloatArray = NDArray[np.float64]
+
+
+class Quantity(StrEnum):
+    """What a channel measures; decides its SI unit and how it may be interpolated."""
+
+    TORQUE = "torque"  # N*m
+    PRESSURE = "pressure"  # Pa
+    SPEED = "speed"  # rad/s
+    FRACTION = "fraction"  # 1 (pedal, percent torque)
+    TEMPERATURE = "temperature"  # K
+    STATE = "state"  # integers: gear, flags; held, never interpolated
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One measured signal.
+
+    `role` is what it is to the driveline: `engine_torque`, `output_torque`, `input_speed`,
+    `engine_speed`, `output_speed`, `wheel_speed`, `pressure.<element>`, `throttle`, `gear`, ...
+    `time` (n,) in s strictly increasing; `values` (n,) in SI. `source_name` and `source_unit`
+    are as in the file. `held` marks a slow signal that the logger repeated on a faster time base.
+    """
+
+    role: str
+    quantity: Quantity
+    time: FloatArray
+    values: FloatArray
+    source_name: str
+    source_unit: str
+    held: bool = False
+
+    @property
+    def step(self) -> float:
+        """Median sample interval [s]."""
+        return float(np.median(np.diff(self.time)))
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Values at `time` (m,): linear between samples (held for states), NaN outside the span."""
+        if self.quantity is Quantity.STATE:
+            index = np.searchsorted(self.time, time, side="right") - 1
+            values = self.values[np.clip(index, 0, None)]
+        else:
+            values = np.interp(time, self.time, self.values)
+        outside = (time < self.time[0]) | (time > self.time[-1])
+        return np.where(outside, np.nan, values)
+
+
+@dataclass(frozen=True)
+class ShiftLog:
+    """All mapped channels of one recording, by role."""
+
+    channels: Mapping[str, Channel]
+    source: str
+    sha256: str
+    warnings: tuple[str, ...] = field(default=())
+
+    def __contains__(self, role: object) -> bool:
+        return role in self.channels
+
+    def __getitem__(self, role: str) -> Channel:
+        try:
+            return self.channels[role]
+        except KeyError:
+            raise MissingChannelError(
+                f"no channel for {role!r}; the log maps {', '.join(sorted(self.channels))}",
+                "name it in a channel mapping file (--channels) or in [channels] of the card",
+                Where(file=self.source),
+            ) from None
+
+    def pressure(self, element: str) -> Channel:
+        """Pressure of a clutch or brake by its name on the card."""
+        return self[f"pressure.{element}"]

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""The parameter table: every identified quantity is declared once, here.
+
+Result tables, reports, exports and documentation derive from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drivetwin.errors import InputError
+
+
+@dataclass(frozen=True)
+class ParameterSpec:
+    """One identified quantity.
+
+    `stem` is the id without its gear or element suffix; `unit` is SI and ASCII;
+    `lower` and `upper` bound every fit; `weak_above` is the relative half width of
+    the 95 % interval from which the verdict is `weak`.
+    """
+
+    stem: str
+    symbol: str
+    unit: str
+    meaning: str
+    lower: float
+    upper: float
+    suffix: str = ""
+    """`gear` or `element` where one value exists for each, else empty."""
+    weak_above: float = 0.25
+
+
+_SPECS = (
+    ParameterSpec("eta", "η", "1", "lumped gear efficiency (eq. 3, 10)", 0.3, 1.2),
+    ParameterSpec(
+        "J_prime",
+        "J′",
+        "kg*m^2",
+        "lumped inertia at the engine in a gear (eq. 10)",
+        0.0,
+        1e4,
+        "gear",
+    ),
+    ParameterSpec("J_out", "Jo′", "kg*m^2", "output side before the shaft (eq. 7)", 0.0, 1e4),
+    ParameterSpec("J_vehicle", "J3", "kg*m^2", "vehicle inertia at the wheel (eq. 9, 11)", 0, 1e7),
+    ParameterSpec("Tv_over_if", "Tv/if", "N*m", "load torque over final drive", -1e6, 1e6),
+    ParameterSpec("k_o", "k_o", "N*m/rad", "output shaft stiffness (eq. 8, 14)", 0.0, 1e9),
+    ParameterSpec("c_o", "c_o", "N*m*s/rad", "output shaft damping (eq. 8, 14)", 0.0, 1e7),
+    ParameterSpec("f_d", "f_d", "Hz", "frequency of the lock-up oscillation", 0.0, 1e3, "gear"),
+    ParameterSpec("zeta", "ζ", "1", "damping ratio of the lock-up oscillation", 0.0, 1.0, "gear"),
+    ParameterSpec("P0", "P0", "Pa", "pressure at which the clutch fill ends", 0.0, 1e7, "element"),
+    ParameterSpec("te_delay", "τ_e", "s", "age of a fresh engine torque value", -1.0, 1.0),
+)
+
+SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}
+
+
+def spec_of(parameter_id: str) -> ParameterSpec:
+    """Return the declaration behind an id such as `J_prime_2`, `P0.B3` or `eta`.
+
+    Raises InputError for an id that no declaration covers.
+    """
+    if parameter_id in SPECS:
+        return SPECS[parameter_id]
+    for spec in _SPECS:
+        separator = {"gear": "_", "element": "."}.get(spec.suffix)
+        if separator and parameter_id.startswith(spec.stem + separator):
+            return spec
+    raise InputError(
+        f"unknown parameter id {parameter_id!r}", f"use one of {', '.join(sorted(SPECS))}"
+    )
