@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""The dual-clutch driveline of THEORY section 3 and its simulation, as seen from Python.
+
+The physics itself stands in the Rust core; these classes only describe and carry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+LossLaw = Literal["paper", "dissipative"]
+
+
+@dataclass(frozen=True)
+class Stribeck:
+    """μ(s) = mu_c + (mu_s - mu_c)·exp(-|s|/v_s) + mu_v·|s|; s and v_s in rad/s, mu_v in s/rad."""
+
+    mu_c: float
+    mu_s: float
+    v_s: float
+    mu_v: float
+
+
+@dataclass(frozen=True)
+class FrictionTable:
+    """μ linear between `slip` (n,) [rad/s], increasing from 0, and constant beyond its end."""
+
+    slip: tuple[float, ...]
+    mu: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ShiftElement:
+    """One clutch of the dual-clutch form: slip = ω_in/i_c - i_out·ω_out (eq. 15).
+
+    `gain` = N·D·A·r [m^3]; capacity = μ·gain·max(0, P - P0) [N m]; static capacity `peak` times
+    μ(0). `drum_inertia` [kg m^2] runs with the slip (THEORY section 2).
+    """
+
+    name: str
+    i_c: float
+    i_out: float
+    gain: float
+    P0: float
+    friction: Stribeck | FrictionTable
+    peak: float = 1.0
+    drum_inertia: float = 0.0
+
+
+@dataclass(frozen=True)
+class RoadLoad:
+    """Load torque at the wheel [N m] against forward motion, from vehicle speed r_w·ω_w.
+
+    `constant` holds in either direction of motion (a dynamometer or grade load); `rolling` opposes
+    the motion; `aero` is ½·ρ·c_d·A·r_w^3 [N m s^2/rad^2], times ω_w·|ω_w|.
+    """
+
+    constant: float = 0.0
+    rolling: float = 0.0
+    aero: float = 0.0
+
+
+@dataclass(frozen=True)
+class DualClutch:
+    """Parameters of eqs. 2-9, SI. `J_v` is at the wheel; J2e as in THEORY section 3.
+
+    Only J1·η + J2e is identifiable; an identified model carries it as J2e = 0, J1 = Je/η.
+    """
+
+    J1: float
+    J2e: float
+    eta: float
+    loss_law: LossLaw
+    i_in: float
+    J_out: float
+    i_f: float
+    J_v: float
+    k_o: float
+    c_o: float
+    load: RoadLoad
+    elements: tuple[ShiftElement, ...]
+
+
+@dataclass(frozen=True)
+class State:
+    """Start of a simulation: speeds [rad/s] and shaft twist [rad]; elements that start locked."""
+
+    engine_speed: float
+    output_speed: float
+    wheel_speed: float
+    twist: float
+    locked: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Signal:
+    """An input, linear between its samples; `time` (n,) [s], `values` (n,) SI."""
+
+    time: FloatArray
+    values: FloatArray
+
+
+@dataclass(frozen=True)
+class Event:
+    """A change of friction mode: `kind` is lock, break_away, reverse, fill or vent."""
+
+    time: float
+    element: str
+    kind: str
+
+
+@dataclass(frozen=True)
+class EnergyAudit:
+    """Work over the run [J]: source = stored + friction + gear_loss + shaft + load + error.
+
+    `gear_loss` is negative where the `paper` law creates energy; `created` is the sum of those
+    negative parts, as a positive number.
+    """
+
+    source: float
+    stored: float
+    friction: float
+    gear_loss: float
+    shaft: float
+    load: float
+    created: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Result of one run. Arrays (n,) on `time`; `clutch_torque` and `slip` by element name.
+
+    A run that fails keeps its length: NaN after the failure, and `status` says what happened
+    (`completed` otherwise).
+    """
+
+    time: FloatArray
+    engine_speed: FloatArray
+    output_speed: FloatArray
+    wheel_speed: FloatArray
+    twist: FloatArray
+    shaft_torque: FloatArray
+    clutch_torque: Mapping[str, FloatArray]
+    slip: Mapping[str, FloatArray]
+    events: tuple[Event, ...]
+    status: str
+    audit: EnergyAudit | None = field(default=None)
+
+
+def simulate(
+    model: DualClutch,
+    engine_torque: Signal,
+    pressures: Mapping[str, Signal],
+    start: State,
+    time: FloatArray,
+    *,
+    audit: bool = False,
+    max_step: float = 1e-3,
+) -> Trajectory:
+    """Run the model from `time[0]` and return its trajectory on `time` (n,) [s], increasing.
+
+    `pressures` maps element names to gauge pressures [Pa]. `max_step` [s] bounds the step in
+    slipping phases; steps always end on input samples and events.
+    Raises InputError where the description is inconsistent; a run that fails returns its status.
+    """
+    raise NotImplementedError(asdict(model), engine_torque, pressures, start, time, audit, max_step)
