@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+# Everything a developer or a build machine calls. `make help` lists the targets.
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+venv := .venv
+bin := $(venv)/bin
+pip := $(bin)/python -m pip --disable-pip-version-check
+rust_sources := Cargo.toml $(wildcard Cargo.lock) $(shell find crates -name '*.rs' -o -name Cargo.toml)
+
+# The binding crate looks for an interpreter when cargo builds it outside maturin.
+export PYO3_PYTHON := $(CURDIR)/$(bin)/python
+export PIP_REQUIRE_VIRTUALENV := 1
+
+.PHONY: help
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
+
+.PHONY: demo
+demo: $(venv)/.native ## build, identify a synthetic shift with known truth, name the report
+	$(bin)/drivetwin demo -o out/demo
+
+.PHONY: test
+test: lint-rust lint-python tidy test-rust test-python ## all checks and tests
+
+.PHONY: lint-rust
+lint-rust: $(venv)/.dev ## rustfmt and clippy
+	cargo fmt --all --check
+	cargo clippy --locked --workspace --all-targets -- -D warnings
+
+.PHONY: lint-python
+lint-python: $(venv)/.native ## ruff, mypy --strict, and the native module against its stub
+	$(bin)/ruff check
+	$(bin)/ruff format --check
+	$(bin)/mypy
+	$(bin)/stubtest --concise --mypy-config-file pyproject.toml drivetwin._native
+
+.PHONY: tidy
+tidy: $(venv)/.dev ## the project's own rules (sizes, layers, paths named in the documents)
+	$(bin)/python -m tools.tidy
+
+.PHONY: test-rust
+test-rust: $(venv)/.dev ## tests of the core
+	cargo test --locked --quiet --package drivetwin-core
+
+.PHONY: test-python
+test-python: $(venv)/.native ## tests of the package
+	$(bin)/pytest -q
+
+.PHONY: wheel
+wheel: $(venv)/.dev ## the abi3 wheel, into dist/
+	rm -f dist/drivetwin-*.whl
+	$(bin)/maturin build --quiet --release --locked --out dist
+	ls dist/drivetwin-*.whl
+
+.PHONY: test-wheel
+test-wheel: wheel ## run the demo from the wheel where there is no Rust
+	tools/try_wheel.sh $(bin)/python dist/drivetwin-*.whl
+
+.PHONY: fmt
+fmt: $(venv)/.dev ## format Rust and Python sources
+	cargo fmt --all
+	$(bin)/ruff format
+	$(bin)/ruff check --fix
+
+.PHONY: clean
+clean: ## remove everything that was built
+	rm -rf $(venv) target dist out python/drivetwin/_native*.so
+	find . -name __pycache__ -prune -exec rm -rf {} +
+
+.PHONY: prerequisites
+prerequisites:
+	@tools/prerequisites.sh > /dev/null
+
+# The environment with the tools; new when pyproject.toml is.
+$(venv)/.dev: pyproject.toml | prerequisites
+	"$$(tools/prerequisites.sh)" -m venv $(venv)
+	$(pip) install --quiet --upgrade 'pip>=25.1'
+	$(pip) install --quiet --group dev
+	touch $@
+
+# The package, editable, with its native module; new when a Rust source is.
+$(venv)/.native: $(venv)/.dev $(rust_sources)
+	VIRTUAL_ENV=$(CURDIR)/$(venv) $(bin)/maturin develop --quiet --release --locked
+	touch $@

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""What every rule works on: the files of the repository, and the faults found in them."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A broken rule at a place; `name` is the function or item meant, if any."""
+
+    rule: str
+    path: PurePosixPath
+    line: int
+    text: str
+    name: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}: [{self.rule}] {self.text}"
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file: its path relative to the root, and its content."""
+
+    path: PurePosixPath
+    data: bytes
+
+    @cached_property
+    def text(self) -> str | None:
+        """The content as text, None where it is not UTF-8."""
+        try:
+            return self.data.decode("utf-8")
+        except UnicodeDecodeError:
+            return None
+
+    @property
+    def lines(self) -> list[str]:
+        """The lines of the text; empty for a binary file."""
+        return (self.text or "").splitlines()
+
+
+@dataclass(frozen=True)
+class Tree:
+    """All files of the repository at `root`, sorted by path."""
+
+    root: Path
+    sources: tuple[Source, ...]
+
+    def below(self, folder: str, *suffixes: str) -> Iterator[Source]:
+        """Files under `folder` ("" is the root) with one of the suffixes (all without any)."""
+        for source in self.sources:
+            inside = not folder or PurePosixPath(folder) in source.path.parents
+            if inside and (not suffixes or source.path.suffix in suffixes):
+                yield source
+
+
+Rule = Callable[[Tree], Iterator[Fault]]
+
+
+def read_tree(root: Path) -> Tree:
+    """Read what git knows below `root`: tracked files, and new ones that are not ignored.
+
+    Raises subprocess.CalledProcessError where `root` is in no git repository.
+    """
+    listing = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=root,
+        capture_output=True,
+        check=True,
+    ).stdout.decode()
+    names = sorted({name for name in listing.split("\0") if name})
+    return Tree(
+        root,
+        tuple(
+            Source(PurePosixPath(name), (root / name).read_bytes())
+            for name in names
+            if (root / name).is_file()
+        ),
+    )

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+"""Where tests stand: beside what they test, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import PurePosixPath
+
+from tools.tidy_rules.base import Fault, Tree
+
+WHOLE_PROGRAM = "tests/system"
+_SOURCE_ROOTS = ("python/drivetwin", ".")
+
+
+def tests_mirror_sources(tree: Tree) -> Iterator[Fault]:
+    """`tests/logs/test_units.py` tests the module `python/drivetwin/logs/units.py`.
+
+    A second file on one module adds a word (`test_units_property.py`); tests of several parts
+    together stand in `tests/system`.
+    """
+    modules = {source.path.with_suffix("") for source in tree.below("", ".py")}
+    packages = {path.parent for path in modules}
+    for source in tree.below("tests", ".py"):
+        if not source.path.name.startswith("test_"):
+            continue
+        if PurePosixPath(WHOLE_PROGRAM) in source.path.parents:
+            continue
+        subject = source.path.stem.removeprefix("test_")
+        folder = source.path.parent.relative_to("tests")
+        known = {
+            path.name
+            for root in _SOURCE_ROOTS
+            for path in modules | packages
+            if path.parent == PurePosixPath(root) / folder
+        }
+        if not any(subject == name or subject.startswith(f"{name}_") for name in known):
+            text = f"no module {subject} in {folder} to test; name its subject, or tests/system"
+            yield Fault("tests-mirror-sources", source.path, 1, text)
