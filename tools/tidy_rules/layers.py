@@ -20,13 +20,14 @@ _IMPURE = re.compile(
 _SOLVER_MAY_NOT = re.compile(r"\bcrate\s*::\s*(?:\{[^}]*\b)?(?:model|simulate)\b")
 
 PYTHON_LAYERS = (
-    frozenset({"errors", "parameters", "driveline", "_native"}),
-    frozenset({"vehicle", "logs"}),
-    frozenset({"shifts"}),
+    frozenset({"errors", "parameters", "driveline", "tomlfile", "_native"}),
+    frozenset({"logs"}),
+    frozenset({"vehicle", "held"}),
+    frozenset({"shifts", "dyno"}),
     frozenset({"identify"}),
-    frozenset({"twin", "dyno"}),
+    frozenset({"twin", "results", "start_state", "validate"}),
     frozenset({"report"}),
-    frozenset({"cli"}),
+    frozenset({"cli", "__main__"}),
 )
 """From the bottom up: a module may import from its own layer and those below."""
 

@@ -18,7 +18,7 @@ def tests_mirror_sources(tree: Tree) -> Iterator[Fault]:
     A second file on one module adds a word (`test_units_property.py`); tests of several parts
     together stand in `tests/system`.
     """
-    modules = {source.path.with_suffix("") for source in tree.below("", ".py")}
+    modules = {source.path.with_suffix("") for source in tree.below("", ".py", ".sh")}
     packages = {path.parent for path in modules}
     for source in tree.below("tests", ".py"):
         if not source.path.name.startswith("test_"):
