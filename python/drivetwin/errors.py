@@ -92,6 +92,10 @@ class IdentificationError(DrivetwinError):
     """The data cannot carry the identification that was asked for."""
 
 
+class MissingParameterError(IdentificationError):
+    """A model needs parameters that the log could not tell; the text names each and why."""
+
+
 class SimulationError(DrivetwinError):
     """A simulation ended with a status other than `completed`."""
 

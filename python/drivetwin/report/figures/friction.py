@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Friction coefficient over slip with its 95 % band and the points behind it (paper Fig. 8, 9)."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from drivetwin.identify.result import FloatArray, FrictionCurve
+from drivetwin.report.decimate import MAX_POINTS
+from drivetwin.report.style import COMPARED, FITTED, MEASURED, axis, layout
+
+_BAND = "rgba(213,94,0,0.18)"
+
+
+def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
+    """Points, smoothed curve with band, and the fitted Stribeck law of one element."""
+    figure = go.Figure()
+    if curve.points_slip.size:
+        stride = -(-curve.points_slip.size // MAX_POINTS)
+        figure.add_scatter(
+            x=curve.points_slip[::stride].astype("float32"),
+            y=curve.points_mu[::stride].astype("float32"),
+            mode="markers",
+            name="points from the log",
+            marker={"color": MEASURED, "size": 4, "opacity": 0.45},
+        )
+    known = np.isfinite(curve.mu_lo) & np.isfinite(curve.mu_hi)
+    if known.any():
+        slip = curve.slip[known]
+        figure.add_scatter(
+            x=np.concatenate((slip, slip[::-1])),
+            y=np.concatenate((curve.mu_hi[known], curve.mu_lo[known][::-1])),
+            fill="toself",
+            fillcolor=_BAND,
+            line={"width": 0},
+            name="95 % band, sensors included",
+            hoverinfo="skip",
+        )
+    figure.add_scatter(
+        x=curve.slip,
+        y=curve.mu,
+        mode="lines",
+        name=f"curve of {element}",
+        line={"color": FITTED, "width": 2.2},
+    )
+    if curve.stribeck is not None:
+        figure.add_scatter(
+            x=curve.slip,
+            y=stribeck_mu(curve.stribeck, curve.slip),
+            mode="lines",
+            name="Stribeck law",
+            line={"color": COMPARED, "width": 1.6, "dash": "dash"},
+        )
+    figure.update_layout(
+        layout(
+            420,
+            xaxis=axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
+            yaxis=axis("friction coefficient μ [–]", range=_mu_range(curve)),
+            hovermode="x",
+        )
+    )
+    return figure
+
+
+def stribeck_mu(law: dict[str, float], slip: FloatArray) -> FloatArray:
+    """μ(|slip|) of a Stribeck law; slip (n,) in rad/s."""
+    size = np.abs(slip)
+    drop = (law["mu_s"] - law["mu_c"]) * np.exp(-size / law["v_s"])
+    return np.asarray(law["mu_c"] + drop + law["mu_v"] * size)
+
+
+def _mu_range(curve: FrictionCurve) -> tuple[float, float]:
+    """Range that shows curve and band whole; stray points at vanishing pressure may lie outside."""
+    values = np.concatenate((curve.mu, curve.mu_lo, curve.mu_hi))
+    values = values[np.isfinite(values)]
+    middle = curve.points_mu[np.isfinite(curve.points_mu)]
+    if middle.size:
+        values = np.concatenate((values, np.percentile(middle, [2, 98])))
+    low, high = float(values.min()), float(values.max())
+    margin = 0.15 * (high - low) + 0.002
+    return low - margin, high + margin

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""The shift with its four phases (paper Fig. 4)."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.report.figures.stack import Curve, Panel, stacked
+from drivetwin.report.style import ACCENT, COMPARED, MEASURED, SECOND
+from drivetwin.report.units import BAR, NM, RPM
+from drivetwin.shifts.shift import Shift
+
+_SPEEDS = {
+    "engine_speed": ("engine", ACCENT),
+    "input_speed": ("gearbox input", MEASURED),
+    "output_speed": ("gearbox output", COMPARED),
+    "wheel_speed": ("wheel", SECOND),
+}
+
+
+def shift_phases(log: ShiftLog, shift: Shift) -> go.Figure:
+    """Engine torque, pressures, output torque and speeds over time, as measured."""
+    torque = log["engine_torque"]
+    panels = [
+        Panel(
+            "engine torque",
+            NM,
+            [Curve("T_e", torque.time, torque.values, MEASURED, step=torque.held)],
+            0.8,
+        ),
+        Panel(
+            "pressure",
+            BAR,
+            [
+                _curve(f"{shift.offgoing} (off-going)", log.pressure(shift.offgoing), COMPARED),
+                _curve(f"{shift.oncoming} (on-coming)", log.pressure(shift.oncoming), SECOND),
+            ],
+        ),
+    ]
+    if "output_torque" in log:
+        panels.append(
+            Panel("output torque", NM, [_curve("T_o", log["output_torque"], MEASURED)], 1.3)
+        )
+    speeds = [
+        _curve(name, log[role], colour) for role, (name, colour) in _SPEEDS.items() if role in log
+    ]
+    panels.append(Panel("speed", RPM, speeds, 1.2))
+    return stacked(panels, shift_spans(shift), height=760)
+
+
+def shift_spans(shift: Shift) -> dict[str, tuple[float, float]]:
+    """Intervals of the four phases [s]."""
+    return {
+        "before": shift.before,
+        "torque": shift.torque_phase,
+        "inertia": shift.inertia_phase,
+        "after": (shift.lockup_time, shift.after[1]),
+    }
+
+
+def _curve(name: str, channel: Channel, colour: str) -> Curve:
+    return Curve(name, channel.time, channel.values, colour, step=channel.held)

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+"""Panels over one time axis, with phase bands, a cursor through all panels and zoom by phase."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import plotly.graph_objects as go
+
+from drivetwin.identify.result import FloatArray
+from drivetwin.report.decimate import envelope
+from drivetwin.report.style import PHASE_FILL, PHASE_NUMBER, axis, layout
+from drivetwin.report.units import Display
+
+Phases = Mapping[str, tuple[float, float]]
+
+_GAP = 0.035
+_ZOOMS = {"torque": "torque phase", "inertia": "inertia phase", "after": "lock-up"}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One trace: `time` (n,) s, `values` (n,) SI."""
+
+    name: str
+    time: FloatArray
+    values: FloatArray
+    colour: str
+    width: float = 1.3
+    dash: str = "solid"
+    step: bool = False
+    """Drawn as a staircase: a value that is held until the next."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One row: what its y axis shows, in which unit, and its curves. `weight` is its height."""
+
+    quantity: str
+    display: Display
+    curves: Sequence[Curve]
+    weight: float = 1.0
+
+
+def stacked(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
+    """Draw panels from top to bottom over a common time axis [s].
+
+    `phases` maps `before`, `torque`, `inertia`, `after` to intervals [s]; the view opens on the
+    shift, buttons zoom to the phases.
+    """
+    figure = go.Figure()
+    domains = _domains([panel.weight for panel in panels])
+    options: dict[str, Any] = {}
+    for number, (panel, domain) in enumerate(zip(panels, domains, strict=True), start=1):
+        suffix = "" if number == 1 else str(number)
+        title = f"{panel.quantity} [{panel.display.label}]"
+        options[f"yaxis{suffix}"] = axis(title, domain=domain, anchor="x")
+        options[f"legend{suffix}"] = {
+            "x": 1.01,
+            "y": domain[1],
+            "yanchor": "top",
+            "bgcolor": "rgba(0,0,0,0)",
+        }
+        for curve in panel.curves:
+            figure.add_trace(_trace(curve, panel.display, suffix, len(panel.curves) > 1))
+    view = _view(phases)
+    options["xaxis"] = axis(
+        "time [s]",
+        anchor=f"y{len(panels)}" if len(panels) > 1 else "y",
+        range=view,
+        showspikes=True,
+        spikemode="across",
+        spikethickness=1,
+        spikedash="dot",
+        spikecolor="#8a8f98",
+    )
+    figure.update_layout(layout(height, **options))
+    figure.update_layout(
+        margin={"t": 64, "r": 150},
+        hovermode="x unified",
+        hoversubplots="axis",
+        updatemenus=[_zoom_buttons(panels, phases, view)],
+    )
+    _mark_phases(figure, phases)
+    return figure
+
+
+def _domains(weights: Sequence[float]) -> list[tuple[float, float]]:
+    """Vertical extents from top to bottom, in shares of the plot's height."""
+    usable = 1.0 - _GAP * (len(weights) - 1)
+    domains, top = [], 1.0
+    for weight in weights:
+        bottom = top - usable * weight / sum(weights)
+        domains.append((max(0.0, bottom), top))
+        top = bottom - _GAP
+    return domains
+
+
+def _trace(curve: Curve, display: Display, suffix: str, in_legend: bool) -> go.Scatter:
+    time, values = envelope(curve.time, curve.values)
+    return go.Scatter(
+        x=time.astype("float32"),
+        y=display.of(values).astype("float32"),
+        name=curve.name,
+        mode="lines",
+        line={
+            "color": curve.colour,
+            "width": curve.width,
+            "dash": curve.dash,
+            "shape": "hv" if curve.step else "linear",
+        },
+        xaxis="x",
+        yaxis=f"y{suffix}",
+        legend=f"legend{suffix}",
+        showlegend=in_legend,
+        hovertemplate=f"%{{y:.5~g}} {display.label}",
+    )
+
+
+def _view(phases: Phases) -> tuple[float, float]:
+    """The shift with half a second before and one second after it."""
+    start, end = phases["torque"][0], phases["inertia"][1]
+    return max(phases["before"][0], start - 0.5), min(phases["after"][1], end + 1.0)
+
+
+def _zoom_buttons(
+    panels: Sequence[Panel], phases: Phases, view: tuple[float, float]
+) -> dict[str, Any]:
+    spans = [curve.time for panel in panels for curve in panel.curves if curve.time.size]
+    whole = (float(min(t[0] for t in spans)), float(max(t[-1] for t in spans)))
+    ranges = {"shift": view, "whole": whole}
+    for phase, label in _ZOOMS.items():
+        start, end = phases[phase]
+        end = min(end, start + 1.0)
+        margin = 0.1 * (end - start)
+        ranges[label] = (start - margin, end + margin)
+    return {
+        "type": "buttons",
+        "direction": "right",
+        "showactive": False,
+        "x": 0,
+        "xanchor": "left",
+        "y": 1.0,
+        "yanchor": "bottom",
+        "pad": {"b": 22, "t": 0},
+        "font": {"size": 11},
+        "buttons": [
+            {"label": label, "method": "relayout", "args": [{"xaxis.range": list(span)}]}
+            for label, span in ranges.items()
+        ],
+    }
+
+
+def _mark_phases(figure: go.Figure, phases: Phases) -> None:
+    for phase, (start, end) in phases.items():
+        if phase in ("torque", "inertia"):
+            figure.add_shape(
+                type="rect",
+                xref="x",
+                yref="paper",
+                x0=start,
+                x1=end,
+                y0=0,
+                y1=1,
+                fillcolor=PHASE_FILL[phase],
+                line={"width": 0},
+                layer="below",
+            )
+        place, anchor = {
+            "before": (end, "right"),
+            "after": (start, "left"),
+        }.get(phase, (0.5 * (start + end), "center"))
+        figure.add_annotation(
+            x=place,
+            xref="x",
+            y=1.0,
+            yref="paper",
+            yanchor="bottom",
+            xanchor=anchor,
+            text=f"<b>{PHASE_NUMBER[phase]}</b>",
+            showarrow=False,
+        )

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""Simulation over measurement with the residual of the output torque (paper Fig. 11)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import plotly.graph_objects as go
+
+from drivetwin.report.figures.stack import Curve, Panel, stacked
+from drivetwin.report.style import COMPARED, MEASURED, MUTED, SECOND, SIMULATED
+from drivetwin.report.units import BAR, NM, RPM, Display
+from drivetwin.validate import SignalTrace, Validation
+
+_OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
+    "output_torque": ("output torque", NM, 1.6),
+    "input_speed": ("input speed", RPM, 1.1),
+    "output_speed": ("output speed", RPM, 1.1),
+}
+
+
+def validation_figure(validation: Validation) -> go.Figure:
+    """Inputs that drove the model, then each output as measured and as simulated."""
+    shift = validation.shift
+    torque = validation.engine_torque
+    panels = [
+        Panel("engine torque", NM, [Curve("T_e", torque.time, torque.values, MEASURED)], 0.7),
+        Panel(
+            "pressure",
+            BAR,
+            [
+                Curve(name, signal.time, signal.values, colour)
+                for (name, signal), colour in zip(
+                    sorted(
+                        validation.pressures.items(), key=lambda item: item[0] == shift.oncoming
+                    ),
+                    (COMPARED, SECOND),
+                    strict=True,
+                )
+            ],
+            0.7,
+        ),
+    ]
+    for name, (title, display, weight) in _OUTPUTS.items():
+        if name in validation.traces:
+            trace = validation.traces[name]
+            panels.append(Panel(title, display, _pair(trace), weight))
+            panels.append(Panel("residual", display, [_residual(trace)], 0.45))
+    return stacked(panels, validation.phases, height=1000)
+
+
+def _pair(trace: SignalTrace) -> list[Curve]:
+    return [
+        Curve("measured", trace.time, trace.measured, MEASURED),
+        Curve("simulated", trace.time, trace.simulated, SIMULATED, width=1.6),
+    ]
+
+
+def _residual(trace: SignalTrace) -> Curve:
+    return Curve("measured - simulated", trace.time, trace.measured - trace.simulated, MUTED, 1.0)

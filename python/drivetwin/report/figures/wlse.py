@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""Weighted least squares of the paper: scatter and error over the grid (Fig. 6, Table 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from drivetwin.identify.result import FloatArray
+from drivetwin.identify.wlse import GridFit
+from drivetwin.report.style import COMPARED, FITTED, MEASURED, MUTED, axis, layout
+
+
+@dataclass(frozen=True)
+class WlseLabels:
+    """Texts of one grid search; `slope` is the inertia's share in the drawn line.
+
+    Eq. 10 draws torque = J′·ω_e' (slope 1); eq. 11 draws torque = (J3/i_f)·ω_w' (slope 1/i_f).
+    """
+
+    grid: str
+    acceleration: str
+    torque: str
+    inertia: str
+    slope: float = 1.0
+
+
+def wlse_figure(fit: GridFit, labels: WlseLabels) -> go.Figure:
+    """Scatter with the fitted line at the best grid value; RMS error over the grid beside it."""
+    figure = make_subplots(cols=2, column_widths=[0.62, 0.38], horizontal_spacing=0.12)
+    first = fit.rows[0].value
+    inside = fit.weights >= 1.0
+    groups = (
+        (f"{labels.grid} = {first:g}", fit.torque_start, np.ones_like(inside), MUTED, 0.3),
+        ("implausible quotient, weight 0.01", fit.torque, ~inside, COMPARED, 0.35),
+        (f"{labels.grid} = {fit.best.value:g}, weight 1", fit.torque, inside, MEASURED, 0.7),
+    )
+    for name, torque, kept, colour, opacity in groups:
+        figure.add_scatter(
+            x=fit.acceleration[kept].astype("float32"),
+            y=torque[kept].astype("float32"),
+            mode="markers",
+            name=name,
+            marker={"color": colour, "size": 5, "opacity": opacity},
+            row=1,
+            col=1,
+        )
+    ends = _ends(fit.acceleration)
+    figure.add_scatter(
+        x=ends,
+        y=ends * fit.best.inertia * labels.slope,
+        mode="lines",
+        name=f"{labels.inertia} = {fit.best.inertia:.4g} kg·m²",
+        line={"color": FITTED, "width": 2},
+        row=1,
+        col=1,
+    )
+    figure.add_scatter(
+        x=[row.value for row in fit.rows],
+        y=[row.rmse for row in fit.rows],
+        mode="lines+markers",
+        name="RMS error",
+        showlegend=False,
+        line={"color": MEASURED},
+        row=1,
+        col=2,
+    )
+    figure.add_scatter(
+        x=[fit.best.value],
+        y=[fit.best.rmse],
+        mode="markers",
+        name="least error",
+        showlegend=False,
+        marker={"color": FITTED, "size": 11, "symbol": "diamond"},
+        row=1,
+        col=2,
+    )
+    figure.update_layout(layout(430))
+    figure.update_layout(
+        xaxis=axis(labels.acceleration),
+        yaxis=axis(labels.torque),
+        xaxis2=axis(labels.grid),
+        yaxis2=axis("RMS error at the output shaft [Nm]", rangemode="tozero"),
+    )
+    return figure
+
+
+def _ends(values: FloatArray) -> FloatArray:
+    return np.array([min(0.0, float(values.min())), max(0.0, float(values.max()))])

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT
+"""Colours and layout shared by all figures: Okabe-Ito, safe for colour-blind readers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+MEASURED = "#0072B2"
+SIMULATED = "#D55E00"
+FITTED = "#D55E00"
+COMPARED = "#009E73"
+ACCENT = "#CC79A7"
+SECOND = "#E69F00"
+MUTED = "#8a8f98"
+
+VERDICT_COLOURS = {"identified": "#009E73", "weak": "#E69F00", "not identifiable": "#8a8f98"}
+
+PHASE_FILL = {
+    "before": "rgba(0,0,0,0)",
+    "torque": "rgba(230,159,0,0.16)",
+    "inertia": "rgba(86,180,233,0.18)",
+    "after": "rgba(0,0,0,0)",
+}
+PHASE_NUMBER = {"before": "1", "torque": "2", "inertia": "3", "after": "4"}
+
+FONT = "Inter, 'Segoe UI', system-ui, -apple-system, 'Liberation Sans', sans-serif"
+GRID = "rgba(128,128,128,0.22)"
+
+
+def axis(title: str, **extra: Any) -> dict[str, Any]:
+    """Axis with a title that carries the unit and a quiet grid."""
+    return {
+        "title": {"text": title, "standoff": 8},
+        "gridcolor": GRID,
+        "linecolor": "rgba(128,128,128,0.6)",
+        "zeroline": False,
+        "ticks": "outside",
+        "ticklen": 4,
+        "automargin": True,
+        **extra,
+    }
+
+
+def layout(height: int, **extra: Any) -> dict[str, Any]:
+    """Layout common to all figures; transparent, so that the page's theme shows through."""
+    return {
+        "height": height,
+        "margin": {"l": 70, "r": 20, "t": 30, "b": 50},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "font": {"family": FONT, "size": 12, "color": "#333a44"},
+        "hoverlabel": {"font": {"family": FONT, "size": 12}},
+        "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
+        **extra,
+    }

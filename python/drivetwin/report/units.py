@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""Display units and number formats of the report; everything inside stays SI."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from drivetwin.identify.result import FloatArray
+
+
+@dataclass(frozen=True)
+class Display:
+    """How a quantity is shown: `label` of the unit, and the factor from SI to it."""
+
+    label: str
+    factor: float = 1.0
+
+    def of(self, values: FloatArray) -> FloatArray:
+        """Values (n,) in the display unit."""
+        return values * self.factor
+
+
+RPM = Display("rpm", 30.0 / math.pi)
+BAR = Display("bar", 1e-5)
+NM = Display("Nm")
+RAD_PER_S = Display("rad/s")
+
+_BY_SI = {
+    "1": Display(""),
+    "kg*m^2": Display("kg·m²"),
+    "N*m": NM,
+    "N*m/rad": Display("Nm/rad"),
+    "N*m*s/rad": Display("Nm·s/rad"),
+    "Hz": Display("Hz"),
+    "Pa": BAR,
+    "s": Display("ms", 1e3),
+}
+
+
+def display_of(si_unit: str) -> Display:
+    """Display unit of an SI unit from the parameter table; the unit itself where none is set."""
+    return _BY_SI.get(si_unit, Display(si_unit))
+
+
+def with_uncertainty(value: float, half_width: float | None) -> tuple[str, str]:
+    """Value and half width as text, both cut to two digits of the half width.
+
+    Without a usable half width the value has four digits and the second text is empty.
+    """
+    if half_width is None or not math.isfinite(half_width) or half_width <= 0.0:
+        return significant(value), ""
+    digits = 1 - math.floor(math.log10(half_width))
+    if not -15 < digits < 15:
+        return significant(value), significant(half_width, 2)
+    return _rounded(value, digits), _rounded(half_width, digits)
+
+
+def significant(value: float, digits: int = 4) -> str:
+    """Text with so many significant digits, never in powers of ten within 1e-6 to 1e9."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if not -6 <= exponent < 9:
+        return f"{value:.{digits - 1}e}"
+    return _rounded(value, digits - 1 - exponent)
+
+
+def _rounded(value: float, digits: int) -> str:
+    text = f"{round(value, digits):,.{max(0, digits)}f}"
+    return text.replace(",", "\u202f").replace("-", "−")

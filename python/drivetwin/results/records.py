@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: MIT
+"""Records shared by `result.json` and `twin.toml`: parameters, friction curves, schema check."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
+
+from drivetwin.errors import ResultFileError, Where
+from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, Verdict
+
+
+def finite_or_none(value: object) -> object:
+    """Turn NaN and infinities into None: neither exists in JSON."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(finite_or_none)]
+Interval = tuple[FiniteFloat, FiniteFloat]
+
+
+class Record(BaseModel):
+    """Base of all records: closed key set, immutable."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class StribeckRecord(Record):
+    """μ(s) = mu_c + (mu_s - mu_c)·exp(-|s|/v_s) + mu_v·|s|; v_s in rad/s, mu_v in s/rad."""
+
+    mu_c: FiniteFloat
+    mu_s: FiniteFloat
+    v_s: FiniteFloat
+    mu_v: FiniteFloat
+
+
+class FrictionRecord(Record):
+    """μ over |slip| [rad/s] of one element with its 95 % band, over the slip range seen."""
+
+    slip: list[FiniteFloat]
+    mu: list[FiniteFloat]
+    mu_lo: list[OptionalFloat]
+    mu_hi: list[OptionalFloat]
+    stribeck: StribeckRecord | None = None
+    stribeck_covariance: list[list[FiniteFloat]] | None = None
+    method: str
+
+    @model_validator(mode="after")
+    def _arrays_agree(self) -> Self:
+        lengths = {len(self.slip), len(self.mu), len(self.mu_lo), len(self.mu_hi)}
+        if len(lengths) != 1 or not self.slip:
+            raise ValueError("slip, mu, mu_lo and mu_hi must be of one length, at least 1")
+        return self
+
+    @classmethod
+    def of(cls, curve: FrictionCurve) -> FrictionRecord:
+        """Record of a curve; its raw points stay in the report."""
+        return cls(
+            slip=curve.slip.tolist(),
+            mu=curve.mu.tolist(),
+            mu_lo=curve.mu_lo.tolist(),
+            mu_hi=curve.mu_hi.tolist(),
+            stribeck=None if curve.stribeck is None else StribeckRecord(**curve.stribeck),
+            stribeck_covariance=_rows(curve.stribeck_covariance),
+            method=curve.method,
+        )
+
+    def curve(self) -> FrictionCurve:
+        """Back to the curve, without raw points."""
+        return FrictionCurve(
+            slip=np.asarray(self.slip),
+            mu=np.asarray(self.mu),
+            mu_lo=_array(self.mu_lo),
+            mu_hi=_array(self.mu_hi),
+            points_slip=np.empty(0),
+            points_mu=np.empty(0),
+            stribeck=None if self.stribeck is None else self.stribeck.model_dump(),
+            method=self.method,
+            stribeck_covariance=None
+            if self.stribeck_covariance is None
+            else np.asarray(self.stribeck_covariance),
+        )
+
+
+def _rows(matrix: FloatArray | None) -> list[list[float]] | None:
+    """Nested lists of a finite matrix; None where it is unknown."""
+    if matrix is None or not np.isfinite(matrix).all():
+        return None
+    return [[float(item) for item in row] for row in matrix]
+
+
+def _array(values: list[OptionalFloat]) -> FloatArray:
+    return np.array([np.nan if value is None else value for value in values])
+
+
+class ParameterRecord(Record):
+    """One parameter, SI. `value` is null exactly where the verdict is `not identifiable`."""
+
+    value: OptionalFloat
+    unit: str
+    std_noise: OptionalFloat = None
+    ci95: Interval | None = None
+    std_total: OptionalFloat = None
+    ci95_total: Interval | None = None
+    verdict: Verdict
+    method: str
+    reason: str = ""
+
+    @model_validator(mode="after")
+    def _bare_numbers_only_where_told(self) -> Self:
+        if (self.value is None) != (self.verdict is Verdict.NOT_IDENTIFIABLE):
+            raise ValueError("value must be null exactly where the verdict is 'not identifiable'")
+        return self
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> ParameterRecord:
+        """Record of an estimate."""
+        return cls(
+            value=estimate.value,
+            unit=estimate.unit,
+            std_noise=estimate.std_noise,
+            ci95=_finite_interval(estimate.ci95),
+            std_total=estimate.std_total,
+            ci95_total=_finite_interval(estimate.ci95_total),
+            verdict=estimate.verdict,
+            method=estimate.method,
+            reason=estimate.reason,
+        )
+
+    def estimate(self, parameter_id: str) -> Estimate:
+        """Back to the estimate of that id."""
+        systematic = None
+        if self.std_total is not None and self.std_noise is not None:
+            systematic = math.sqrt(max(0.0, self.std_total**2 - self.std_noise**2))
+        return Estimate(
+            id=parameter_id,
+            value=self.value,
+            std_noise=self.std_noise,
+            verdict=self.verdict,
+            method=self.method,
+            std_systematic=systematic,
+            reason=self.reason,
+        )
+
+
+def _finite_interval(interval: tuple[float, float] | None) -> tuple[float, float] | None:
+    if interval is None or not all(map(math.isfinite, interval)):
+        return None
+    return interval
+
+
+SchemaName = Annotated[str, Field(alias="schema")]
+
+
+def check_schema(found: object, known: str, file: str) -> None:
+    """Raise ResultFileError unless `found` names the family of `known` in a version not newer.
+
+    `known` reads like `drivetwin/twin-1`: family, dash, version. Older versions stay readable.
+    """
+    family, _, version = known.rpartition("-")
+    match = re.fullmatch(rf"{re.escape(family)}-(\d+)", found) if isinstance(found, str) else None
+    where = Where(file=file, key="schema")
+    if match is None:
+        raise ResultFileError(
+            f"schema is {found!r}, expected {known!r}", "give a file written by drivetwin", where
+        )
+    if int(match[1]) > int(version):
+        raise ResultFileError(
+            f"schema {found!r} is newer than this program's {known!r}",
+            "update drivetwin, or write the file again with this version",
+            where,
+        )

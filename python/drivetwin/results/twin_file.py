@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""`twin.toml`: the records of an identified model on disk."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import tomlkit
+from pydantic import Field, FiniteFloat, ValidationError, model_validator
+
+from drivetwin.errors import ResultFileError, Where
+from drivetwin.identify.result import Method
+from drivetwin.results.atomic import write_text
+from drivetwin.results.records import (
+    FrictionRecord,
+    Interval,
+    ParameterRecord,
+    Record,
+    SchemaName,
+    check_schema,
+)
+
+TWIN_SCHEMA = "drivetwin/twin-1"
+_HEADER = (
+    "An identified driveline model; written by drivetwin. All values in SI units:",
+    "rad, s, N*m, kg*m^2, Pa. A parameter without `value` could not be told from the log.",
+)
+
+
+class GearRecord(Record):
+    """One gear: overall ratio (input gear included) and the shift element that holds it."""
+
+    ratio: FiniteFloat
+    element: str
+
+
+class ElementRecord(Record):
+    """Design data of one shift element (THEORY sections 1 and 2)."""
+
+    i_c: FiniteFloat
+    i_out: FiniteFloat
+    gain_m3: FiniteFloat = Field(gt=0)
+    P0_Pa: FiniteFloat
+    peak: FiniteFloat = Field(ge=1)
+    drum_inertia_kgm2: FiniteFloat = Field(ge=0)
+
+
+class TransmissionRecord(Record):
+    """What the vehicle card knew from design."""
+
+    i_in: FiniteFloat = Field(gt=0)
+    final_drive: FiniteFloat = Field(gt=0)
+    gears: dict[str, GearRecord]
+    elements: dict[str, ElementRecord]
+
+
+class CovarianceRecord(Record):
+    """Covariance of the parameters `ids` (total), row by row, in products of their SI units."""
+
+    ids: list[str]
+    matrix: list[list[FiniteFloat]]
+
+    @model_validator(mode="after")
+    def _square(self) -> Self:
+        size = len(self.ids)
+        if len(self.matrix) != size or any(len(row) != size for row in self.matrix):
+            raise ValueError(f"matrix must be {size} by {size}, as ids")
+        return self
+
+
+class TwinFile(Record):
+    """The whole of `twin.toml`."""
+
+    schema_name: SchemaName
+    version: str
+    name: str
+    method: Method
+    loss_law: Literal["paper", "dissipative"]
+    transmission: TransmissionRecord
+    parameters: dict[str, ParameterRecord]
+    friction: dict[str, FrictionRecord]
+    covariance: CovarianceRecord | None = None
+    validity: dict[str, Interval]
+    inputs: dict[str, str]
+    settings: dict[str, Any]
+    assumptions: list[str]
+
+
+def twin_json_schema() -> dict[str, Any]:
+    """JSON Schema of `twin.toml`."""
+    return TwinFile.model_json_schema(by_alias=True)
+
+
+def write_twin_file(path: Path, content: TwinFile) -> None:
+    """Write the records as TOML; the file appears whole or not at all."""
+    document = tomlkit.document()
+    for line in _HEADER:
+        document.add(tomlkit.comment(line))
+    for key, value in _without_null(content.model_dump(mode="json", by_alias=True)).items():
+        document.add(key, tomlkit.item(value))
+    write_text(path, tomlkit.dumps(document))
+
+
+def read_twin_file(path: Path) -> TwinFile:
+    """Read and check `twin.toml`.
+
+    Raises ResultFileError where the file is missing, damaged or of a newer schema.
+    """
+    try:
+        tree = tomllib.loads(path.read_text(encoding="utf-8"))
+        check_schema(tree.get("schema"), TWIN_SCHEMA, path.name)
+        for parameter in tree.get("parameters", {}).values():
+            parameter.setdefault("value", None)
+        return TwinFile.model_validate(tree)
+    except (OSError, ValueError, AttributeError, ValidationError) as fault:
+        raise ResultFileError(
+            f"cannot be read as a twin: {fault}",
+            "write it again with `drivetwin identify`",
+            Where(file=path.name),
+        ) from fault
+
+
+def _without_null(value: Any) -> Any:
+    """Drop null table entries, which TOML does not know; null in an array becomes NaN."""
+    if isinstance(value, dict):
+        return {k: _without_null(item) for k, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [float("nan") if item is None else _without_null(item) for item in value]
+    return value

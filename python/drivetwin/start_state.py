@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Start of a simulation from the first measured moments of a gear that is held."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.driveline import DualClutch, State
+from drivetwin.errors import MissingChannelError, Where
+from drivetwin.identify.result import FloatArray
+from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.shift import Shift
+
+_SPAN = 0.08
+"""Length of the local fit [s]: well under a period of the shaft oscillation."""
+_CURVED_FROM = 6
+"""Number of samples from which a parabola is fitted, a straight line below."""
+
+
+@dataclass(frozen=True)
+class _Local:
+    """Value, slope [1/s] and variance of the value at the start of a local fit."""
+
+    value: float
+    slope: float
+    variance: float
+
+
+def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> State:
+    """State at `time` [s] with the off-going element of `shift` locked.
+
+    Output torque and its slope give the shaft's twist and twist rate; the speeds are then pooled
+    by their noise into one motion that keeps the gear ratio exactly. Without an output-torque
+    channel the shaft is taken to transmit the engine torque in steady state.
+    Raises MissingChannelError where neither input nor output speed is there.
+    """
+    ratio = _ratio(model, shift.offgoing)
+    twist, rate = _twist(model, log, ratio, time)
+    motions = []
+    if "input_speed" in log:
+        motions.append((_local(log["input_speed"], time), ratio / model.i_in, 0.0))
+    if "output_speed" in log:
+        motions.append((_local(log["output_speed"], time), 1.0, 0.0))
+    if "wheel_speed" in log:
+        motions.append((_local(log["wheel_speed"], time), 1.0 / model.i_f, rate))
+    if not motions:
+        raise MissingChannelError(
+            "no channel for input, output or wheel speed: the simulation has no start",
+            "map at least one of them with --channels",
+            Where(file=log.source),
+        )
+    weights = np.array([scale**2 / fit.variance for fit, scale, _ in motions])
+    speeds = np.array([fit.value / scale + lead for fit, scale, lead in motions])
+    output_speed = float(weights @ speeds / weights.sum())
+    return State(
+        engine_speed=ratio * output_speed,
+        output_speed=output_speed,
+        wheel_speed=(output_speed - rate) / model.i_f,
+        twist=twist,
+        locked=(shift.offgoing,),
+    )
+
+
+def _ratio(model: DualClutch, element: str) -> float:
+    """Overall ratio ω_e/ω_out with `element` locked."""
+    spec = next(one for one in model.elements if one.name == element)
+    return model.i_in * spec.i_c * spec.i_out
+
+
+def _twist(model: DualClutch, log: ShiftLog, ratio: float, time: float) -> tuple[float, float]:
+    """Shaft twist [rad] and twist rate ω_out - i_f·ω_w [rad/s] at `time`."""
+    if "output_torque" not in log:
+        load = model.load.constant / model.i_f
+        drive = ratio * model.eta * _local(log["engine_torque"], time).value
+        return (load + _share(model, ratio) * (drive - load)) / model.k_o, 0.0
+    torque_fit = _local(log["output_torque"], time)
+    rate = torque_fit.slope / model.k_o
+    return (torque_fit.value - model.c_o * rate) / model.k_o, rate
+
+
+def _share(model: DualClutch, ratio: float) -> float:
+    """Share of the surplus torque that accelerates the vehicle behind the shaft."""
+    before = (model.J1 * model.eta + model.J2e) * ratio**2 + model.J_out
+    behind = model.J_v / model.i_f**2
+    return behind / (before + behind)
+
+
+def _local(channel: Channel, time: float) -> _Local:
+    """Polynomial fit over the first moments from `time`; at least two samples are taken."""
+    first = int(np.searchsorted(channel.time, time - 1e-9))
+    count = max(2, int(np.searchsorted(channel.time, time + _SPAN) - first))
+    t = channel.time[first : first + count] - time
+    values = channel.values[first : first + count]
+    degree = 2 if t.size >= _CURVED_FROM else min(1, t.size - 1)
+    design = np.vander(t, degree + 1, increasing=True)
+    coefficients: FloatArray = np.linalg.lstsq(design, values, rcond=None)[0].astype(np.float64)
+    return _Local(
+        value=float(coefficients[0]),
+        slope=float(coefficients[1]) if degree else 0.0,
+        variance=_value_variance(design, values, coefficients),
+    )
+
+
+def _value_variance(design: FloatArray, values: FloatArray, coefficients: FloatArray) -> float:
+    """Variance of the fitted start value from the scatter about the fit; never zero."""
+    freedom = max(1, values.size - coefficients.size)
+    scatter = float(np.sum((values - design @ coefficients) ** 2)) / freedom
+    floor = (1e-9 * (1.0 + float(np.abs(values).max()))) ** 2
+    return max(scatter * float(np.linalg.pinv(design.T @ design)[0, 0]), floor)

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: MIT
+"""The twin: an identified driveline model with its uncertainty, validity range and provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drivetwin.driveline import (
+    DualClutch,
+    FrictionTable,
+    LossLaw,
+    RoadLoad,
+    ShiftElement,
+    Stribeck,
+)
+from drivetwin.errors import InputError, MissingParameterError, Where
+from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, Identification, Method
+from drivetwin.shifts.shift import Shift
+
+if TYPE_CHECKING:
+    from drivetwin.vehicle.card import VehicleCard
+
+
+@dataclass(frozen=True)
+class TwinGear:
+    """A gear: overall ratio i_in·i_c·i_out and the shift element that holds it."""
+
+    ratio: float
+    element: str
+
+
+@dataclass(frozen=True)
+class TwinElement:
+    """Design data of one shift element: ratios of eq. 15, gain [m^3], P0 [Pa], drum [kg m^2]."""
+
+    i_c: float
+    i_out: float
+    gain: float
+    P0: float
+    peak: float
+    drum_inertia: float
+
+
+@dataclass(frozen=True)
+class Twin:
+    """What is known of one driveline after an identification; immutable, SI.
+
+    `parameters` by id (see parameters.py), also those that could not be told; `friction` by
+    element; `covariance` (n, n) over `covariance_ids`, total; `validity` the ranges of slip,
+    pressure, torque and speed that the log covered; `inputs` file name -> SHA-256.
+    """
+
+    name: str
+    method: Method
+    loss_law: LossLaw
+    i_in: float
+    final_drive: float
+    gears: Mapping[str, TwinGear]
+    elements: Mapping[str, TwinElement]
+    parameters: Mapping[str, Estimate]
+    friction: Mapping[str, FrictionCurve]
+    validity: Mapping[str, tuple[float, float]]
+    inputs: Mapping[str, str]
+    settings: Mapping[str, Any]
+    assumptions: tuple[str, ...]
+    version: str
+    covariance_ids: tuple[str, ...] = ()
+    covariance: FloatArray | None = None
+
+    @classmethod
+    def from_identification(cls, found: Identification, card: VehicleCard) -> Twin:
+        """Join what the log told with what the card knew."""
+        from drivetwin.results.twin_build import twin_of
+
+        return twin_of(found, card)
+
+    @classmethod
+    def load(cls, path: Path) -> Twin:
+        """Read `twin.toml`. Raises ResultFileError where it is damaged or of a newer schema."""
+        from drivetwin.results.twin_build import twin_from_file
+        from drivetwin.results.twin_file import read_twin_file
+
+        return twin_from_file(read_twin_file(path))
+
+    def save(self, path: Path) -> None:
+        """Write `twin.toml`; the file appears whole or not at all."""
+        from drivetwin.results.twin_build import file_of
+        from drivetwin.results.twin_file import write_twin_file
+
+        write_twin_file(path, file_of(self))
+
+    def dual_clutch(
+        self,
+        shift: Shift,
+        *,
+        overrides: Mapping[str, float] | None = None,
+        loss_law: LossLaw | None = None,
+    ) -> DualClutch:
+        """Model for the simulation of one shift (eqs. 2-9).
+
+        Only Je = J1·η + J2e is identifiable: J′ = Je + Jo′/i_g² gives it, and it is carried as
+        J2e = 0, J1 = Je/η. `overrides` sets parameters by id, in place of identified ones.
+        Raises MissingParameterError naming every parameter that neither source gives, and
+        InputError for a gear or element the twin does not know.
+        """
+        given = dict(overrides or {})
+        gear = self._inertia_gear(shift, given)
+        inertia_id = f"J_prime_{gear}"
+        needed = ("eta", inertia_id, "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+        values = self._values(needed, given)
+        J_e = values[inertia_id] - values["J_out"] / self.gear(gear).ratio ** 2
+        return DualClutch(
+            J1=J_e / values["eta"],
+            J2e=0.0,
+            eta=values["eta"],
+            loss_law=loss_law or self.loss_law,
+            i_in=self.i_in,
+            J_out=values["J_out"],
+            i_f=self.final_drive,
+            J_v=values["J_vehicle"],
+            k_o=values["k_o"],
+            c_o=values["c_o"],
+            load=RoadLoad(constant=values["Tv_over_if"] * self.final_drive),
+            elements=tuple(
+                self._element(name, partner, given)
+                for name, partner in (
+                    (shift.offgoing, shift.oncoming),
+                    (shift.oncoming, shift.offgoing),
+                )
+            ),
+        )
+
+    def gear(self, name: str) -> TwinGear:
+        """Gear by its name on the card. Raises InputError where the twin has none such."""
+        try:
+            return self.gears[name]
+        except KeyError:
+            raise InputError(
+                f"the twin {self.name!r} knows no gear {name!r}",
+                f"use one of {', '.join(self.gears)}",
+            ) from None
+
+    def value(self, parameter_id: str, default: float) -> float:
+        """Identified value, or `default` where the log could not tell it."""
+        estimate = self.parameters.get(parameter_id)
+        return default if estimate is None or estimate.value is None else estimate.value
+
+    def _inertia_gear(self, shift: Shift, given: Mapping[str, float]) -> str:
+        """Gear whose J′ carries the engine-side inertia: overridden, else told most narrowly."""
+
+        def rank(gear: str) -> float:
+            if f"J_prime_{gear}" in given:
+                return -1.0
+            estimate = self.parameters.get(f"J_prime_{gear}")
+            if estimate is None or estimate.value is None:
+                return np.inf
+            return estimate.std_total / estimate.value if estimate.std_total is not None else 1e9
+
+        return min((shift.start_gear, shift.end_gear), key=rank)
+
+    def _values(self, ids: tuple[str, ...], given: Mapping[str, float]) -> dict[str, float]:
+        values, missing = {}, []
+        for parameter_id in ids:
+            estimate = self.parameters.get(parameter_id)
+            value = given.get(parameter_id, None if estimate is None else estimate.value)
+            if value is not None:
+                values[parameter_id] = float(value)
+            elif estimate is None:
+                missing.append(f"{parameter_id} (not part of the identification)")
+            else:
+                missing.append(f"{parameter_id} ({estimate.reason or estimate.verdict.value})")
+        if missing:
+            raise MissingParameterError(
+                f"the twin cannot be simulated without {'; '.join(missing)}",
+                "give these values as overrides, or identify from a log that can tell them",
+                Where(file=self.name),
+            )
+        return values
+
+    def _element(self, name: str, partner: str, given: Mapping[str, float]) -> ShiftElement:
+        try:
+            design = self.elements[name]
+        except KeyError:
+            raise InputError(
+                f"the twin {self.name!r} knows no shift element {name!r}",
+                f"use one of {', '.join(self.elements)}",
+            ) from None
+        curve = self.friction.get(name, self.friction.get(partner))
+        if curve is None:
+            raise MissingParameterError(
+                f"no friction curve of {name} or {partner} was identified",
+                "identify from a log where one of them slips under load",
+                Where(file=self.name),
+            )
+        return ShiftElement(
+            name=name,
+            i_c=design.i_c,
+            i_out=design.i_out,
+            gain=design.gain,
+            P0=given.get(f"P0.{name}", self.value(f"P0.{name}", design.P0)),
+            friction=_law(curve),
+            peak=design.peak,
+            drum_inertia=design.drum_inertia,
+        )
+
+
+def _law(curve: FrictionCurve) -> Stribeck | FrictionTable:
+    """Fitted Stribeck law, or the smoothed curve continued flat to zero slip."""
+    if curve.stribeck is not None:
+        return Stribeck(**curve.stribeck)
+    slip, mu = curve.slip.tolist(), curve.mu.tolist()
+    if slip[0] > 0.0:
+        slip, mu = [0.0, *slip], [mu[0], *mu]
+    return FrictionTable(tuple(slip), tuple(mu))

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: MIT
+"""Validation (paper Fig. 11): measured torque and pressures drive the model, outputs compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.driveline import DualClutch, Signal, Trajectory, simulate
+from drivetwin.held import fresh_samples
+from drivetwin.identify.result import FloatArray, Identification, SignalFit
+from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.shift import Shift
+from drivetwin.start_state import start_state
+from drivetwin.twin import Twin
+
+SIGNALS = ("output_torque", "input_speed", "output_speed")
+_GRID = 1e-3
+"""Output step [s] of the simulation: 80 points per period of a 12 Hz oscillation."""
+
+
+@dataclass(frozen=True)
+class SignalTrace:
+    """One compared signal on its own measured time base; arrays (n,), SI."""
+
+    time: FloatArray
+    measured: FloatArray
+    simulated: FloatArray
+    log_mean: float
+    """Mean of the measurement over the whole log, the reference of fit %."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """One shift simulated from its measured inputs.
+
+    `phases` maps `before`, `torque`, `inertia`, `after` to their intervals [s]; `fit` is by signal
+    and phase, with `all` for the whole window. `status` is the simulation's.
+    """
+
+    shift: Shift
+    phases: Mapping[str, tuple[float, float]]
+    engine_torque: Signal
+    pressures: Mapping[str, Signal]
+    trajectory: Trajectory
+    traces: Mapping[str, SignalTrace]
+    fit: Mapping[str, Mapping[str, SignalFit]]
+    status: str
+    warnings: tuple[str, ...]
+
+
+def validate(
+    twin: Twin, log: ShiftLog, shift: Shift, model: DualClutch | None = None
+) -> Validation:
+    """Simulate one shift, from `before` to the end of `after`, with the log's inputs.
+
+    The engine torque is moved by the twin's `te_delay`; the start state comes from the first
+    measured moments. `model` replaces the twin's own (e.g. the other loss law).
+    Raises MissingChannelError, MissingParameterError; a run that fails returns its status.
+    """
+    model = model or twin.dual_clutch(shift)
+    window = _window(log, shift)
+    engine_torque = _moved(log["engine_torque"], -twin.value("te_delay", 0.0))
+    pressures = {element.name: _signal(log.pressure(element.name)) for element in model.elements}
+    count = round((window[1] - window[0]) / _GRID)
+    time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
+    start = start_state(model, log, shift, window[0])
+    trajectory = simulate(model, engine_torque, pressures, start, time)
+    traces = _traces(model, log, trajectory)
+    phases = phases_of(shift, window)
+    validation = Validation(
+        shift=shift,
+        phases=phases,
+        engine_torque=engine_torque,
+        pressures=pressures,
+        trajectory=trajectory,
+        traces=traces,
+        fit={name: _fit(trace, phases) for name, trace in traces.items()},
+        status=trajectory.status,
+        warnings=(),
+    )
+    return replace(validation, warnings=_warnings(twin, validation))
+
+
+def with_fit(found: Identification, validations: Sequence[Validation]) -> Identification:
+    """Identification with the fits of its validations entered: pooled over the shifts."""
+    if not validations:
+        return found
+    warnings = tuple(text for one in validations for text in one.warnings)
+    return replace(
+        found,
+        fit=_pooled_fit(validations),
+        evidence={**found.evidence, "validation": tuple(validations)},
+        warnings=found.warnings + warnings,
+    )
+
+
+def fit_of(measured: FloatArray, simulated: FloatArray, mean: float) -> SignalFit:
+    """Rmse and fit % = 100·(1 - ‖y - ŷ‖/‖y - mean‖) (THEORY section 4); arrays (n,), SI.
+
+    NaN where there are no samples; a constant measurement has no fit %.
+    """
+    if measured.size == 0:
+        return SignalFit(float("nan"), float("nan"))
+    miss = float(np.linalg.norm(measured - simulated))
+    spread = float(np.linalg.norm(measured - mean))
+    percent = 100.0 * (1.0 - miss / spread) if spread > 0.0 else float("nan")
+    return SignalFit(miss / np.sqrt(measured.size), percent)
+
+
+def phases_of(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[float, float]]:
+    """The four phases of THEORY section 4, cut to `window`."""
+    return {
+        "before": (window[0], shift.torque_phase[0]),
+        "torque": shift.torque_phase,
+        "inertia": shift.inertia_phase,
+        "after": (shift.lockup_time, window[1]),
+    }
+
+
+def _window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
+    """Span of the shift's four phases that all compared and driving channels cover."""
+    roles = ["engine_torque", f"pressure.{shift.offgoing}", f"pressure.{shift.oncoming}"]
+    channels = [log[role] for role in (*roles, *(name for name in SIGNALS if name in log))]
+    start = max(shift.before[0], *(channel.time[0] for channel in channels))
+    end = min(shift.after[1], *(channel.time[-1] for channel in channels))
+    return float(start), float(end)
+
+
+def _signal(channel: Channel) -> Signal:
+    return Signal(channel.time, channel.values)
+
+
+def _moved(channel: Channel, shift: float) -> Signal:
+    """Fresh samples moved by `shift` [s]; the last value is held to the end of the channel."""
+    fresh = fresh_samples(channel)
+    time, values = channel.time[fresh] + shift, channel.values[fresh]
+    if time[0] > channel.time[0]:
+        time, values = np.append(channel.time[0], time), np.append(values[0], values)
+    if time[-1] < channel.time[-1]:
+        time, values = np.append(time, channel.time[-1]), np.append(values, values[-1])
+    return Signal(time, values)
+
+
+def _traces(model: DualClutch, log: ShiftLog, run: Trajectory) -> dict[str, SignalTrace]:
+    simulated = {
+        "output_torque": run.shaft_torque,
+        "input_speed": run.engine_speed / model.i_in,
+        "output_speed": run.output_speed,
+    }
+    traces = {}
+    for name in SIGNALS:
+        if name not in log:
+            continue
+        channel = log[name]
+        inside = (channel.time >= run.time[0]) & (channel.time <= run.time[-1])
+        time = channel.time[inside]
+        traces[name] = SignalTrace(
+            time=time,
+            measured=channel.values[inside],
+            simulated=np.interp(time, run.time, simulated[name]),
+            log_mean=float(np.mean(channel.values)),
+        )
+    return traces
+
+
+def _fit(trace: SignalTrace, phases: Mapping[str, tuple[float, float]]) -> dict[str, SignalFit]:
+    spans = {"all": None, **phases}
+    return {phase: fit_of(*_part(trace, span), trace.log_mean) for phase, span in spans.items()}
+
+
+def _pooled_fit(validations: Sequence[Validation]) -> dict[str, dict[str, SignalFit]]:
+    """Fits over the samples of all shifts together, by signal and phase."""
+    pooled: dict[str, dict[str, SignalFit]] = {}
+    for name in SIGNALS:
+        traces = [(one.traces[name], one.phases) for one in validations if name in one.traces]
+        if not traces:
+            continue
+        pooled[name] = {}
+        for phase in ("all", *validations[0].phases):
+            parts = [_part(trace, phases.get(phase)) for trace, phases in traces]
+            measured, simulated = (np.concatenate(side) for side in zip(*parts, strict=True))
+            pooled[name][phase] = fit_of(measured, simulated, traces[0][0].log_mean)
+    return pooled
+
+
+def _part(trace: SignalTrace, span: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
+    if span is None:
+        return trace.measured, trace.simulated
+    inside = (trace.time >= span[0]) & (trace.time <= span[1])
+    return trace.measured[inside], trace.simulated[inside]
+
+
+def _warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
+    """Say where the run failed or left the range of the log behind the twin."""
+    run = validation.trajectory
+    texts = []
+    if run.status != "completed":
+        texts.append(f"simulation of the validation ended early: {run.status}")
+    seen = {
+        "slip": [np.abs(slip) for slip in run.slip.values()],
+        "pressure": [signal.values for signal in validation.pressures.values()],
+        "torque": [validation.engine_torque.values],
+        "speed": [run.engine_speed],
+    }
+    for name, arrays in seen.items():
+        if name in twin.validity:
+            texts += _outside(name, arrays, twin.validity[name])
+    return tuple(texts)
+
+
+def _outside(name: str, arrays: list[FloatArray], limits: tuple[float, float]) -> list[str]:
+    values = np.concatenate(arrays)
+    values = values[np.isfinite(values)]
+    if values.size == 0:
+        return []
+    low, high = float(values.min()), float(values.max())
+    margin = 0.02 * (limits[1] - limits[0])
+    if low >= limits[0] - margin and high <= limits[1] + margin:
+        return []
+    return [
+        f"the simulation leaves the twin's range of {name}: {low:.4g} to {high:.4g}, "
+        f"identified for {limits[0]:.4g} to {limits[1]:.4g} (SI)"
+    ]
