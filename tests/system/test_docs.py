@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""What the documents state of file formats, parameters and commands is what the program does."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from drivetwin.logs.profile import read_mapping
+from drivetwin.parameters import SPECS, ParameterSpec
+from drivetwin.vehicle.card import load_card
+
+ROOT = Path(__file__).resolve().parents[2]
+REFERENCE = ROOT / "docs" / "reference"
+PLACEHOLDER = {"gear": "_<gear>", "element": ".<element>", "": ""}
+
+
+def blocks(document: Path, language: str) -> list[str]:
+    """The fenced code blocks of one language."""
+    text = document.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def test_the_documented_vehicle_card_loads(tmp_path: Path) -> None:
+    (text,) = blocks(REFERENCE / "vehicle-card.md", "toml")
+    path = tmp_path / "card.toml"
+    path.write_text(text, encoding="utf-8")
+    card = load_card(path)
+    assert card.elements["B2"].P0.std == pytest.approx(5e3)
+    assert card.elements["B3"].gain == pytest.approx(0.027)
+    assert card.sensors["output_torque"].offset == pytest.approx(30.0)
+
+
+def test_the_documented_channel_mapping_loads(tmp_path: Path) -> None:
+    (text,) = blocks(REFERENCE / "channel-mapping.md", "toml")
+    path = tmp_path / "channels.toml"
+    path.write_text(text, encoding="utf-8")
+    mapping = read_mapping(path)
+    assert set(mapping.channels) == {"engine_torque", "output_torque", "pressure.B2"}
+    assert mapping.channels["output_torque"].sign == -1
+
+
+def row(spec: ParameterSpec) -> str:
+    name = f"{spec.stem}{PLACEHOLDER[spec.suffix]}"
+    return f"| `{name}` | {spec.symbol} | {spec.unit} | {spec.meaning} |"
+
+
+@pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
+def test_every_parameter_is_documented_as_declared(spec: ParameterSpec) -> None:
+    assert row(spec) in (REFERENCE / "result-files.md").read_text(encoding="utf-8").splitlines()
+
+
+def test_no_other_parameter_is_documented() -> None:
+    text = (REFERENCE / "result-files.md").read_text(encoding="utf-8")
+    table = text.split("| id | symbol |")[1].split("\n\n")[0]
+    assert len(re.findall(r"^\| `", table, re.MULTILINE)) == len(SPECS)
