@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin.identify.method import Method as Method
 from drivetwin.parameters import spec_of
 from drivetwin.shifts.shift import RejectedShift, Shift
 
@@ -24,14 +25,6 @@ class Verdict(StrEnum):
     IDENTIFIED = "identified"
     WEAK = "weak"
     NOT_IDENTIFIABLE = "not identifiable"
-
-
-class Method(StrEnum):
-    """Which estimator family answers."""
-
-    PAPER = "paper"
-    INTEGRAL = "integral"
-    LIKELIHOOD = "likelihood"
 
 
 @dataclass(frozen=True)

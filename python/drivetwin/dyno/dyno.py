@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""Run the virtual dynamometer: scenario and seed in, recorded channels and their truth out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin import driveline
+from drivetwin.driveline import Signal, Trajectory
+from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.sensors import Sensor
+from drivetwin.dyno.truth import Truth, truth_of
+from drivetwin.errors import InputError, SimulationError, Where
+from drivetwin.logs.shiftlog import Channel
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DynoRun:
+    """What one run recorded (`channels`, each on its own time base) and what was true.
+
+    `trajectory` is the exact motion at all instants that a sensor looked at.
+    """
+
+    scenario: Scenario
+    seed: int
+    noise: float
+    channels: tuple[Channel, ...]
+    truth: Truth
+    trajectory: Trajectory
+
+
+def run(scenario: Scenario, seed: int = 0, *, noise: float = 1.0) -> DynoRun:
+    """Simulate the scenario and record it.
+
+    `noise` scales the white noise of all sensors; 0 makes them ideal (no noise, no rounding) while
+    their rates and delays stay. The same arguments give the same log, bit for bit.
+    Raises SimulationError where the run does not complete, InputError for a negative noise.
+    """
+    if not noise >= 0.0:
+        raise InputError(
+            f"a noise factor of {noise:g}",
+            "give 0 for ideal sensors, 1 for the scenario's, or another positive factor",
+            Where(key="noise"),
+        )
+    stamps = {sensor.role: sensor.stamps(scenario.duration) for sensor in scenario.sensors}
+    looks = {sensor.role: _looks(sensor, stamps[sensor.role]) for sensor in scenario.sensors}
+    trajectory, inputs = _simulate(scenario, np.unique(np.concatenate(list(looks.values()))))
+    generators = np.random.SeedSequence(seed).spawn(len(scenario.sensors))
+    channels = tuple(
+        sensor.read(
+            stamps[sensor.role],
+            _quantity(sensor, looks[sensor.role], trajectory, inputs),
+            noise,
+            np.random.default_rng(generator),
+        )
+        for sensor, generator in zip(scenario.sensors, generators, strict=True)
+    )
+    return DynoRun(scenario, seed, noise, channels, truth_of(scenario, trajectory), trajectory)
+
+
+def _looks(sensor: Sensor, stamps: FloatArray) -> FloatArray:
+    """When a sensor looks [s], to the nanosecond, so that sensors of one rate share instants."""
+    return np.asarray(np.round(np.maximum(stamps - sensor.delay, 0.0), 9), dtype=np.float64)
+
+
+def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[str, Signal]]:
+    """The exact motion at `time`, and the inputs behind it by role."""
+    grid = np.arange(int(np.ceil(scenario.duration * scenario.rate)) + 1) / scenario.rate
+    pressures = {
+        name: Signal(grid, actuator.pressure(grid)) for name, actuator in scenario.actuators.items()
+    }
+    torque = Signal(grid, scenario.torque(grid))
+    trajectory = driveline.simulate(scenario.model, torque, pressures, scenario.start(), time)
+    if trajectory.status != "completed":
+        raise SimulationError(
+            f"scenario {scenario.name!r} ended with status {trajectory.status!r}",
+            "change its pressure commands or parameters so that the elements can hold the load",
+        )
+    inputs = {f"pressure.{name}": pressure for name, pressure in pressures.items()}
+    return trajectory, {"engine_torque": torque, **inputs}
+
+
+def _quantity(
+    sensor: Sensor, at: FloatArray, trajectory: Trajectory, inputs: dict[str, Signal]
+) -> FloatArray:
+    """The exact quantity that `sensor` sees at the instants `at` (n,)."""
+    if sensor.role in inputs:
+        signal = inputs[sensor.role]
+        return np.interp(at, signal.time, signal.values)
+    outputs = {
+        "output_torque": trajectory.shaft_torque,
+        "input_speed": trajectory.engine_speed,
+        "output_speed": trajectory.output_speed,
+        "wheel_speed": trajectory.wheel_speed,
+    }
+    return np.interp(at, trajectory.time, outputs[sensor.role])

@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: MIT
+"""Names of the built-in scenarios; see `drivetwin.dyno.scenarios` for what they are."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class ScenarioName(StrEnum):
+    """Built-in runs of the virtual dynamometer."""
+
+    PAPER = "paper"
+    PAPER_STEPS = "paper_steps"
+    THROTTLE_STEPS = "throttle_steps"

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""What one run of the virtual dynamometer is: driveline, driver, TCU, actuators, sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.driveline import DualClutch, ShiftElement, State
+from drivetwin.dyno.actuators import Actuator, Program
+from drivetwin.dyno.sensors import Sensor
+from drivetwin.errors import InputError, Where
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TorqueReduction:
+    """Torque intervention of the TCU: the share `fraction` is taken from `start` to `end` [s].
+
+    It comes and goes within `ramp` [s].
+    """
+
+    fraction: float
+    start: float
+    end: float
+    ramp: float = 0.05
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.fraction < 1.0:
+            raise InputError(
+                f"{self.fraction:g} is no share of the engine torque",
+                "give a number from 0 to below 1, such as 0.3",
+                Where(key="torque reduction"),
+            )
+
+    def factor(self, time: FloatArray) -> FloatArray:
+        """What the engine torque is multiplied with at `time` (n,)."""
+        knots = (self.start, self.start + self.ramp, self.end, self.end + self.ramp)
+        return 1.0 - self.fraction * np.interp(time, knots, (0.0, 1.0, 1.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """An upshift from `start_gear` (element `offgoing`) to `end_gear` (element `oncoming`).
+
+    `engine_speed` [rad/s] is the speed at time 0, where the start gear is in quasi-steady
+    acceleration. `engine_torque` [N m] is the driver's demand, without the TCU's `reduction`.
+    `rate` [Hz] is the sampling of the inputs, linear between samples. `drive_range` are plausible
+    ranges for the vehicle card: of J' at the engine and of J3 at the wheel [kg m^2].
+    """
+
+    name: str
+    model: DualClutch
+    start_gear: str
+    end_gear: str
+    offgoing: str
+    oncoming: str
+    duration: float
+    engine_speed: float
+    engine_torque: Program
+    actuators: Mapping[str, Actuator]
+    sensors: tuple[Sensor, ...]
+    J_prime_range: tuple[float, float]
+    J_vehicle_range: tuple[float, float]
+    reduction: TorqueReduction
+    rate: float = 1000.0
+
+    def element(self, name: str) -> ShiftElement:
+        """The shift element called `name`."""
+        return next(element for element in self.model.elements if element.name == name)
+
+    def ratio(self, element: str) -> float:
+        """Overall ratio with `element` locked."""
+        held = self.element(element)
+        return self.model.i_in * held.i_c * held.i_out
+
+    def torque(self, time: FloatArray) -> FloatArray:
+        """Engine torque [N m] at `time` (n,), with the TCU's reduction."""
+        return self.engine_torque.at(time) * self.reduction.factor(time)
+
+    def start(self) -> State:
+        """Quasi-steady acceleration in the start gear: eqs. 10 and 11 with equal accelerations."""
+        model, i_g = self.model, self.ratio(self.offgoing)
+        wheel_speed = self.engine_speed / i_g / model.i_f
+        turning = model.load.rolling * np.sign(wheel_speed)
+        air = model.load.aero * wheel_speed * abs(wheel_speed)
+        load = (model.load.constant + turning + air) / model.i_f
+        drive = model.eta * float(self.torque(np.zeros(1))[0]) * i_g
+        J4 = (model.J1 * model.eta + model.J2e) * i_g**2 + model.J_out
+        J5 = model.J_v / model.i_f**2
+        shaft_torque = load + J5 * (drive - load) / (J4 + J5)
+        return State(
+            engine_speed=self.engine_speed,
+            output_speed=self.engine_speed / i_g,
+            wheel_speed=wheel_speed,
+            twist=shaft_torque / model.k_o,
+            locked=(self.offgoing,),
+        )

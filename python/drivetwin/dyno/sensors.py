@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: MIT
+"""Sensors and the CAN bus: from exact trajectories to what a logger records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.logs.shiftlog import Channel, Quantity
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One channel of the log.
+
+    `column` and `unit` are what the file shows; everything else is SI. A sample is the quantity at
+    its time stamp minus `delay` [s], plus white noise of `noise` (1 σ), rounded to a multiple of
+    `resolution` (0: not rounded). `rate` in Hz; a rate below the logger's shows as held values.
+    """
+
+    role: str
+    quantity: Quantity
+    column: str
+    unit: str
+    rate: float
+    noise: float
+    resolution: float = 0.0
+    delay: float = 0.0
+
+    def stamps(self, duration: float) -> FloatArray:
+        """Time stamps (n,) [s] from 0 to `duration`, exact multiples of the period."""
+        return np.arange(int(np.floor(duration * self.rate + 1e-9)) + 1) / self.rate
+
+    def read(
+        self, stamps: FloatArray, exact: FloatArray, noise: float, rng: np.random.Generator
+    ) -> Channel:
+        """The recorded channel from the `exact` quantity (n,) at `stamps - delay`.
+
+        `noise` scales the white noise; at 0 the sensor is ideal and does not round either.
+        """
+        values = exact + noise * self.noise * rng.standard_normal(exact.size)
+        if noise > 0.0 and self.resolution > 0.0:
+            values = self.resolution * np.round(values / self.resolution)
+        return Channel(self.role, self.quantity, stamps, values, self.column, self.unit)

@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: MIT
+"""The estimator families, by the names used on the command line and in results."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Method(StrEnum):
+    """Which estimator family answers."""
+
+    PAPER = "paper"
+    INTEGRAL = "integral"
+    LIKELIHOOD = "likelihood"
