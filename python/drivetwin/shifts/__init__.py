@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: MIT
+"""Gear shifts and their phases, found in a log."""

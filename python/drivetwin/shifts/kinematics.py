@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""Gearbox speeds on one time base, and the synchronisation error of a gear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.errors import MissingChannelError, Where
+from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.vehicle.spec import VehicleCard
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GearboxSpeeds:
+    """Input and output speed of the gearbox [rad/s], (n,) on `time` [s]; no NaN."""
+
+    time: FloatArray
+    input: FloatArray
+    output: FloatArray
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def step(self) -> float:
+        """Median sample interval [s]."""
+        return float(np.median(np.diff(self.time)))
+
+    def sync_error(self, ratio: float) -> FloatArray:
+        """ω_in - i·ω_out [rad/s], (n,): zero where the gear of `ratio` i = ic·iout is held.
+
+        It is the slip of eq. 15 times ic of the element that makes the gear, so its zeros are the
+        zeros of the slip whatever the element's own ratios and signs are.
+        """
+        return self.input - ratio * self.output
+
+    def samples(self, seconds: float, at_least: int) -> int:
+        """Number of samples in a span, but no fewer than `at_least`."""
+        return max(at_least, round(seconds / self.step))
+
+
+def gear_ratios(card: VehicleCard) -> dict[str, float]:
+    """ω_in/ω_out of each gear by name (ic·iout, without the input gear)."""
+    return {gear.name: gear.ratio for gear in card.gears}
+
+
+def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
+    """Bring both speeds to the time base of the input speed (linear between output samples).
+
+    Without an input speed the engine speed over i_in stands in (exact with lock-up engaged);
+    without an output speed the wheel speed times the final drive, which the twisting shaft
+    separates from the true one. Both are told in `warnings`. Raises MissingChannelError.
+    """
+    warnings: list[str] = []
+    if "input_speed" in log:
+        source, scale = log["input_speed"], 1.0
+    elif "engine_speed" in log:
+        source, scale = log["engine_speed"], 1.0 / card.i_in
+        warnings.append("input speed taken from the engine speed: right with lock-up engaged only")
+    else:
+        raise _missing("input_speed", "engine_speed", log)
+    time, inlet = _finite(source)
+    if "output_speed" in log:
+        sink, factor = log["output_speed"], 1.0
+    elif "wheel_speed" in log:
+        sink, factor = log["wheel_speed"], card.final_drive
+        warnings.append("output speed taken from the wheel speed: shaft twist adds to the slip")
+    else:
+        raise _missing("output_speed", "wheel_speed", log)
+    sink_time, outlet = _finite(sink)
+    inside = (time >= sink_time[0]) & (time <= sink_time[-1])
+    time = time[inside]
+    output = factor * np.interp(time, sink_time, outlet)
+    return GearboxSpeeds(time, scale * inlet[inside], output, tuple(warnings))
+
+
+def _finite(channel: Channel) -> tuple[FloatArray, FloatArray]:
+    keep = np.isfinite(channel.values)
+    if np.count_nonzero(keep) < 2:
+        raise MissingChannelError(
+            f"channel for {channel.role!r} holds fewer than two numbers",
+            "map another channel to it or record it again",
+            Where(channel=channel.source_name),
+        )
+    return channel.time[keep], channel.values[keep]
+
+
+def _missing(wanted: str, substitute: str, log: ShiftLog) -> MissingChannelError:
+    return MissingChannelError(
+        f"neither {wanted!r} nor {substitute!r} is mapped; without it no ratio can be formed",
+        "name the channel in a channel mapping file (--channels) or in [channels] of the card",
+        Where(file=log.source),
+    )

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: MIT
+"""Shift quality figures of one shift; what cannot be computed is absent, never guessed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.kinematics import GearboxSpeeds, gear_ratios, gearbox_speeds
+from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.vehicle.spec import VehicleCard
+
+FloatArray = NDArray[np.float64]
+
+QUALITY_UNITS: dict[str, str] = {
+    "shift_time": "s",
+    "torque_phase_time": "s",
+    "inertia_phase_time": "s",
+    "flare_speed": "rad/s",
+    "undershoot_speed": "rad/s",
+    "torque_hole_depth": "N*m",
+    "torque_hole_area": "N*m*s",
+    "tie_up_torque": "N*m",
+    "lockup_oscillation": "N*m",
+    "torque_rate_max": "N*m/s",
+    "wheel_jerk_max": "rad/s^3",
+    "vibration_dose": "rad/s^1.75",
+    "friction_work": "J",
+    "friction_power_max": "W",
+}
+"""SI unit of every figure that `shift_quality` may return."""
+
+_REFERENCE = 0.1
+"""Span before the torque phase [s] whose mean is the torque before the shift."""
+_RING = 0.5
+"""Span after lock-up [s] that counts as the response to the shift."""
+_BAND = 32.0
+"""Cut-off of the low-pass on torque [Hz]: upper end of felt longitudinal vibration."""
+_SPEED_BAND = 25.0
+
+
+@dataclass(frozen=True)
+class _Torque:
+    """Output torque over the shift and its response, low-passed, on a uniform grid."""
+
+    time: FloatArray
+    values: FloatArray
+
+    def within(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
+        keep = (self.time >= start) & (self.time <= end)
+        return self.time[keep], self.values[keep]
+
+
+def shift_quality(
+    log: ShiftLog, card: VehicleCard, shift: Shift, J_vehicle: float | None = None
+) -> dict[str, float]:
+    """Figures of one shift by name, units in QUALITY_UNITS.
+
+    `flare_speed`: input speed above the higher of the two synchronous speeds; `undershoot_speed`:
+    below the lower one (both from smoothed speeds, 0 in a clean shift).
+    With an output torque T_o (low-pass 32 Hz, zero phase):
+    `torque_hole_depth`, `torque_hole_area`: fall below (in the direction of power) its mean over
+    0.1 s before the torque phase, from there to its return or the lock-up;
+    `tie_up_torque`: fall in the torque phase beyond T_o·i_after/i_before, where a clean hand-over
+    of a power-on upshift ends; `lockup_oscillation`: max - min within 0.5 s from lock-up;
+    `torque_rate_max`: largest |dT_o/dt| from torque phase to 0.5 s after lock-up;
+    `wheel_jerk_max` = torque_rate_max·i_f/J_v; `vibration_dose` = (∫ a^4 dt)^¼ over the same time
+    with a = i_f·(T_o - straight line through both ends)/J_v, the wheel's angular acceleration (eq.
+    9; times the wheel radius: m/s^1.75 of ISO 2631-1, unweighted). J_v is `J_vehicle` [kg m2], or
+    the geometric mean of the card's range. `friction_work`, `friction_power_max`: of the on-coming
+    element in the inertia phase, T_c = T_o/iout (eq. 16) times the slip (eq. 15).
+    """
+    start, end = shift.torque_phase[0], shift.lockup_time
+    figures = {
+        "shift_time": end - start,
+        "torque_phase_time": shift.torque_phase[1] - start,
+        "inertia_phase_time": end - shift.inertia_phase[0],
+    }
+    speeds = gearbox_speeds(log, card)
+    figures |= _speed_excess(speeds, gear_ratios(card), shift)
+    torque = _output_torque(log, shift)
+    if torque is not None:
+        J_v = J_vehicle or float(np.sqrt(np.prod(card.J_vehicle_range)))
+        figures |= _torque_hole(torque, gear_ratios(card), shift)
+        figures |= _vibration(torque, shift, card.final_drive / J_v)
+        figures |= _friction(torque, speeds, card.clutch_ratios(shift.oncoming), shift)
+    return figures
+
+
+def _low_pass(values: FloatArray, step: float, cutoff: float) -> FloatArray:
+    """Zero-phase Butterworth of order 2 run twice; unchanged where sampling is too slow for it."""
+    if cutoff * step >= 0.4 or len(values) < 16:
+        return values
+    return np.asarray(sosfiltfilt(butter(2, cutoff, fs=1.0 / step, output="sos"), values))
+
+
+def _uniform(channel: Channel, span: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Finite samples within `span` on an even grid of the channel's own step."""
+    keep = np.isfinite(channel.values) & (channel.time >= span[0]) & (channel.time <= span[1])
+    time, values = channel.time[keep], channel.values[keep]
+    if len(time) < 16 or np.diff(time).max() > 20.0 * channel.step:
+        return np.empty(0), np.empty(0)
+    grid = np.arange(time[0], time[-1], channel.step)
+    return grid, np.interp(grid, time, values)
+
+
+def _output_torque(log: ShiftLog, shift: Shift) -> _Torque | None:
+    """T_o from 0.3 s before the torque phase to the end of the response; None where missing."""
+    if "output_torque" not in log:
+        return None
+    channel = log["output_torque"]
+    span = (
+        shift.torque_phase[0] - 3 * _REFERENCE,
+        min(shift.lockup_time + 2 * _RING, shift.after[1]),
+    )
+    time, values = _uniform(channel, span)
+    if not len(time) or time[-1] < shift.lockup_time:
+        return None
+    return _Torque(time, _low_pass(values, channel.step, _BAND))
+
+
+def _speed_excess(
+    speeds: GearboxSpeeds, ratios: dict[str, float], shift: Shift
+) -> dict[str, float]:
+    margin = 0.1
+    near = (speeds.time >= shift.inertia_phase[0] - margin) & (
+        speeds.time <= shift.lockup_time + margin
+    )
+    pair = sorted([ratios[shift.start_gear], ratios[shift.end_gear]])
+    inlet = _low_pass(speeds.input[near], speeds.step, _SPEED_BAND)
+    outlet = _low_pass(speeds.output[near], speeds.step, _SPEED_BAND)
+    inside = (speeds.time[near] >= shift.inertia_phase[0]) & (
+        speeds.time[near] <= shift.lockup_time
+    )
+    above = (inlet - pair[1] * outlet)[inside]
+    below = (pair[0] * outlet - inlet)[inside]
+    return {
+        "flare_speed": max(0.0, float(above.max())),
+        "undershoot_speed": max(0.0, float(below.max())),
+    }
+
+
+def _torque_hole(torque: _Torque, ratios: dict[str, float], shift: Shift) -> dict[str, float]:
+    start, end = shift.torque_phase[0], shift.lockup_time
+    before = torque.within(start - _REFERENCE, start)[1]
+    time, values = torque.within(start, end)
+    if not len(before) or len(values) < 2:
+        return {}
+    reference = float(before.mean())
+    fall = np.sign(reference) * (reference - values)
+    inertia = np.flatnonzero((time >= shift.inertia_phase[0]) & (fall <= 0.0))
+    stop = int(inertia[0]) + 1 if len(inertia) else len(fall)
+    hole = np.clip(fall[:stop], 0.0, None)
+    figures = {
+        "torque_hole_depth": float(hole.max()),
+        "torque_hole_area": float(np.trapezoid(hole, time[:stop])),
+    }
+    step = ratios[shift.end_gear] / ratios[shift.start_gear]
+    dip = torque.within(*shift.torque_phase)[1]
+    if shift.kind is ShiftKind.POWER_ON_UP and len(dip):
+        figures["tie_up_torque"] = max(0.0, step * reference - float(dip.min()))
+    return figures
+
+
+def _vibration(torque: _Torque, shift: Shift, gain: float) -> dict[str, float]:
+    """`gain` turns torque at the output shaft into angular acceleration of the wheel: i_f/J_v."""
+    time, values = torque.within(shift.torque_phase[0], shift.lockup_time + _RING)
+    ring = torque.within(shift.lockup_time, shift.lockup_time + _RING)[1]
+    if len(values) < 3 or len(ring) < 3:
+        return {}
+    rate = float(np.abs(np.gradient(values, time)).max())
+    line = np.interp(time, time[[0, -1]], values[[0, -1]])
+    dose = float(np.trapezoid((gain * (values - line)) ** 4, time) ** 0.25)
+    return {
+        "lockup_oscillation": float(np.ptp(ring)),
+        "torque_rate_max": rate,
+        "wheel_jerk_max": gain * rate,
+        "vibration_dose": dose,
+    }
+
+
+def _friction(
+    torque: _Torque, speeds: GearboxSpeeds, ratios: tuple[float, float], shift: Shift
+) -> dict[str, float]:
+    i_c, i_out = ratios
+    time, values = torque.within(*shift.inertia_phase)
+    if len(time) < 2:
+        return {}
+    slip = np.interp(time, speeds.time, speeds.input / i_c - i_out * speeds.output)
+    power = values / i_out * slip
+    return {
+        "friction_work": float(np.trapezoid(power, time)),
+        "friction_power_max": float(power.max()),
+    }

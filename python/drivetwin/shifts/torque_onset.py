@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""Start of the torque phase: where the on-coming element begins to carry torque."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.logs.shiftlog import Channel
+from drivetwin.shifts.boundaries import Boundary
+from drivetwin.shifts.hinge import Moving, fit_hinge
+
+FloatArray = NDArray[np.float64]
+
+_SMOOTH = 0.01
+_DIP = 0.03
+"""A torque dip must be this part of the torque before, and clear of its noise."""
+
+
+class OnsetSource(StrEnum):
+    """What told the start of the torque phase."""
+
+    PRESSURE = "on-coming pressure above P0"
+    OUTPUT_TORQUE = "fall of the output torque"
+    UNKNOWN = "no channel"
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """A channel averaged over about 10 ms; `noise` is what is left in `values` of its noise."""
+
+    time: FloatArray
+    values: FloatArray
+    noise: float
+
+
+def smoothed(channel: Channel, span: tuple[float, float]) -> Smoothed:
+    """Moving average of the finite samples within `span` [s], centred, so a ramp is kept."""
+    keep = np.isfinite(channel.values) & (channel.time >= span[0]) & (channel.time <= span[1])
+    time, values = channel.time[keep], channel.values[keep]
+    half = round(0.5 * _SMOOTH / channel.step)
+    width = 2 * half + 1
+    if len(values) < width + 2:
+        return Smoothed(time, values, 0.0)
+    noise = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0 * width)
+    padded = np.pad(values, half, mode="edge")
+    return Smoothed(time, np.convolve(padded, np.ones(width) / width, "valid"), noise)
+
+
+def pressure_onset(
+    pressure: Smoothed, threshold: tuple[float, float], break_away: float
+) -> Boundary | None:
+    """Sustained crossing of P0 (`threshold`: value and standard deviation [Pa]); None if never.
+
+    It is the last upward crossing before break-away, so that a filling pulse does not count, or
+    the first one after it. Sigma spans the crossings of P0 ± (its own deviation and the noise).
+    """
+    value, std = threshold
+    margin = float(np.hypot(std, pressure.noise))
+    crossings = [
+        _crossing(pressure, level, break_away) for level in (value - margin, value, value + margin)
+    ]
+    early, at, late = crossings
+    if at is None:
+        return None
+    early = at if early is None else early
+    late = 2.0 * at - early if late is None else late
+    step = float(np.median(np.diff(pressure.time)))
+    return Boundary(at, float(np.hypot(0.5 * max(late - early, 0.0), 0.3 * step)))
+
+
+def _crossing(pressure: Smoothed, level: float, break_away: float) -> float | None:
+    """Time [s] of the upward crossing of `level` that lasts, or None."""
+    above = pressure.values > level
+    if not above.any():
+        return None
+    before = np.flatnonzero(pressure.time <= break_away)
+    if len(before) and above[before[-1]]:
+        below = np.flatnonzero(~above[: before[-1] + 1])
+        index = int(below[-1]) + 1 if len(below) else 0
+    else:
+        start = int(before[-1]) + 1 if len(before) else 0
+        later = np.flatnonzero(above[start:])
+        if not len(later):
+            return None
+        index = start + int(later[0])
+    if index == 0:
+        return float(pressure.time[0])
+    t, p = pressure.time[index - 1 : index + 1], pressure.values[index - 1 : index + 1]
+    return float(t[0] + (level - p[0]) / (p[1] - p[0]) * (t[1] - t[0]))
+
+
+def torque_dip_onset(torque: Smoothed, break_away: float) -> Boundary | None:
+    """Where the output torque begins to fall towards break-away; None if it does not clearly.
+
+    Only for power-on upshifts, whose torque phase lowers the output torque at a steady engine
+    torque. Sigma is that of the hinge fit, doubled because the fall need not be smooth.
+    """
+    keep = torque.time <= break_away
+    time, values = torque.time[keep], torque.values[keep]
+    if len(values) < 12:
+        return None
+    third = len(values) // 3
+    level, spread = float(np.median(values[:third])), float(np.std(values[:third]))
+    dip = level - float(values[-1])
+    if dip < max(_DIP * abs(level), 5.0 * spread, 5.0 * torque.noise):
+        return None
+    search = (float(time[third]), float(time[-3]))
+    hinge = fit_hinge(time, values, Moving.AFTER, search, max(torque.noise, 1e-3 * abs(level)))
+    return None if hinge is None else Boundary(hinge.time, 2.0 * hinge.sigma)
