@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""From the text of a table's cells to numbers, without guessing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.errors import FileFormatError, Where
+from drivetwin.logs.shiftlog import FloatArray
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
+_NOT_A_NUMBER = frozenset(("nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"))
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A column as numbers: `values` (n,) where `present` (n,); NaN where the file says so.
+
+    `fault` names the first cell that is neither number, empty, nor a word for "no number".
+    """
+
+    values: FloatArray
+    present: NDArray[np.bool_]
+    fault: str | None = None
+
+
+def is_number(cell: str, decimal: str = ".") -> bool:
+    """Tell whether a cell is a number with this decimal sign."""
+    pattern = _NUMBER if decimal == "." else _COMMA_NUMBER
+    return pattern.fullmatch(cell.strip()) is not None
+
+
+def decimal_sign(rows: Sequence[Sequence[str]], file: str) -> str:
+    """Return `,` where numbers in `rows` are written with it, else `.`.
+
+    Raises FileFormatError where both occur: then one of them groups thousands.
+    """
+    commas = [cell for row in rows for cell in row if "," in cell]
+    if not any(is_number(cell, ",") for cell in commas):
+        return "."
+    pointed = next((c for row in rows for c in row if "." in c and is_number(c)), None)
+    if pointed is not None:
+        example = next(cell for cell in commas if is_number(cell, ","))
+        raise FileFormatError(
+            f"numbers with point ({pointed.strip()!r}) and with comma ({example.strip()!r})",
+            "export with one decimal sign and no sign between thousands",
+            Where(file=file),
+        )
+    return ","
+
+
+def to_numbers(cells: Sequence[str], line_numbers: Sequence[int], decimal: str) -> Numbers:
+    """Convert the cells of one column; `line_numbers` place a faulty cell in the file."""
+    plain = cells if decimal == "." else [cell.replace(",", ".") for cell in cells]
+    try:
+        values = np.fromiter(map(float, plain), np.float64, len(plain))
+    except ValueError:
+        return _one_by_one(cells, plain, line_numbers)
+    if any("_" in cell for cell in plain):  # float() takes 1_000 for a number
+        return _one_by_one(cells, plain, line_numbers)
+    return Numbers(values, np.ones(len(plain), dtype=np.bool_))
+
+
+def _one_by_one(cells: Sequence[str], plain: Sequence[str], line_numbers: Sequence[int]) -> Numbers:
+    values = np.full(len(cells), np.nan)
+    present = np.ones(len(cells), dtype=np.bool_)
+    fault = None
+    for row, text in enumerate(map(str.strip, plain)):
+        if not text:
+            present[row] = False
+        elif _NUMBER.fullmatch(text):
+            values[row] = float(text)
+        elif text.casefold() not in _NOT_A_NUMBER and fault is None:
+            fault = f"line {line_numbers[row]}: {cells[row].strip()[:40]!r} is no number"
+    return Numbers(values, present, fault)

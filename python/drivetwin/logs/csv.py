@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: MIT
+"""Reader of CSV and TSV logs.
+
+Delimiter `,` `;` or tab; decimal point or comma; units in a row under the names or in the names as
+`EngTrq [Nm]`; comment lines (# % //); byte order mark; quoted fields. An empty cell is no sample of
+its column, so each column keeps its own time base.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drivetwin.errors import (
+    FileFormatError,
+    MappingError,
+    MissingChannelError,
+    TimeError,
+    Where,
+)
+from drivetwin.logs.cells import Numbers, decimal_sign, is_number, to_numbers
+from drivetwin.logs.raw import RawChannel, RawLog, TimeColumn
+from drivetwin.logs.shiftlog import FloatArray
+from drivetwin.logs.units import is_unit, time_factor
+from drivetwin.tomlfile import did_you_mean
+
+_TIME_NAMES = frozenset(
+    ("t", "time", "times", "timestamp", "timestamps", "zeit", "zeitstempel", "messzeit")
+)
+_COMMENT_MARKS = ("#", "%", "//")
+_EXPORT = "export the log as text: one row of names, one of units, then one row for each sample"
+_CONTROL_BYTES = frozenset(range(32)) - frozenset(b"\t\n\r\f")
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Rows of equal width, with the line of the file on which each ends."""
+
+    rows: Sequence[Sequence[str]]
+    lines: Sequence[int]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Header:
+    """Names and units of the columns and the index of the time column."""
+
+    names: Sequence[str]
+    units: Sequence[str | None]
+    time: int
+    height: int
+    """How many rows it takes: names, perhaps units."""
+
+
+def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
+    """Read a text log from its bytes; `file` names it in errors.
+
+    Raises FileFormatError (empty, binary, no header, ragged rows), MissingChannelError (no time
+    column), MappingError (several), UnitError and TimeError (time without unit or stamps).
+    """
+    table = _table(_decode(data, file), file)
+    header = _header(table, time, file)
+    body = table.rows[header.height :]
+    if not body:
+        raise FileFormatError("the file holds names but no samples", _EXPORT, Where(file=file))
+    decimal = decimal_sign(body, file)
+    columns = [
+        to_numbers(cells, table.lines[header.height :], decimal)
+        for cells in zip(*body, strict=True)
+    ]
+    unit = time.unit if time.unit is not None else header.units[header.time]
+    where = Where(file=file, channel=header.names[header.time])
+    stamps = _stamps(columns[header.time], table.lines[header.height :], where)
+    seconds = stamps * time_factor(unit, where)
+    return _channels(header, columns, seconds, table.warnings)
+
+
+def _channels(
+    header: _Header, columns: Sequence[Numbers], seconds: FloatArray, warnings: tuple[str, ...]
+) -> RawLog:
+    channels: list[RawChannel] = []
+    unreadable: dict[str, str] = {}
+    for index, (name, unit, column) in enumerate(
+        zip(header.names, header.units, columns, strict=True)
+    ):
+        if index == header.time or (not name and not column.present.any()):
+            continue
+        if column.fault is not None:
+            unreadable[name] = column.fault
+        elif column.present.all():
+            channels.append(RawChannel(name, unit, seconds, column.values))
+        else:
+            present = column.present
+            channels.append(RawChannel(name, unit, seconds[present], column.values[present]))
+    return RawLog(tuple(channels), unreadable, warnings)
+
+
+def _decode(data: bytes, file: str) -> str:
+    """Text of the file; cp1252 where it is no UTF-8, as older tools write ° and µ."""
+    where = Where(file=file)
+    if not data.strip():
+        raise FileFormatError("the file is empty", "record or export the log again", where)
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", errors="replace")
+    if not _CONTROL_BYTES.isdisjoint(data[:65536]):
+        raise FileFormatError("the file is binary, no text of a known format", _EXPORT, where)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
+
+
+def _table(text: str, file: str) -> _Table:
+    """Split into rows; comment and blank lines are left out."""
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    delimiter = None
+    if stated := re.fullmatch(r"sep=(.)", lines[0].strip()):
+        delimiter = stated[1]
+        lines[0] = ""
+    kept = [
+        (number, line)
+        for number, line in enumerate(lines, start=1)
+        if line.strip() and not line.lstrip().startswith(_COMMENT_MARKS)
+    ]
+    if not kept:
+        raise FileFormatError("the file holds only comments", _EXPORT, Where(file=file))
+    numbers, content = zip(*kept, strict=True)
+    if delimiter is None:
+        delimiter = _delimiter(content, file)
+    if '"' not in text:
+        return _even([line.split(delimiter) for line in content], numbers, file)
+    rows, ends = [], []
+    reader = csv.reader((line + "\n" for line in content), delimiter=delimiter)
+    try:
+        for row in reader:
+            rows.append(row)
+            ends.append(numbers[reader.line_num - 1])
+    except csv.Error as fault:
+        line = numbers[min(reader.line_num, len(numbers)) - 1]
+        raise FileFormatError(f"line {line}: {fault}", _EXPORT, Where(file=file)) from None
+    return _even(rows, ends, file)
+
+
+def _delimiter(lines: Sequence[str], file: str) -> str:
+    """The sign that splits names and first row into equally many fields."""
+    for sign in ("\t", ";", ","):
+        counts = [len(next(csv.reader([line], delimiter=sign))) for line in lines[:2]]
+        if min(counts) > 1 and max(counts) - min(counts) <= 1:
+            return sign
+    raise FileFormatError(
+        f"no columns found: no tab, semicolon or comma splits {lines[0][:60]!r} and the line "
+        "below alike",
+        _EXPORT,
+        Where(file=file),
+    )
+
+
+def _even(rows: list[list[str]], lines: Sequence[int], file: str) -> _Table:
+    """Rows as wide as the names: empty fields at line ends go, a cut last line is left out."""
+    while len(rows[0]) > 1 and not rows[0][-1].strip():
+        rows[0].pop()
+    width = len(rows[0])
+    warnings: tuple[str, ...] = ()
+    if len(rows) > 2 and len(rows[-1]) < width:
+        text = f"line {lines[-1]}, the last, has {len(rows[-1])} of {width} fields and is left out"
+        warnings = (f"the file is cut: {text}",)
+        rows, lines = rows[:-1], lines[:-1]
+    for row, line in zip(rows, lines, strict=True):
+        if len(row) == width:
+            continue
+        if len(row) < width or any(cell.strip() for cell in row[width:]):
+            raise FileFormatError(
+                f"line {line} has {len(row)} fields, the names have {width}", _EXPORT,
+                Where(file=file),
+            )  # fmt: skip
+        del row[width:]
+    return _Table(rows, lines, warnings)
+
+
+def _header(table: _Table, time: TimeColumn, file: str) -> _Header:
+    cells = [cell.strip() for cell in table.rows[0]]
+    if all(is_number(cell) or is_number(cell, ",") for cell in cells if cell):
+        raise FileFormatError(
+            f"line {table.lines[0]} holds numbers where the names should stand",
+            _EXPORT,
+            Where(file=file),
+        )
+    split = [_name_and_unit(cell) for cell in cells]
+    names = [name for name, _ in split]
+    units = [unit for _, unit in split]
+    index = _time_index(names, time, file)
+    if len(table.rows) < 2:
+        return _Header(names, units, index, height=1)
+    second = [cell.strip() for cell in table.rows[1]]
+    if is_number(second[index]) or is_number(second[index], ","):
+        return _Header(names, units, index, height=1)
+    units = [below or beside for below, beside in zip(second, units, strict=True)]
+    return _Header(names, units, index, height=2)
+
+
+def _name_and_unit(cell: str) -> tuple[str, str | None]:
+    """`EngTrq [Nm]` -> name and unit; round brackets count where they hold a unit.
+
+    `x[1]` without a blank is an index, part of the name.
+    """
+    if match := re.fullmatch(r"(.+?)(\s*)\[([^\[\]]*)\]", cell):
+        name, blank, inside = match.groups()
+        if blank or not inside.isdigit():
+            return name, inside.strip() or None
+    if (match := re.fullmatch(r"(.+?)\s*\(([^()]*)\)", cell)) and is_unit(match[2]):
+        return match[1], match[2].strip()
+    return cell, None
+
+
+def _time_index(names: Sequence[str], time: TimeColumn, file: str) -> int:
+    if time.source is not None:
+        found = [index for index, name in enumerate(names) if name == time.source]
+    else:
+        found = [
+            index
+            for index, name in enumerate(names)
+            if re.sub(r"[^a-z]", "", name.casefold()) in _TIME_NAMES
+        ]
+    if len(found) == 1:
+        return found[0]
+    where = Where(file=file)
+    remedy = 'name the time column in a channel mapping: [time] source = "..."'
+    if found:
+        listed = ", ".join(names[index] for index in found)
+        raise MappingError(f"several time columns: {listed}", remedy, where)
+    if time.source is not None:
+        what = f"no column {time.source!r} for time{did_you_mean(time.source, names)}"
+    else:
+        what = f"no time column among {', '.join(names)}"
+    raise MissingChannelError(what, remedy, where)
+
+
+def _stamps(column: Numbers, lines: Sequence[int], where: Where) -> FloatArray:
+    if column.fault is not None:
+        remedy = "export time as seconds since the start of the recording"
+        raise TimeError(f"no time stamp: {column.fault}", remedy, where)
+    if not column.present.all():
+        line = lines[int(column.present.argmin())]
+        raise TimeError(f"line {line} has no time stamp", "remove the line", where)
+    return column.values

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""Slow signals that a logger repeats on a faster time base, as CAN torque in a 1 kHz table.
+
+Only the instants of update carry information: a value is fresh there and stale until the next.
+Rounding can make an update repeat the old value, so the updates are not the changes; they lie on a
+regular raster of which the changes show a part.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
+
+MIN_CHANGES = 8
+"""Fewer changes of value cannot prove a raster."""
+
+_JITTER = 0.2
+"""How far a change may lie from the raster, as part of the period."""
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Instants of update `start` + k·`period` [s]."""
+
+    start: float
+    period: float
+
+
+def find_raster(channel: Channel) -> Raster | None:
+    """Return the update raster of a held channel; None where each sample may be an update.
+
+    The period is the longest one, up to the shortest distance of two changes, on which all changes
+    lie; start and period are fitted by least squares so that clock drift does not add up.
+    """
+    if channel.quantity is Quantity.STATE:
+        return None
+    changes = channel.time[1:][np.diff(channel.values) != 0.0]
+    if changes.size < MIN_CHANGES:
+        return None
+    distance = np.diff(changes)
+    longest = round(float(distance.min()) / channel.step * (1.0 + _JITTER))
+    for samples in range(longest, 1, -1):
+        raster = _fit(changes, distance, samples * channel.step)
+        if raster is not None and raster.period > 1.5 * channel.step:
+            return raster
+    return None
+
+
+def _fit(changes: FloatArray, distance: FloatArray, period: float) -> Raster | None:
+    steps = np.round(distance / period)
+    if steps.min() < 1.0:
+        return None
+    count = np.concatenate(([0.0], np.cumsum(steps)))
+    slope, start = np.polyfit(count, changes, 1)
+    residual = np.abs(changes - start - slope * count).max()
+    return Raster(float(start), float(slope)) if residual <= _JITTER * slope else None
+
+
+def _update_indices(channel: Channel, raster: Raster) -> NDArray[np.intp]:
+    """Samples at which an update arrives: the change near each raster instant, else the instant."""
+    margin = 0.5 * channel.step
+    first = np.ceil((channel.time[0] - margin - raster.start) / raster.period)
+    last = np.floor((channel.time[-1] + margin - raster.start) / raster.period)
+    instants = raster.start + raster.period * np.arange(first, last + 1.0)
+    nearest = np.minimum(np.searchsorted(channel.time, instants - margin), channel.time.size - 1)
+    changed = np.flatnonzero(np.diff(channel.values) != 0.0) + 1
+    slot = np.round((channel.time[changed] - instants[0]) / raster.period).astype(np.intp)
+    inside = (slot >= 0) & (slot < instants.size)
+    nearest[slot[inside]] = changed[inside]
+    return np.unique(nearest)
+
+
+def fresh_samples(channel: Channel) -> Channel:
+    """Return the channel reduced to the instants at which its value was updated.
+
+    A channel that is not `held` is returned as it is. The value at such an instant is the newest
+    the sender had, `te_delay` old; nothing is interpolated.
+    """
+    raster = find_raster(channel) if channel.held else None
+    if raster is None:
+        return channel
+    fresh = _update_indices(channel, raster)
+    return replace(channel, time=channel.time[fresh], values=channel.values[fresh], held=False)

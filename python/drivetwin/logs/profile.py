@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""Channel mapping files: TOML tables `[channels.<role>]`, as in the vehicle card, and `[time]`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Generic, Literal, TypeVar
+
+import tomlkit
+from pydantic import Field
+
+from drivetwin.errors import MappingError
+from drivetwin.logs.mapping import ChannelSpec, Mapped
+from drivetwin.logs.raw import TimeColumn
+from drivetwin.logs.roles import PRESSURE, ROLES
+from drivetwin.tomlfile import StrictModel, raise_faults, read_toml, schema_faults
+
+Entry = TypeVar("Entry")
+
+
+class ByRole(StrictModel, Generic[Entry]):
+    """A table with one entry for each channel role; pressures stand under `pressure.<element>`."""
+
+    engine_torque: Entry | None = None
+    output_torque: Entry | None = None
+    input_speed: Entry | None = None
+    engine_speed: Entry | None = None
+    output_speed: Entry | None = None
+    wheel_speed: Entry | None = None
+    throttle: Entry | None = None
+    gear: Entry | None = None
+    pressure: dict[str, Entry] = Field(default_factory=dict)
+
+    def items(self) -> Iterator[tuple[str, Entry]]:
+        """Yield role and entry of all that are given."""
+        for role in ROLES:
+            entry = getattr(self, role)
+            if entry is not None:
+                yield role, entry
+        for element, entry in self.pressure.items():
+            yield PRESSURE + element, entry
+
+
+class ChannelTable(StrictModel):
+    """`[channels.<role>]`: see ChannelSpec for the meaning of each key."""
+
+    source: str = Field(min_length=1)
+    unit: str | None = None
+    sign: Literal[1, -1] = 1
+    scale: float = Field(default=1.0, gt=0)
+    offset: float = 0.0
+    time_shift_s: float = 0.0
+
+    def spec(self) -> ChannelSpec:
+        """Return the table as the mapping uses it."""
+        return ChannelSpec(
+            self.source, self.unit, self.sign, self.scale, self.offset, self.time_shift_s
+        )
+
+
+class TimeTable(StrictModel):
+    """`[time]`: name and unit of the time column, where they cannot be found in the file."""
+
+    source: str | None = None
+    unit: str | None = None
+
+
+class MappingFile(StrictModel):
+    """A channel mapping file."""
+
+    time: TimeTable = TimeTable()
+    channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
+
+
+def read_mapping(path: Path) -> Mapped:
+    """Read a channel mapping file; raises MappingError naming every fault by its key."""
+    document = read_toml(path, MappingError)
+    raise_faults(
+        schema_faults(document, MappingFile),
+        MappingError,
+        str(path),
+        "correct the channel mapping file; `drivetwin inspect --write-mapping` writes a valid one",
+    )
+    file = MappingFile.model_validate(document)
+    channels = {role: table.spec() for role, table in file.channels.items()}
+    return Mapped(channels, TimeColumn(file.time.source, file.time.unit))
+
+
+def write_mapping(path: Path, channels: Mapping[str, ChannelSpec]) -> None:
+    """Write `channels` (by role) as a mapping file to edit; an existing file is replaced."""
+    document = tomlkit.document()
+    document.add(tomlkit.comment("Channel mapping: which column is what to the driveline."))
+    document.add(tomlkit.comment("value = sign * (scale * column + offset), in `unit`;"))
+    document.add(tomlkit.comment("time_shift_s is added to the time stamps of the channel."))
+    tables = tomlkit.table(is_super_table=True)
+    pressures = tomlkit.table(is_super_table=True)
+    for role, spec in channels.items():
+        if role.startswith(PRESSURE):
+            pressures.add(role.removeprefix(PRESSURE), _table(spec))
+        else:
+            tables.add(role, _table(spec))
+    if pressures:
+        tables.add(PRESSURE.rstrip("."), pressures)
+    document.add("channels", tables)
+    path.write_text(tomlkit.dumps(document), encoding="utf-8")
+
+
+def _table(spec: ChannelSpec) -> tomlkit.items.Table:
+    table = tomlkit.table()
+    table.add("source", spec.source)
+    if spec.unit is not None:
+        table.add("unit", spec.unit)
+    table.add("sign", spec.sign)
+    table.add("scale", spec.scale)
+    table.add("offset", spec.offset)
+    table.add("time_shift_s", spec.time_shift)
+    return table

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: MIT
+"""The closed set of channel roles: what a channel is to the driveline, and its quantity."""
+
+from __future__ import annotations
+
+from drivetwin.logs.shiftlog import Quantity
+
+ROLES: dict[str, Quantity] = {
+    "engine_torque": Quantity.TORQUE,
+    "output_torque": Quantity.TORQUE,
+    "input_speed": Quantity.SPEED,
+    "engine_speed": Quantity.SPEED,
+    "output_speed": Quantity.SPEED,
+    "wheel_speed": Quantity.SPEED,
+    "throttle": Quantity.FRACTION,
+    "gear": Quantity.STATE,
+}
+"""Roles that exist once; beside them stands one `pressure.<element>` for each shift element."""
+
+PRESSURE = "pressure."
+"""Prefix of the roles of clutch and brake pressures."""
+
+NEEDED = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
+"""Roles without which a log cannot be identified in absolute terms (pressures come on top)."""
+
+
+def quantity_of(role: str) -> Quantity:
+    """Return the quantity of a role; raises KeyError for a role that does not exist."""
+    return Quantity.PRESSURE if role.startswith(PRESSURE) else ROLES[role]

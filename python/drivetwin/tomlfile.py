@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""TOML files with a strict schema: every fault is found at once and named by its key path."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from drivetwin.errors import InputError, Where
+
+
+class StrictModel(BaseModel):
+    """A table of a file: unknown keys, wrong types, infinities and NaN are faults."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong in a file: the key path, such as `gears[1].ratio`, and what is wrong."""
+
+    key: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.text}" if self.key else self.text
+
+
+def read_toml(path: Path, error: type[InputError]) -> dict[str, Any]:
+    """Return the document in `path`; raises `error` where it cannot be read or is no TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as fault:
+        raise error(
+            f"cannot read the file: {fault.strerror}", "check the path", Where(file=str(path))
+        ) from None
+    except UnicodeDecodeError:
+        raise error(
+            "the file is no UTF-8 text", "hand in a TOML text file", Where(file=str(path))
+        ) from None
+    except tomllib.TOMLDecodeError as fault:
+        raise error(
+            f"no valid TOML: {fault}", "correct the syntax at that line", Where(file=str(path))
+        ) from None
+
+
+def schema_faults(document: Mapping[str, Any], model: type[BaseModel]) -> list[Fault]:
+    """Return every fault that the schema `model` finds in `document`, in file order."""
+    try:
+        model.model_validate(document)
+    except ValidationError as error:
+        schema = model.model_json_schema()
+        return [
+            Fault(key_path(item["loc"]), _text(item["type"], item["loc"], item["msg"], schema))
+            for item in error.errors(include_url=False, include_context=False, include_input=False)
+        ]
+    return []
+
+
+def raise_faults(faults: Iterable[Fault], error: type[InputError], file: str, remedy: str) -> None:
+    """Raise one `error` that lists all `faults`; return where there is none."""
+    found = list(faults)
+    if len(found) == 1:
+        raise error(found[0].text, remedy, Where(file=file, key=found[0].key or None))
+    if found:
+        listed = "".join(f"\n  - {fault}" for fault in found)
+        raise error(f"{len(found)} faults{listed}", remedy, Where(file=file))
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return `; did you mean 'x'?` for the nearest of the `known` words, else what is known."""
+    words = list(known)
+    by_folded = {each.casefold(): each for each in words}
+    near = get_close_matches(word.casefold(), by_folded, n=1)
+    if near:
+        return f"; did you mean {by_folded[near[0]]!r}?"
+    return f"; known here: {', '.join(words)}" if words else ""
+
+
+def key_path(location: Iterable[int | str]) -> str:
+    """Write a location as a key path: `("gears", 1, "ratio")` -> `gears[1].ratio`."""
+    path = ""
+    for part in location:
+        path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else part
+    return path
+
+
+def _text(kind: str, location: tuple[int | str, ...], message: str, schema: dict[str, Any]) -> str:
+    if kind == "extra_forbidden":
+        known = _keys_at(schema, schema, location[:-1])
+        return f"unknown key{did_you_mean(str(location[-1]), known)}"
+    if kind == "missing":
+        return "this key is required and missing"
+    return message.removeprefix("Value error, ").replace("Input should", "the value should")
+
+
+def _keys_at(
+    schema: dict[str, Any], node: dict[str, Any], location: tuple[int | str, ...]
+) -> list[str]:
+    """Keys that the JSON Schema `node` allows at `location` below it."""
+    if "$ref" in node:
+        return _keys_at(schema, schema["$defs"][node["$ref"].rsplit("/", 1)[-1]], location)
+    for choice in node.get("anyOf", ()):
+        if keys := _keys_at(schema, choice, location):
+            return keys
+    if not location:
+        return list(node.get("properties", ()))
+    step = "items" if isinstance(location[0], int) else "additionalProperties"
+    child = node.get("properties", {}).get(location[0], node.get(step))
+    return _keys_at(schema, child, location[1:]) if isinstance(child, dict) else []

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Vehicle cards: from the TOML file to a VehicleCard in SI, with every fault told at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from drivetwin.errors import CardError
+from drivetwin.logs.roles import PRESSURE
+from drivetwin.tomlfile import raise_faults, read_toml
+from drivetwin.vehicle.check import card_faults
+from drivetwin.vehicle.schema import CardFile, SensorsTable, card_schema
+from drivetwin.vehicle.spec import (
+    ElementSpec,
+    Gear,
+    Prior,
+    SensorTolerance,
+    VehicleCard,
+    brake_ratios,
+)
+
+__all__ = [
+    "ElementSpec",
+    "Gear",
+    "Prior",
+    "SensorTolerance",
+    "VehicleCard",
+    "brake_ratios",
+    "card_schema",
+    "load_card",
+]
+
+
+def load_card(path: Path) -> VehicleCard:
+    """Read a vehicle card.
+
+    Raises CardError that lists all faults by key path: unknown keys (with the nearest known one),
+    wrong types, missing keys, impossible or contradicting ratios.
+    """
+    document = read_toml(path, CardError)
+    raise_faults(
+        card_faults(document),
+        CardError,
+        str(path),
+        "correct these keys of the vehicle card; examples/vehicles holds complete cards",
+    )
+    file = CardFile.model_validate(document)
+    J_out = file.inertia.J_out_kgm2
+    return VehicleCard(
+        name=file.name,
+        loss_law=file.loss_law,
+        i_in=file.i_in,
+        final_drive=file.final_drive,
+        gears=tuple(Gear(gear.name, gear.ratio, tuple(gear.elements)) for gear in file.gears),
+        elements={name: table.spec(name) for name, table in file.elements.items()},
+        J_prime_range=(file.inertia.J_prime_kgm2[0], file.inertia.J_prime_kgm2[1]),
+        J_vehicle_range=(file.inertia.J_vehicle_kgm2[0], file.inertia.J_vehicle_kgm2[1]),
+        J_out=None if J_out is None else J_out.prior(),
+        sensors=_tolerances(file.sensors),
+        channels={role: table.spec() for role, table in file.channels.items()},
+        source=str(path),
+    )
+
+
+def _tolerances(sensors: SensorsTable) -> dict[str, SensorTolerance]:
+    stated = {role: table for role, table in sensors if role != "pressure" and table is not None}
+    stated |= {PRESSURE + element: table for element, table in sensors.pressure.items()}
+    return {role: table.tolerance() for role, table in stated.items()}

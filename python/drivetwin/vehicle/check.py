@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""Faults of a vehicle card that lie between its tables: gear order, elements, ratios."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from drivetwin.tomlfile import Fault, did_you_mean, schema_faults
+from drivetwin.vehicle.schema import CardFile, ElementTable, GearTable
+
+Table = TypeVar("Table", bound=BaseModel)
+
+RATIO_TOLERANCE = 5e-3
+"""Relative; design sheets round ratios to three figures."""
+
+
+def card_faults(document: Mapping[str, Any]) -> list[Fault]:
+    """Return all faults of a card file, those of the schema first.
+
+    The checks between tables run on the tables that are sound by themselves, so that one
+    misspelt key does not hide an impossible ratio.
+    """
+    return [
+        *schema_faults(document, CardFile),
+        *_gear_faults(_gears(document)),
+        *_reference_faults(document),
+        *_ratio_faults(_gears(document), _elements(document)),
+    ]
+
+
+def _sound(table: object, model: type[Table]) -> Table | None:
+    try:
+        return model.model_validate(table)
+    except ValidationError:
+        return None
+
+
+def _items(document: Mapping[str, Any], key: str) -> dict[str, Any]:
+    table = document.get(key)
+    return table if isinstance(table, dict) else {}
+
+
+def _gears(document: Mapping[str, Any]) -> dict[int, GearTable]:
+    listed = document.get("gears")
+    gears = [_sound(table, GearTable) for table in listed] if isinstance(listed, list) else []
+    return {index: gear for index, gear in enumerate(gears) if gear is not None}
+
+
+def _elements(document: Mapping[str, Any]) -> dict[str, ElementTable]:
+    tables = {
+        name: _sound(table, ElementTable) for name, table in _items(document, "elements").items()
+    }
+    return {name: table for name, table in tables.items() if table is not None}
+
+
+def _gear_faults(gears: Mapping[int, GearTable]) -> list[Fault]:
+    faults = []
+    names: set[str] = set()
+    for index, gear in gears.items():
+        if gear.name in names:
+            faults.append(Fault(f"gears[{index}].name", f"gear {gear.name!r} is given twice"))
+        names.add(gear.name)
+        lower = gears.get(index - 1)
+        if lower is not None and gear.ratio >= lower.ratio:
+            faults.append(
+                Fault(
+                    f"gears[{index}].ratio",
+                    f"gears run from low to high: gear {gear.name!r} with {gear.ratio:g} must be "
+                    f"below gear {lower.name!r} with {lower.ratio:g}",
+                )
+            )
+    return faults
+
+
+def _reference_faults(document: Mapping[str, Any]) -> list[Fault]:
+    """Elements that a gear names but the card does not describe, and the reverse."""
+    described = _items(document, "elements")
+    gears = _gears(document)
+    faults = [
+        Fault(f"gears[{index}].elements", f"no [elements.{name}]{did_you_mean(name, described)}")
+        for index, gear in gears.items()
+        for name in gear.elements
+        if name not in described
+    ]
+    used = {name for gear in gears.values() for name in gear.elements}
+    listed = document.get("gears")
+    all_sound = isinstance(listed, list) and len(listed) == len(gears)
+    if all_sound:
+        faults += [
+            Fault(f"elements.{name}", "no gear names this element; add it to a gear or remove it")
+            for name in described
+            if name not in used
+        ]
+    return faults + [
+        Fault(f"{section}.pressure.{name}", f"no [elements.{name}]{did_you_mean(name, described)}")
+        for section in ("sensors", "channels")
+        for name in _items(_items(document, section), "pressure")
+        if name not in described
+    ]
+
+
+def _ratio_faults(
+    gears: Mapping[int, GearTable], elements: Mapping[str, ElementTable]
+) -> list[Fault]:
+    """i_c·i_out must be the ratio of the element's gear; a brake cannot make 1.00."""
+    faults = []
+    for gear in gears.values():
+        for name in gear.elements:
+            element = elements.get(name)
+            if element is None:
+                continue
+            if element.i_c is None or element.i_out is None:
+                if gear.ratio == 1.0:
+                    text = f"a brake cannot make gear {gear.name!r} with ratio 1 (i_c = i - 1 = 0)"
+                    faults.append(Fault(f"elements.{name}", text))
+                continue
+            product = element.i_c * element.i_out
+            if abs(product - gear.ratio) > RATIO_TOLERANCE * gear.ratio:
+                faults.append(
+                    Fault(
+                        f"elements.{name}.i_c",
+                        f"i_c·i_out = {product:.4g}, but gear {gear.name!r} has {gear.ratio:g}",
+                    )
+                )
+    faults += [
+        Fault(
+            f"elements.{name}",
+            "makes several gears, but has one pair i_c, i_out: describe it once for each gear "
+            "under two names, with the ratios of that gear",
+        )
+        for name in elements
+        if sum(name in gear.elements for gear in gears.values()) > 1
+    ]
+    return faults

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+"""The vehicle card file: pydantic models of its tables, keys with unit suffix."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from drivetwin.driveline import LossLaw
+from drivetwin.logs.profile import ByRole, ChannelTable
+from drivetwin.tomlfile import StrictModel
+from drivetwin.vehicle.spec import ElementSpec, Prior, SensorTolerance
+
+BAR = 1e5  # Pa
+RPM = math.pi / 30.0  # rad/s
+
+
+class PriorTable(StrictModel):
+    """A design value with its standard deviation in the same unit; 0 means known."""
+
+    value: float = Field(ge=0)
+    std: float = Field(default=0.0, ge=0)
+
+    def prior(self, factor: float = 1.0) -> Prior:
+        """Return the value in SI, `factor` being the size of the file's unit."""
+        return Prior(factor * self.value, factor * self.std)
+
+
+def _known(value: object) -> object:
+    """A bare number is a known value."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return {"value": value} if is_number else value
+
+
+PriorEntry = Annotated[
+    PriorTable, BeforeValidator(_known, json_schema_input_type=PriorTable | float)
+]
+
+
+def _increasing(limits: list[float]) -> list[float]:
+    if not 0 <= limits[0] < limits[1]:
+        raise ValueError(f"a range is [low, high] with 0 <= low < high, not {limits}")
+    return limits
+
+
+RangeEntry = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
+
+
+class GearTable(StrictModel):
+    """`[[gears]]`: one gear, its ratio without the input gear, the shift elements that make it."""
+
+    name: str = Field(min_length=1)
+    ratio: float = Field(gt=0)
+    elements: list[str] = Field(min_length=1)
+
+
+class ElementTable(StrictModel):
+    """`[elements.<name>]`: a brake or clutch; its gain as one number or from its geometry."""
+
+    kind: Literal["brake", "clutch"]
+    gain_m3: float | None = Field(default=None, gt=0)
+    surfaces: int | None = Field(default=None, ge=1)
+    derating: float | None = Field(default=None, gt=0, le=1)
+    area_m2: float | None = Field(default=None, gt=0)
+    radius_m: float | None = Field(default=None, gt=0)
+    P0_bar: PriorEntry
+    peak: float = Field(default=1.0, ge=1)
+    drum_inertia_kgm2: PriorEntry = PriorTable(value=0.0)
+    i_c: float | None = None
+    i_out: float | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> ElementTable:
+        geometry = (self.surfaces, self.derating, self.area_m2, self.radius_m)
+        given = sum(part is not None for part in geometry)
+        if (self.gain_m3 is None) == (given == 0) or given not in (0, len(geometry)):
+            raise ValueError(
+                "give the gain either as gain_m3 or as all of surfaces, derating, area_m2, radius_m"
+            )
+        if (self.i_c is None) != (self.i_out is None):
+            raise ValueError("i_c and i_out belong together: give both or none")
+        if self.i_c == 0.0 or self.i_out == 0.0:
+            raise ValueError("i_c and i_out must not be zero")
+        if self.kind == "clutch" and self.i_c is None:
+            raise ValueError("a rotating clutch needs i_c and i_out (eq. 15)")
+        return self
+
+    @property
+    def gain(self) -> float:
+        """N·D·A·r [m^3]."""
+        if self.gain_m3 is not None:
+            return self.gain_m3
+        surfaces, area = self.surfaces or 0, self.area_m2 or 0.0
+        return surfaces * (self.derating or 0.0) * area * (self.radius_m or 0.0)
+
+    def spec(self, name: str) -> ElementSpec:
+        """Return the element in SI."""
+        return ElementSpec(
+            name=name,
+            kind=self.kind,
+            gain=self.gain,
+            P0=self.P0_bar.prior(BAR),
+            peak=self.peak,
+            drum_inertia=self.drum_inertia_kgm2.prior(),
+            i_c=self.i_c,
+            i_out=self.i_out,
+        )
+
+
+class InertiaTable(StrictModel):
+    """`[inertia]`: plausible ranges and the known output inertia Jo', all in kg m^2."""
+
+    J_prime_kgm2: RangeEntry
+    J_vehicle_kgm2: RangeEntry
+    J_out_kgm2: PriorEntry | None = None
+
+
+class SensorTable(StrictModel):
+    """`[sensors.<role>]`: standard deviations of a sensor's constant gain and offset errors."""
+
+    gain_tolerance: float = Field(default=0.0, ge=0, lt=1)
+
+
+class TorqueSensor(SensorTable):
+    """Tolerances of a torque sensor or an engine torque message."""
+
+    offset_tolerance_Nm: float = Field(default=0.0, ge=0)
+
+    def tolerance(self) -> SensorTolerance:
+        """Return both tolerances, the offset in SI."""
+        return SensorTolerance(self.gain_tolerance, self.offset_tolerance_Nm)
+
+
+class SpeedSensor(SensorTable):
+    """Tolerances of a speed sensor."""
+
+    offset_tolerance_rpm: float = Field(default=0.0, ge=0)
+
+    def tolerance(self) -> SensorTolerance:
+        """Return both tolerances, the offset in SI."""
+        return SensorTolerance(self.gain_tolerance, self.offset_tolerance_rpm * RPM)
+
+
+class PressureSensor(SensorTable):
+    """Tolerances of a pressure sensor."""
+
+    offset_tolerance_bar: float = Field(default=0.0, ge=0)
+
+    def tolerance(self) -> SensorTolerance:
+        """Return both tolerances, the offset in SI."""
+        return SensorTolerance(self.gain_tolerance, self.offset_tolerance_bar * BAR)
+
+
+class SensorsTable(StrictModel):
+    """`[sensors]`: tolerances by channel role; none stated means that only noise is counted."""
+
+    engine_torque: TorqueSensor | None = None
+    output_torque: TorqueSensor | None = None
+    input_speed: SpeedSensor | None = None
+    engine_speed: SpeedSensor | None = None
+    output_speed: SpeedSensor | None = None
+    wheel_speed: SpeedSensor | None = None
+    pressure: dict[str, PressureSensor] = Field(default_factory=dict)
+
+
+class CardFile(StrictModel):
+    """A vehicle card."""
+
+    name: str = Field(min_length=1)
+    loss_law: LossLaw = "paper"
+    i_in: float = Field(default=1.0, gt=0)
+    final_drive: float = Field(gt=0)
+    gears: list[GearTable] = Field(min_length=2)
+    elements: dict[str, ElementTable] = Field(min_length=1)
+    inertia: InertiaTable
+    sensors: SensorsTable = SensorsTable()
+    channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
+
+
+def card_schema() -> dict[str, Any]:
+    """Return the JSON Schema of the vehicle card, for editors."""
+    return CardFile.model_json_schema()

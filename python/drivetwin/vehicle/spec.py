@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""What is known of a vehicle from design, in SI: ratios, shift elements, plausible ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from drivetwin.driveline import LossLaw
+from drivetwin.errors import CardError, Where
+from drivetwin.logs.mapping import ChannelSpec
+
+ElementKind = Literal["brake", "clutch"]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A design value and its standard deviation, same unit; `std` 0: taken as known."""
+
+    value: float
+    std: float = 0.0
+
+
+@dataclass(frozen=True)
+class SensorTolerance:
+    """One standard deviation of a sensor's constant errors: `gain` relative, `offset` in SI."""
+
+    gain: float = 0.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Gear:
+    """A gear of the box: `ratio` = ω_in/ω_out without the input gear i_in; elements holding it."""
+
+    name: str
+    ratio: float
+    elements: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ElementSpec:
+    """A clutch or brake that makes a gear.
+
+    `gain` = N·D·A·r [m^3] (N friction surfaces, D de-rating, A area, r effective radius);
+    capacity = μ·gain·(P - P0), static capacity `peak` times that at zero slip (THEORY section 1).
+    `P0` [Pa] ends the fill; `drum_inertia` [kg m^2] runs with the slip (THEORY section 2).
+    `i_c`, `i_out` are the ratios of eq. 15 where the card states them.
+    """
+
+    name: str
+    kind: ElementKind
+    gain: float
+    P0: Prior
+    peak: float = 1.0
+    drum_inertia: Prior = Prior(0.0)
+    i_c: float | None = None
+    i_out: float | None = None
+
+
+def brake_ratios(ratio: float) -> tuple[float, float]:
+    """Return (i_c, i_out) of a brake in a gear of `ratio` i: i_c = i - 1, i_out = i/(i - 1).
+
+    Holds where the other elements of the gear are rotating clutches (THEORY section 2); both
+    negative for i < 1. Raises ZeroDivisionError for i = 1, which no brake can make.
+    """
+    return ratio - 1.0, ratio / (ratio - 1.0)
+
+
+@dataclass(frozen=True)
+class VehicleCard:
+    """A vehicle as known from design; SI.
+
+    `gears` run from low to high. `final_drive` is i_f. `J_prime_range` [kg m^2] bounds J' at the
+    engine, `J_vehicle_range` [kg m^2] bounds J3 at the wheel; `J_out` [kg m^2] is the inertia of
+    the output side before the shaft (Jo' without drums), None if unknown. `sensors` and `channels`
+    go by channel role.
+    """
+
+    name: str
+    loss_law: LossLaw
+    i_in: float
+    final_drive: float
+    gears: tuple[Gear, ...]
+    elements: Mapping[str, ElementSpec]
+    J_prime_range: tuple[float, float]
+    J_vehicle_range: tuple[float, float]
+    J_out: Prior | None = None
+    sensors: Mapping[str, SensorTolerance] = field(default_factory=dict)
+    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+    source: str = ""
+
+    def gear(self, name: str) -> Gear:
+        """Return the gear of this name; raises CardError if the card has none."""
+        for gear in self.gears:
+            if gear.name == name:
+                return gear
+        raise self._error(
+            f"the card has no gear {name!r}; it has {', '.join(gear.name for gear in self.gears)}",
+            "add it under [[gears]]",
+        )
+
+    def ratio(self, name: str) -> float:
+        """Return the overall ratio engine to output, i_in·i_c·i_out, of a gear."""
+        return self.i_in * self.gear(name).ratio
+
+    def element(self, name: str) -> ElementSpec:
+        """Return a shift element by name; raises CardError if the card has none."""
+        try:
+            return self.elements[name]
+        except KeyError:
+            raise self._error(
+                f"the card has no element {name!r}; it has {', '.join(self.elements)}",
+                f"add [elements.{name}]",
+            ) from None
+
+    def element_of(self, gear: str) -> str:
+        """Return the one shift element that makes a gear in the dual-clutch picture.
+
+        Raises CardError where several elements hold it.
+        """
+        elements = self.gear(gear).elements
+        if len(elements) != 1:
+            raise self._error(
+                f"gear {gear!r} is held by {', '.join(elements)}",
+                "name only the element that changes in the shift; the others are common to both "
+                "gears",
+            )
+        return elements[0]
+
+    def clutch_ratios(self, element: str) -> tuple[float, float]:
+        """Return (i_c, i_out) of eq. 15: as stated, else of a brake from its gear's ratio."""
+        spec = self.element(element)
+        if spec.i_c is not None and spec.i_out is not None:
+            return spec.i_c, spec.i_out
+        for gear in self.gears:
+            if element in gear.elements:
+                return brake_ratios(gear.ratio)
+        raise self._error(f"element {element!r} holds no gear", "name it under a gear's elements")
+
+    def _error(self, what: str, remedy: str) -> CardError:
+        return CardError(what, remedy, Where(file=self.source or None))
