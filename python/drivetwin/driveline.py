@@ -26,6 +26,12 @@ class Stribeck:
     v_s: float
     mu_v: float
 
+    def at(self, slip: FloatArray) -> FloatArray:
+        """μ at slips (n,) [rad/s] of either sign."""
+        size = np.abs(slip)
+        stiction = (self.mu_s - self.mu_c) * np.exp(-size / self.v_s)
+        return np.asarray(self.mu_c + stiction + self.mu_v * size, dtype=np.float64)
+
 
 @dataclass(frozen=True)
 class FrictionTable:
@@ -33,6 +39,10 @@ class FrictionTable:
 
     slip: tuple[float, ...]
     mu: tuple[float, ...]
+
+    def at(self, slip: FloatArray) -> FloatArray:
+        """μ at slips (n,) [rad/s] of either sign."""
+        return np.asarray(np.interp(np.abs(slip), self.slip, self.mu), dtype=np.float64)
 
 
 @dataclass(frozen=True)
