@@ -10,21 +10,25 @@ wheel=$(realpath "$2")
 place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 
+run_demo() (
+    cd "$place"
+    PATH=$place/venv/bin
+    for tool in cargo rustc cc; do
+        if command -v "$tool"; then
+            printf '%s is still on PATH: this run proves nothing\n' "$tool" >&2
+            exit 1
+        fi
+    done
+    pip install --quiet --disable-pip-version-check "$wheel"
+    drivetwin demo -o "$place/out"
+    for file in result.json twin.toml report.html; do
+        if [[ ! -s $place/out/$file ]]; then
+            printf 'the demo wrote no %s\n' "$file" >&2
+            exit 1
+        fi
+    done
+)
+
 "$python" -m venv "$place/venv"
-cd "$place"
-PATH=$place/venv/bin
-for tool in cargo rustc cc; do
-    if command -v "$tool"; then
-        printf '%s is still on PATH: this run proves nothing\n' "$tool" >&2
-        exit 1
-    fi
-done
-pip install --quiet --disable-pip-version-check "$wheel"
-drivetwin demo -o "$place/out"
-for file in result.json twin.toml report.html; do
-    if [[ ! -s $place/out/$file ]]; then
-        printf 'the demo wrote no %s\n' "$file" >&2
-        exit 1
-    fi
-done
+run_demo
 printf 'the wheel works without Rust: %s\n' "${wheel##*/}"
