@@ -1,0 +1,336 @@
+# SPDX-License-Identifier: MIT
+"""η, Je and Jo′ from the momentum balance through gear, inertia phase and next gear.
+
+In gear g (eq. 10) and, with the output side's torque put in for the slipping element, in the
+inertia phase of the shift to h:
+
+    η·T_e - T_o/i_g = (Je + Jo′/i_g²)·ω_e'
+    η·T_e - T_o/i_h = Je·ω_e' + (Jo′/i_h)·ω_out'
+
+The equations are linear in (η, Je, Jo′) and hold as long as one element alone carries torque, so
+the shift's own speed change excites Je even where the engine torque stands still. The torque
+phase is left out: there two unknown torques act. Windows never straddle a phase boundary.
+Drum inertias of the shift elements (THEORY section 2) enter as further linear parameters with
+their design priors; Jo′ has one too. The age of the engine torque is estimated with the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.modulating import Kernels, Windows, hann_kernels, join, windows_in
+from drivetwin.identify.regression import Fit, Prior, Term, regressors, solve, whitening
+from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals, Span
+
+
+@dataclass(frozen=True)
+class MomentumSettings:
+    """Windows and priors of the momentum form; times in s.
+
+    `width`, `step` of the Hann windows; in a phase shorter than two widths the window is
+    `share` of the phase. `margin` keeps clear of lock and break-away. `delay_prior` is the
+    plausible age of an engine torque value on a CAN bus; `delay_grid` the ages scanned.
+    """
+
+    width: float = 0.4
+    step: float = 0.025
+    share: float = 0.4
+    margin: float = 0.01
+    delay_prior: PriorValue = PriorValue(0.02, 0.03)
+    delay_grid: tuple[float, ...] = tuple(np.linspace(-0.02, 0.08, 21).tolist())
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch of the log where one momentum equation holds.
+
+    `ratio` is i_g or i_h; `tied` says that the gear is locked, so ω_e = ratio·ω_out.
+    """
+
+    name: str
+    span: Span
+    ratio: float
+    tied: bool
+    windows: Windows
+
+
+DELAY_STD_MAX = 0.005
+"""Standard error [s] above which the age of the engine torque is taken as not shown."""
+DELAY_Q_MIN = 30.0
+"""Least rise of Q over the scanned ages for the minimum to mean anything."""
+
+
+@dataclass(frozen=True)
+class DelayScan:
+    """Q of the regression over the assumed age of the engine torque: `delay` [s], `q`, (n,).
+
+    `best` is the age at the minimum, None where the engine torque moves too little to show it.
+    """
+
+    delay: FloatArray
+    q: FloatArray
+    best: float | None
+
+    def tells(self, std: float) -> bool:
+        """Whether the engine torque moves enough to show its age, to `std` [s]."""
+        return std < DELAY_STD_MAX and float(np.ptp(self.q)) > DELAY_Q_MIN
+
+
+@dataclass(frozen=True)
+class MomentumFit:
+    """Result of the joint regression. `names` are the parameters of `fit.theta`, in order.
+
+    Evidence for the report, one entry per window: `time` [s], `stretch` name, `drive` = mean
+    η·T_e - T_o/i [N m] and `acceleration` [rad/s^2] over the window, `inertia_torque` the fitted
+    right-hand side [N m].
+    """
+
+    names: tuple[str, ...]
+    fit: Fit
+    scan: DelayScan
+    time: FloatArray
+    stretch: tuple[str, ...]
+    drive: FloatArray
+    acceleration: FloatArray
+    inertia_torque: FloatArray
+
+    def index(self, name: str) -> int:
+        """Position of a parameter in `fit.theta`."""
+        return self.names.index(name)
+
+    def value(self, name: str) -> float:
+        """Estimate of one parameter."""
+        return float(self.fit.theta[self.index(name)])
+
+    def std(self, name: str) -> float:
+        """Standard error of one parameter."""
+        return float(self.fit.std[self.index(name)])
+
+
+def momentum_names(driveline: Driveline) -> tuple[str, ...]:
+    """Parameters of the regression: η, Je, Jo′, age of T_e, then the drums by element."""
+    return ("eta", "J_e", "J_out", "te_delay", *(f"drum.{c.name}" for c in driveline.drums))
+
+
+def _vented(signals: ShiftSignals, driveline: Driveline, start: float) -> float:
+    """First instant from `start` [s] on at which the off-going element carries nothing."""
+    element = driveline.offgoing
+    if element.name not in signals.pressures:
+        return start
+    pressure = signals.pressures[element.name]
+    limit = element.P0.value - 2.0 * element.P0.std
+    kernel = np.ones(5) / 5.0
+    smooth = np.convolve(pressure.values, kernel, mode="same")
+    after = pressure.time[(pressure.time >= start) & (smooth >= limit)]
+    held = after[after < signals.shift.inertia_phase[1]]
+    return start if held.size == 0 else float(held[-1])
+
+
+def stretches(
+    signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
+) -> tuple[Stretch, ...]:
+    """The stretches of a shift that carry an equation, with their windows."""
+    shift = signals.shift
+    guard = {k: settings.margin + 3.0 * s for k, s in shift.sigma.items()}
+    default = settings.margin
+    lockup = guard.get("lockup", default)
+    free = _vented(signals, driveline, shift.inertia_phase[0] + guard.get("inertia_start", default))
+    spans = (
+        ("before", (shift.before[0], shift.before[1] - guard.get("torque_start", default)), True),
+        ("inertia", (free, shift.lockup_time - lockup), False),
+        ("after", (shift.lockup_time + lockup, shift.after[1]), True),
+    )
+    found = []
+    for name, span, tied in spans:
+        length = span[1] - span[0]
+        if length < 0.05:
+            continue
+        short = length < 2.0 * settings.width
+        width = settings.share * length if short else settings.width
+        step = settings.step * width / settings.width
+        ratio = driveline.i_before if name == "before" else driveline.i_after
+        found.append(Stretch(name, span, ratio, tied, windows_in(span, width, step)))
+    if not found:
+        raise IdentificationError(
+            "no stretch of the log is long enough for the momentum balance",
+            "record at least 0.5 s before and after the shift",
+        )
+    return tuple(found)
+
+
+FIRST_DRUM = 4
+"""Index of the first drum inertia among the parameters."""
+
+
+class _Equations:
+    """All rows of the momentum balance: one window each, with per-row coefficients.
+
+    `u[p]`, `v[p]` (m,) are the coefficients of inertia parameter p on ω_e' and ω_out'. Where the
+    gear is locked both sensors show the same motion: they share it by inverse variance.
+    """
+
+    def __init__(
+        self, signals: ShiftSignals, driveline: Driveline, found: tuple[Stretch, ...]
+    ) -> None:
+        self.signals = signals
+        self.windows = join([s.windows for s in found])
+        counts = [s.windows.count for s in found]
+        self.ratio = np.repeat([s.ratio for s in found], counts)
+        self.stretch = tuple(np.repeat([s.name for s in found], counts).tolist())
+        tied = np.repeat([s.tied for s in found], counts)
+        self.torque = hann_kernels(signals.output_torque.time, self.windows).psi
+        self.engine = hann_kernels(signals.engine_speed.time, self.windows).slope
+        self.output = hann_kernels(signals.output_speed.time, self.windows).slope
+        one, zero = np.ones_like(self.ratio), np.zeros_like(self.ratio)
+        raw = {1: (one, zero), 2: (zero, 1.0 / self.ratio)}
+        for k, c in enumerate(driveline.drums):
+            net = c.a - c.b / self.ratio
+            raw[FIRST_DRUM + k] = (c.a * net, -c.b * net)
+        variance_e = signals.engine_speed.sigma**2
+        variance_o = (self.ratio * signals.output_speed.sigma) ** 2
+        share = variance_o / (variance_e + variance_o)
+        self.u = {p: np.where(tied, share * (u + v / self.ratio), u) for p, (u, v) in raw.items()}
+        self.v = {
+            p: np.where(tied, (1.0 - share) * (self.ratio * u + v), v) for p, (u, v) in raw.items()
+        }
+
+    def engine_torque(self, theta: FloatArray, kernels: Kernels | None = None) -> Term:
+        """The part η·T_e, its stamps taken θ[3] seconds after the instant they show."""
+        torque = self.signals.engine_torque
+        kernels = kernels or hann_kernels(torque.time, self.windows, theta[3])
+        factor = np.full_like(self.ratio, theta[0])
+        slopes = {0: (np.ones_like(self.ratio), kernels.psi), 3: (factor, kernels.slope)}
+        return Term(torque.values, torque.sigma, kernels.psi, factor, slopes)
+
+    def others(self, theta: FloatArray) -> list[Term]:
+        """The parts -T_o/i, -u·ω_e' and -v·ω_out'."""
+        terms = [
+            Term(
+                self.signals.output_torque.values,
+                self.signals.output_torque.sigma,
+                self.torque,
+                -1.0 / self.ratio,
+                {},
+            )
+        ]
+        for signal, quadrature, coefficients in (
+            (self.signals.engine_speed, self.engine, self.u),
+            (self.signals.output_speed, self.output, self.v),
+        ):
+            factor = np.zeros_like(self.ratio)
+            for p, c in coefficients.items():
+                factor = factor - theta[p] * c
+            slopes = {p: (-c, quadrature) for p, c in coefficients.items()}
+            terms.append(Term(signal.values, signal.sigma, quadrature, factor, slopes))
+        return terms
+
+    def terms(self, theta: FloatArray) -> list[Term]:
+        """All parts of the equations at θ, the engine torque first."""
+        return [self.engine_torque(theta), *self.others(theta)]
+
+
+def _prior(driveline: Driveline, settings: MomentumSettings) -> Prior:
+    entries = {3: (settings.delay_prior.value, settings.delay_prior.std)}
+    if driveline.J_out is not None:
+        entries[2] = (driveline.J_out.value, known(driveline.J_out))
+    for k, element in enumerate(driveline.drums):
+        entries[FIRST_DRUM + k] = (element.drum.value, known(element.drum))
+    return Prior(entries)
+
+
+def known(prior: PriorValue) -> float:
+    """Standard deviation of a prior; a known value gets one too small to matter."""
+    return prior.std if prior.std > 0.0 else 1e-6 * max(abs(prior.value), 1e-6)
+
+
+def _scan(
+    equations: _Equations, theta: FloatArray, prior: Prior, delays: tuple[float, ...]
+) -> DelayScan:
+    """Q over the age of the engine torque, the other parameters fitted at each age.
+
+    The weighting is that at `theta`; the equations are then linear in the rest.
+    """
+    terms = equations.terms(theta)
+    whiten = whitening(terms)
+    free = [p for p in range(theta.size) if p != 3]
+    rest = equations.others(theta)
+    columns = regressors(rest, theta.size)
+    fixed = whiten(terms[1].factor * (terms[1].quadrature.matrix @ terms[1].values))
+    weight = np.sqrt(np.diag(prior.precision(theta.size)))[free]
+    target = np.concatenate([-fixed, weight * prior.means(theta.size)[free]])
+    torque = equations.signals.engine_torque
+    q = []
+    for delay in delays:
+        psi = hann_kernels(torque.time, equations.windows, delay).psi
+        columns[:, 0] = psi.matrix @ torque.values
+        design = np.vstack([whiten(columns[:, free]), np.diag(weight)])
+        solution = np.linalg.lstsq(design, target, rcond=None)[0]
+        q.append(float(np.sum((design @ solution - target) ** 2)))
+    return DelayScan(np.asarray(delays), np.asarray(q), parabola_minimum(np.asarray(delays), np.asarray(q)))
+
+
+def parabola_minimum(x: FloatArray, y: FloatArray) -> float:
+    """Abscissa of the minimum of y (n,) over equidistant x (n,), by a parabola through three."""
+    k = int(np.argmin(y))
+    if k in (0, x.size - 1):
+        return float(x[k])
+    left, middle, right = y[k - 1 : k + 2]
+    bend = left - 2.0 * middle + right
+    return float(x[k] + 0.5 * (x[k + 1] - x[k]) * (left - right) / bend)
+
+
+def momentum_inertia(
+    signals: ShiftSignals,
+    driveline: Driveline,
+    settings: MomentumSettings,
+    start_inertia: float,
+) -> MomentumFit:
+    """Estimate η, Je, Jo′, age of T_e and drums over the whole shift, with their covariance.
+
+    `start_inertia` [kg m^2] is any value within the plausible range of J′.
+    """
+    found = stretches(signals, driveline, settings)
+    equations = _Equations(signals, driveline, found)
+    names = momentum_names(driveline)
+    prior = _prior(driveline, settings)
+    start = np.zeros(len(names))
+    start[:2] = 0.9, start_inertia
+    for index, (mean, _) in prior.entries.items():
+        start[index] = mean
+    first = solve(equations.terms, start, _held(prior, 3, start[3]), tolerance=0.1)
+    scan = _scan(equations, first.theta, prior, settings.delay_grid)
+    theta = first.theta.copy()
+    theta[3] = scan.best
+    fit = solve(equations.terms, theta, prior)
+    if not scan.tells(fit.std[3]):
+        fit = solve(equations.terms, first.theta, _held(prior, 3, start[3]))
+        scan = replace(scan, best=None)
+    return _with_evidence(equations, names, fit, scan)
+
+
+def _held(prior: Prior, index: int, value: float) -> Prior:
+    """`prior` with one parameter fixed."""
+    return Prior({**prior.entries, index: (value, 1e-9)})
+
+
+def _with_evidence(
+    equations: _Equations, names: tuple[str, ...], fit: Fit, scan: DelayScan
+) -> MomentumFit:
+    area = 0.5 * equations.windows.width
+    drive, load, *inertia = (
+        t.factor * (t.quadrature.matrix @ t.values) / area for t in equations.terms(fit.theta)
+    )
+    speed = equations.signals.engine_speed
+    return MomentumFit(
+        names,
+        fit,
+        scan,
+        equations.windows.centre,
+        equations.stretch,
+        drive + load,
+        (equations.engine.matrix @ speed.values) / area,
+        -sum(inertia, np.zeros_like(area)),
+    )

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""Noise level of a channel, from the log itself.
+
+A driveline signal is smooth over a few samples at the logger's rate, so its third difference is
+nearly all noise. Blocks in which the signal itself bends sharply stand out and are left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.identify.signals import FloatArray
+
+_THIRD_DIFFERENCE_GAIN = np.sqrt(20.0)
+"""Standard deviation of the third difference of unit white noise: sqrt(1 + 9 + 9 + 1)."""
+
+
+def white_noise(values: FloatArray, block: int = 25, spread: float = 3.0) -> float:
+    """Standard deviation of the sample-to-sample noise of `values` (n,), in their unit.
+
+    The mean square of the third difference is averaged over the blocks of `block` samples whose
+    own mean square is at most `spread` times the median's. Rounding counts as noise.
+    """
+    third = np.diff(values, 3) / _THIRD_DIFFERENCE_GAIN
+    count = third.size // block
+    if count < 2:
+        return float(np.sqrt(np.mean(third**2)))
+    power = np.mean(third[: count * block].reshape(count, block) ** 2, axis=1)
+    calm = power[power <= spread * np.median(power)]
+    return float(np.sqrt(np.mean(calm)))
+
+
+def resolution(values: FloatArray) -> float:
+    """Rounding step of a channel: the smallest jump of which all others are multiples, or 0."""
+    jumps = np.abs(np.diff(values))
+    jumps = jumps[jumps > 1e-9 * max(float(np.max(np.abs(values))), 1e-9)]
+    if jumps.size < 10:
+        return 0.0
+    step = float(np.min(jumps))
+    multiples = jumps / step
+    return step if float(np.max(np.abs(multiples - np.round(multiples)))) < 1e-3 else 0.0

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: MIT
+"""Least squares where every number in the equations is measured (errors in variables).
+
+The equations are r(θ) = Σ_c A_c(θ)·y_c = 0: each row combines samples of several channels c with
+coefficients that depend on the parameters θ. With independent noise of variance σ_c² the
+maximum-likelihood estimate, the true signals eliminated, minimises
+
+    Q(θ) = rᵀ S⁻¹ r + (θ - θ₀)ᵀ P⁻¹ (θ - θ₀),   S(θ) = Σ_c σ_c² A_c A_cᵀ
+
+Its gradient is that of generalised least squares with an instrument: the regressors evaluated at
+the signals y_c - σ_c² A_cᵀ S⁻¹ r, from which the noise that enters the residual has been taken
+out. Hence no attenuation by noise in the regressors, and overlapping windows are weighted by
+their correlation (structured total least squares; Van Huffel and Vandewalle 1991).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.modulating import Quadrature
+from drivetwin.identify.signals import FloatArray
+
+MAX_PASSES = 20
+NUGGET = 1e-9
+"""Added to S relative to its diagonal: strongly overlapping windows are nearly dependent."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """One channel's part of the equations, at one θ.
+
+    It adds factor ∘ (quadrature · y) to r; y (n,) are the samples, `sigma` their white noise
+    (0 for an exact quantity). `slopes[p]` are the pairs (factor, quadrature) of ∂/∂θ_p.
+    """
+
+    values: FloatArray
+    sigma: float
+    quadrature: Quadrature
+    factor: FloatArray
+    slopes: Mapping[int, tuple[FloatArray, Quadrature]]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Independent normal priors by parameter index: (mean, standard deviation > 0)."""
+
+    entries: Mapping[int, tuple[float, float]]
+
+    def precision(self, size: int) -> FloatArray:
+        """Diagonal precision matrix (size, size)."""
+        diagonal = np.zeros(size)
+        for index, (_, std) in self.entries.items():
+            diagonal[index] = std**-2
+        return np.diag(diagonal)
+
+    def means(self, size: int) -> FloatArray:
+        """θ₀ (size,), zero where no prior stands."""
+        means = np.zeros(size)
+        for index, (mean, _) in self.entries.items():
+            means[index] = mean
+        return means
+
+    def pull(self, theta: FloatArray) -> FloatArray:
+        """Precision times (θ - θ₀), shape (size,)."""
+        force = np.zeros(theta.size)
+        for index, (mean, std) in self.entries.items():
+            force[index] = (theta[index] - mean) / std**2
+        return force
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Estimate `theta` (p,), `covariance` (p, p) from noise and priors, and its residuals.
+
+    `residual` (m,) and `residual_std` (m,) at the estimate; `chi2` is Q per degree of freedom
+    without the prior; `information` (p, p) is that of the data alone.
+    """
+
+    theta: FloatArray
+    covariance: FloatArray
+    information: FloatArray
+    residual: FloatArray
+    residual_std: FloatArray
+    q: float
+    chi2: float
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard errors (p,), inflated where the residuals exceed the stated noise."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=float)
+
+
+@dataclass(frozen=True)
+class _Point:
+    residual: FloatArray
+    q: float
+    gradient: FloatArray
+    regressors: FloatArray
+    factor: tuple[FloatArray, bool]
+    variance: FloatArray
+
+    @property
+    def hessian(self) -> FloatArray:
+        return np.asarray(self.regressors.T @ cho_solve(self.factor, self.regressors), dtype=float)
+
+
+def _covariance(terms: Sequence[Term]) -> FloatArray:
+    """S (m, m): covariance of the residuals from the noise of all channels."""
+    cov = np.zeros((terms[0].factor.size,) * 2)
+    for t in terms:
+        if t.sigma > 0.0:
+            cov += np.outer(t.sigma**2 * t.factor, t.factor) * t.quadrature.gram
+    cov[np.diag_indices_from(cov)] *= 1.0 + NUGGET
+    return cov
+
+
+def whitening(terms: Sequence[Term]) -> Callable[[FloatArray], FloatArray]:
+    """The map x -> L⁻¹x with S = L·Lᵀ, under which the residuals have unit covariance."""
+    lower = np.linalg.cholesky(_covariance(terms))
+    return lambda x: np.asarray(solve_triangular(lower, x, lower=True), dtype=float)
+
+
+def regressors(terms: Sequence[Term], size: int) -> FloatArray:
+    """∂r/∂θ (m, size) at the measured signals."""
+    columns = np.zeros((terms[0].factor.size, size))
+    for t in terms:
+        for index, (slope, quadrature) in t.slopes.items():
+            columns[:, index] += slope * (quadrature.matrix @ t.values)
+    return columns
+
+
+def _evaluate(terms: Sequence[Term], size: int) -> _Point:
+    count = terms[0].factor.size
+    residual = np.zeros(count)
+    for t in terms:
+        residual += t.factor * (t.quadrature.matrix @ t.values)
+    cov = _covariance(terms)
+    variance = np.diag(cov).copy()
+    factor = cho_factor(cov, lower=True)
+    multiplier = cho_solve(factor, residual)
+    columns = np.zeros((count, size))
+    for t in terms:
+        clean = t.values
+        if t.sigma > 0.0:
+            clean = clean - t.sigma**2 * (t.quadrature.matrix.T @ (t.factor * multiplier))
+        for index, (slope, quadrature) in t.slopes.items():
+            columns[:, index] += slope * (quadrature.matrix @ clean)
+    gradient = columns.T @ multiplier
+    return _Point(residual, float(residual @ multiplier), gradient, columns, factor, variance)
+
+
+def _spurious(terms: Sequence[Term], point: _Point, size: int) -> FloatArray:
+    """Expected part of the information (p, p) that the noise left in the regressors feigns."""
+    inverse = cho_solve(point.factor, np.eye(point.residual.size))
+    cross = np.zeros((size, point.residual.size, point.residual.size))
+    own = np.zeros((size, size))
+    for t in terms:
+        for p, (f, k) in t.slopes.items():
+            cross[p] += t.sigma**2 * np.outer(f, t.factor) * k.overlap(t.quadrature)
+            for q, (g, h) in t.slopes.items():
+                own[p, q] += t.sigma**2 * float(np.sum(inverse * np.outer(f, g) * k.overlap(h)))
+    shared = [[float(np.sum((inverse @ a @ inverse) * b)) for b in cross] for a in cross]
+    return own - np.asarray(shared)
+
+
+def solve(
+    assemble: Callable[[FloatArray], Sequence[Term]],
+    start: FloatArray,
+    prior: Prior,
+    tolerance: float = 1e-4,
+) -> Fit:
+    """Minimise Q(θ) from `start` (p,) by Gauss-Newton; stop at `tolerance` standard errors.
+
+    Raises IdentificationError where the equations leave a direction of θ undetermined.
+    """
+    theta = np.asarray(start, dtype=float).copy()
+    for _ in range(MAX_PASSES):
+        point = _evaluate(assemble(theta), theta.size)
+        hessian = point.hessian + prior.precision(theta.size)
+        step = -_inverse(hessian) @ (point.gradient + prior.pull(theta))
+        theta = theta + step
+        if float(np.sqrt(step @ hessian @ step)) < tolerance:
+            break
+    terms = assemble(theta)
+    point = _evaluate(terms, theta.size)
+    information = point.hessian - _spurious(terms, point, theta.size)
+    chi2 = point.q / max(point.residual.size - theta.size, 1)
+    covariance = _inverse(_positive(information) + prior.precision(theta.size))
+    return Fit(
+        theta,
+        covariance * max(1.0, chi2),
+        information,
+        point.residual,
+        np.sqrt(point.variance),
+        point.q,
+        chi2,
+    )
+
+
+def _positive(matrix: FloatArray) -> FloatArray:
+    """The nearest matrix without negative curvature, in units of its own diagonal."""
+    scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    lifted = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return np.asarray(lifted * np.outer(scale, scale), dtype=float)
+
+
+def _inverse(information: FloatArray) -> FloatArray:
+    """Inverse of an information matrix, balanced by its diagonal.
+
+    Raises IdentificationError where a direction carries no information.
+    """
+    scale = np.sqrt(np.maximum(np.diag(information), 0.0))
+    if not np.all(np.isfinite(scale)) or np.any(scale == 0.0):
+        raise IdentificationError(
+            "a parameter does not act on any of the equations",
+            "record a run in which engine torque and speed change",
+        )
+    balanced = information / np.outer(scale, scale)
+    if np.linalg.cond(balanced) > 1e13:
+        raise IdentificationError(
+            "the equations cannot tell some of the parameters apart",
+            "record a run in which engine torque and speed change independently",
+        )
+    return np.asarray(np.linalg.inv(balanced) / np.outer(scale, scale), dtype=float)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""What the estimators see: sampled signals with their noise, and the ratios of one shift."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.shifts.shift import Shift
+
+FloatArray = NDArray[np.float64]
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """One signal: `time` (n,) s increasing, `values` (n,) SI, `sigma` white noise of a sample."""
+
+    time: FloatArray
+    values: FloatArray
+    sigma: float = 0.0
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Values at `time` (m,), linear between samples."""
+        return np.interp(time, self.time, self.values)
+
+    def within(self, span: Span) -> Sampled:
+        """The samples inside `span` [s], both ends included."""
+        keep = (self.time >= span[0]) & (self.time <= span[1])
+        return Sampled(self.time[keep], self.values[keep], self.sigma)
+
+
+@dataclass(frozen=True)
+class PriorValue:
+    """A design value and its standard deviation; `std` 0 means known."""
+
+    value: float
+    std: float = 0.0
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A shift element in the dual-clutch form: slip = a·ω_e - b·ω_out (eq. 15).
+
+    `a` = 1/(i_in·i_c), `b` = i_out; its torque acts as -a·T on the engine and b·T on the output
+    side. `gain` N·D·A·r [m^3]; `drum` [kg m^2] is the inertia that turns with the slip.
+    """
+
+    name: str
+    a: float
+    b: float
+    gain: float
+    P0: PriorValue
+    drum: PriorValue = PriorValue(0.0)
+
+    @property
+    def ratio(self) -> float:
+        """Overall ratio ω_e/ω_out with this element locked."""
+        return self.b / self.a
+
+
+@dataclass(frozen=True)
+class Driveline:
+    """Known structure during one shift. `couplings` holds every shift element by name."""
+
+    i_f: float
+    offgoing: Coupling
+    oncoming: Coupling
+    couplings: Mapping[str, Coupling]
+    J_out: PriorValue | None
+    loss_law: str = "paper"
+
+    @property
+    def i_before(self) -> float:
+        """Overall ratio of the gear that is left."""
+        return self.offgoing.ratio
+
+    @property
+    def i_after(self) -> float:
+        """Overall ratio of the gear that is entered."""
+        return self.oncoming.ratio
+
+    @property
+    def drums(self) -> tuple[Coupling, ...]:
+        """Elements whose drum inertia is not zero."""
+        return tuple(c for c in self.couplings.values() if c.drum.value > 0 or c.drum.std > 0)
+
+
+@dataclass(frozen=True)
+class ShiftSignals:
+    """The measured signals of a log, engine side referred to ω_e, and the shift they show.
+
+    `engine_torque` holds fresh values only, at their own raster. `wheel_speed` is None where the
+    log has none. Positive directions as in THEORY section 3.
+    """
+
+    engine_torque: Sampled
+    output_torque: Sampled
+    engine_speed: Sampled
+    output_speed: Sampled
+    wheel_speed: Sampled | None
+    pressures: Mapping[str, Sampled]
+    shift: Shift
+    torque_resolution: float = field(default=0.0)
+    """Rounding step of the engine torque [N m]; 0 where none shows."""
