@@ -21,8 +21,7 @@ _SOLVER_MAY_NOT = re.compile(r"\bcrate\s*::\s*(?:\{[^}]*\b)?(?:model|simulate)\b
 
 PYTHON_LAYERS = (
     frozenset({"errors", "parameters", "driveline", "tomlfile", "_native"}),
-    frozenset({"logs"}),
-    frozenset({"vehicle", "held"}),
+    frozenset({"logs", "vehicle", "held"}),
     frozenset({"shifts", "dyno"}),
     frozenset({"identify"}),
     frozenset({"twin", "results", "start_state", "validate"}),
