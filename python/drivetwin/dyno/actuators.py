@@ -36,7 +36,7 @@ class Program:
     def at(self, time: FloatArray) -> FloatArray:
         """Values at `time` (n,) [s]."""
         knots = np.array(self.knots)
-        return np.interp(time, knots[:, 0], knots[:, 1])
+        return np.asarray(np.interp(time, knots[:, 0], knots[:, 1]), dtype=np.float64)
 
 
 @dataclass(frozen=True)

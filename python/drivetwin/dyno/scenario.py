@@ -86,7 +86,7 @@ class Scenario:
         """Quasi-steady acceleration in the start gear: eqs. 10 and 11 with equal accelerations."""
         model, i_g = self.model, self.ratio(self.offgoing)
         wheel_speed = self.engine_speed / i_g / model.i_f
-        turning = model.load.rolling * np.sign(wheel_speed)
+        turning = model.load.rolling * float(np.sign(wheel_speed))
         air = model.load.aero * wheel_speed * abs(wheel_speed)
         load = (model.load.constant + turning + air) / model.i_f
         drive = model.eta * float(self.torque(np.zeros(1))[0]) * i_g

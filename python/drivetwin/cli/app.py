@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""The program `drivetwin`: its commands, and the one place where errors become exit codes."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from drivetwin.cli.demo import demo
+from drivetwin.cli.identify import identify
+from drivetwin.cli.inspect import inspect
+from drivetwin.cli.output import show_error
+from drivetwin.cli.report import report
+from drivetwin.cli.shifts import shifts
+from drivetwin.cli.simulate import simulate
+from drivetwin.cli.synth import synth
+from drivetwin.errors import DrivetwinError, InputError, Where
+
+app = typer.Typer(
+    name="drivetwin",
+    help="From gear-shift logs to validated driveline models.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+for command in (demo, synth, inspect, shifts, identify, simulate, report):
+    app.command()(command)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from drivetwin.results.version import program_version
+
+        typer.echo(f"drivetwin {program_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_version, is_eager=True, help="Print the version and stop."
+        ),
+    ] = False,
+) -> None:
+    """From gear-shift logs to validated driveline models."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit code.
+
+    0: done; 2: wrong usage or an input that cannot be used; 130: interrupted.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        app(args=arguments, prog_name="drivetwin")
+    except DrivetwinError as error:
+        show_error(error, as_json="--json" in arguments)
+        return error.exit_code
+    except OSError as error:
+        fault = InputError(
+            error.strerror or str(error),
+            "check the path, its permissions and the free space",
+            Where(file=None if error.filename is None else str(error.filename)),
+        )
+        show_error(fault, as_json="--json" in arguments)
+        return fault.exit_code
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else 0
+    return 0

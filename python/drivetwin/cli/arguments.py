@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+"""Arguments that several commands share, and how they become a log and a card."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from drivetwin.logs.shiftlog import ShiftLog
+    from drivetwin.vehicle.card import VehicleCard
+
+LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="Shift log (CSV with a unit row).")]
+VehicleFile = Annotated[
+    Path, typer.Option("--vehicle", metavar="CARD", help="Vehicle card (TOML).")
+]
+ChannelsFile = Annotated[
+    Path | None,
+    typer.Option("--channels", metavar="MAP", help="Channel mapping file (TOML)."),
+]
+
+
+def load(log: Path, vehicle: Path, channels: Path | None) -> tuple[ShiftLog, VehicleCard]:
+    """Read card, mapping and log; raises the typed errors of their readers."""
+    from drivetwin.logs.read import read_log
+    from drivetwin.vehicle.card import load_card
+
+    card = load_card(vehicle)
+    return read_log(log, card, channels), card

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Truth of a synthetic log beside what the methods found in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from drivetwin.dyno.truth import Truth
+from drivetwin.identify.method import Method
+from drivetwin.identify.result import Identification
+from drivetwin.parameters import spec_of
+
+_SLIPS = (10.0, 30.0, 50.0, 80.0)
+"""Slips [rad/s] at which friction coefficients are compared."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Value and 95 % interval (total) by one method; None where it gives none."""
+
+    value: float | None = None
+    interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity: id, true value, what each method found, SI unit."""
+
+    id: str
+    truth: float
+    found: Mapping[Method, Found]
+    unit: str
+
+    def document(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "id": self.id,
+            "truth": self.truth,
+            "unit": self.unit,
+            **{
+                method.value: {"value": one.value, "ci95_total": one.interval}
+                for method, one in self.found.items()
+            },
+        }
+
+
+def compare(truth: Truth, found: Mapping[Method, Identification]) -> list[Row]:
+    """Rows for all true parameters that some method answers, then friction over slip."""
+    rows = [
+        Row(key, value, {m: _estimate(one, key) for m, one in found.items()}, spec_of(key).unit)
+        for key, value in truth.parameters.items()
+        if any(key in one.estimates for one in found.values())
+    ]
+    for element, law in truth.friction.items():
+        for slip in _SLIPS:
+            points = {method: _friction(one, element, slip) for method, one in found.items()}
+            if any(point.value is not None for point in points.values()):
+                rows.append(
+                    Row(f"mu.{element} @{slip:g}", float(law.at(np.array(slip))), points, "1")
+                )
+    return rows
+
+
+def _estimate(found: Identification, key: str) -> Found:
+    estimate = found.estimates.get(key)
+    return Found() if estimate is None else Found(estimate.value, estimate.ci95_total)
+
+
+def _friction(found: Identification, element: str, slip: float) -> Found:
+    """The curve of an element at one slip; nothing outside the slip range seen."""
+    curve = found.friction.get(element)
+    if curve is None or not curve.slip[0] <= slip <= curve.slip[-1]:
+        return Found()
+    mu, low, high = (
+        float(np.interp(slip, curve.slip, values))
+        for values in (curve.mu, curve.mu_lo, curve.mu_hi)
+    )
+    return Found(mu, (low, high) if np.isfinite(high - low) else None)

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin demo`: the main job on a log with known truth, both methods side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from drivetwin.cli.output import JsonFlag, print_json, say, show, table_of
+from drivetwin.cli.synth import NoiseOption, ScenarioOption, SeedOption
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.identify.method import Method
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from drivetwin.cli.comparison import Row
+
+_METHODS = (Method.INTEGRAL, Method.PAPER)
+
+
+def demo(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Where all files go.")
+    ] = Path("drivetwin-demo"),
+    scenario: ScenarioOption = ScenarioName.PAPER_STEPS,
+    seed: SeedOption = 0,
+    noise: NoiseOption = 1.0,
+    as_json: JsonFlag = False,
+) -> None:
+    """Make a log with the paper's numbers, identify it both ways, compare with the truth."""
+    from drivetwin.cli.comparison import compare
+    from drivetwin.cli.pipeline import REPORT, run, write
+    from drivetwin.cli.synth import write_run
+    from drivetwin.dyno.dyno import run as run_dyno
+    from drivetwin.dyno.scenarios import SCENARIOS
+
+    bench = run_dyno(SCENARIOS[scenario](), seed, noise=noise)
+    log, card, _ = write_run(output / f"{scenario}.csv", bench)
+    outcomes = {method: run(log, card, None, method) for method in _METHODS}
+    for method, outcome in outcomes.items():
+        write(outcome, output / method)
+    found = {method: outcome.found for method, outcome in outcomes.items()}
+    rows = compare(bench.truth, found)
+    report = output / Method.INTEGRAL / REPORT
+    if as_json:
+        print_json({"parameters": [row.document() for row in rows], "log": log, "report": report})
+        return
+    show(_table(rows, scenario))
+    say("± is the half width of the 95 % interval; the paper's method states none for its grids.")
+    say(f"log, card and truth: {log.parent}")
+    say(f"report: {report}")
+
+
+def _table(rows: list[Row], scenario: ScenarioName) -> Table:
+    """Truth, and value, interval and deviation of both methods."""
+    from drivetwin.cli.numbers import deviation, shown
+
+    table = table_of(
+        f"Scenario {scenario}: truth and what the log tells", "parameter", "truth", "paper", "off",
+        "integral", "95 %", "off", "unit", right=("truth", "paper", "off", "integral", "95 %"),
+    )  # fmt: skip
+    for row in rows:
+        paper, default = row.found[Method.PAPER], row.found[Method.INTEGRAL]
+        value, interval, unit = shown(default.value, default.interval, row.unit)
+        table.add_row(
+            row.id,
+            shown(row.truth, None, row.unit)[0],
+            shown(paper.value, None, row.unit)[0],
+            deviation(paper.value, row.truth),
+            value,
+            interval,
+            deviation(default.value, row.truth),
+            unit,
+        )
+    return table

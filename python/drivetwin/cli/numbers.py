@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+"""How numbers are printed: in display units, with as many digits as their interval supports."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from drivetwin.report.units import display_of, significant, with_uncertainty
+
+Interval = tuple[float, float]
+
+
+def shown(value: float | None, interval: Interval | None, si_unit: str) -> tuple[str, str, str]:
+    """Value, `± half width` of its interval, and the unit they are in; a dash for None."""
+    display = display_of(si_unit)
+    if value is None:
+        return "-", "", display.label
+    half = None if interval is None else (interval[1] - interval[0]) / 2.0 * display.factor
+    number, width = with_uncertainty(value * display.factor, half)
+    return number, f"± {width}" if width else "", display.label
+
+
+def quantity(value: float | None, si_unit: str) -> str:
+    """A value with its unit to three digits; a dash for None."""
+    if value is None:
+        return "-"
+    display = display_of(si_unit)
+    return f"{significant(value * display.factor, 3)} {display.label}".rstrip()
+
+
+def percent(value: float | None) -> str:
+    """A share in percent with one decimal; a dash for None or NaN."""
+    return "-" if value is None or not isfinite(value) else f"{value:.1f}"
+
+
+def deviation(value: float | None, truth: float) -> str:
+    """Deviation from a known truth in percent; empty where either gives none."""
+    return "" if value is None or truth == 0.0 else f"{100.0 * (value / truth - 1.0):+.2g} %"

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""What commands share in talking to the user: results on stdout, progress and errors on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from drivetwin.errors import DrivetwinError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+JsonFlag = Annotated[
+    bool, typer.Option("--json", help="Print the result as JSON on stdout, nothing else.")
+]
+
+
+def console(*, stderr: bool = False) -> Console:
+    """Console of this moment; no colours and 80 columns where it is not a terminal."""
+    from rich.console import Console
+
+    return Console(stderr=stderr, highlight=False)
+
+
+def say(text: str) -> None:
+    """Print a line of plain text on stdout; a long one is left to the terminal to wrap."""
+    console().print(text, markup=False, soft_wrap=True)
+
+
+def show(table: Table) -> None:
+    """Print a table on stdout."""
+    console().print(table)
+
+
+def table_of(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
+    """Empty table in the program's one style; columns in `right` are aligned to the right."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in columns:
+        table.add_column(column, justify="right" if column in right else "left")
+    return table
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Print one strict JSON document on stdout; NaN and infinities become null."""
+    from drivetwin.results.result_file import plain
+
+    text = json.dumps(plain(dict(value)), allow_nan=False, ensure_ascii=False, indent=2)
+    sys.stdout.write(text + "\n")
+
+
+@contextmanager
+def step(text: str) -> Iterator[None]:
+    """Show on stderr, while it runs and where that is a terminal, what the program is doing."""
+    with console(stderr=True).status(text):
+        yield
+
+
+def show_error(error: DrivetwinError, *, as_json: bool) -> None:
+    """Report an error: text on stderr, or as JSON on stdout where that was asked for."""
+    if not as_json:
+        from rich.text import Text
+
+        message = Text.assemble(("error: ", "bold red"), str(error))
+        console(stderr=True).print(message, soft_wrap=True)
+        return
+    place = {key: part for key, part in vars(error.where).items() if part is not None}
+    fault = {
+        "type": type(error).__name__,
+        "what": error.what,
+        "where": place,
+        "remedy": error.remedy,
+    }
+    print_json({"error": fault})

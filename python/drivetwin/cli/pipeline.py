@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""From a log and a card to an identification with its twin, validation and files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from drivetwin.cli.arguments import load
+from drivetwin.cli.output import step
+from drivetwin.cli.staging import staged
+from drivetwin.errors import NoShiftError, Where
+
+if TYPE_CHECKING:
+    from drivetwin.identify.method import Method
+    from drivetwin.identify.result import Identification
+    from drivetwin.logs.shiftlog import ShiftLog
+    from drivetwin.shifts.shift import RejectedShift
+    from drivetwin.twin import Twin
+    from drivetwin.vehicle.card import VehicleCard
+
+RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one log gave: the log and card themselves, the identification, its twin."""
+
+    log: ShiftLog
+    card: VehicleCard
+    found: Identification
+    twin: Twin
+
+
+def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outcome:
+    """Read, find shifts, identify, and validate by simulation.
+
+    Raises the typed errors of each stage; NoShiftError lists what was refused and why.
+    """
+    from drivetwin.identify.pipeline import identify
+    from drivetwin.shifts.find import find_shifts
+    from drivetwin.twin import Twin
+    from drivetwin.validate import validate, with_fit
+
+    with step(f"reading {log.name}"):
+        recording, card = load(log, vehicle, channels)
+        shifts = find_shifts(recording, card)
+        if not shifts.shifts:
+            raise no_shift(recording, shifts.rejected)
+    with step(f"identifying by the {method} method"):
+        found = identify(recording, card, shifts, method)
+        twin = Twin.from_identification(found, card)
+    with step("simulating the shifts"):
+        found = with_fit(found, [validate(twin, recording, shift) for shift in shifts.shifts])
+    return Outcome(recording, card, found, twin)
+
+
+def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
+    """Write result, twin and report into `folder`, all or none; returns their paths."""
+    from drivetwin.report.html import save_report
+    from drivetwin.results.result_file import save_result
+
+    with step("writing the report"), staged(folder) as beside:
+        save_result(beside / RESULT, outcome.found)
+        outcome.twin.save(beside / TWIN)
+        save_report(beside / REPORT, outcome.found, outcome.log)
+    return tuple(folder / name for name in (RESULT, TWIN, REPORT))
+
+
+def no_shift(log: ShiftLog, rejected: Sequence[RejectedShift]) -> NoShiftError:
+    """The error for a log without a usable shift, with the candidates and why they were refused."""
+    reasons = "; ".join(
+        f"{one.time[0]:.3f} s to {one.time[1]:.3f} s: {one.reason}" for one in rejected
+    )
+    return NoShiftError(
+        f"no usable gear shift; {reasons}" if reasons else "no gear shift: one gear throughout",
+        "record from a second before the torque phase to a second after lock-up; "
+        "check the ratios on the card and the speed channels with `drivetwin inspect`",
+        Where(file=log.source),
+    )

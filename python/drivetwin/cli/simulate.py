@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin simulate TWIN LOG`: the identified model driven by a log's inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load
+from drivetwin.cli.output import JsonFlag, print_json, say, show, step
+
+if TYPE_CHECKING:
+    from drivetwin.validate import Validation
+
+_SI = {"output_torque": "N*m", "input_speed": "rad/s", "output_speed": "rad/s"}
+
+
+def simulate(
+    twin: Annotated[Path, typer.Argument(metavar="TWIN", help="Identified model (twin.toml).")],
+    log: LogFile,
+    vehicle: VehicleFile,
+    channels: ChannelsFile = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE.csv", help="Where the traces go (SI)."),
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Simulate the shifts of a log with an identified model and compare.
+
+    Measured engine torque and pressures drive the model; the log may be another than the twin's.
+    """
+    from drivetwin.cli.pipeline import no_shift
+    from drivetwin.cli.tables import fit_table
+    from drivetwin.results.atomic import write_text
+    from drivetwin.shifts.find import find_shifts
+    from drivetwin.twin import Twin
+    from drivetwin.validate import validate
+
+    model = Twin.load(twin)
+    with step(f"simulating {log.name}"):
+        recording, card = load(log, vehicle, channels)
+        shifts = find_shifts(recording, card)
+        if not shifts.shifts:
+            raise no_shift(recording, shifts.rejected)
+        runs = [validate(model, recording, shift) for shift in shifts.shifts]
+    if output is not None:
+        write_text(output, traces_text(runs))
+    if as_json:
+        print_json({"shifts": [_document(run) for run in runs]})
+        return
+    for run in runs:
+        show(fit_table(run.fit, f"Shift {run.shift.start_gear}→{run.shift.end_gear}: {run.status}"))
+        for warning in run.warnings:
+            say(f"warning: {warning}")
+    if output is not None:
+        say(f"wrote {output}")
+
+
+def _document(run: Validation) -> dict[str, object]:
+    return {
+        "from": run.shift.start_gear,
+        "to": run.shift.end_gear,
+        "status": run.status,
+        "fit": {
+            signal: {phase: vars(fit) for phase, fit in phases.items()}
+            for signal, phases in run.fit.items()
+        },
+        "warnings": list(run.warnings),
+    }
+
+
+def traces_text(runs: Sequence[Validation]) -> str:
+    """CSV with a unit row: time and the simulated signals, SI, one shift after the other."""
+    names = ["time", *_SI]
+    lines = [",".join(names), ",".join(["s", *_SI.values()])]
+    for run in runs:
+        motion = run.trajectory
+        columns = (motion.time, motion.shaft_torque, motion.engine_speed, motion.output_speed)
+        lines += [",".join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""Tables of shifts, parameters and fits as the commands print them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from drivetwin.cli.numbers import percent, quantity, shown
+from drivetwin.cli.output import table_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from drivetwin.identify.result import Estimate, SignalFit
+    from drivetwin.shifts.shift import Shift
+
+_PHASES = ("all", "before", "torque", "inertia", "after")
+
+
+def shift_table(shifts: Sequence[Shift], source: str) -> Table:
+    """One row for each phase boundary pair of each shift."""
+    table = table_of(
+        f"Shifts in {source}", "shift", "phase", "from s", "to s", "± ms",
+        right=("from s", "to s", "± ms"),
+    )  # fmt: skip
+    for shift in shifts:
+        phases = (
+            (f"gear {shift.start_gear}, {shift.offgoing} locked", shift.before, None),
+            ("torque phase", shift.torque_phase, "torque_start"),
+            ("inertia phase", shift.inertia_phase, "inertia_start"),
+            (f"gear {shift.end_gear}, {shift.oncoming} locked", shift.after, "lockup"),
+        )
+        for index, (phase, (start, end), boundary) in enumerate(phases):
+            sigma = shift.sigma.get(boundary) if boundary else None
+            table.add_row(
+                f"{shift.start_gear}→{shift.end_gear} {shift.kind}" if index == 0 else "",
+                phase,
+                f"{start:.3f}",
+                f"{end:.3f}",
+                "" if sigma is None else f"{1e3 * sigma:.1f}",
+            )
+    return table
+
+
+def parameter_table(estimates: Mapping[str, Estimate], title: str) -> Table:
+    """Value, 95 % interval with sensor tolerances, unit and verdict of every parameter."""
+    table = table_of(
+        title, "parameter", "value", "95 %", "unit", "verdict", right=("value", "95 %")
+    )
+    for estimate in estimates.values():
+        value, interval, unit = shown(estimate.value, estimate.ci95_total, estimate.unit)
+        table.add_row(estimate.id, value, interval, unit, estimate.verdict.value)
+    return table
+
+
+def reasons(estimates: Mapping[str, Estimate]) -> list[str]:
+    """Why a verdict is not `identified`, one line for each reason given."""
+    return [f"{one.id}: {one.reason}" for one in estimates.values() if one.reason]
+
+
+def fit_table(fit: Mapping[str, Mapping[str, SignalFit]], title: str) -> Table:
+    """Fit in percent by phase, and the root mean square error over all of it in SI."""
+    table = table_of(title, "fit %", *_PHASES, "rmse", right=(*_PHASES, "rmse"))
+    for signal, phases in fit.items():
+        cells = [percent(phases[name].fit_percent if name in phases else None) for name in _PHASES]
+        rmse = phases["all"].rmse if "all" in phases else None
+        unit = "N*m" if signal.endswith("torque") else "rad/s"
+        table.add_row(signal, *cells, quantity(rmse, unit))
+    return table
