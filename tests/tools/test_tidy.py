@@ -57,6 +57,12 @@ def python_function(body_lines: int, arguments: str = "", docstring: str = "") -
             1,
         ),
         (
+            python_functions,
+            {"tests/a.py": "def test_f(a, b, c, d, e, f, g, h): ..."},
+            {"tests/a.py": "def f(a, b, c, d, e, f, g, h): ..."},
+            1,
+        ),
+        (
             rust_functions,
             {"a.rs": "fn f<F: Fn(f64, f64) -> (u8, u8)>(&mut self, a: [f64; 7], g: F) {}"},
             {"a.rs": "\nfn f(a: A, b: A, c: A, d: A, e: A, f: A, g: A, h: A) {}"},
