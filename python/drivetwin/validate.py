@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.driveline import DualClutch, Signal, Trajectory, simulate
-from drivetwin.held import fresh_samples
 from drivetwin.identify.result import FloatArray, Identification, SignalFit
+from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.shift import Shift
 from drivetwin.start_state import start_state
@@ -136,7 +136,7 @@ def _signal(channel: Channel) -> Signal:
 def _moved(channel: Channel, shift: float) -> Signal:
     """Fresh samples moved by `shift` [s]; the last value is held to the end of the channel."""
     fresh = fresh_samples(channel)
-    time, values = channel.time[fresh] + shift, channel.values[fresh]
+    time, values = fresh.time + shift, fresh.values
     if time[0] > channel.time[0]:
         time, values = np.append(channel.time[0], time), np.append(values[0], values)
     if time[-1] < channel.time[-1]:

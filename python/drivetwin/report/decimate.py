@@ -25,9 +25,7 @@ def envelope(
         return time, values
     bins = np.linspace(0, time.size, max_points // 4 + 1).astype(np.intp)
     kept = [
-        start + offset
-        for start, end in pairwise(bins)
-        for offset in _picked(values[start:end])
+        start + offset for start, end in pairwise(bins) for offset in _picked(values[start:end])
     ]
     return time[kept], values[kept]
 

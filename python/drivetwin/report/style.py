@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import plotly.graph_objects as go
+
 MEASURED = "#0072B2"
 SIMULATED = "#D55E00"
 FITTED = "#D55E00"
@@ -44,6 +46,7 @@ def axis(title: str, **extra: Any) -> dict[str, Any]:
 def layout(height: int, **extra: Any) -> dict[str, Any]:
     """Layout common to all figures; transparent, so that the page's theme shows through."""
     return {
+        "template": go.layout.Template(),
         "height": height,
         "margin": {"l": 70, "r": 20, "t": 30, "b": 50},
         "paper_bgcolor": "rgba(0,0,0,0)",

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""The report: one HTML file that opens offline; plotly.js stands in it exactly once."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from drivetwin.identify.result import Identification
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.report.sections.blocks import FigureBlock, Section
+from drivetwin.report.sections.evidence import evidence_sections
+from drivetwin.report.sections.provenance import limits_section, provenance_section
+from drivetwin.report.sections.story import friction_section, shift_section, validation_section
+from drivetwin.report.sections.trust import trust_section
+from drivetwin.results.atomic import write_text
+
+
+def save_report(path: Path, found: Identification, log: ShiftLog) -> None:
+    """Write the report of an identification; the file appears whole or not at all."""
+    write_text(path, render_report(found, log))
+
+
+def render_report(found: Identification, log: ShiftLog) -> str:
+    """HTML text of the report; equal inputs give equal text."""
+    shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in found.shifts)
+    return render_page(
+        title=f"Driveline model from {Path(log.source).name}",
+        subtitle=f"shift {shifts} · method {found.method.value} · loss law {found.loss_law}",
+        sections=report_sections(found, log),
+    )
+
+
+def report_sections(found: Identification, log: ShiftLog) -> list[Section]:
+    """All sections in reading order; those without content are left out."""
+    validations = tuple(found.evidence.get("validation", ()))
+    sections = [
+        trust_section(found),
+        shift_section(found, log),
+        *evidence_sections(found),
+        friction_section(found),
+        validation_section(validations),
+        limits_section(found),
+        provenance_section(found),
+    ]
+    return [section for section in sections if section.blocks]
+
+
+def render_page(title: str, subtitle: str, sections: list[Section]) -> str:
+    """Fill the page template; figures become JSON that the page's script draws."""
+    environment = Environment(
+        loader=PackageLoader("drivetwin.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["figure_json"] = figure_json
+    return environment.get_template("report.html.j2").render(
+        title=title,
+        subtitle=subtitle,
+        sections=sections,
+        style=_resource("report.css"),
+        script=_resource("report.js"),
+        plotly_js=Markup(get_plotlyjs()),
+    )
+
+
+def figure_json(block: FigureBlock) -> Markup:
+    """JSON of a figure, safe inside a script element."""
+    return Markup(block.figure.to_json().replace("<", "\\u003c"))
+
+
+def _resource(name: str) -> Markup:
+    return Markup(files("drivetwin.report").joinpath("templates", name).read_text("utf-8"))

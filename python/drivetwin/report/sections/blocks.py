@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""The few things a report page is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import plotly.graph_objects as go
+
+
+class Tone(StrEnum):
+    """How a cell, tile or note is coloured."""
+
+    PLAIN = "plain"
+    GOOD = "good"
+    DOUBTFUL = "doubtful"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One table cell; `number` cells are right-aligned, `badge` cells drawn as a coloured label."""
+
+    text: str
+    number: bool = False
+    badge: bool = False
+    tone: Tone = Tone.PLAIN
+    note: str = ""
+    """Smaller text under the cell's own."""
+
+
+@dataclass(frozen=True)
+class FigureBlock:
+    """A figure with its caption."""
+
+    figure: go.Figure
+    caption: str
+    kind: str = field(default="figure", init=False)
+
+
+@dataclass(frozen=True)
+class TableBlock:
+    """A table with its caption."""
+
+    caption: str
+    head: Sequence[Cell]
+    rows: Sequence[Sequence[Cell]]
+    kind: str = field(default="table", init=False)
+
+
+@dataclass(frozen=True)
+class NotesBlock:
+    """A list of sentences under a heading."""
+
+    heading: str
+    items: Sequence[str]
+    tone: Tone = Tone.PLAIN
+    kind: str = field(default="notes", init=False)
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One figure of merit on the first page."""
+
+    label: str
+    value: str
+    tone: Tone = Tone.PLAIN
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class TilesBlock:
+    """Figures of merit side by side."""
+
+    tiles: Sequence[Tile]
+    kind: str = field(default="tiles", init=False)
+
+
+Block = FigureBlock | TableBlock | NotesBlock | TilesBlock
+
+
+@dataclass(frozen=True)
+class Section:
+    """A titled part of the report; `anchor` is its address in the page."""
+
+    anchor: str
+    title: str
+    intro: str
+    blocks: Sequence[Block]
+
+
+def cells(*texts: str, number: bool = False) -> tuple[Cell, ...]:
+    """Plain cells of one row."""
+    return tuple(Cell(text, number=number) for text in texts)

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: MIT
+"""The story of an identification: the log and its shift, simulation over measurement."""
+
+from __future__ import annotations
+
+from drivetwin.identify.result import Identification
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.report.figures.friction import friction_figure
+from drivetwin.report.figures.shift_phases import shift_phases
+from drivetwin.report.figures.validation import validation_figure
+from drivetwin.report.sections.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    NotesBlock,
+    Section,
+    TableBlock,
+    Tone,
+    cells,
+)
+from drivetwin.report.units import significant
+from drivetwin.shifts.shift import Shift
+from drivetwin.validate import Validation
+
+PHASE_KEY = (
+    "1 gear held before the shift · 2 torque phase: the on-coming element takes over torque, the "
+    "output torque dips · 3 inertia phase: the input speed falls to the new gear · 4 new gear "
+    "locked, lock-up oscillation."
+)
+
+
+def shift_section(found: Identification, log: ShiftLog) -> Section:
+    """Measured signals with the detected phases, one figure per shift."""
+    blocks: list[Block] = []
+    for shift in found.shifts:
+        title = f"Shift {shift.start_gear}→{shift.end_gear}, {shift.kind.value}. "
+        blocks.append(FigureBlock(shift_phases(log, shift), title + PHASE_KEY))
+        blocks.append(_phase_table(shift))
+        if shift.warnings:
+            blocks.append(NotesBlock("About this shift", shift.warnings, Tone.DOUBTFUL))
+    if found.rejected:
+        texts = [f"{r.time[0]:.2f} to {r.time[1]:.2f} s: {r.reason}" for r in found.rejected]
+        blocks.append(NotesBlock("Not used", texts))
+    return Section(
+        "shift",
+        "The log and its phases",
+        "What was measured, and where the shift was found in it.",
+        blocks,
+    )
+
+
+def _phase_table(shift: Shift) -> TableBlock:
+    spans = (
+        ("1 gear held", shift.before, None),
+        ("2 torque phase", shift.torque_phase, "torque_start"),
+        ("3 inertia phase", shift.inertia_phase, "inertia_start"),
+        ("4 new gear locked", (shift.lockup_time, shift.after[1]), "lockup"),
+    )
+    rows = []
+    for label, (start, end), boundary in spans:
+        sigma = shift.sigma.get(boundary) if boundary else None
+        doubt = f"± {significant(1.96e3 * sigma, 2)} ms" if sigma else ""
+        rows.append(
+            (
+                Cell(label),
+                Cell(f"{start:.3f} s", number=True),
+                Cell(doubt, number=True),
+                Cell(f"{end:.3f} s", number=True),
+                Cell(f"{1e3 * (end - start):.0f} ms", number=True),
+            )
+        )
+    head = (
+        Cell("phase"),
+        Cell("starts", number=True),
+        Cell("± 95 %", number=True),
+        Cell("ends", number=True),
+        Cell("lasts", number=True),
+    )
+    elements = f"{shift.offgoing} off-going, {shift.oncoming} on-coming."
+    return TableBlock(
+        f"Phases of shift {shift.start_gear}→{shift.end_gear}: {elements}", head, rows
+    )
+
+
+def friction_section(found: Identification) -> Section:
+    """μ over slip of every element that slipped under load."""
+    blocks: list[Block] = []
+    for element, curve in found.friction.items():
+        caption = f"Friction of {element}, method: {curve.method}. "
+        blocks.append(
+            FigureBlock(friction_figure(element, curve), caption + _law_text(curve.stribeck))
+        )
+    return Section(
+        "friction",
+        "Friction of the on-coming element",
+        "The clutch torque follows from the output torque (eq. 16, with the output side's "
+        "inertia), the slip from both speeds (eq. 15); μ = T_c / (N·D·A·r·(P − P0)). Only the product of μ "
+        "and N·D·A·r can be told from a log: an error of the geometry scales the whole curve.",
+        blocks,
+    )
+
+
+def _law_text(law: dict[str, float] | None) -> str:
+    if law is None:
+        return "No Stribeck law fits within the range seen; the smoothed curve is used."
+    return (
+        f"Stribeck law μ(s) = μ_c + (μ_s − μ_c)·exp(−|s|/v_s) + μ_v·|s| with "
+        f"μ_c = {significant(law['mu_c'])}, μ_s = {significant(law['mu_s'])}, "
+        f"v_s = {significant(law['v_s'], 3)} rad/s, μ_v = {significant(law['mu_v'], 3)} s/rad."
+    )
+
+
+def validation_section(validations: tuple[Validation, ...]) -> Section:
+    """Simulation over measurement (Fig. 11)."""
+    blocks: list[Block] = []
+    for one in validations:
+        shift = one.shift
+        text = (
+            f"Shift {shift.start_gear}→{shift.end_gear}: the measured engine torque and pressures "
+            "drive the identified model; nothing else is fed in after the start. Below each output "
+            "stands what is left, measured minus simulated."
+        )
+        blocks.append(FigureBlock(validation_figure(one), text))
+        blocks.append(_event_table(one))
+    return Section(
+        "validation",
+        "Simulation over measurement",
+        "The proof of the model: does it do what the vehicle did?",
+        blocks,
+    )
+
+
+def _event_table(validation: Validation) -> TableBlock:
+    rows = [
+        cells(f"{event.time:.4f} s", event.element, event.kind.replace("_", " "))
+        for event in validation.trajectory.events
+    ]
+    return TableBlock(
+        f"Events of the simulation (status: {validation.status}).",
+        cells("time", "element", "event"),
+        rows,
+    )

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""First page: can I trust this model?"""
+
+from __future__ import annotations
+
+import math
+
+from drivetwin.identify.result import Estimate, Identification, SignalFit, Verdict
+from drivetwin.parameters import spec_of
+from drivetwin.report.figures.parameters import interval_figure
+from drivetwin.report.sections.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    NotesBlock,
+    Section,
+    TableBlock,
+    Tile,
+    TilesBlock,
+    Tone,
+)
+from drivetwin.report.units import NM, RPM, Display, display_of, significant, with_uncertainty
+
+TONES = {
+    Verdict.IDENTIFIED: Tone.GOOD,
+    Verdict.WEAK: Tone.DOUBTFUL,
+    Verdict.NOT_IDENTIFIABLE: Tone.UNKNOWN,
+}
+SIGNALS: dict[str, tuple[str, Display]] = {
+    "output_torque": ("output torque", NM),
+    "input_speed": ("input speed", RPM),
+    "output_speed": ("output speed", RPM),
+}
+PHASES = {
+    "all": "whole",
+    "before": "1 before",
+    "torque": "2 torque phase",
+    "inertia": "3 inertia phase",
+    "after": "4 after lock-up",
+}
+
+
+def trust_section(found: Identification) -> Section:
+    """Verdicts, agreement and warnings at a glance, then the parameter table."""
+    blocks: list[Block] = [TilesBlock(_tiles(found))]
+    if found.warnings:
+        blocks.append(NotesBlock("Warnings", found.warnings, Tone.DOUBTFUL))
+    blocks.append(parameter_table(found))
+    if found.fit:
+        blocks.append(fit_table(found))
+    blocks.append(
+        FigureBlock(
+            interval_figure(found.estimates),
+            "How narrowly each parameter is known. Bars: sensor noise together with the gain and "
+            "offset tolerances on the vehicle card; marks: noise alone.",
+        )
+    )
+    return Section("trust", "Can I trust this model?", _headline(found), blocks)
+
+
+def _headline(found: Identification) -> str:
+    count = dict.fromkeys(Verdict, 0)
+    for estimate in found.estimates.values():
+        count[estimate.verdict] += 1
+    text = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)} parameters are identified"
+    if count[Verdict.WEAK]:
+        text += f", {count[Verdict.WEAK]} only weakly"
+    if count[Verdict.NOT_IDENTIFIABLE]:
+        text += f", {count[Verdict.NOT_IDENTIFIABLE]} cannot be told from this log"
+    text += "."
+    fit = found.fit.get("output_torque", {}).get("all")
+    if fit is not None and math.isfinite(fit.fit_percent):
+        text += (
+            f" Driven by the measured inputs alone, the model reproduces the output torque with a "
+            f"fit of {significant(fit.fit_percent, 3)} %."
+        )
+    return text
+
+
+def _tiles(found: Identification) -> list[Tile]:
+    tiles = []
+    for name, (label, display) in SIGNALS.items():
+        fit = found.fit.get(name, {}).get("all")
+        if fit is not None:
+            note = f"rmse {significant(fit.rmse * display.factor, 3)} {display.label}"
+            tiles.append(Tile(f"fit of {label}", _percent(fit), _fit_tone(fit), note))
+    told = [one for one in found.estimates.values() if one.verdict is Verdict.IDENTIFIED]
+    complete = len(told) == len(found.estimates)
+    tiles.append(
+        Tile(
+            "identified",
+            f"{len(told)} of {len(found.estimates)}",
+            Tone.GOOD if complete else Tone.DOUBTFUL,
+            "parameters",
+        )
+    )
+    tone = Tone.DOUBTFUL if found.warnings else Tone.GOOD
+    tiles.append(Tile("warnings", str(len(found.warnings)), tone))
+    return tiles
+
+
+def parameter_table(found: Identification) -> TableBlock:
+    """All parameters with their intervals and verdicts."""
+    head = (
+        Cell("parameter"),
+        Cell("value", number=True),
+        Cell("± 95 %", number=True, note="sensors included"),
+        Cell("± 95 %", number=True, note="noise alone"),
+        Cell("unit"),
+        Cell("verdict"),
+        Cell("method"),
+    )
+    return TableBlock(
+        "Identified parameters.", head, [_parameter_row(one) for one in found.estimates.values()]
+    )
+
+
+def _parameter_row(estimate: Estimate) -> tuple[Cell, ...]:
+    spec = spec_of(estimate.id)
+    display = display_of(estimate.unit)
+    value, total = _shown(estimate, estimate.std_total, display)
+    _, noise = _shown(estimate, estimate.std_noise, display)
+    suffix = estimate.id.removeprefix(spec.stem).lstrip("_.")
+    label = f"{spec.symbol} ({suffix})" if suffix else spec.symbol
+    return (
+        Cell(label, note=f"{spec.meaning} · {estimate.id}"),
+        Cell(value, number=True),
+        Cell(total, number=True),
+        Cell(noise, number=True),
+        Cell(display.label),
+        Cell(estimate.verdict.value, badge=True, tone=TONES[estimate.verdict]),
+        Cell(estimate.method),
+    )
+
+
+def _shown(estimate: Estimate, std: float | None, display: Display) -> tuple[str, str]:
+    if estimate.value is None:
+        return "–", "–"
+    half = None if std is None else 1.96 * std * display.factor
+    value, width = with_uncertainty(estimate.value * display.factor, half)
+    return value, width or "–"
+
+
+def fit_table(found: Identification) -> TableBlock:
+    """Fit % and rmse by signal and phase."""
+    head = [Cell("signal"), *(Cell(label, number=True) for label in PHASES.values())]
+    rows = []
+    for name, (label, display) in SIGNALS.items():
+        if name not in found.fit:
+            continue
+        fits = [found.fit[name].get(phase) for phase in PHASES]
+        rows.append([Cell(label), *(_fit_cell(fit, display) for fit in fits)])
+    return TableBlock(
+        "Simulation against measurement: fit % = 100·(1 − ‖y − ŷ‖ / ‖y − mean(y)‖), the mean taken "
+        "over the whole log for every phase; root mean square error below.",
+        head,
+        rows,
+    )
+
+
+def _fit_cell(fit: SignalFit | None, display: Display) -> Cell:
+    if fit is None:
+        return Cell("–", number=True)
+    note = f"{significant(fit.rmse * display.factor, 3)} {display.label}"
+    return Cell(_percent(fit), number=True, note=note)
+
+
+def _percent(fit: SignalFit) -> str:
+    return f"{fit.fit_percent:.1f} %" if math.isfinite(fit.fit_percent) else "–"
+
+
+def _fit_tone(fit: SignalFit) -> Tone:
+    return Tone.GOOD if fit.fit_percent >= 80.0 else Tone.DOUBTFUL

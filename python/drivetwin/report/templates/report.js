@@ -1,0 +1,41 @@
+"use strict";
+(() => {
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const plots = [];
+
+  /* Colours of text, grid and buttons; traces keep theirs, which read on both grounds. */
+  function theme(layout, isDark) {
+    const ink = isDark ? "#dfe3e9" : "#2a313b";
+    const change = {
+      "font.color": ink,
+      "hoverlabel.bgcolor": isDark ? "#232a34" : "#ffffff",
+      "hoverlabel.font.color": ink,
+    };
+    (layout.updatemenus || []).forEach((_, index) => {
+      change[`updatemenus[${index}].bgcolor`] = isDark ? "#232a34" : "#ffffff";
+      change[`updatemenus[${index}].bordercolor`] = isDark ? "#475060" : "#c3cad4";
+      change[`updatemenus[${index}].font.color`] = ink;
+    });
+    return change;
+  }
+
+  function paint(isDark) {
+    return Promise.all(plots.map((plot) => Plotly.relayout(plot, theme(plot.layout, isDark))));
+  }
+
+  const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
+  document.querySelectorAll(".plot").forEach((plot) => {
+    const source = plot.querySelector("script");
+    const figure = JSON.parse(source.textContent);
+    source.remove();
+    plots.push(plot);
+    Plotly.newPlot(plot, figure.data, figure.layout, options);
+  });
+  paint(dark.matches);
+  dark.addEventListener("change", (event) => paint(event.matches));
+  window.addEventListener("beforeprint", () => {
+    paint(false);
+    plots.forEach((plot) => Plotly.Plots.resize(plot));
+  });
+  window.addEventListener("afterprint", () => paint(dark.matches));
+})();

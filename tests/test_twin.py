@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""The twin: built from an identification, saved, loaded, turned into a model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.driveline import FrictionTable, Stribeck
+from drivetwin.errors import InputError, MissingParameterError, ResultFileError
+from drivetwin.twin import Twin
+from tests.report.sample import SHIFT, STRIBECK, card, identification
+
+
+@pytest.fixture
+def twin() -> Twin:
+    return Twin.from_identification(identification(), card())
+
+
+def test_identifiable_engine_side_inertia_is_kept(twin: Twin) -> None:
+    model = twin.dual_clutch(SHIFT)
+    J_prime = twin.parameters["J_prime_2"].value
+    assert J_prime is not None
+    i_g = card().ratio("2")
+    assert model.J1 * model.eta + model.J2e + model.J_out / i_g**2 == pytest.approx(J_prime)
+    assert model.load.constant == pytest.approx(2300.0 * 5.38)
+
+
+def test_locked_ratios_are_those_of_the_gears(twin: Twin) -> None:
+    offgoing, oncoming = twin.dual_clutch(SHIFT).elements
+    assert (offgoing.name, oncoming.name) == ("B2", "B3")
+    assert offgoing.i_c * offgoing.i_out == pytest.approx(1.91)
+    assert oncoming.i_c * oncoming.i_out == pytest.approx(1.43)
+    assert oncoming.drum_inertia == 0.05
+
+
+def test_element_without_a_curve_runs_on_its_partners_and_says_so(twin: Twin) -> None:
+    offgoing, oncoming = twin.dual_clutch(SHIFT).elements
+    assert offgoing.friction == oncoming.friction == Stribeck(**STRIBECK)
+    assert "friction of B2 is taken to be that of B3" in twin.assumptions
+
+
+def test_curve_without_a_law_becomes_a_table_from_zero_slip(twin: Twin) -> None:
+    curve = replace(twin.friction["B3"], stribeck=None)
+    model = replace(twin, friction={"B3": curve}).dual_clutch(SHIFT)
+    table = model.elements[1].friction
+    assert isinstance(table, FrictionTable)
+    assert table.slip[0] == 0.0
+    assert table.mu[0] == curve.mu[0]
+    assert table.slip[1:] == tuple(curve.slip)
+
+
+def test_identified_fill_pressure_goes_before_the_cards(twin: Twin) -> None:
+    offgoing, oncoming = twin.dual_clutch(SHIFT).elements
+    assert (offgoing.P0, oncoming.P0) == (8e4, 8.2e4)
+    assert twin.dual_clutch(SHIFT, overrides={"P0.B3": 9e4}).elements[1].P0 == 9e4
+
+
+def test_missing_parameter_is_named_with_its_reason(twin: Twin) -> None:
+    told = dict(twin.parameters)
+    told["k_o"] = replace(told["te_delay"], id="k_o", reason="no oscillation after lock-up")
+    del told["eta"]
+    partial = replace(twin, parameters=told)
+    with pytest.raises(MissingParameterError) as caught:
+        partial.dual_clutch(SHIFT)
+    assert "k_o (no oscillation after lock-up)" in str(caught.value)
+    assert "eta (not part of the identification)" in str(caught.value)
+    model = partial.dual_clutch(SHIFT, overrides={"k_o": 1.8e5, "eta": 0.9})
+    assert (model.k_o, model.eta) == (1.8e5, 0.9)
+
+
+def test_unknown_gear_is_refused_with_the_known_ones(twin: Twin) -> None:
+    with pytest.raises(InputError, match="use one of 2, 3"):
+        twin.gear("7")
+
+
+def test_covariance_is_total(twin: Twin) -> None:
+    assert twin.covariance is not None
+    stds = [twin.parameters[name].std_total for name in twin.covariance_ids]
+    assert np.sqrt(np.diag(twin.covariance)) == pytest.approx(stds)
+    assert twin.covariance[0, 1] == pytest.approx(0.6 * (stds[0] or 0.0) * (stds[1] or 0.0))
+
+
+def test_round_trip(twin: Twin, tmp_path: Path) -> None:
+    twin.save(tmp_path / "twin.toml")
+    back = Twin.load(tmp_path / "twin.toml")
+    assert back.dual_clutch(SHIFT) == twin.dual_clutch(SHIFT)
+    assert back.parameters["te_delay"] == twin.parameters["te_delay"]
+    assert back.covariance == pytest.approx(twin.covariance)
+    assert back.gears == twin.gears
+    assert back.validity == twin.validity
+    assert back.inputs == twin.inputs
+    back.save(tmp_path / "again.toml")
+    assert Twin.load(tmp_path / "again.toml").dual_clutch(SHIFT) == twin.dual_clutch(SHIFT)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("schema = 'drivetwin/twin-2'", "newer"),
+        ("schema = 'other'", "expected 'drivetwin/twin-1'"),
+        ("schema = 'drivetwin/twin-1'", "cannot be read as a twin"),
+        ("not toml", "cannot be read as a twin"),
+    ],
+)
+def test_damaged_or_newer_files_are_refused(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "twin.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ResultFileError, match=says):
+        Twin.load(path)
