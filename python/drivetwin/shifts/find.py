@@ -109,9 +109,9 @@ def _unfinished(search: _Search, runs: list[Run], index: int) -> str:
         return ""
     ratio = _ratio(speeds, run.first, run.last)
     measured = f"measured ratio {ratio.min():.4g} to {ratio.max():.4g}"
-    if np.ptp(np.percentile(ratio, [5, 95])) < _STEADY * np.median(ratio):
-        gears = ", ".join(f"{name} {value:.4g}" for name, value in search.ratios.items())
-        return f"steady ratio {np.median(ratio):.4g} matches no gear of the card ({gears})"
+    resting = _resting_ratio(search, start, end)
+    if resting is not None:
+        return f"steady ratio {resting:.4g} matches no gear of the card ({_gear_list(search)})"
     if before is None and after is None:
         return f"no gear of the card is held; {measured}"
     if before is None:
@@ -131,25 +131,21 @@ def _shift(search: _Search, before: Run, after: Run) -> Shift:
     """Build the shift between two gears held, or say with _NoShiftError why there is none."""
     speeds, settings = search.speeds, search.settings
     start_gear, end_gear = before.gear or "", after.gear or ""
-    between = speeds.time[before.last : after.first + 1]
     if start_gear == end_gear:
         raise _NoShiftError(f"gear {start_gear} slips and is held again: no change of gear")
-    if between[-1] - between[0] > settings.max_inertia_phase:
-        raise _NoShiftError(
-            f"{between[-1] - between[0]:.2f} s without gear between {start_gear} and {end_gear}, "
-            f"more than max_inertia_phase = {settings.max_inertia_phase:g} s"
-        )
     begin = break_away(
         speeds, search.ratios[start_gear], (before.first, before.last), after.first, settings
     )
     lock = lock_up(
         speeds, search.ratios[end_gear], (after.first, after.last), before.last, settings
     )
+    if begin is None or lock is None:
+        what = "break-away of the off-going" if begin is None else "lock-up of the on-coming"
+        raise _NoShiftError(f"the {what} element cannot be located in its slip")
     _check_inertia_phase(search, begin, lock)
-    assert begin is not None
-    assert lock is not None
     offgoing, oncoming = search.card.element_of(start_gear), search.card.element_of(end_gear)
-    span = (float(speeds.time[before.first]), float(speeds.time[after.last]))
+    _check_passage(search, begin, lock)
+    span = _usable(search, before, after)
     kind, warnings = shift_kind(
         search.log, search.ratios[start_gear] > search.ratios[end_gear], begin.time
     )
@@ -175,10 +171,7 @@ def _shift(search: _Search, before: Run, after: Run) -> Shift:
     )
 
 
-def _check_inertia_phase(search: _Search, begin: Boundary | None, lock: Boundary | None) -> None:
-    if begin is None or lock is None:
-        what = "break-away of the off-going" if begin is None else "lock-up of the on-coming"
-        raise _NoShiftError(f"the {what} element cannot be located in its slip")
+def _check_inertia_phase(search: _Search, begin: Boundary, lock: Boundary) -> None:
     time = search.speeds.time
     inside = int(np.count_nonzero((time > begin.time) & (time < lock.time)))
     if inside < search.settings.min_inertia_samples:
@@ -189,6 +182,46 @@ def _check_inertia_phase(search: _Search, begin: Boundary | None, lock: Boundary
     gap = float(np.diff(time[(time >= begin.time) & (time <= lock.time)]).max())
     if gap > 10.0 * search.speeds.step and gap > 0.2 * (lock.time - begin.time):
         raise _NoShiftError(f"the speeds are missing for {gap:.3f} s of the inertia phase")
+
+
+def _check_passage(search: _Search, begin: Boundary, lock: Boundary) -> None:
+    """Refuse what takes too long, and what rests at a ratio that the card does not have."""
+    taken, longest = lock.time - begin.time, search.settings.max_inertia_phase
+    resting = _resting_ratio(search, begin.time, lock.time)
+    if resting is not None:
+        raise _NoShiftError(
+            f"between the gears the ratio rests at {resting:.4g}, "
+            f"which is no gear of the card ({_gear_list(search)})"
+        )
+    if taken > longest:
+        raise _NoShiftError(
+            f"{taken:.2f} s from break-away to lock-up, more than max_inertia_phase = {longest:g} s"
+        )
+
+
+def _resting_ratio(search: _Search, start: float, end: float) -> float | None:
+    """First ratio held steadily for twice `min_hold` between two times [s], or None."""
+    speeds, window = search.speeds, 2.0 * search.settings.min_hold
+    for begin in np.arange(start, end - window, 0.5 * window):
+        first, stop = np.searchsorted(speeds.time, [begin, begin + window])
+        if stop - first < search.settings.min_inertia_samples:
+            continue
+        ratio = _ratio(speeds, int(first), int(stop) - 1)
+        if np.ptp(np.percentile(ratio, [5, 95])) < _STEADY * np.median(ratio):
+            return float(np.median(ratio))
+    return None
+
+
+def _usable(search: _Search, before: Run, after: Run) -> tuple[float, float]:
+    """Times from and to which the two gears are held; clear of slip where a run was cut."""
+    time, settle = search.speeds.time, search.settings.settle
+    start = time[before.first] + (settle if before.first > 0 else 0.0)
+    end = time[after.last] - (settle if after.last < len(time) - 1 else 0.0)
+    return float(start), float(end)
+
+
+def _gear_list(search: _Search) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in search.ratios.items())
 
 
 def _torque_start(

@@ -78,7 +78,10 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
 
 
 def _finite(channel: Channel) -> tuple[FloatArray, FloatArray]:
+    """Time and value of the numbers in a channel, of a held one its fresh values only."""
     keep = np.isfinite(channel.values)
+    if channel.held:
+        keep[1:] &= np.diff(channel.values) != 0.0
     if np.count_nonzero(keep) < 2:
         raise MissingChannelError(
             f"channel for {channel.role!r} holds fewer than two numbers",

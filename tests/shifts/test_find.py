@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: MIT
+"""Shift detection on made drives: boundaries within their sigma, candidates refused with reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivetwin.errors import InputError, MissingChannelError
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.shifts.find import find_shifts
+from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.shifts.shift import Shift, ShiftKind
+from tests.shifts.made import P0_MADE, Plan, make_card, make_log
+
+_UP = Plan(gears=(("2", 1.91), ("3", 1.43)), break_aways=(1.5,))
+
+
+def _only(plan: Plan) -> Shift:
+    shifts, rejected = find_shifts(plan.log(), plan.card())
+    assert rejected == ()
+    assert len(shifts) == 1
+    return shifts[0]
+
+
+def _without(log: ShiftLog, *roles: str) -> ShiftLog:
+    return replace(log, channels={r: c for r, c in log.channels.items() if r not in roles})
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(
+    ratio=st.floats(0.6, 4.0),
+    ratio_step=st.floats(1.2, 1.9),
+    up=st.booleans(),
+    start=st.floats(1.0, 2.0),
+    duration=st.floats(0.2, 0.8),
+    noise=st.floats(0.0, 0.5),
+    step=st.sampled_from([1e-3, 2e-3, 5e-3, 1e-2]),
+    seed=st.integers(0, 2**16),
+)
+def test_boundaries_lie_within_their_sigma(
+    ratio: float,
+    ratio_step: float,
+    up: bool,
+    start: float,
+    duration: float,
+    noise: float,
+    step: float,
+    seed: int,
+) -> None:
+    pair = (("3", ratio * ratio_step), ("4", ratio))
+    plan = Plan(
+        gears=pair if up else pair[::-1],
+        break_aways=(start,),
+        duration=duration,
+        noise=noise,
+        step=step,
+        seed=seed,
+    )
+    shift = _only(plan)
+    assert (shift.start_gear, shift.end_gear) == tuple(name for name, _ in plan.gears)
+    assert abs(shift.lockup_time - start - duration) < 4.0 * shift.sigma["lockup"] + 1e-4
+    assert abs(shift.inertia_phase[0] - start) < 4.5 * shift.sigma["inertia_start"] + 1e-4
+    # No boundary is vaguer than what a reader would see in the plot.
+    assert shift.sigma["lockup"] < 0.1 * duration + step
+
+
+def test_phases_join_and_are_named() -> None:
+    shift = _only(replace(_UP, noise=0.05))
+    assert (shift.offgoing, shift.oncoming) == ("B2", "B3")
+    assert shift.kind is ShiftKind.POWER_ON_UP
+    assert shift.before[0] == 0.0
+    assert shift.before[1] == shift.torque_phase[0]
+    assert shift.torque_phase[1] == shift.inertia_phase[0]
+    assert shift.inertia_phase[1] == shift.lockup_time == shift.after[0]
+    assert shift.after[1] == pytest.approx(4.0, abs=2e-3)
+    assert shift.torque_phase[0] == pytest.approx(1.35, abs=3 * shift.sigma["torque_start"])
+    assert shift.sigma["torque_start"] < 0.01
+    assert shift.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("up", "torque", "kind"),
+    [
+        (True, 1500.0, ShiftKind.POWER_ON_UP),
+        (True, -200.0, ShiftKind.POWER_OFF_UP),
+        (False, 1500.0, ShiftKind.POWER_ON_DOWN),
+        (False, -200.0, ShiftKind.POWER_OFF_DOWN),
+    ],
+)
+def test_kind(up: bool, torque: float, kind: ShiftKind) -> None:
+    gears = _UP.gears if up else _UP.gears[::-1]
+    assert _only(replace(_UP, gears=gears, engine_torque=torque)).kind is kind
+
+
+def test_several_shifts_share_the_gear_between() -> None:
+    plan = Plan(
+        gears=(("2", 1.91), ("3", 1.43), ("4", 1.0), ("3", 1.43)),
+        break_aways=(1.0, 2.2, 3.4),
+        end=5.0,
+        noise=0.1,
+    )
+    shifts, rejected = find_shifts(plan.log(), plan.card())
+    assert rejected == ()
+    assert [(s.start_gear, s.end_gear) for s in shifts] == [("2", "3"), ("3", "4"), ("4", "3")]
+    for earlier, later in pairwise(shifts):
+        assert earlier.after[1] <= later.torque_phase[0]
+        assert later.before[0] == pytest.approx(earlier.lockup_time + ShiftSettings().settle)
+
+
+def test_engine_and_wheel_speed_stand_in_with_warnings() -> None:
+    log = _UP.log()
+    card = _UP.card()
+    engine, output = log["input_speed"], log["output_speed"]
+    stand_in = make_log(
+        {
+            "engine_speed": (engine.time, engine.values),
+            "wheel_speed": (output.time, output.values / card.final_drive),
+        }
+    )
+    (shift,), _ = find_shifts(stand_in, card)
+    assert shift.lockup_time == pytest.approx(1.85, abs=2e-3)
+    text = " ".join(shift.warnings)
+    assert "engine speed" in text
+    assert "wheel speed" in text
+    assert "power state" in text
+
+
+def test_torque_phase_from_output_torque_without_pressures() -> None:
+    log = _without(_UP.log(), "pressure.B2", "pressure.B3")
+    (shift,), _ = find_shifts(log, _UP.card())
+    assert shift.torque_phase[0] == pytest.approx(1.35, abs=0.01)
+    assert any("output torque" in warning for warning in shift.warnings)
+
+
+def test_torque_phase_unknown_is_said_with_a_wide_sigma() -> None:
+    log = _without(_UP.log(), "pressure.B2", "pressure.B3", "output_torque")
+    (shift,), _ = find_shifts(log, _UP.card())
+    assert shift.torque_phase[0] == shift.torque_phase[1] == shift.inertia_phase[0]
+    assert shift.sigma["torque_start"] >= ShiftSettings().unknown_torque_phase
+    assert any("torque phase set empty" in warning for warning in shift.warnings)
+
+
+def test_oncoming_element_that_takes_hold_after_break_away() -> None:
+    log = _UP.log()
+    late = log["pressure.B3"]
+    shifted = np.interp(late.time - 0.3, late.time, late.values)
+    channels = {**log.channels, "pressure.B3": replace(late, values=shifted)}
+    (shift,), _ = find_shifts(replace(log, channels=channels), _UP.card())
+    assert shift.torque_phase[0] == shift.inertia_phase[0]
+    assert any("after break-away" in warning for warning in shift.warnings)
+
+
+def test_ratio_off_the_card_is_warned_of() -> None:
+    (shift,), _ = find_shifts(_UP.log(), make_card({"2": 1.92, "3": 1.43}))
+    assert any("gear 2 is 1.91, the card says 1.92" in warning for warning in shift.warnings)
+
+
+def test_gap_and_spikes_outside_the_shift_do_no_harm() -> None:
+    log = replace(_UP, noise=0.05).log()
+    speed = log["input_speed"]
+    values = speed.values.copy()
+    values[700:760] = np.nan
+    values[[200, 900, 2600]] = 1e4
+    (shift,), rejected = find_shifts(
+        replace(log, channels={**log.channels, "input_speed": replace(speed, values=values)}),
+        _UP.card(),
+    )
+    assert rejected == ()
+    assert shift.lockup_time == pytest.approx(1.85, abs=2e-3)
+
+
+def _refused(log: ShiftLog, ratios: dict[str, float]) -> str:
+    shifts, rejected = find_shifts(log, make_card(ratios))
+    assert shifts == ()
+    assert rejected
+    return " | ".join(candidate.reason for candidate in rejected)
+
+
+def _cut(log: ShiftLog, start: float, end: float) -> ShiftLog:
+    channels = {}
+    for role, channel in log.channels.items():
+        keep = (channel.time >= start) & (channel.time < end)
+        channels[role] = replace(channel, time=channel.time[keep], values=channel.values[keep])
+    return replace(log, channels=channels)
+
+
+_CARD = {"2": 1.91, "3": 1.43}
+
+
+def test_refused_gear_missing_on_the_card() -> None:
+    assert "steady ratio 1.91 matches no gear" in _refused(_UP.log(), {"3": 1.43, "4": 1.0})
+    three = Plan(gears=(("2", 1.91), ("3", 1.43), ("4", 1.0)), break_aways=(1.0, 2.0))
+    assert "rests at 1.43" in _refused(three.log(), {"2": 1.91, "4": 1.0})
+
+
+def test_refused_never_locks() -> None:
+    assert "does not lock" in _refused(_cut(_UP.log(), 0.0, 1.75), _CARD)
+
+
+def test_refused_nothing_before() -> None:
+    assert "no gear is held before gear 3" in _refused(_cut(_UP.log(), 1.6, 4.0), _CARD)
+    assert "before the torque phase" in _refused(_cut(_UP.log(), 1.3, 4.0), _CARD)
+
+
+def test_refused_too_short() -> None:
+    assert "too short" in _refused(replace(_UP, duration=0.02, step=0.01).log(), _CARD)
+
+
+def test_refused_pressure_below_P0() -> None:
+    log = _UP.log()
+    low = replace(log["pressure.B3"], values=0.1 * log["pressure.B3"].values)
+    assert low.values.max() < P0_MADE
+    text = _refused(replace(log, channels={**log.channels, "pressure.B3": low}), _CARD)
+    assert "pressures contradict" in text
+    assert "B3" in text
+
+
+def test_refused_slip_without_change_of_gear() -> None:
+    plan = Plan(gears=(("2", 1.91), ("3", 1.7), ("2", 1.91)), break_aways=(1.5, 1.75), duration=0.3)
+    assert "held again" in _refused(plan.log(), {"2": 1.91, "4": 1.0})
+
+
+def test_refused_long_neutral() -> None:
+    plan = replace(_UP, duration=6.0, end=9.0)
+    assert "max_inertia_phase" in _refused(plan.log(), _CARD)
+
+
+def test_standstill_and_steady_gear_hold_no_candidate() -> None:
+    time = np.arange(0.0, 3.0, 1e-3)
+    output = np.clip(60.0 * (time - 1.0), 0.0, 90.0)
+    idle = np.maximum(1.91 * output, 0.0)
+    log = make_log({"input_speed": (time, idle), "output_speed": (time, output)})
+    assert find_shifts(log, make_card(_CARD)) == ((), ())
+
+
+def test_missing_speed_is_a_typed_error() -> None:
+    with pytest.raises(MissingChannelError, match="output_speed"):
+        find_shifts(_without(_UP.log(), "output_speed"), _UP.card())
+    with pytest.raises(MissingChannelError, match="input_speed"):
+        find_shifts(_without(_UP.log(), "input_speed"), _UP.card())
+
+
+def test_settings_must_be_positive() -> None:
+    with pytest.raises(InputError, match="min_hold"):
+        ShiftSettings(min_hold=0.0)
