@@ -24,7 +24,7 @@ RULES: tuple[Rule, ...] = (
     sizes.python_functions,
     sizes.rust_functions,
     layers.core_is_pure,
-    layers.solver_knows_no_elements,
+    layers.core_layers,
     layers.python_layers,
     layers.units_at_the_edge,
     texts.licence_line,

@@ -12,8 +12,8 @@ from tools import tidy
 from tools.tidy_rules.base import Fault, Rule, Source, Tree, read_tree
 from tools.tidy_rules.layers import (
     core_is_pure,
+    core_layers,
     python_layers,
-    solver_knows_no_elements,
     units_at_the_edge,
 )
 from tools.tidy_rules.layout import tests_mirror_sources as mirror_rule
@@ -82,9 +82,15 @@ def python_function(body_lines: int, arguments: str = "", docstring: str = "") -
             2,
         ),
         (
-            solver_knows_no_elements,
+            core_layers,
             {f"{CORE}/solve/a.rs": "use crate::network::Mode;"},
             {f"{CORE}/solve/a.rs": "use crate::{network::Mode, model::Clutch};"},
+            1,
+        ),
+        (
+            core_layers,
+            {f"{CORE}/simulate/a.rs": "use crate::solve::Status;"},
+            {f"{CORE}/network/a.rs": "use crate::solve::Status;"},
             1,
         ),
         (
@@ -113,7 +119,7 @@ def python_function(body_lines: int, arguments: str = "", docstring: str = "") -
         ),
         (
             licence_line,
-            {"a.sh": "#!/bin/sh\n# SPDX-License-Identifier: MIT"},
+            {"a.sh": "#!/bin/sh\n# SPDX-License-Identifier: MIT", "__init__.py": ""},
             {"a.rs": "//! SPDX is missing"},
             1,
         ),

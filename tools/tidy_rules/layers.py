@@ -17,7 +17,12 @@ PACKAGE = "python/drivetwin"
 _IMPURE = re.compile(
     r"\bpyo3\b|\bstd\s*::\s*(?:fs|io|net|process|env)\b|\b(?:e?print(?:ln)?|dbg)\s*!"
 )
-_SOLVER_MAY_NOT = re.compile(r"\bcrate\s*::\s*(?:\{[^}]*\b)?(?:model|simulate)\b")
+_MAY_NOT_USE = {
+    "model": ("network", "solve", "simulate"),
+    "network": ("solve", "simulate"),
+    "solve": ("model", "simulate"),
+}
+"""Folders of the core and what they must not know; the integrator knows no elements either."""
 
 PYTHON_LAYERS = (
     frozenset({"errors", "parameters", "driveline", "tomlfile", "_native"}),
@@ -47,14 +52,16 @@ def core_is_pure(tree: Tree) -> Iterator[Fault]:
                 yield Fault("core-is-pure", source.path, number, "the core depends on Python")
 
 
-def solver_knows_no_elements(tree: Tree) -> Iterator[Fault]:
-    """The integrator sees rows, capacities and modes of the network, never what they are."""
-    for source in tree.below(f"{CORE}/src/solve", ".rs"):
-        code = mask(source.text or "")
-        for match in _SOLVER_MAY_NOT.finditer(code):
-            line = code.count("\n", 0, match.start()) + 1
-            text = "solve/ may use network/ only"
-            yield Fault("solver-knows-no-elements", source.path, line, text)
+def core_layers(tree: Tree) -> Iterator[Fault]:
+    """The pipeline of the core runs one way, and its integrator never sees what the rows are."""
+    for folder, forbidden in _MAY_NOT_USE.items():
+        use = re.compile(rf"\bcrate\s*::\s*(?:\{{[^}}]*\b)?({'|'.join(forbidden)})\b")
+        for source in tree.below(f"{CORE}/src/{folder}", ".rs"):
+            code = mask(source.text or "")
+            for match in use.finditer(code):
+                line = code.count("\n", 0, match.start()) + 1
+                text = f"{folder}/ may not use {match.group(1)}/"
+                yield Fault("core-layers", source.path, line, text)
 
 
 def _layer_of(module: str) -> int | None:

@@ -24,9 +24,11 @@ _PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)*/?")
 
 
 def licence_line(tree: Tree) -> Iterator[Fault]:
-    """The first line (after `#!`) of every source file names the licence."""
+    """The first line (after `#!`) of every source file that is not empty names the licence."""
     for source in tree.below("", *_LICENSED):
         lines = source.lines
+        if not lines:
+            continue
         first = 1 if lines[:1] and lines[0].startswith("#!") else 0
         if not (lines[first : first + 1] and lines[first].endswith(SPDX)):
             yield Fault("licence-line", source.path, first + 1, f"does not say {SPDX}")
