@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+//! The dual-clutch driveline with lock-up engaged (paper eqs. 2-9) as one instance of the network.
+
+use super::elements::{Clutch, Element, Gear, GearLoss, Inertia, RoadLoad, SpringDamper, Torque};
+use super::mechanism::LossLaw;
+use super::{Driveline, FrictionLaw};
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+
+/// A shift element: `slip = ω_in / i_c - i_out ω_out` (eq. 15).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShiftElement<T> {
+    /// Name, such as B2.
+    pub name: String,
+    /// Ratio between input gear and clutch.
+    pub i_c: T,
+    /// Ratio between clutch and output.
+    pub i_out: T,
+    /// N·D·A·r, m³.
+    pub gain: T,
+    /// Pressure at which the fill ends, Pa.
+    #[serde(rename = "P0")]
+    pub p0: T,
+    /// μ over |slip|.
+    pub friction: FrictionLaw<T>,
+    /// Static over kinetic capacity.
+    pub peak: T,
+    /// Inertia that turns with the slip, kg·m².
+    pub drum_inertia: T,
+}
+
+/// Load at the wheel, see [`RoadLoad`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Load<T> {
+    /// N·m.
+    pub constant: T,
+    /// N·m.
+    pub rolling: T,
+    /// N·m·s²/rad².
+    pub aero: T,
+}
+
+/// Parameters of eqs. 2-9; symbols as in THEORY section 3.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(non_snake_case, reason = "the symbols of the equations")]
+pub struct DualClutch<T> {
+    /// Inertia before the input gear, kg·m².
+    pub J1: T,
+    /// Inertia between input gear and clutches, at the engine, kg·m².
+    pub J2e: T,
+    /// Lumped efficiency.
+    pub eta: T,
+    /// Loss law by name.
+    pub loss_law: LossLaw,
+    /// Input gear.
+    pub i_in: T,
+    /// Output side before the shaft (Jo'), kg·m².
+    pub J_out: T,
+    /// Final drive.
+    pub i_f: T,
+    /// Vehicle at the wheel, kg·m².
+    pub J_v: T,
+    /// Output shaft stiffness, N·m/rad.
+    pub k_o: T,
+    /// Output shaft damping, N·m·s/rad.
+    pub c_o: T,
+    /// Load torque at the wheel.
+    pub load: Load<T>,
+    /// Shift elements.
+    pub elements: Vec<ShiftElement<T>>,
+}
+
+/// Node of the engine.
+pub const ENGINE: &str = "engine";
+/// Node of the gearbox output.
+pub const OUTPUT: &str = "output";
+/// Node of the wheel.
+pub const WHEEL: &str = "wheel";
+/// Name of the output shaft.
+pub const SHAFT: &str = "output shaft";
+/// Name of the engine torque input.
+pub const ENGINE_TORQUE: &str = "engine torque";
+
+impl<T: Real> DualClutch<T> {
+    /// The same driveline as elements of the network.
+    pub fn driveline(&self) -> Driveline<T> {
+        let input = "input gear";
+        let axle = "axle";
+        let mut elements = vec![
+            inertia("J1", ENGINE, self.J1),
+            Element::Torque(Torque {
+                name: "engine".into(),
+                node: ENGINE.into(),
+                input: ENGINE_TORQUE.into(),
+                number: PhantomData,
+            }),
+            Element::Gear(Gear {
+                loss: Some(GearLoss { law: self.loss_law, eta: self.eta }),
+                ..gear("i_in", ENGINE, input, self.i_in)
+            }),
+            inertia("J2e", input, self.J2e * self.i_in * self.i_in),
+            inertia("J_out", OUTPUT, self.J_out),
+            Element::SpringDamper(SpringDamper {
+                name: SHAFT.into(),
+                a: OUTPUT.into(),
+                b: axle.into(),
+                stiffness: self.k_o,
+                damping: self.c_o,
+            }),
+            Element::Gear(gear("i_f", axle, WHEEL, self.i_f)),
+            inertia("J_v", WHEEL, self.J_v),
+            Element::RoadLoad(RoadLoad {
+                name: "load".into(),
+                node: WHEEL.into(),
+                constant: self.load.constant,
+                rolling: self.load.rolling,
+                aero: self.load.aero,
+            }),
+        ];
+        for element in &self.elements {
+            elements.extend(element.path(input));
+        }
+        Driveline { elements }
+    }
+}
+
+impl<T: Real> ShiftElement<T> {
+    /// Gear i_c, clutch, gear i_out between the input gear and the output (paper Figure 2).
+    fn path(&self, input: &str) -> [Element<T>; 3] {
+        let (a, b) = (format!("{} input side", self.name), format!("{} output side", self.name));
+        [
+            Element::Gear(gear(&format!("i_c {}", self.name), input, &a, self.i_c)),
+            Element::Clutch(Clutch {
+                name: self.name.clone(),
+                a,
+                b: b.clone(),
+                friction: self.friction.clone(),
+                gain: self.gain,
+                p0: self.p0,
+                peak: self.peak,
+                pressure: self.name.clone(),
+                drum_inertia: self.drum_inertia,
+            }),
+            Element::Gear(gear(&format!("i_out {}", self.name), &b, OUTPUT, self.i_out)),
+        ]
+    }
+}
+
+fn inertia<T: Real>(name: &str, node: &str, inertia: T) -> Element<T> {
+    Element::Inertia(Inertia { name: name.into(), node: node.into(), inertia })
+}
+
+fn gear<T: Real>(name: &str, a: &str, b: &str, ratio: T) -> Gear<T> {
+    Gear { name: name.into(), a: a.into(), b: b.into(), ratio, loss: None }
+}

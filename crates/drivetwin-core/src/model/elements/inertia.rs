@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+//! A rotating mass.
+
+use crate::model::error::{require, ModelError};
+use crate::model::mechanism::{self, Mechanism};
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+
+/// Inertia on one node: `inertia · ω' = Σ torques`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Inertia<T> {
+    /// Unique name.
+    pub name: String,
+    /// Node it turns with.
+    pub node: String,
+    /// kg·m². Must be >= 0.
+    pub inertia: T,
+}
+
+impl<T: Real> Inertia<T> {
+    pub(crate) fn check(&self) -> Result<(), ModelError> {
+        require(&self.name, "inertia", self.inertia.re(), |v| v >= 0.0, ">= 0 kg m^2")
+    }
+
+    pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
+        let row = m.row(&[(&self.node, T::of(1.0))]);
+        m.inertias.push(mechanism::Inertia { row, inertia: self.inertia });
+    }
+}

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+//! External resistance of the vehicle (paper eq. 9): grade, rolling, aerodynamic.
+
+use crate::model::error::{require, ModelError};
+use crate::model::friction::FrictionLaw;
+use crate::model::mechanism::{Account, Force, ForceLaw, Friction, Mechanism, Normal};
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+
+/// Torque against positive speed: `constant + rolling · Sgn(ω) + aero · ω|ω|`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoadLoad<T> {
+    /// Unique name.
+    pub name: String,
+    /// Node of the wheel.
+    pub node: String,
+    /// Independent of the direction of motion (grade, dynamometer), N·m.
+    pub constant: T,
+    /// Rolling resistance, opposes the motion and holds the vehicle at rest, N·m. Must be >= 0.
+    pub rolling: T,
+    /// ½ ρ c_d A r³, N·m·s²/rad². Must be >= 0.
+    pub aero: T,
+}
+
+impl<T: Real> RoadLoad<T> {
+    pub(crate) fn check(&self) -> Result<(), ModelError> {
+        require(&self.name, "constant", self.constant.re(), |_| true, "finite")?;
+        require(&self.name, "rolling", self.rolling.re(), |v| v >= 0.0, ">= 0 N m")?;
+        require(&self.name, "aero", self.aero.re(), |v| v >= 0.0, ">= 0 N m s^2/rad^2")
+    }
+
+    pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
+        let node = m.node(&self.node);
+        let mut force = |law| {
+            m.forces.push(Force { element: self.name.clone(), node, law, account: Account::Load });
+        };
+        force(ForceLaw::Constant(-self.constant));
+        if self.aero.re() != 0.0 {
+            force(ForceLaw::Quadratic(-self.aero));
+        }
+        if self.rolling.re() != 0.0 {
+            m.frictions.push(Friction {
+                element: self.name.clone(),
+                row: vec![(node, T::of(1.0))],
+                law: FrictionLaw::constant(T::of(1.0)),
+                normal: Normal::Constant(self.rolling),
+                peak: T::of(1.0),
+            });
+        }
+    }
+}

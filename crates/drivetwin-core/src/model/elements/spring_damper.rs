@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+//! A compliant shaft (paper eq. 8).
+
+use crate::model::error::{require, require_apart, ModelError};
+use crate::model::mechanism::{Mechanism, Spring};
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+
+/// `twist' = ω_a - ω_b`; torque `k · twist + c · twist'` on `b`, opposite on `a`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpringDamper<T> {
+    /// Unique name.
+    pub name: String,
+    /// Driving end.
+    pub a: String,
+    /// Driven end.
+    pub b: String,
+    /// N·m/rad. Must be >= 0.
+    pub stiffness: T,
+    /// N·m·s/rad. Must be >= 0.
+    pub damping: T,
+}
+
+impl<T: Real> SpringDamper<T> {
+    pub(crate) fn check(&self) -> Result<(), ModelError> {
+        require_apart(&self.name, &self.a, &self.b)?;
+        require(&self.name, "stiffness", self.stiffness.re(), |v| v >= 0.0, ">= 0 N m/rad")?;
+        require(&self.name, "damping", self.damping.re(), |v| v >= 0.0, ">= 0 N m s/rad")
+    }
+
+    pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
+        let row = m.row(&[(&self.a, T::of(1.0)), (&self.b, T::of(-1.0))]);
+        m.springs.push(Spring {
+            element: self.name.clone(),
+            row,
+            stiffness: self.stiffness,
+            damping: self.damping,
+        });
+    }
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+//! A prescribed torque, such as a measured engine torque.
+
+use crate::model::error::ModelError;
+use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+
+/// Torque on one node from an input, N·m, positive with the speed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Torque<T> {
+    /// Unique name.
+    pub name: String,
+    /// Node it acts on.
+    pub node: String,
+    /// Name of the input.
+    pub input: String,
+    /// The element has no number of its own.
+    #[serde(skip)]
+    pub number: PhantomData<T>,
+}
+
+impl<T: Real> Torque<T> {
+    #[expect(clippy::unnecessary_wraps, reason = "all elements share one form")]
+    #[expect(clippy::unused_self, reason = "all elements share one form")]
+    pub(crate) fn check(&self) -> Result<(), ModelError> {
+        Ok(())
+    }
+
+    pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
+        let law = ForceLaw::Input(m.input(&self.input));
+        let node = m.node(&self.node);
+        let account = Account::Source;
+        m.forces.push(Force { element: self.name.clone(), node, law, account });
+    }
+}

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+//! Faults of a description, each naming its element.
+
+use std::fmt;
+use thiserror::Error;
+
+/// One fault of a model description.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ModelError {
+    /// A number lies outside what its meaning allows.
+    #[error("{element}: {field} = {value} is impossible; it must be {requirement}")]
+    Value {
+        /// Name of the element.
+        element: String,
+        /// Name of the field.
+        field: &'static str,
+        /// The offending value, SI.
+        value: f64,
+        /// What would be accepted.
+        requirement: &'static str,
+    },
+    /// A friction table or map has unequal lengths or does not increase.
+    #[error("{element}: {table} {problem}")]
+    Table {
+        /// Name of the element.
+        element: String,
+        /// Which table.
+        table: &'static str,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// Two elements carry one name.
+    #[error("{element}: the name is used twice; element names must be unique")]
+    DuplicateName {
+        /// The name.
+        element: String,
+    },
+    /// Both flanges of an element sit on the same node.
+    #[error("{element}: both flanges are on node {node:?}, so the element has no effect")]
+    ShortCircuit {
+        /// Name of the element.
+        element: String,
+        /// The node.
+        node: String,
+    },
+}
+
+/// All faults of a description at once.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub struct ModelFaults(pub Vec<ModelError>);
+
+impl fmt::Display for ModelFaults {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let texts: Vec<String> = self.0.iter().map(ToString::to_string).collect();
+        f.write_str(&texts.join("; "))
+    }
+}
+
+/// Require a finite number that satisfies `accept`.
+pub(crate) fn require(
+    element: &str,
+    field: &'static str,
+    value: f64,
+    accept: impl Fn(f64) -> bool,
+    requirement: &'static str,
+) -> Result<(), ModelError> {
+    if value.is_finite() && accept(value) {
+        Ok(())
+    } else {
+        Err(ModelError::Value { element: element.to_owned(), field, value, requirement })
+    }
+}
+
+/// Require two flanges on different nodes.
+pub(crate) fn require_apart(element: &str, a: &str, b: &str) -> Result<(), ModelError> {
+    if a == b {
+        Err(ModelError::ShortCircuit { element: element.to_owned(), node: a.to_owned() })
+    } else {
+        Ok(())
+    }
+}

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+//! μ over slip: the Stribeck law of a wet clutch (paper Figure 8), or a table.
+
+use super::error::{require, ModelError};
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+
+/// `μ(s) = μ_c + (μ_s - μ_c) exp(-|s|/v_s) + μ_v |s|`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stribeck<T> {
+    /// Level after the exponential has died out, 1.
+    pub mu_c: T,
+    /// Value at zero slip, 1.
+    pub mu_s: T,
+    /// Slip over which the exponential falls by e, rad/s. Must be > 0.
+    pub v_s: T,
+    /// Viscous slope, s/rad.
+    pub mu_v: T,
+}
+
+/// μ linear between points of |slip|, constant beyond the last.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrictionTable<T> {
+    /// |slip|, rad/s, increasing from 0.
+    pub slip: Vec<f64>,
+    /// μ at each slip.
+    pub mu: Vec<T>,
+}
+
+/// μ over |slip|.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum FrictionLaw<T> {
+    /// Exponential plus viscous.
+    Stribeck(Stribeck<T>),
+    /// Piecewise linear.
+    Table(FrictionTable<T>),
+}
+
+impl<T: Real> FrictionLaw<T> {
+    /// μ independent of slip.
+    pub fn constant(mu: T) -> Self {
+        Self::Table(FrictionTable { slip: vec![0.0], mu: vec![mu] })
+    }
+
+    /// μ at a slip of magnitude `s` ≥ 0 [rad/s].
+    pub fn at(&self, s: T) -> T {
+        match self {
+            Self::Stribeck(law) => {
+                law.mu_c + (law.mu_s - law.mu_c) * (-s / law.v_s).exp() + law.mu_v * s
+            }
+            Self::Table(table) => table.piece(table.cell(s.re())).0.at(s),
+        }
+    }
+
+    /// Refuse laws that are no friction: μ must be finite and not negative where it is tabulated.
+    pub(crate) fn check(&self, element: &str) -> Result<(), ModelError> {
+        match self {
+            Self::Stribeck(law) => {
+                require(element, "mu_c", law.mu_c.re(), |v| v >= 0.0, ">= 0")?;
+                require(element, "mu_s", law.mu_s.re(), |v| v >= 0.0, ">= 0")?;
+                require(element, "mu_v", law.mu_v.re(), |_| true, "finite")?;
+                require(element, "v_s", law.v_s.re(), |v| v > 0.0, "> 0 rad/s")
+            }
+            Self::Table(table) => table.check(element),
+        }
+    }
+}
+
+/// One linear piece of a table: `value + slope (s - from)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece<T> {
+    /// Left end of the piece.
+    pub from: f64,
+    /// Value at the left end.
+    pub value: T,
+    /// Slope.
+    pub slope: T,
+}
+
+impl<T: Real> Piece<T> {
+    /// Value at `s`.
+    pub fn at(&self, s: T) -> T {
+        self.value + self.slope * (s - self.from)
+    }
+}
+
+impl<T: Real> FrictionTable<T> {
+    /// Index of the piece that holds |slip| `s`.
+    pub fn cell(&self, s: f64) -> usize {
+        self.slip.partition_point(|&x| x <= s).saturating_sub(1)
+    }
+
+    /// Piece `i` and its span of |slip| [rad/s].
+    pub fn piece(&self, i: usize) -> (Piece<T>, (f64, f64)) {
+        let from = self.slip[i];
+        match self.slip.get(i + 1) {
+            Some(&to) => {
+                let slope = (self.mu[i + 1] - self.mu[i]) / (to - from);
+                (Piece { from, value: self.mu[i], slope }, (from, to))
+            }
+            None => {
+                let flat = Piece { from, value: self.mu[i], slope: T::zero_() };
+                (flat, (from, f64::INFINITY))
+            }
+        }
+    }
+
+    fn check(&self, element: &str) -> Result<(), ModelError> {
+        let fault = |problem| {
+            Err(ModelError::Table { element: element.to_owned(), table: "friction table", problem })
+        };
+        if self.slip.is_empty() || self.slip.len() != self.mu.len() {
+            return fault("needs as many slips as values, at least one");
+        }
+        if self.slip[0] != 0.0 || !self.slip.windows(2).all(|w| w[0] < w[1]) {
+            return fault("must have slips that increase from 0");
+        }
+        if !self.slip.iter().all(|s| s.is_finite()) {
+            return fault("has a slip that is not finite");
+        }
+        if !self.mu.iter().all(|mu| mu.re().is_finite() && mu.re() >= 0.0) {
+            return fault("has a value that is negative or not finite");
+        }
+        Ok(())
+    }
+}

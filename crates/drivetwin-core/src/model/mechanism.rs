@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+//! The vocabulary in which elements state their laws: a mechanism that is linear in the node
+//! speeds, with scalar force laws and set-valued friction (THEORY section 1).
+
+use super::friction::FrictionLaw;
+use super::torque_map::TorqueMap;
+use super::GROUND;
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+
+/// A linear form over node speeds: `Σ coefficient · ω_node`; the ground has no entry.
+pub type Row<T> = Vec<(usize, T)>;
+
+/// How gear losses depend on the direction of power (THEORY section 3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LossLaw {
+    /// φ = η T_g whatever the direction; creates energy in overrun.
+    Paper,
+    /// φ = η T_g for T_g ω ≥ 0, else T_g / η.
+    Dissipative,
+}
+
+/// Loss of a constraint: the driven entries of its force row carry η (or 1/η).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loss<T> {
+    /// Which law holds.
+    pub law: LossLaw,
+    /// Efficiency, in (0, 1].
+    pub eta: T,
+    /// Node on the side where power is counted as entering.
+    pub driving: usize,
+}
+
+/// `row · ω = 0`, with the torque of its first entry as multiplier.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constraint<T> {
+    /// Element that states it.
+    pub element: String,
+    /// Kinematic row.
+    pub row: Row<T>,
+    /// Loss, if the element has one.
+    pub loss: Option<Loss<T>>,
+}
+
+/// Kinetic energy `½ inertia (row · ω)²`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inertia<T> {
+    /// Speed that carries the inertia.
+    pub row: Row<T>,
+    /// kg·m².
+    pub inertia: T,
+}
+
+/// Torque `k·twist + c·twist'` against `twist' = row · ω`; the twist is a state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spring<T> {
+    /// Element that states it.
+    pub element: String,
+    /// Rate of twist.
+    pub row: Row<T>,
+    /// Stiffness, N·m/rad.
+    pub stiffness: T,
+    /// Damping, N·m·s/rad.
+    pub damping: T,
+}
+
+/// What presses the surfaces of a friction element together: capacity = μ · normal, N·m.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Normal<T> {
+    /// `gain · max(0, P - P0)` with P an input.
+    Pressure {
+        /// Index of the pressure input.
+        input: usize,
+        /// N·D·A·r, m³.
+        gain: T,
+        /// Pressure at which the fill ends, Pa.
+        p0: T,
+    },
+    /// Always the same.
+    Constant(T),
+}
+
+/// A friction element: torque in `capacity · Sgn(slip)` against `slip = row · ω`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Friction<T> {
+    /// Element that states it.
+    pub element: String,
+    /// Slip.
+    pub row: Row<T>,
+    /// μ over |slip|.
+    pub law: FrictionLaw<T>,
+    /// What μ is multiplied by.
+    pub normal: Normal<T>,
+    /// Static over kinetic capacity at zero slip, ≥ 1.
+    pub peak: T,
+}
+
+/// Which account of the energy audit a torque belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Account {
+    /// Brought in by an engine or motor.
+    Source,
+    /// Taken by the load.
+    Load,
+}
+
+/// A scalar torque law.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ForceLaw<T> {
+    /// The input itself, N·m.
+    Input(usize),
+    /// Always the same, N·m.
+    Constant(T),
+    /// `coefficient · ω |ω|` of the driven node.
+    Quadratic(T),
+    /// Map over an input (throttle) and the node's speed.
+    Map {
+        /// Index of the throttle input.
+        input: usize,
+        /// Torque over throttle and speed.
+        map: TorqueMap,
+    },
+}
+
+/// A torque on one node, positive with its speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Force<T> {
+    /// Element that states it.
+    pub element: String,
+    /// Node it acts on.
+    pub node: usize,
+    /// Its value.
+    pub law: ForceLaw<T>,
+    /// Where its work is booked.
+    pub account: Account,
+}
+
+/// Everything the elements stated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mechanism<T> {
+    /// Node names, in order of appearance.
+    pub nodes: Vec<String>,
+    /// Input names, in order of appearance.
+    pub inputs: Vec<String>,
+    /// Kinetic energy.
+    pub inertias: Vec<Inertia<T>>,
+    /// Rigid couplings.
+    pub constraints: Vec<Constraint<T>>,
+    /// Compliances.
+    pub springs: Vec<Spring<T>>,
+    /// Clutches, brakes, dry friction.
+    pub frictions: Vec<Friction<T>>,
+    /// Sources and loads.
+    pub forces: Vec<Force<T>>,
+}
+
+impl<T> Default for Mechanism<T> {
+    fn default() -> Self {
+        Self {
+            nodes: Vec::new(),
+            inputs: Vec::new(),
+            inertias: Vec::new(),
+            constraints: Vec::new(),
+            springs: Vec::new(),
+            frictions: Vec::new(),
+            forces: Vec::new(),
+        }
+    }
+}
+
+impl<T: Real> Mechanism<T> {
+    /// Index of a node, added on first use.
+    pub fn node(&mut self, name: &str) -> usize {
+        index_of(&mut self.nodes, name)
+    }
+
+    /// Index of an input, added on first use.
+    pub fn input(&mut self, name: &str) -> usize {
+        index_of(&mut self.inputs, name)
+    }
+
+    /// Linear form over named nodes; entries at the ground drop out.
+    pub fn row(&mut self, terms: &[(&str, T)]) -> Row<T> {
+        let moving = terms.iter().filter(|(name, _)| *name != GROUND);
+        moving.map(|&(name, coefficient)| (self.node(name), coefficient)).collect()
+    }
+}
+
+fn index_of(names: &mut Vec<String>, name: &str) -> usize {
+    names.iter().position(|n| n == name).unwrap_or_else(|| {
+        names.push(name.to_owned());
+        names.len() - 1
+    })
+}

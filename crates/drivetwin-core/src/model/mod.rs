@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+//! 1 The physical description: what the user states, in SI, as plain data.
+//!
+//! Each element is one file that states its law in the vocabulary of [`mechanism`]. Elements know
+//! no integrator.
+
+pub mod dual_clutch;
+pub mod elements;
+mod error;
+pub mod friction;
+pub mod mechanism;
+pub mod torque_map;
+
+pub use dual_clutch::DualClutch;
+pub use elements::Element;
+pub use error::{ModelError, ModelFaults};
+pub use friction::{FrictionLaw, FrictionTable, Stribeck};
+pub use mechanism::Mechanism;
+
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+
+/// Name of the node that does not turn.
+pub const GROUND: &str = "ground";
+
+/// A driveline: elements joined at named nodes (shafts). Every name used at a flange is a node.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Driveline<T> {
+    /// All elements; names must be unique.
+    pub elements: Vec<Element<T>>,
+}
+
+impl<T: Real> Driveline<T> {
+    /// State every element's law; all faults of the description are reported together.
+    pub fn mechanism(&self) -> Result<Mechanism<T>, ModelFaults> {
+        let mut faults = Vec::new();
+        let mut mechanism = Mechanism::default();
+        let mut seen: Vec<&str> = Vec::new();
+        for element in &self.elements {
+            if seen.contains(&element.name()) {
+                faults.push(ModelError::DuplicateName { element: element.name().to_owned() });
+            }
+            seen.push(element.name());
+            match element.check() {
+                Ok(()) => element.state_law(&mut mechanism),
+                Err(error) => faults.push(error),
+            }
+        }
+        if faults.is_empty() { Ok(mechanism) } else { Err(ModelFaults(faults)) }
+    }
+}

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+//! Why a mechanism cannot be compiled.
+
+use crate::model::ModelFaults;
+use thiserror::Error;
+
+/// Fault of a mechanism as a whole, naming its elements or members.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum CompileError {
+    /// The elements themselves are faulty.
+    #[error(transparent)]
+    Model(#[from] ModelFaults),
+    /// Rigid couplings that repeat or contradict each other.
+    #[error(
+        "the rigid couplings of {} depend on each other; remove one of them or put a compliance          between them",
+        elements.join(", ")
+    )]
+    DependentConstraints {
+        /// Elements whose rows are linearly dependent.
+        elements: Vec<String>,
+    },
+    /// A member has no inertia and nothing determines its acceleration.
+    #[error(
+        "nothing determines the acceleration of {}: give one of these members an inertia or a          rigid connection to one that has it",
+        members.join(", ")
+    )]
+    Massless {
+        /// Nodes that move in the undetermined direction.
+        members: Vec<String>,
+    },
+    /// Everything is rigidly connected to the ground.
+    #[error("the mechanism cannot move: its rigid couplings leave no independent speed")]
+    Immobile,
+    /// More friction elements or lossy gears than mode keys can hold.
+    #[error("{count} friction elements; at most {limit} are supported")]
+    TooManyFrictions {
+        /// Number found.
+        count: usize,
+        /// Number supported.
+        limit: usize,
+    },
+}

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+//! A run of the dual-clutch driveline with its usual outputs.
+
+use super::run::{run, SimulateError};
+use super::start::Start;
+use super::trajectory::{Output, Trajectory};
+use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};
+use crate::network::Network;
+use crate::number::Real;
+use crate::solve::Settings;
+
+/// Start of a dual-clutch run.
+#[derive(Clone, Debug)]
+pub struct DualClutchStart<T> {
+    /// rad/s.
+    pub engine_speed: T,
+    /// rad/s.
+    pub output_speed: T,
+    /// rad/s.
+    pub wheel_speed: T,
+    /// Twist of the output shaft, rad.
+    pub twist: T,
+    /// Elements without slip.
+    pub locked: Vec<String>,
+}
+
+/// Trajectory whose columns are engine, output and wheel speed, twist, shaft torque, then torque
+/// and slip of each shift element.
+pub type DualClutchRun<T> = Trajectory<T>;
+
+/// Simulate the dual-clutch driveline (paper eqs. 2-9).
+pub fn simulate_dual_clutch<T: Real>(
+    model: &DualClutch<T>,
+    signals: &[(&str, &[f64], &[T])],
+    start: &DualClutchStart<T>,
+    grid: &[f64],
+    options: (Settings, bool),
+) -> Result<DualClutchRun<T>, SimulateError> {
+    let network = Network::compile(&model.driveline())?;
+    let start = Start {
+        speeds: vec![
+            (ENGINE.into(), start.engine_speed),
+            (OUTPUT.into(), start.output_speed),
+            (WHEEL.into(), start.wheel_speed),
+        ],
+        twists: vec![(SHAFT.into(), start.twist)],
+        locked: start.locked.clone(),
+    };
+    let mut outputs = vec![
+        Output::Speed(ENGINE.into()),
+        Output::Speed(OUTPUT.into()),
+        Output::Speed(WHEEL.into()),
+        Output::Twist(SHAFT.into()),
+        Output::ShaftTorque(SHAFT.into()),
+    ];
+    for element in &model.elements {
+        outputs.push(Output::FrictionTorque(element.name.clone()));
+        outputs.push(Output::Slip(element.name.clone()));
+    }
+    run(&network, signals, &start, grid, &outputs, options)
+}

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+//! Taylor expansion in time of the whole state in one mode.
+
+use crate::network::channel::{Cell, ChannelSeries};
+use crate::network::{Mode, Network};
+use crate::number::{evaluate, Real, Series, TERMS};
+
+/// Coefficients of states and channels over one step, and the working space to compute them.
+#[derive(Clone, Debug)]
+pub struct Expansion<T> {
+    /// States (speeds, twists).
+    pub states: Vec<Series<T>>,
+    /// Channels.
+    pub channels: Vec<ChannelSeries<T>>,
+    /// Value and rate of every input at the start.
+    pub inputs: Vec<[T; 2]>,
+    /// Highest coefficient that is filled in.
+    pub order: usize,
+}
+
+/// What the step control needs.
+#[derive(Clone, Copy, Debug)]
+pub struct Accuracy {
+    /// Truncation error allowed per step, relative to `scale` of each state.
+    pub tolerance: f64,
+    /// Fixed order; `None` lets the order follow the tolerance.
+    pub order: Option<usize>,
+}
+
+impl<T: Real> Expansion<T> {
+    /// Working space for a network.
+    pub fn new(network: &Network<T>) -> Self {
+        Self {
+            states: vec![[T::zero_(); TERMS]; network.states()],
+            channels: vec![ChannelSeries::default(); network.channels.len()],
+            inputs: vec![[T::zero_(); 2]; network.mechanism.inputs.len()],
+            order: 0,
+        }
+    }
+
+    /// Expand from state `x`; returns the step `<= h` [s] over which the truncation error stays within
+    /// the tolerance. Inputs must have been set.
+    pub fn expand(
+        &mut self,
+        network: &Network<T>,
+        mode: &Mode<T>,
+        cells: &[Cell],
+        x: &[T],
+        (h, accuracy): (f64, Accuracy),
+    ) -> f64 {
+        for (series, &value) in self.states.iter_mut().zip(x) {
+            series[0] = value;
+        }
+        let last = accuracy.order.unwrap_or(TERMS - 1);
+        let (mut power, mut before) = (1.0, f64::INFINITY);
+        for k in 0..last {
+            self.channel_terms(network, cells, k);
+            self.next_term(network, mode, k);
+            power *= h;
+            let size = self.relative_size(network, k + 1) * power;
+            if accuracy.order.is_none() && k >= 2 && size.max(before) <= accuracy.tolerance {
+                self.finish(network, cells, k + 1);
+                return h;
+            }
+            before = size;
+        }
+        self.finish(network, cells, last);
+        if accuracy.order.is_some() {
+            return h;
+        }
+        let excess = before / accuracy.tolerance;
+        h * (0.8 * excess.powf(-1.0 / last as f64)).min(1.0)
+    }
+
+    /// State at `h` [s] after the start.
+    pub fn state_at(&self, h: T, x: &mut [T]) {
+        for (value, series) in x.iter_mut().zip(&self.states) {
+            *value = evaluate(series, self.order, h);
+        }
+    }
+
+    /// Coefficients of a linear form over the basis (x, u, 1, φ).
+    pub fn form(&self, network: &Network<T>, row: &[T]) -> Series<T> {
+        let mut out = [T::zero_(); TERMS];
+        for (k, value) in out.iter_mut().enumerate().take(self.order + 1) {
+            *value = self.form_term(network, row, k);
+        }
+        out
+    }
+
+    /// Coefficients of a linear form over the independent speeds.
+    pub fn speed_form(&self, row: &[T]) -> Series<T> {
+        let mut out = [T::zero_(); TERMS];
+        for (&c, series) in row.iter().zip(&self.states) {
+            for k in 0..=self.order {
+                out[k] += c * series[k];
+            }
+        }
+        out
+    }
+
+    fn finish(&mut self, network: &Network<T>, cells: &[Cell], order: usize) {
+        self.channel_terms(network, cells, order);
+        self.order = order;
+    }
+
+    fn channel_terms(&mut self, network: &Network<T>, cells: &[Cell], k: usize) {
+        for ((channel, &cell), series) in
+            network.channels.iter().zip(cells).zip(&mut self.channels)
+        {
+            let mut speed = T::zero_();
+            for (&c, state) in channel.speed.iter().zip(&self.states) {
+                speed += c * state[k];
+            }
+            series.speed[k] = speed;
+            channel.term(cell, &self.inputs, series, k);
+        }
+    }
+
+    fn next_term(&mut self, network: &Network<T>, mode: &Mode<T>, k: usize) {
+        for i in 0..self.states.len() {
+            let rate = self.form_term(network, mode.derivative.row(i), k);
+            self.states[i][k + 1] = rate / (k + 1) as f64;
+        }
+    }
+
+    fn form_term(&self, network: &Network<T>, row: &[T], k: usize) -> T {
+        let mut sum = T::zero_();
+        for (&c, state) in row.iter().zip(&self.states) {
+            sum += c * state[k];
+        }
+        if k < 2 {
+            for (&c, input) in row[network.first_input()..].iter().zip(&self.inputs) {
+                sum += c * input[k];
+            }
+        }
+        if k == 0 {
+            sum += row[network.one()];
+        }
+        for (&c, channel) in row[network.first_channel()..].iter().zip(&self.channels) {
+            sum += c * channel.torque[k];
+        }
+        sum
+    }
+
+    /// Largest coefficient `k` relative to the scale of its state: speeds to 1 rad/s, twists to
+    /// 1 mrad at least.
+    fn relative_size(&self, network: &Network<T>, k: usize) -> f64 {
+        let floor = |i: usize| if i < network.speeds() { 1.0 } else { 1e-3 };
+        let size = |(i, s): (usize, &Series<T>)| s[k].re().abs() / s[0].re().abs().max(floor(i));
+        self.states.iter().enumerate().map(size).fold(0.0, f64::max)
+    }
+}

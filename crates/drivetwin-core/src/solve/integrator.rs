@@ -1,0 +1,426 @@
+// SPDX-License-Identifier: MIT
+//! The main loop: expand, find the first event, advance, change the mode.
+
+use super::expansion::{Accuracy, Expansion};
+use super::guard::{earliest, Cause, Watch};
+use super::inputs::Inputs;
+use super::status::Status;
+use crate::network::channel::{form, Cell, ChannelSeries};
+use crate::network::linalg::{least_norm, solve, Matrix};
+use crate::network::{Mode, ModeKey, Network};
+use crate::number::Real;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Friction mode of one element (paper eqs. 4-6).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RowState {
+    /// No capacity.
+    Open,
+    /// Slip in one direction.
+    Slipping {
+        /// Sign of the slip and of the torque.
+        sign: f64,
+    },
+    /// No slip, torque within the static capacity.
+    Stuck,
+    /// No slip because other elements hold the same speeds; torque at the static capacity.
+    Saturated {
+        /// Sign of the torque.
+        sign: f64,
+    },
+}
+
+/// What happened at an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// Slip came to rest.
+    Lock,
+    /// The holding torque exceeded the static capacity.
+    BreakAway,
+    /// Slip passed through zero.
+    Reverse,
+    /// The pressure rose above the fill pressure.
+    Fill,
+    /// The pressure fell below the fill pressure.
+    Vent,
+}
+
+/// A change of friction mode.
+#[derive(Clone, Debug)]
+pub struct Event<T> {
+    /// When, s; carries derivatives.
+    pub time: T,
+    /// Index of the friction element.
+    pub element: usize,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// Accuracy of the integration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Truncation error allowed per step, relative to the states.
+    pub tolerance: f64,
+    /// Longest step, s.
+    pub max_step: f64,
+    /// Fixed order instead of one that follows the tolerance; for convergence studies.
+    pub order: Option<usize>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { tolerance: 1e-12, max_step: f64::INFINITY, order: None }
+    }
+}
+
+/// One step: the expansion of the integrator holds from `start` for `length` seconds.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<T> {
+    /// Start, s.
+    pub start: T,
+    /// Length, s; zero at coincident events.
+    pub length: T,
+}
+
+/// Most steps without progress before a run counts as chattering.
+const MAX_STALLED: usize = 60;
+/// Most events within one input segment before a run counts as chattering.
+const MAX_EVENTS_PER_SEGMENT: usize = 2000;
+
+/// A run in progress.
+pub struct Integrator<'a, T> {
+    /// Network.
+    pub network: &'a Network<T>,
+    /// State (speeds, twists) at the end of the last step.
+    pub x: Vec<T>,
+    /// Friction modes during the last step.
+    pub rows: Vec<RowState>,
+    /// Active mode during the last step.
+    pub mode: Arc<Mode<T>>,
+    /// Expansion of the last step.
+    pub expansion: Expansion<T>,
+    /// Events so far.
+    pub events: Vec<Event<T>>,
+    pub(super) t: T,
+    pub(super) cells: Vec<Cell>,
+    pub(super) released: Vec<bool>,
+    pub(super) backward: u32,
+    pub(super) gear_speed_sign: Vec<f64>,
+    inputs: &'a Inputs<T>,
+    settings: Settings,
+    modes: HashMap<ModeKey, Arc<Mode<T>>>,
+    segment: usize,
+    pending: Option<Cause>,
+    stalled: usize,
+    events_in_segment: usize,
+}
+
+impl<'a, T: Real> Integrator<'a, T> {
+    /// Start at state `x` with the elements `locked` brought to zero slip; which of these hold is
+    /// decided by their capacities.
+    pub fn start(
+        network: &'a Network<T>,
+        inputs: &'a Inputs<T>,
+        settings: Settings,
+        x: Vec<T>,
+        locked: &[usize],
+    ) -> Result<Self, Status> {
+        let t = inputs.span(0).0;
+        let frictions = network.frictions.len();
+        let none = vec![T::zero_(); frictions];
+        let mode = network.mode(ModeKey::default(), &none);
+        let mut run = Self {
+            x,
+            rows: vec![RowState::Open; frictions],
+            mode: Arc::new(mode.ok_or_else(|| self_locking(network, t))?),
+            expansion: Expansion::new(network),
+            events: Vec::new(),
+            t: T::of(t),
+            cells: vec![Cell::Off; network.channels.len()],
+            released: vec![false; frictions],
+            backward: 0,
+            gear_speed_sign: vec![1.0; network.losses.len()],
+            network,
+            inputs,
+            settings,
+            modes: HashMap::new(),
+            segment: 0,
+            pending: None,
+            stalled: 0,
+            events_in_segment: 0,
+        };
+        run.bring_to_rest(locked);
+        for (i, loss) in network.losses.iter().enumerate() {
+            run.gear_speed_sign[i] = if form(&loss.speed, &run.x).re() < 0.0 { -1.0 } else { 1.0 };
+        }
+        run.refresh()?;
+        run.events.clear();
+        Ok(run)
+    }
+
+    /// Time reached, s.
+    pub fn time(&self) -> T {
+        self.t
+    }
+
+    /// Advance by one step, to the next input sample or event; `None` at the end of the inputs.
+    pub fn advance(&mut self) -> Result<Option<Step<T>>, Status> {
+        self.change_mode()?;
+        if !self.enter_segment()? {
+            return Ok(None);
+        }
+        self.released_by_redundancy()?;
+        let end = self.inputs.span(self.segment).1;
+        let remaining = (-self.t + end).re();
+        let wish = remaining.min(self.settings.max_step);
+        let accuracy =
+            Accuracy { tolerance: self.settings.tolerance, order: self.settings.order };
+        let mode = Arc::clone(&self.mode);
+        let (cells, x) = (&self.cells, &self.x);
+        let h = self.expansion.expand(self.network, &mode, cells, x, (wish, accuracy));
+        if h < 1e-14 * (1.0 + end.abs()) && h < remaining {
+            return Err(Status::StepTooSmall { time: self.t.re() });
+        }
+        let event = earliest(&self.watch(&mode), &self.expansion, h);
+        let start = self.t;
+        let length = match event {
+            Some((at, _)) => at,
+            None if h >= remaining => -self.t + end,
+            None => T::of(h),
+        };
+        self.pending = event.map(|(_, cause)| cause);
+        self.expansion.state_at(length, &mut self.x);
+        self.t = if event.is_none() && h >= remaining { T::of(end) } else { start + length };
+        self.released.iter_mut().for_each(|r| *r &= length.re() == 0.0);
+        self.check_progress(length.re())?;
+        Ok(Some(Step { start, length }))
+    }
+
+    /// Mode of a key, compiled once.
+    pub(super) fn mode(&mut self, key: ModeKey) -> Result<Arc<Mode<T>>, Status> {
+        if let Some(mode) = self.modes.get(&key) {
+            return Ok(Arc::clone(mode));
+        }
+        let mode = self.network.mode(key, &self.capacities());
+        let mode = Arc::new(mode.ok_or_else(|| self_locking(self.network, self.t.re()))?);
+        if !mode.redundant {
+            self.modes.insert(key, Arc::clone(&mode));
+        }
+        Ok(mode)
+    }
+
+    /// Note every difference between the friction modes and `rows` as an event.
+    pub(super) fn record_changes(&mut self, rows: &[RowState]) {
+        use RowState::{Open, Saturated, Slipping, Stuck};
+        for (element, (&before, &after)) in self.rows.iter().zip(rows).enumerate() {
+            let kind = match (before, after) {
+                (Open, Open) => continue,
+                (_, Open) => EventKind::Vent,
+                (Open, _) => EventKind::Fill,
+                (Slipping { .. }, Stuck | Saturated { .. }) => EventKind::Lock,
+                (Stuck | Saturated { .. }, Slipping { .. }) => EventKind::BreakAway,
+                (Slipping { sign: a }, Slipping { sign: b }) if a != b => EventKind::Reverse,
+                _ => continue,
+            };
+            self.events.push(Event { time: self.t, element, kind });
+        }
+    }
+
+    fn watch<'w>(&'w self, mode: &'w Mode<T>) -> Watch<'w, T> {
+        Watch {
+            network: self.network,
+            mode,
+            rows: &self.rows,
+            released: &self.released,
+            cells: &self.cells,
+            gear_speed_sign: &self.gear_speed_sign,
+            backward: self.backward,
+        }
+    }
+
+    fn change_mode(&mut self) -> Result<(), Status> {
+        let Some(cause) = self.pending.take() else { return Ok(()) };
+        self.inputs.at(self.segment, self.t, &mut self.expansion.inputs);
+        match cause {
+            Cause::SlipZero(j) => {
+                self.bring_to_rest(&[j]);
+                self.decide(None)
+            }
+            Cause::Fill(j) => self.fill(j),
+            Cause::Vent(j) => self.vent(j),
+            Cause::Overload(j) => {
+                self.bring_to_rest(&[]);
+                let sign = self.holding_sign(j);
+                self.decide(Some((j, sign)))
+            }
+            Cause::PowerReversal(i) => {
+                self.backward ^= 1 << i;
+                self.decide(None)
+            }
+            Cause::SpeedReversal(i) => {
+                self.gear_speed_sign[i] = -self.gear_speed_sign[i];
+                self.decide(None)
+            }
+            Cause::Border(channel, cell) => {
+                self.cells[channel] = cell;
+                Ok(())
+            }
+        }
+    }
+
+    /// Step into the next segment where the present one is used up; false at the end.
+    fn enter_segment(&mut self) -> Result<bool, Status> {
+        let mut jumped = false;
+        while self.t.re() >= self.inputs.span(self.segment).1 {
+            if self.segment + 1 == self.inputs.segments() {
+                return Ok(false);
+            }
+            self.segment += 1;
+            self.events_in_segment = 0;
+            let (from, to) = self.inputs.span(self.segment);
+            jumped |= from == to;
+        }
+        self.inputs.at(self.segment, self.t, &mut self.expansion.inputs);
+        if jumped {
+            self.refresh()?;
+        }
+        Ok(true)
+    }
+
+    /// Take up everything anew at this instant, as after a jump of an input.
+    fn refresh(&mut self) -> Result<(), Status> {
+        self.inputs.at(self.segment, self.t, &mut self.expansion.inputs);
+        let mut rows = self.rows.clone();
+        for (j, row) in self.network.frictions.iter().enumerate() {
+            let [normal, rate] = row.normal.line(&self.expansion.inputs).map(|n| n.re());
+            let pressed = normal > 0.0 || (normal == 0.0 && rate > 0.0);
+            let slip = form(&row.slip, &self.x).re();
+            rows[j] = match (pressed, rows[j]) {
+                (false, _) => RowState::Open,
+                (true, RowState::Open) => RowState::Slipping { sign: sign_of(slip) },
+                (true, state) => state,
+            };
+        }
+        self.record_changes(&rows);
+        self.rows = rows;
+        for i in self.network.frictions.len()..self.network.channels.len() {
+            let channel = &self.network.channels[i];
+            let speed = form(&channel.speed, &self.x).re();
+            self.cells[i] = channel.cell_at(speed, sign_of(speed), &self.expansion.inputs);
+        }
+        self.decide(None)
+    }
+
+    /// Locks of which one carries its full capacity, or whose split follows the capacities, are
+    /// decided anew at every sample; accelerations do not depend on the split.
+    fn released_by_redundancy(&mut self) -> Result<(), Status> {
+        let saturated = |row: &RowState| matches!(row, RowState::Saturated { .. });
+        if self.mode.redundant || self.rows.iter().any(saturated) {
+            self.decide(None)?;
+        }
+        Ok(())
+    }
+
+    fn fill(&mut self, j: usize) -> Result<(), Status> {
+        let slip = form(&self.network.frictions[j].slip, &self.x).re();
+        let mut rows = self.rows.clone();
+        rows[j] = RowState::Slipping { sign: sign_of(slip) };
+        self.record_changes(&rows);
+        self.rows = rows;
+        self.decide(None)
+    }
+
+    fn vent(&mut self, j: usize) -> Result<(), Status> {
+        let mut rows = self.rows.clone();
+        rows[j] = RowState::Open;
+        self.record_changes(&rows);
+        self.rows = rows;
+        self.decide(None)
+    }
+
+    /// Remove the round-off slip of everything stuck and of `more`, changing the momentum least.
+    fn bring_to_rest(&mut self, more: &[usize]) {
+        let at_rest = |j: &usize| {
+            more.contains(j)
+                || matches!(self.rows[*j], RowState::Stuck | RowState::Saturated { .. })
+        };
+        let rows: Vec<usize> = (0..self.rows.len()).filter(at_rest).collect();
+        if rows.is_empty() {
+            return;
+        }
+        let mut g = Matrix::zeros(rows.len(), self.network.speeds());
+        let mut slip = Matrix::zeros(rows.len(), 1);
+        for (i, &j) in rows.iter().enumerate() {
+            g.row_mut(i).copy_from_slice(&self.network.frictions[j].slip);
+            slip[(i, 0)] = form(g.row(i), &self.x);
+        }
+        let response = solve(&self.network.mass, &g.transposed()).expect("the mass is regular");
+        let change = response.times(&least_norm(&g.times(&response), &slip));
+        for i in 0..self.network.speeds() {
+            self.x[i] -= change[(i, 0)];
+        }
+    }
+
+    /// Sign of the torque that a stuck element holds now.
+    fn holding_sign(&self, j: usize) -> f64 {
+        let position = self.mode.stuck.iter().position(|&s| s == j);
+        let row = self.mode.stuck_torque.row(position.expect("the element is stuck"));
+        let mut basis = self.x.clone();
+        basis.extend(self.expansion.inputs.iter().map(|input| input[0]));
+        basis.push(T::of(1.0));
+        basis.extend((0..self.cells.len()).map(|i| self.channel_now(i)));
+        sign_of(form(row, &basis).re())
+    }
+
+    /// Torque of a channel at this instant, in its present cell.
+    pub(super) fn channel_now(&self, i: usize) -> T {
+        let channel = &self.network.channels[i];
+        let mut series = ChannelSeries::default();
+        series.speed[0] = form(&channel.speed, &self.x);
+        channel.term(self.cells[i], &self.expansion.inputs, &mut series, 0);
+        series.torque[0]
+    }
+
+    fn check_progress(&mut self, length: f64) -> Result<(), Status> {
+        let time = self.t.re();
+        if !self.x.iter().all(|v| v.re().is_finite()) {
+            return Err(Status::NotFinite { time });
+        }
+        let Some(cause) = self.pending else {
+            self.stalled = 0;
+            return Ok(());
+        };
+        self.events_in_segment += 1;
+        self.stalled = if length > 1e-13 * (1.0 + time.abs()) { 0 } else { self.stalled + 1 };
+        if self.stalled > MAX_STALLED || self.events_in_segment > MAX_EVENTS_PER_SEGMENT {
+            return Err(Status::Chattering { time, element: self.culprit(cause) });
+        }
+        Ok(())
+    }
+
+    fn culprit(&self, cause: Cause) -> String {
+        match cause {
+            Cause::SlipZero(j) | Cause::Fill(j) | Cause::Vent(j) | Cause::Overload(j) => {
+                self.network.frictions[j].element.clone()
+            }
+            Cause::PowerReversal(i) | Cause::SpeedReversal(i) => {
+                self.network.losses[i].element.clone()
+            }
+            Cause::Border(channel, _) => match self.network.frictions.get(channel) {
+                Some(row) => row.element.clone(),
+                None => format!("map {}", channel - self.network.frictions.len()),
+            },
+        }
+    }
+}
+
+/// Sign with zero counted as positive.
+fn sign_of(value: f64) -> f64 {
+    if value < 0.0 { -1.0 } else { 1.0 }
+}
+
+fn self_locking<T>(network: &Network<T>, time: f64) -> Status {
+    let element = network.losses.first().map_or_else(String::new, |l| l.element.clone());
+    Status::SelfLocking { time, element }
+}

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+//! 3 The hybrid integrator. It sees rows, capacities and modes, and no element.
+//!
+//! Per mode the motion is analytic between input samples, so a step is a Taylor expansion in time
+//! of the whole state; guards are polynomials of the same expansion and their first roots are the
+//! events. Who stays stuck is decided by the box-constrained programme of THEORY section 1.
+
+mod decide;
+mod expansion;
+mod first_fall;
+mod guard;
+mod inputs;
+mod integrator;
+mod status;
+
+pub use expansion::Expansion;
+pub use inputs::{InputError, Inputs};
+pub use integrator::{Event, EventKind, Integrator, RowState, Settings, Step};
+pub use status::Status;
