@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.errors import InputError, MissingChannelError
+from drivetwin.errors import InputError, MissingChannelError, TimeError
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.shifts.find import find_shifts
 from drivetwin.shifts.settings import ShiftSettings
@@ -237,6 +237,35 @@ def test_standstill_and_steady_gear_hold_no_candidate() -> None:
     idle = np.maximum(1.91 * output, 0.0)
     log = make_log({"input_speed": (time, idle), "output_speed": (time, output)})
     assert find_shifts(log, make_card(_CARD)) == ((), ())
+
+
+def test_standing_throughout_is_said() -> None:
+    log = _UP.log()
+    reverse = replace(log["output_speed"], values=-log["output_speed"].values)
+    text = _refused(replace(log, channels={**log.channels, "output_speed": reverse}), _CARD)
+    assert "wrong sign" in text
+
+
+def test_speeds_without_common_time() -> None:
+    log = _UP.log()
+    later = replace(log["output_speed"], time=log["output_speed"].time + 100.0)
+    with pytest.raises(TimeError, match="common times"):
+        find_shifts(replace(log, channels={**log.channels, "output_speed": later}), _UP.card())
+
+
+def test_repeats_of_a_held_speed_count_once() -> None:
+    """A 20 ms speed that the logger wrote every ms: boundaries as from its fresh values."""
+    log = replace(_UP, step=0.02, noise=0.1).log()
+    fast = np.arange(0.0, 3.9, 1e-3)
+    channels = dict(log.channels)
+    for role in ("input_speed", "output_speed"):
+        channel = log[role]
+        index = np.searchsorted(channel.time, fast + 1e-9, side="right") - 1
+        channels[role] = replace(channel, time=fast, values=channel.values[index], held=True)
+    (shift,), _ = find_shifts(replace(log, channels=channels), _UP.card())
+    (fresh,), _ = find_shifts(log, _UP.card())
+    assert shift.lockup_time == pytest.approx(fresh.lockup_time, abs=1e-6)
+    assert shift.sigma["lockup"] == pytest.approx(fresh.sigma["lockup"], rel=1e-3)
 
 
 def test_missing_speed_is_a_typed_error() -> None:

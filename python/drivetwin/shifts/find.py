@@ -57,11 +57,13 @@ def find_shifts(
     Between two gears held, the inertia phase runs from the hinge at which the off-going slip
     leaves zero to the one at which the on-coming slip reaches it; the torque phase precedes it,
     from the on-coming pressure's crossing of P0 (without it: from the fall of the output torque).
-    Raises MissingChannelError where a speed is missing.
+    Raises MissingChannelError where a speed is missing, TimeError where the speeds share no time.
     """
     speeds = gearbox_speeds(log, card)
     search = _Search(log, card, speeds, gear_ratios(card), settings or ShiftSettings())
     runs = gear_runs(speeds, search.ratios, search.settings)
+    if not runs:
+        return FoundShifts((), (_standing(search),))
     shifts: list[Shift] = []
     rejected = [
         RejectedShift(_span(speeds, run), reason)
@@ -80,6 +82,15 @@ def find_shifts(
     chained = _chain(shifts, search.settings)
     finished = tuple(replace(s, quality=shift_quality(log, card, s)) for s in chained)
     return FoundShifts(finished, tuple(sorted(rejected, key=lambda item: item.time)))
+
+
+def _standing(search: _Search) -> RejectedShift:
+    speeds = search.speeds
+    return RejectedShift(
+        (float(speeds.time[0]), float(speeds.time[-1])),
+        f"the output speed is never above {search.settings.min_output_speed:g} rad/s "
+        f"(highest {speeds.output.max():.4g} rad/s): standstill, or the wrong sign or unit",
+    )
 
 
 def _span(speeds: GearboxSpeeds, run: Run) -> tuple[float, float]:

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.errors import MissingChannelError, Where
+from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.vehicle.spec import VehicleCard
 
 FloatArray = NDArray[np.float64]
+
+_LEAST = 8
+"""Fewest samples that any statement on a ratio is made from."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,8 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
 
     Without an input speed the engine speed over i_in stands in (exact with lock-up engaged);
     without an output speed the wheel speed times the final drive, which the twisting shaft
-    separates from the true one. Both are told in `warnings`. Raises MissingChannelError.
+    separates from the true one. Both are told in `warnings`. Raises MissingChannelError, and
+    TimeError where the two share no time.
     """
     warnings: list[str] = []
     if "input_speed" in log:
@@ -73,6 +77,13 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
     sink_time, outlet = _finite(sink)
     inside = (time >= sink_time[0]) & (time <= sink_time[-1])
     time = time[inside]
+    if len(time) < _LEAST:
+        raise TimeError(
+            f"{source.source_name!r} and {sink.source_name!r} have {len(time)} samples at common "
+            f"times, at least {_LEAST} are needed",
+            "record both speeds together, or correct time_shift in the channel mapping",
+            Where(file=log.source),
+        )
     output = factor * np.interp(time, sink_time, outlet)
     return GearboxSpeeds(time, scale * inlet[inside], output, tuple(warnings))
 

@@ -72,7 +72,8 @@ def shift_quality(
     with a = i_f·(T_o - straight line through both ends)/J_v, the wheel's angular acceleration (eq.
     9; times the wheel radius: m/s^1.75 of ISO 2631-1, unweighted). J_v is `J_vehicle` [kg m2], or
     the geometric mean of the card's range. `friction_work`, `friction_power_max`: of the on-coming
-    element in the inertia phase, T_c = T_o/iout (eq. 16) times the slip (eq. 15).
+    element in the inertia phase, T_c = T_o/iout (eq. 16; leaves out the output
+    side's inertia and the drums) times the slip (eq. 15).
     """
     start, end = shift.torque_phase[0], shift.lockup_time
     figures = {
