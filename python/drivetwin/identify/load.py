@@ -9,8 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
 
-from drivetwin.identify.signals import ShiftSignals, Span
+from drivetwin.identify.modulating import Quadrature, hann_kernels, join, windows_in
+from drivetwin.identify.regression import Fit, Prior, Term, solve
+from drivetwin.identify.signals import FloatArray, ShiftSignals, Span
 from drivetwin.identify.wlse import (
     GridFit,
     GridRow,
@@ -64,3 +67,79 @@ def paper_load(
     torque = output_torque - best.value
     _, weights = weighted_inertia(torque, acceleration, settings.weighting, scale=i_f)
     return GridFit(rows, best, acceleration, torque, output_torque - rows[0].value, weights)
+
+
+SETTLING = 0.5
+"""Time after lock-up [s] in which the output speed cannot stand in for the wheel speed."""
+
+
+@dataclass(frozen=True)
+class LoadFit:
+    """Regression of eq. 11: θ = (T_v/i_f, J3) in `fit`.
+
+    Evidence, one entry per window: `time` [s], `torque` = mean T_o - T_v/i_f [N m],
+    `acceleration` = mean ω_w' [rad/s^2]. `mean_speed` is that of the wheel [rad/s];
+    `speed_trend` the t value of a residual proportional to the speed's deviation from it.
+    """
+
+    fit: Fit
+    time: FloatArray
+    torque: FloatArray
+    acceleration: FloatArray
+    mean_speed: float
+    speed_trend: float
+
+    @property
+    def load(self) -> float:
+        """T_v/i_f [N m]."""
+        return float(self.fit.theta[0])
+
+    @property
+    def J_vehicle(self) -> float:
+        """J3 at the wheel [kg m^2]."""
+        return float(self.fit.theta[1])
+
+
+def momentum_load(
+    signals: ShiftSignals, i_f: float, spans: tuple[Span, ...], width: float = 0.4
+) -> LoadFit:
+    """Estimate (T_v/i_f, J3) from ∫ψ·T_o - (T_v/i_f)·∫ψ = (J3/i_f)·∫ψ·ω_w' over all windows.
+
+    Eq. 11 knows no gear, so `spans` may cover the whole log where the wheel speed is measured.
+    Raises IdentificationError where torque and speed do not determine both.
+    """
+    windows = join([windows_in(span, width, width / 16.0) for span in spans])
+    wheel = signals.wheel_speed
+    speed = signals.output_speed if wheel is None else wheel
+    scale = i_f**-2 if wheel is None else 1.0 / i_f
+    torque = signals.output_torque
+    psi = hann_kernels(torque.time, windows).psi
+    slope = hann_kernels(speed.time, windows).slope
+    area = 0.5 * windows.width
+    one = np.ones(windows.count)
+    constant = Quadrature(csr_array(area[:, None]))
+
+    def terms(theta: FloatArray) -> list[Term]:
+        inertia = {1: (-scale * one, slope)}
+        return [
+            Term(torque.values, torque.sigma, psi, one, {}),
+            Term(np.ones(1), 0.0, constant, -theta[0] * one, {0: (-one, constant)}),
+            Term(speed.values, speed.sigma, slope, -theta[1] * scale * one, inertia),
+        ]
+
+    start = np.array([float(np.mean(torque.values)), 1.0])
+    fit = solve(terms, start, Prior.independent(2, {}))
+    ratio = 1.0 if wheel is not None else 1.0 / i_f
+    local = speed.at(windows.centre) * ratio
+    centred = local - local.mean()
+    z = fit.residual / fit.residual_std
+    spread = float(np.sqrt(np.sum(centred**2)))
+    overlap = np.sqrt(width / (width / 16.0) * 0.375)
+    return LoadFit(
+        fit,
+        windows.centre,
+        (psi.matrix @ torque.values) / area - fit.theta[0],
+        (slope.matrix @ speed.values) * ratio / area,
+        float(local.mean()),
+        float(z @ centred) / (spread * overlap) if spread > 0.0 else 0.0,
+    )

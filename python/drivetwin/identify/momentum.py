@@ -238,7 +238,7 @@ def _prior(driveline: Driveline, settings: MomentumSettings) -> Prior:
         entries[2] = (driveline.J_out.value, known(driveline.J_out))
     for k, element in enumerate(driveline.drums):
         entries[FIRST_DRUM + k] = (element.drum.value, known(element.drum))
-    return Prior(entries)
+    return Prior.independent(len(momentum_names(driveline)), entries)
 
 
 def known(prior: PriorValue) -> float:
@@ -255,21 +255,25 @@ def _scan(
     """
     terms = equations.terms(theta)
     whiten = whitening(terms)
-    free = [p for p in range(theta.size) if p != 3]
-    rest = equations.others(theta)
-    columns = regressors(rest, theta.size)
-    fixed = whiten(terms[1].factor * (terms[1].quadrature.matrix @ terms[1].values))
-    weight = np.sqrt(np.diag(prior.precision(theta.size)))[free]
-    target = np.concatenate([-fixed, weight * prior.means(theta.size)[free]])
+    free = [p for p in range(theta.size) if p not in (0, 3)]
+    fixed = terms[1].factor * (terms[1].quadrature.matrix @ terms[1].values)
+    rest = whiten(np.column_stack([fixed, regressors(terms[1:], theta.size)[:, free]]))
     torque = equations.signals.engine_torque
+    drives = [
+        hann_kernels(torque.time, equations.windows, delay).psi.matrix @ torque.values
+        for delay in delays
+    ]
+    weight = np.sqrt(np.diag(prior.precision))[free]
+    ties = np.column_stack([-weight * prior.mean[free], np.diag(weight)])
+    rows = np.vstack([rest, ties])
+    pad = np.zeros(weight.size)
     q = []
-    for delay in delays:
-        psi = hann_kernels(torque.time, equations.windows, delay).psi
-        columns[:, 0] = psi.matrix @ torque.values
-        design = np.vstack([whiten(columns[:, free]), np.diag(weight)])
-        solution = np.linalg.lstsq(design, target, rcond=None)[0]
-        q.append(float(np.sum((design @ solution - target) ** 2)))
-    return DelayScan(np.asarray(delays), np.asarray(q), parabola_minimum(np.asarray(delays), np.asarray(q)))
+    for drive in whiten(np.column_stack(drives)).T:
+        design = np.column_stack([np.concatenate([drive, pad]), rows[:, 1:]])
+        solution = np.linalg.lstsq(design, -rows[:, 0], rcond=None)[0]
+        q.append(float(np.sum((design @ solution + rows[:, 0]) ** 2)))
+    ages, values = np.asarray(delays), np.asarray(q)
+    return DelayScan(ages, values, parabola_minimum(ages, values))
 
 
 def parabola_minimum(x: FloatArray, y: FloatArray) -> float:
@@ -296,24 +300,17 @@ def momentum_inertia(
     equations = _Equations(signals, driveline, found)
     names = momentum_names(driveline)
     prior = _prior(driveline, settings)
-    start = np.zeros(len(names))
+    start = prior.mean.copy()
     start[:2] = 0.9, start_inertia
-    for index, (mean, _) in prior.entries.items():
-        start[index] = mean
-    first = solve(equations.terms, start, _held(prior, 3, start[3]), tolerance=0.1)
+    first = solve(equations.terms, start, prior.held(3, start[3]), tolerance=0.1)
     scan = _scan(equations, first.theta, prior, settings.delay_grid)
     theta = first.theta.copy()
     theta[3] = scan.best
     fit = solve(equations.terms, theta, prior)
     if not scan.tells(fit.std[3]):
-        fit = solve(equations.terms, first.theta, _held(prior, 3, start[3]))
+        fit = solve(equations.terms, first.theta, prior.held(3, start[3]))
         scan = replace(scan, best=None)
     return _with_evidence(equations, names, fit, scan)
-
-
-def _held(prior: Prior, index: int, value: float) -> Prior:
-    """`prior` with one parameter fixed."""
-    return Prior({**prior.entries, index: (value, 1e-9)})
 
 
 def _with_evidence(

@@ -26,6 +26,7 @@ from drivetwin.identify.modulating import Quadrature
 from drivetwin.identify.signals import FloatArray
 
 MAX_PASSES = 20
+MAX_HALVINGS = 8
 NUGGET = 1e-9
 """Added to S relative to its diagonal: strongly overlapping windows are nearly dependent."""
 
@@ -47,30 +48,34 @@ class Term:
 
 @dataclass(frozen=True)
 class Prior:
-    """Independent normal priors by parameter index: (mean, standard deviation > 0)."""
+    """Normal prior on θ: `mean` (p,) and `precision` (p, p), zero rows where nothing is known."""
 
-    entries: Mapping[int, tuple[float, float]]
+    mean: FloatArray
+    precision: FloatArray
 
-    def precision(self, size: int) -> FloatArray:
-        """Diagonal precision matrix (size, size)."""
-        diagonal = np.zeros(size)
-        for index, (_, std) in self.entries.items():
-            diagonal[index] = std**-2
-        return np.diag(diagonal)
+    @classmethod
+    def independent(cls, size: int, entries: Mapping[int, tuple[float, float]]) -> Prior:
+        """Independent priors by parameter index: (mean, standard deviation > 0)."""
+        mean, precision = np.zeros(size), np.zeros((size, size))
+        for index, (value, std) in entries.items():
+            mean[index], precision[index, index] = value, std**-2
+        return cls(mean, precision)
 
-    def means(self, size: int) -> FloatArray:
-        """θ₀ (size,), zero where no prior stands."""
-        means = np.zeros(size)
-        for index, (mean, _) in self.entries.items():
-            means[index] = mean
-        return means
+    def held(self, index: int, value: float) -> Prior:
+        """The same prior with one parameter fixed at `value`."""
+        mean, precision = self.mean.copy(), self.precision.copy()
+        mean[index] = value
+        precision[index, :] = precision[:, index] = 0.0
+        precision[index, index] = 1e18
+        return Prior(mean, precision)
 
     def pull(self, theta: FloatArray) -> FloatArray:
-        """Precision times (θ - θ₀), shape (size,)."""
-        force = np.zeros(theta.size)
-        for index, (mean, std) in self.entries.items():
-            force[index] = (theta[index] - mean) / std**2
-        return force
+        """Precision times (θ - θ₀), shape (p,)."""
+        return np.asarray(self.precision @ (theta - self.mean), dtype=float)
+
+    def cost(self, theta: FloatArray) -> float:
+        """(θ - θ₀)ᵀ P⁻¹ (θ - θ₀)."""
+        return float((theta - self.mean) @ self.pull(theta))
 
 
 @dataclass(frozen=True)
@@ -164,33 +169,41 @@ def _spurious(terms: Sequence[Term], point: _Point, size: int) -> FloatArray:
             cross[p] += t.sigma**2 * np.outer(f, t.factor) * k.overlap(t.quadrature)
             for q, (g, h) in t.slopes.items():
                 own[p, q] += t.sigma**2 * float(np.sum(inverse * np.outer(f, g) * k.overlap(h)))
-    shared = [[float(np.sum((inverse @ a @ inverse) * b)) for b in cross] for a in cross]
-    return own - np.asarray(shared)
+    shared = np.empty((size, size))
+    for p, block in enumerate(cross):
+        weighted = inverse @ block @ inverse
+        shared[p] = [float(np.sum(weighted * other)) for other in cross]
+    return own - shared
 
 
 def solve(
     assemble: Callable[[FloatArray], Sequence[Term]],
     start: FloatArray,
     prior: Prior,
-    tolerance: float = 1e-4,
+    tolerance: float = 1e-3,
 ) -> Fit:
     """Minimise Q(θ) from `start` (p,) by Gauss-Newton; stop at `tolerance` standard errors.
 
-    Raises IdentificationError where the equations leave a direction of θ undetermined.
+    A step that does not lower Q is halved. Raises IdentificationError where the equations leave a
+    direction of θ undetermined.
     """
     theta = np.asarray(start, dtype=float).copy()
+    point = _evaluate(assemble(theta), theta.size)
     for _ in range(MAX_PASSES):
-        point = _evaluate(assemble(theta), theta.size)
-        hessian = point.hessian + prior.precision(theta.size)
+        hessian = point.hessian + prior.precision
         step = -_inverse(hessian) @ (point.gradient + prior.pull(theta))
-        theta = theta + step
+        cost = point.q + prior.cost(theta)
+        for _ in range(MAX_HALVINGS):
+            trial = _evaluate(assemble(theta + step), theta.size)
+            if trial.q + prior.cost(theta + step) <= cost * (1.0 + 1e-9):
+                break
+            step = 0.5 * step
+        theta, point = theta + step, trial
         if float(np.sqrt(step @ hessian @ step)) < tolerance:
             break
-    terms = assemble(theta)
-    point = _evaluate(terms, theta.size)
-    information = point.hessian - _spurious(terms, point, theta.size)
+    information = point.hessian - _spurious(assemble(theta), point, theta.size)
     chi2 = point.q / max(point.residual.size - theta.size, 1)
-    covariance = _inverse(_positive(information) + prior.precision(theta.size))
+    covariance = _inverse(_positive(information) + prior.precision)
     return Fit(
         theta,
         covariance * max(1.0, chi2),
@@ -222,7 +235,7 @@ def _inverse(information: FloatArray) -> FloatArray:
             "record a run in which engine torque and speed change",
         )
     balanced = information / np.outer(scale, scale)
-    if np.linalg.cond(balanced) > 1e13:
+    if np.linalg.cond(balanced) > 1e14:
         raise IdentificationError(
             "the equations cannot tell some of the parameters apart",
             "record a run in which engine torque and speed change independently",

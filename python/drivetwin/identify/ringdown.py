@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: MIT
+"""Frequency and damping of the lock-up oscillation in the output torque.
+
+The paper's way reads them from the extremes of the curve. The better way starts from a matrix
+pencil (Hua and Sarkar 1990) and fits one decaying sine on a quadratic; what a moving engine
+torque adds is the response of the same oscillator to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import cont2discrete, lfilter
+
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.signals import FloatArray, Sampled, Span
+from drivetwin.identify.wlse import window_edges, window_means
+
+START_AFTER_LOCKUP = 0.05
+"""Start of the fit after lock-up [s]."""
+LONGEST = 1.6
+"""Longest stretch fitted [s]: by then a drivetrain oscillation has died away."""
+BAND = (2.0, 60.0)
+"""Frequencies [Hz] in which a driveline's first torsional mode is looked for."""
+
+
+@dataclass(frozen=True)
+class RingDown:
+    """Decay rate σ [1/s] and damped frequency ω_d [rad/s], `covariance` (2, 2) of the two.
+
+    Evidence: `time` [s], `torque` [N m] measured and `fitted` (both (n,)); `extremes_time`,
+    `extremes_torque` where the values were read from extremes (else empty).
+    """
+
+    decay_rate: float
+    omega_d: float
+    covariance: FloatArray
+    time: FloatArray
+    torque: FloatArray
+    fitted: FloatArray
+    extremes_time: FloatArray
+    extremes_torque: FloatArray
+
+    @property
+    def f_d(self) -> float:
+        """Damped frequency [Hz]."""
+        return self.omega_d / (2.0 * np.pi)
+
+    @property
+    def zeta(self) -> float:
+        """Damping ratio ζ = σ/sqrt(σ² + ω_d²)."""
+        return self.decay_rate / float(np.hypot(self.decay_rate, self.omega_d))
+
+    @property
+    def f_d_std(self) -> float:
+        """Standard error of `f_d` [Hz]."""
+        return float(np.sqrt(self.covariance[1, 1])) / (2.0 * np.pi)
+
+    @property
+    def zeta_std(self) -> float:
+        """Standard error of ζ."""
+        norm = np.hypot(self.decay_rate, self.omega_d) ** 3
+        slope = np.array([self.omega_d**2, -self.decay_rate * self.omega_d]) / norm
+        return float(np.sqrt(slope @ self.covariance @ slope))
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Engine torque [N m] as it acts on the oscillator, and its static gain on T_o."""
+
+    torque: Sampled
+    gain: float
+
+
+def _refuse(what: str) -> IdentificationError:
+    return IdentificationError(
+        f"no clean lock-up oscillation: {what}",
+        "record at least 0.5 s in the new gear after a shift with a firm lock-up, pedal held still",
+    )
+
+
+def _stretch(torque: Sampled, lockup: float, end: float) -> Sampled:
+    part = torque.within((lockup + START_AFTER_LOCKUP, min(end, lockup + LONGEST)))
+    if part.time.size < 20 or part.time[-1] - part.time[0] < 0.15:
+        raise _refuse("less than 0.15 s of the new gear are left after lock-up")
+    return part
+
+
+def _quadratic(time: FloatArray) -> FloatArray:
+    u = (time - time[0]) / (time[-1] - time[0])
+    return np.column_stack([np.ones_like(u), u, u * u])
+
+
+def paper_ringdown(torque: Sampled, lockup: float, end: float) -> RingDown:
+    """Frequency from the spacing of the extremes of T_o, damping from their logarithmic decrement.
+
+    T_o is averaged over 10 ms windows; half the difference of neighbouring extremes falls by
+    exp(-σ·T/2). Extremes count while they exceed four times the noise of an average.
+    """
+    part = _stretch(torque, lockup, end)
+    edges = window_edges((part.time[0], part.time[-1]))
+    mean, centre = window_means(part, edges), 0.5 * (edges[1:] + edges[:-1])
+    count = max(part.time.size / mean.size, 1.0)
+    floor = 4.0 * torque.sigma / np.sqrt(count) + 1e-3 * float(np.ptp(mean))
+    turn = np.flatnonzero(np.diff(np.sign(np.diff(mean))) != 0) + 1
+    picked: list[int] = []
+    for k in turn:
+        if picked and abs(mean[k] - mean[picked[-1]]) < 2.0 * floor:
+            break
+        picked.append(int(k))
+    if len(picked) < 4:
+        raise _refuse(f"only {len(picked)} extremes stand out of the noise")
+    k = np.asarray(picked)
+    bend = mean[k - 1] - 2.0 * mean[k] + mean[k + 1]
+    shift = 0.5 * (mean[k - 1] - mean[k + 1]) / bend
+    instants = centre[k] + shift * (centre[1] - centre[0])
+    order = np.arange(k.size)
+    half_period = float(np.polyfit(order, instants, 1)[0])
+    swing = np.log(0.5 * np.abs(np.diff(mean[k])))
+    decrement = -float(np.polyfit(order[:-1], swing, 1)[0])
+    rate, omega = decrement / half_period, np.pi / half_period
+    if not (rate > 0.0 and BAND[0] < omega / (2 * np.pi) < BAND[1]):
+        raise _refuse(f"decay rate {rate:.3g} 1/s at {omega / (2 * np.pi):.3g} Hz")
+    return RingDown(
+        rate, omega, np.zeros((2, 2)), part.time, part.values, part.values, instants, mean[k]
+    )
+
+
+def pencil_start(time: FloatArray, values: FloatArray, order: int = 6) -> tuple[float, float]:
+    """Decay rate [1/s] and frequency [rad/s] of the strongest mode in `BAND`, by matrix pencil.
+
+    `values` (n,) over equidistant `time` (n,), trend removed; it is thinned to about 200 samples.
+    """
+    thin = max(values.size // 200, 1)
+    usable = values.size // thin * thin
+    y = values[:usable].reshape(-1, thin).mean(axis=1)
+    h = thin * (time[-1] - time[0]) / (time.size - 1)
+    length = y.size // 3
+    hankel = np.lib.stride_tricks.sliding_window_view(y, length + 1)
+    basis = np.linalg.svd(hankel, full_matrices=False)[2][:order]
+    poles = np.linalg.eigvals(np.linalg.pinv(basis[:, :-1].T) @ basis[:, 1:].T)
+    powers = np.vander(poles, y.size, increasing=True).T
+    amplitude = np.abs(np.linalg.lstsq(powers, y.astype(complex), rcond=None)[0])
+    rates = np.log(np.where(poles == 0.0, 1e-300, poles)) / h
+    frequency = rates.imag / (2.0 * np.pi)
+    good = (frequency > BAND[0]) & (frequency < BAND[1]) & (rates.real < 0.0)
+    if not np.any(good):
+        raise _refuse(f"no decaying mode between {BAND[0]:g} and {BAND[1]:g} Hz")
+    best = int(np.argmax(np.where(good, amplitude, 0.0)))
+    return float(-rates[best].real), float(rates[best].imag)
+
+
+def forced_response(rate: float, omega: float, time: FloatArray, drive: FloatArray) -> FloatArray:
+    """Response (n,) of the shaft torque, static gain 1, to `drive` (n,) over equidistant time.
+
+    The two-mass shaft passes a torque on the one mass as (2σp + ω_n²)/(p² + 2σp + ω_n²).
+    """
+    square = rate**2 + omega**2
+    system = ([2.0 * rate, square], [1.0, 2.0 * rate, square])
+    numerator, denominator, _ = cont2discrete(system, time[1] - time[0], method="foh")
+    return np.asarray(lfilter(numerator.ravel(), denominator, drive), dtype=float)
+
+
+def quiet(torque: Sampled, block: int = 4, still: int = 12) -> Sampled:
+    """Engine torque without jitter: where it stands still, a straight line replaces the samples.
+
+    It moves where the means of the `block` values before and after differ by more than four
+    standard errors; a run of at least `still` other values is replaced by its regression line.
+    """
+    v = torque.values
+    if v.size < 3 * block or torque.sigma == 0.0:
+        return torque
+    sums = np.concatenate([[0.0], np.cumsum(v)])
+    mean = (sums[block:] - sums[:-block]) / block
+    jump = np.abs(mean[block:] - mean[:-block])
+    moving = np.zeros(v.size, dtype=bool)
+    for k in np.flatnonzero(jump > 4.0 * torque.sigma * np.sqrt(2.0 / block)):
+        moving[k : k + 2 * block] = True
+    smooth = v.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], moving, [True]]).astype(int)))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if last - first >= still:
+            t = torque.time[first:last] - torque.time[first]
+            smooth[first:last] = np.polyval(np.polyfit(t, v[first:last], 1), t)
+    return Sampled(torque.time, smooth, torque.sigma)
+
+
+def fit_ringdown(torque: Sampled, lockup: float, end: float, drive: Drive | None) -> RingDown:
+    """Fit one decaying sine on a quadratic to T_o from 50 ms after lock-up.
+
+    `drive` adds the response to a moving engine torque. Amplitudes are eliminated (variable
+    projection); the covariance uses the residual's power around the frequency fitted, so that
+    coloured residuals widen it. Raises IdentificationError where no clean decay shows.
+    """
+    part = _stretch(torque, lockup, end)
+    time = np.linspace(part.time[0], part.time[-1], part.time.size)
+    values = part.at(time)
+    local, trend = time - time[0], _quadratic(time)
+    push = np.zeros_like(time)
+    if drive is not None:
+        acting = drive.gain * drive.torque.at(time)
+        push = acting - acting[0]
+
+    def basis(p: FloatArray) -> FloatArray:
+        decay = np.exp(-p[0] * local)
+        return np.column_stack([decay * np.cos(p[1] * local), decay * np.sin(p[1] * local), trend])
+
+    def projected(p: FloatArray) -> FloatArray:
+        target = values - (forced_response(p[0], p[1], time, push) if np.any(push) else 0.0)
+        q, _ = np.linalg.qr(basis(p))
+        return np.asarray(target - q @ (q.T @ target), dtype=float)
+
+    detrended = values - push
+    detrended = detrended - trend @ np.linalg.lstsq(trend, detrended, rcond=None)[0]
+    start = pencil_start(time, detrended)
+    found = least_squares(projected, start, x_scale=(5.0, 5.0), method="lm")
+    rate, omega = (float(v) for v in found.x)
+    residual = projected(found.x)
+    noise = _power_near(residual, omega, time[1] - time[0], torque.sigma)
+    covariance = noise * np.linalg.inv(found.jac.T @ found.jac)
+    if not (0.0 < rate < omega) or np.sqrt(covariance[1, 1]) > 0.05 * omega:
+        raise _refuse(f"the fit ends at decay rate {rate:.3g} 1/s, {omega / (2 * np.pi):.3g} Hz")
+    return RingDown(
+        rate, omega, covariance, time, values, values - residual, np.empty(0), np.empty(0)
+    )
+
+
+def _power_near(residual: FloatArray, omega: float, step: float, sigma: float) -> float:
+    """Noise variance per sample that acts on a fit at ω: the residual's power from ω/2 to 2ω.
+
+    Never less than the power over all frequencies or the sensor's own noise.
+    """
+    power = np.abs(np.fft.rfft(residual)) ** 2 / residual.size
+    frequency = 2.0 * np.pi * np.fft.rfftfreq(residual.size, step)
+    near = (frequency > 0.5 * omega) & (frequency < 2.0 * omega)
+    return float(max(np.mean(power[near]), np.mean(residual**2), sigma**2))
