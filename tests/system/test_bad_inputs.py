@@ -124,7 +124,7 @@ CASES = {
         "CardError", "ratio", card=lambda text: text.replace("ratio = 1.91", "ratio = -1.91")
     ),
     "ratio that no brake makes": Case(
-        "CardError", "ratio.*brake", card=lambda text: text.replace("ratio = 1.43", "ratio = 1.0")
+        "CardError", "brake.*ratio", card=lambda text: text.replace("ratio = 1.43", "ratio = 1.0")
     ),
     "card is not TOML": Case("CardError", "line 1", card=lambda text: "= " + text),
     "empty log": Case("FileFormatError", "empty", lambda _: b""),

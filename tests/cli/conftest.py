@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: MIT
+"""One synthetic log with card and truth for all tests of commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli.synth import write_run
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenarios import paper_steps
+
+
+@dataclass(frozen=True)
+class Files:
+    """Paths of a synthetic log and what belongs to it."""
+
+    log: Path
+    card: Path
+    truth: Path
+
+
+@pytest.fixture(scope="session")
+def bench_files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    """Log, card and truth of the `paper_steps` scenario with its noise."""
+    folder = tmp_path_factory.mktemp("bench")
+    return Files(*write_run(folder / "bench.csv", run(paper_steps(), seed=1)))

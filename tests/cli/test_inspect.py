@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin inspect`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivetwin.cli import main
+from drivetwin.logs.profile import read_mapping
+from tests.cli.conftest import Files
+
+
+def _inspect(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    assert main(["inspect", *arguments, "--json"]) == 0
+    document: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return document
+
+
+def test_columns_rates_and_roles(bench_files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+    found = _inspect(capsys, str(bench_files.log), "--vehicle", str(bench_files.card))
+    columns = {column["name"]: column for column in found["columns"]}
+    assert columns["EngTrq"]["roles"] == ["engine_torque"]
+    assert columns["EngTrq"]["rate"] == pytest.approx(100.0)
+    assert columns["PrsBrk3"]["roles"] == ["pressure.B3"]
+    assert columns["PrsBrk3"]["unit"] == "bar"
+    assert columns["SpdIn"]["rate"] == pytest.approx(1000.0)
+    assert found["notes"] == []
+
+
+def test_a_log_without_units_names_or_all_samples_is_described_not_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [f"{k / 100 + (1.0 if k > 50 else 0.0):.2f},{k % 7},NaN" for k in range(100)]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(["time,what,n_in", "s,,rpm", *rows]) + "\n")
+    found = _inspect(capsys, str(log))
+    columns = {column["name"]: column for column in found["columns"]}
+    assert columns["what"]["unit"] is None
+    assert columns["what"]["gaps"] == 1
+    assert columns["n_in"]["gaps"] == 101
+    assert columns["n_in"]["range"] is None
+    notes = " ".join(found["notes"])
+    assert "output_torque" in notes
+    assert "--vehicle" in notes
+
+
+def test_the_written_mapping_is_read_back(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "map.toml"
+    arguments = [str(bench_files.log), "--vehicle", str(bench_files.card)]
+    _inspect(capsys, *arguments, "--write-mapping", str(path))
+    assert read_mapping(path).channels["pressure.B2"].source == "PrsBrk2"
+    assert main(["shifts", *arguments, "--channels", str(path)]) == 0
+
+
+def test_table_fits_80_columns_without_colours(
+    bench_files: Files, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["inspect", str(bench_files.log), "--vehicle", str(bench_files.card)]) == 0
+    text = capsys.readouterr().out
+    assert "\x1b" not in text
+    assert max(len(line) for line in text.splitlines()) <= 80

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+"""Numbers as printed."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivetwin.cli.numbers import deviation, percent, quantity, shown
+
+
+def test_digits_follow_the_interval() -> None:
+    assert shown(17.50312, (17.37, 17.63), "kg*m^2") == ("17.50", "± 0.13", "kg·m²")
+
+
+def test_display_units() -> None:
+    assert shown(80500.0, (79500.0, 81500.0), "Pa") == ("0.805", "± 0.010", "bar")
+    assert shown(0.0101, (0.0098, 0.0104), "s") == ("10.10", "± 0.30", "ms")
+
+
+def test_what_is_not_known_is_a_dash() -> None:
+    assert shown(None, None, "1")[0] == "-"
+    assert quantity(None, "N*m") == "-"
+    assert percent(float("nan")) == "-"
+
+
+@pytest.mark.parametrize(
+    ("value", "truth", "text"),
+    [(18.0, 17.5, "+2.9 %"), (17.5, 17.5, "+0 %"), (None, 17.5, ""), (0.01, 0.0, "")],
+)
+def test_deviation(value: float | None, truth: float, text: str) -> None:
+    assert deviation(value, truth) == text

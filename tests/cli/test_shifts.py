@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin shifts`."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from drivetwin.cli import main
+from tests.cli.conftest import Files
+
+
+def test_phases_are_those_of_the_truth(
+    bench_files: Files, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["shifts", str(bench_files.log), "--vehicle", str(bench_files.card), "--json"]) == 0
+    (shift,) = json.loads(capsys.readouterr().out)["shifts"]
+    truth = json.loads(bench_files.truth.read_text())["shift"]
+    assert (shift["from"], shift["to"]) == ("2", "3")
+    assert shift["kind"] == "power-on upshift"
+    assert shift["torque_phase"][0] == pytest.approx(truth["torque_start"], abs=0.02)
+    assert shift["inertia_phase"][0] == pytest.approx(truth["inertia_start"], abs=0.01)
+    assert shift["lockup_time"] == pytest.approx(truth["lockup"], abs=0.005)
+
+
+def test_table(bench_files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["shifts", str(bench_files.log), "--vehicle", str(bench_files.card)]) == 0
+    text = capsys.readouterr().out
+    assert "inertia phase" in text
+    assert max(len(line) for line in text.splitlines()) <= 80

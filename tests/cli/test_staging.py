@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: MIT
+"""Output folders change as a whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli.staging import staged
+
+
+def test_files_appear_together_in_a_new_folder(tmp_path: Path) -> None:
+    target = tmp_path / "a" / "b"
+    with staged(target) as beside:
+        (beside / "one.txt").write_text("1")
+        (beside / "two.txt").write_text("2")
+        assert not target.exists()
+    assert {path.name: path.read_text() for path in target.iterdir()} == {
+        "one.txt": "1",
+        "two.txt": "2",
+    }
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+@pytest.mark.parametrize("stop", [ValueError, KeyboardInterrupt])
+def test_failure_or_interrupt_leaves_everything_as_it_was(
+    tmp_path: Path, stop: type[BaseException]
+) -> None:
+    (tmp_path / "old.txt").write_text("old")
+
+    def fail(target: Path) -> None:
+        with staged(target) as beside:
+            (beside / "old.txt").write_text("new")
+            raise stop
+
+    for target in (tmp_path, tmp_path / "fresh"):
+        with pytest.raises(stop):
+            fail(target)
+    assert [path.name for path in tmp_path.iterdir()] == ["old.txt"]
+    assert (tmp_path / "old.txt").read_text() == "old"
+
+
+def test_an_existing_folder_keeps_its_other_files(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    with staged(tmp_path) as beside:
+        (beside / "result.json").write_text("{}")
+    assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", "result.json"}

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""Hydraulic actuators against closed-form responses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivetwin.dyno.actuators import Actuator, Program, Vibration
+from drivetwin.errors import InputError
+
+TIME = np.arange(2001) / 1000.0
+
+
+def test_ramp_response_is_the_exact_one_of_a_first_order_lag() -> None:
+    slope, lag, dead_time = 4e5, 0.05, 0.02
+    command = Program(((0.5, 0.0), (1.5, slope)))
+    pressure = Actuator(command, dead_time, lag).pressure(TIME)
+    since = np.maximum(TIME - 0.5 - dead_time, 0.0)
+    exact = slope * (since - lag * (1.0 - np.exp(-since / lag)))
+    ramping = TIME - dead_time <= 1.5
+    assert np.abs(pressure - exact)[ramping].max() < 1e-9 * slope
+
+
+def test_pressure_rests_before_the_dead_time_is_over() -> None:
+    pressure = Actuator(Program(((0.1, 3e5), (0.11, 9e5))), 0.03, 0.02).pressure(TIME)
+    assert np.allclose(pressure[TIME <= 0.13], 3e5, rtol=1e-12)
+    assert pressure[-1] == pytest.approx(9e5)
+
+
+def test_vibration_is_added_only_in_its_window() -> None:
+    steady = Program(((0.0, 5e5),))
+    vibration = Vibration(amplitude=2e4, frequency=18.0, start=0.5, end=1.0)
+    added = Actuator(steady, 0.01, 0.02, vibration).pressure(TIME) - 5e5
+    outside = (TIME <= 0.5) | (TIME >= 1.0)
+    assert np.abs(added[outside]).max() < 1e-6
+    assert np.abs(added).max() == pytest.approx(2e4, rel=0.01)
+    inside = added[~outside] * np.hanning(np.count_nonzero(~outside))
+    spectrum = np.abs(np.fft.rfft(inside, 8192))
+    assert np.fft.rfftfreq(8192, 1e-3)[spectrum.argmax()] == pytest.approx(18.0, abs=0.3)
+
+
+@pytest.mark.parametrize("knots", [(), ((0.0, 1.0), (0.0, 2.0)), ((1.0, 1.0), (0.5, 2.0))])
+def test_a_program_needs_knots_in_order(knots: tuple[tuple[float, float], ...]) -> None:
+    with pytest.raises(InputError, match="knots"):
+        Program(knots)

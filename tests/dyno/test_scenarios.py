@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""The built-in scenarios are the upshifts they are said to be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.dyno.dyno import DynoRun, run
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenarios import SCENARIOS, paper
+from drivetwin.dyno.truth import lockup_oscillation
+
+
+@pytest.fixture(scope="module", params=list(ScenarioName))
+def bench(request: pytest.FixtureRequest) -> DynoRun:
+    return run(SCENARIOS[request.param](), noise=0.0)
+
+
+def test_phases_come_in_the_order_of_a_power_on_upshift(bench: DynoRun) -> None:
+    truth = bench.truth
+    assert truth.torque_start is not None
+    assert truth.inertia_start is not None
+    assert truth.lockup is not None
+    assert 0.05 < truth.inertia_start - truth.torque_start < 0.25
+    assert 0.25 < truth.lockup - truth.inertia_start < 0.7
+    assert bench.scenario.duration - truth.lockup > 1.5
+
+
+def test_on_coming_element_locks_once_and_before_its_pressure_rises_to_main(
+    bench: DynoRun,
+) -> None:
+    scenario, lockup = bench.scenario, bench.truth.lockup
+    kinds = [e.kind for e in bench.trajectory.events if e.element == scenario.oncoming]
+    assert kinds.count("lock") == 1
+    assert "break_away" not in kinds
+    final_ramp, _ = scenario.actuators[scenario.oncoming].command.knots[-2]
+    assert lockup is not None
+    assert lockup < final_ramp
+
+
+def test_output_torque_dips_in_the_torque_phase_and_rises_in_the_inertia_phase(
+    bench: DynoRun,
+) -> None:
+    time, torque = bench.trajectory.time, bench.trajectory.shaft_torque
+    start, slip, lock = bench.truth.torque_start, bench.truth.inertia_start, bench.truth.lockup
+    assert start is not None
+    assert slip is not None
+    assert lock is not None
+    before = np.mean(torque[(time > start - 0.05) & (time < start)])
+    assert torque[(time > start) & (time < slip + 0.03)].min() < 0.85 * before
+    assert np.mean(torque[(time > slip + 0.1) & (time < lock)]) > 1.3 * before
+
+
+def test_start_is_quasi_steady(bench: DynoRun) -> None:
+    early = bench.trajectory.time < 0.25
+    torque = bench.trajectory.shaft_torque[early]
+    assert np.ptp(torque) < 1e-3 * torque.mean()
+
+
+def test_paper_truth_is_the_published_set() -> None:
+    values = run(paper(), noise=0.0).truth.parameters
+    assert values["eta"] == 0.85
+    assert values["J_prime_2"] == pytest.approx(17.50, abs=0.005)
+    assert values["J_prime_3"] == pytest.approx(17.69, abs=0.01)
+    assert values["Tv_over_if"] == pytest.approx(2300.0)
+    assert values["J_vehicle"] == 6056.0
+    assert values["f_d_3"] == pytest.approx(12.0, abs=0.01)
+
+
+def test_lockup_oscillation_rings_at_its_closed_form_frequency(bench: DynoRun) -> None:
+    """Zero crossings of the detrended shaft torque after lock-up against eq. 14."""
+    lockup = bench.truth.lockup
+    assert lockup is not None
+    time, torque = bench.trajectory.time, bench.trajectory.shaft_torque
+    ring = (time > lockup + 0.02) & (time < lockup + 0.45)
+    t, y = time[ring], torque[ring] - np.mean(torque[time > lockup + 1.2])
+    rising = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
+    crossings = t[rising] - y[rising] * (t[rising + 1] - t[rising]) / (y[rising + 1] - y[rising])
+    scenario = bench.scenario
+    frequency, _ = lockup_oscillation(scenario.model, scenario.ratio(scenario.oncoming))
+    assert 1.0 / np.mean(np.diff(crossings)) == pytest.approx(frequency, rel=0.02)
+
+
+def test_torque_reduction_shortens_the_inertia_phase() -> None:
+    whole = paper()
+    reduced = replace(whole, reduction=replace(whole.reduction, fraction=0.4))
+    plain, cut = (run(scenario, noise=0.0) for scenario in (whole, reduced))
+    torque = next(c for c in cut.channels if c.role == "engine_torque")
+    assert torque.values.min() == pytest.approx(0.6 * 1545.0)
+    assert plain.truth.lockup is not None
+    assert cut.truth.lockup is not None
+    assert cut.truth.lockup < plain.truth.lockup - 0.02
