@@ -6,12 +6,16 @@ The physics itself stands in the Rust core; these classes only describe and carr
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from drivetwin import _native
+from drivetwin.errors import InputError
 
 FloatArray = NDArray[np.float64]
 LossLaw = Literal["paper", "dissipative"]
@@ -117,6 +121,19 @@ class Signal:
 
 
 @dataclass(frozen=True)
+class Accuracy:
+    """How exactly a run is integrated; the defaults leave round-off.
+
+    `tolerance` is the truncation error allowed per step relative to the states, `max_step` [s] the
+    longest step, `order` a fixed order instead of one that follows the tolerance.
+    """
+
+    tolerance: float = 1e-12
+    max_step: float = float("inf")
+    order: int | None = None
+
+
+@dataclass(frozen=True)
 class Event:
     """A change of friction mode: `kind` is lock, break_away, reverse, fill or vent."""
 
@@ -172,12 +189,44 @@ def simulate(
     time: FloatArray,
     *,
     audit: bool = False,
-    max_step: float = 1e-3,
+    accuracy: Accuracy | None = None,
 ) -> Trajectory:
     """Run the model from `time[0]` and return its trajectory on `time` (n,) [s], increasing.
 
-    `pressures` maps element names to gauge pressures [Pa]. `max_step` [s] bounds the step in
-    slipping phases; steps always end on input samples and events.
+    `pressures` maps element names to gauge pressures [Pa]; the signals must span `time`. Steps
+    always end on input samples and events.
     Raises InputError where the description is inconsistent; a run that fails returns its status.
     """
-    raise NotImplementedError(asdict(model), engine_torque, pressures, start, time, audit, max_step)
+    signals = {"engine torque": engine_torque, **pressures}
+    accuracy = accuracy or Accuracy()
+    options = (accuracy.tolerance, accuracy.max_step, accuracy.order, audit)
+    try:
+        columns, events, status, energy = _native.simulate(
+            json.dumps(asdict(model)),
+            [(name, _array(s.time), _array(s.values)) for name, s in signals.items()],
+            (
+                start.engine_speed,
+                start.output_speed,
+                start.wheel_speed,
+                start.twist,
+                list(start.locked),
+            ),
+            _array(time),
+            options,
+        )
+    except ValueError as error:
+        raise InputError(str(error), "correct the model, its inputs or the time grid") from error
+    names = [element.name for element in model.elements]
+    return Trajectory(
+        time,
+        *columns[:5],
+        clutch_torque=dict(zip(names, columns[5::2], strict=True)),
+        slip=dict(zip(names, columns[6::2], strict=True)),
+        events=tuple(Event(*event) for event in events),
+        status=status,
+        audit=EnergyAudit(*energy) if energy is not None else None,
+    )
+
+
+def _array(values: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(values, dtype=np.float64)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! μ over slip: the Stribeck law of a wet clutch (paper Figure 8), or a table.
 
-use super::error::{require, ModelError};
+use super::error::{ModelError, require};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
 

@@ -5,11 +5,11 @@
 //! cell's borders.
 
 use super::linalg::Matrix;
+use crate::model::FrictionLaw;
 use crate::model::friction::{Piece, Stribeck};
 use crate::model::mechanism::{ForceLaw, Friction, Normal};
-use crate::model::torque_map::{span_index, TorqueMap};
-use crate::model::FrictionLaw;
-use crate::number::{product_term, Real, Series, TERMS};
+use crate::model::torque_map::{TorqueMap, span_index};
+use crate::number::{Real, Series, TERMS, product_term};
 
 /// A law over one speed and the inputs.
 #[derive(Clone, Debug)]

@@ -2,9 +2,9 @@
 //! From the stated mechanism to matrices in minimal coordinates.
 
 use super::channel::Channel;
-use super::constraints::{coordinates, Coordinates};
+use super::constraints::{Coordinates, coordinates};
 use super::error::CompileError;
-use super::linalg::{solve, Matrix};
+use super::linalg::{Matrix, solve};
 use crate::model::mechanism::{Account, ForceLaw, LossLaw, Mechanism, Normal, Row};
 use crate::model::{Driveline, FrictionLaw};
 use crate::number::Real;

@@ -2,7 +2,7 @@
 //! Minimal coordinates: some node speeds are independent, the rest follow from the constraints.
 
 use super::error::CompileError;
-use super::linalg::{independent_rows, solve, Matrix};
+use super::linalg::{Matrix, independent_rows, solve};
 use crate::model::mechanism::{Constraint, Mechanism};
 use crate::number::Real;
 
@@ -89,7 +89,8 @@ fn dependent_nodes<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<usize> {
     let massless = |node: usize| {
         !m.inertias.iter().any(|i| i.inertia.re() > 0.0 && i.row.len() == 1 && i.row[0].0 == node)
     };
-    let (mut order, heavy): (Vec<usize>, Vec<usize>) = (0..m.nodes.len()).partition(|&i| massless(i));
+    let (mut order, heavy): (Vec<usize>, Vec<usize>) =
+        (0..m.nodes.len()).partition(|&i| massless(i));
     let by_node = c.transposed();
     let mut chosen: Vec<usize> = Vec::new();
     order.extend(heavy);

@@ -4,7 +4,7 @@
 
 use super::compile::Network;
 use super::constraints::force_map;
-use super::linalg::{independent_rows, least_norm, solve, Matrix};
+use super::linalg::{Matrix, independent_rows, least_norm, solve};
 use crate::model::mechanism::LossLaw;
 use crate::number::Real;
 

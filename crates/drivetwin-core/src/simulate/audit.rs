@@ -2,9 +2,9 @@
 //! Where the energy of a run went.
 
 use crate::model::mechanism::{Account, ForceLaw};
-use crate::network::channel::form;
 use crate::network::Network;
-use crate::number::{evaluate, Real, Series};
+use crate::network::channel::form;
+use crate::number::{Real, Series, evaluate};
 use crate::solve::{Integrator, Step};
 
 /// Work over a run, J: `source = stored + friction + gear_loss + shaft + load + error`.

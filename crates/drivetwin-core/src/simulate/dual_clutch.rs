@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A run of the dual-clutch driveline with its usual outputs.
 
-use super::run::{run, SimulateError};
+use super::run::{SimulateError, run};
 use super::start::Start;
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};

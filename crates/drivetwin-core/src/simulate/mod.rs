@@ -8,7 +8,7 @@ mod start;
 mod trajectory;
 
 pub use audit::EnergyAudit;
-pub use dual_clutch::{simulate_dual_clutch, DualClutchRun, DualClutchStart};
-pub use run::{run, SimulateError};
+pub use dual_clutch::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
+pub use run::{SimulateError, run};
 pub use start::{Start, StartError};
 pub use trajectory::{Output, Trajectory};

@@ -77,7 +77,9 @@ pub fn run<T: Real>(
     };
     let status = integrate().err().unwrap_or(Status::Completed);
     let columns = recorder.finish();
-    Ok(Trajectory { time: grid.to_vec(), columns, events, status, audit: balance })
+    let elements = network.frictions.iter().map(|row| row.element.clone()).collect();
+    let time = grid.to_vec();
+    Ok(Trajectory { time, columns, elements, events, status, audit: balance })
 }
 
 fn check_grid(grid: &[f64]) -> Result<(), SimulateError> {

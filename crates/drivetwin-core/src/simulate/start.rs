@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! The state a run starts from, stated by names.
 
-use crate::network::channel::form;
-use crate::network::linalg::{independent_rows, least_norm, Matrix};
 use crate::network::Network;
+use crate::network::channel::form;
+use crate::network::linalg::{Matrix, independent_rows, least_norm};
 use crate::number::Real;
 use thiserror::Error;
 

@@ -2,10 +2,10 @@
 //! Chosen outputs on a time grid.
 
 use super::audit::EnergyAudit;
-use super::start::{find, StartError};
-use crate::network::channel::form;
+use super::start::{StartError, find};
 use crate::network::Network;
-use crate::number::{evaluate, Real};
+use crate::network::channel::form;
+use crate::number::{Real, evaluate};
 use crate::solve::{Event, Integrator, RowState, Status, Step};
 
 /// A quantity to record.
@@ -39,6 +39,8 @@ pub struct Trajectory<T> {
     pub time: Vec<f64>,
     /// One column per output.
     pub columns: Vec<Vec<T>>,
+    /// Names of the friction elements that events refer to.
+    pub elements: Vec<String>,
     /// Events of friction elements.
     pub events: Vec<Event<T>>,
     /// How the run ended.
@@ -61,7 +63,8 @@ impl<'g, T: Real> Recorder<'g, T> {
         outputs: &[Output],
         grid: &'g [f64],
     ) -> Result<Self, StartError> {
-        let column = |output: &Output| Ok((resolve(network, output)?, Vec::with_capacity(grid.len())));
+        let column =
+            |output: &Output| Ok((resolve(network, output)?, Vec::with_capacity(grid.len())));
         Ok(Self { grid, next: 0, columns: outputs.iter().map(column).collect::<Result<_, _>>()? })
     }
 
@@ -117,9 +120,8 @@ fn resolve<T: Real>(network: &Network<T>, output: &Output) -> Result<Column<T>, 
 fn value<T: Real>(column: &Column<T>, run: &Integrator<'_, T>, h: T) -> T {
     let order = run.expansion.order;
     let state = |i: usize| evaluate(&run.expansion.states[i], order, h);
-    let linear = |row: &[T]| {
-        row.iter().enumerate().fold(T::zero_(), |sum, (i, &c)| sum + c * state(i))
-    };
+    let linear =
+        |row: &[T]| row.iter().enumerate().fold(T::zero_(), |sum, (i, &c)| sum + c * state(i));
     match column {
         Column::Speeds(row) => linear(row),
         Column::Twist(i) => state(run.network.speeds() + i),
@@ -130,9 +132,11 @@ fn value<T: Real>(column: &Column<T>, run: &Integrator<'_, T>, h: T) -> T {
         }
         Column::Friction(j) => match run.rows[*j] {
             RowState::Open => T::zero_(),
-            RowState::Slipping { .. } | RowState::Saturated { .. } => {
-                evaluate(&run.expansion.channels[run.network.frictions[*j].channel].torque, order, h)
-            }
+            RowState::Slipping { .. } | RowState::Saturated { .. } => evaluate(
+                &run.expansion.channels[run.network.frictions[*j].channel].torque,
+                order,
+                h,
+            ),
             RowState::Stuck => holding_torque(run, *j, h),
         },
     }
@@ -142,8 +146,7 @@ fn holding_torque<T: Real>(run: &Integrator<'_, T>, j: usize, h: T) -> T {
     let position = run.mode.stuck.iter().position(|&s| s == j);
     let row = run.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode"));
     let order = run.expansion.order;
-    let mut basis: Vec<T> =
-        run.expansion.states.iter().map(|s| evaluate(s, order, h)).collect();
+    let mut basis: Vec<T> = run.expansion.states.iter().map(|s| evaluate(s, order, h)).collect();
     basis.extend(run.expansion.inputs.iter().map(|&[value, rate]| value + rate * h));
     basis.push(T::of(1.0));
     basis.extend(run.expansion.channels.iter().map(|c| evaluate(&c.torque, order, h)));

@@ -4,8 +4,8 @@
 
 use super::integrator::{Integrator, RowState};
 use super::status::Status;
-use crate::network::channel::{apply, form, Cell};
-use crate::network::linalg::{independent_rows, Matrix};
+use crate::network::channel::{Cell, apply, form};
+use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::{Mode, ModeKey};
 use crate::number::Real;
 use std::sync::Arc;
@@ -61,9 +61,9 @@ impl<T: Real> Integrator<'_, T> {
     fn decide_exhaustively(&mut self, candidates: &[usize]) -> Result<(), Status> {
         let gears = self.network.losses.len() as u32;
         let element = || {
-            candidates.first().map_or_else(String::new, |&j| {
-                self.network.frictions[j].element.clone()
-            })
+            candidates
+                .first()
+                .map_or_else(String::new, |&j| self.network.frictions[j].element.clone())
         };
         let undecidable = Status::Undecidable { time: self.t.re(), element: element() };
         if candidates.len() > 7 || gears > 4 {
@@ -120,11 +120,7 @@ impl<T: Real> Integrator<'_, T> {
         }
         basis[network.one()] = T::of(1.0);
         for (j, row) in network.frictions.iter().enumerate() {
-            let slip = if candidates.contains(&j) {
-                T::zero_()
-            } else {
-                form(&row.slip, &self.x)
-            };
+            let slip = if candidates.contains(&j) { T::zero_() } else { form(&row.slip, &self.x) };
             let normal = row.normal.line(&self.expansion.inputs)[0];
             basis[network.first_channel() + row.channel] = match rows[j] {
                 RowState::Slipping { sign } => row.law.at(slip * sign) * normal * sign,

@@ -3,7 +3,7 @@
 
 use crate::network::channel::{Cell, ChannelSeries};
 use crate::network::{Mode, Network};
-use crate::number::{evaluate, Real, Series, TERMS};
+use crate::number::{Real, Series, TERMS, evaluate};
 
 /// Coefficients of states and channels over one step, and the working space to compute them.
 #[derive(Clone, Debug)]
@@ -105,8 +105,7 @@ impl<T: Real> Expansion<T> {
     }
 
     fn channel_terms(&mut self, network: &Network<T>, cells: &[Cell], k: usize) {
-        for ((channel, &cell), series) in
-            network.channels.iter().zip(cells).zip(&mut self.channels)
+        for ((channel, &cell), series) in network.channels.iter().zip(cells).zip(&mut self.channels)
         {
             let mut speed = T::zero_();
             for (&c, state) in channel.speed.iter().zip(&self.states) {

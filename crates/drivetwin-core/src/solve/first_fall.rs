@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! The first instant at which a guard polynomial falls below zero.
 
-use crate::number::{evaluate, slope, Real, Series, TERMS};
+use crate::number::{Real, Series, TERMS, evaluate, slope};
 
 /// Coefficients with the real parts of a guard, for the search.
 type Polynomial = [f64; TERMS];
@@ -77,7 +77,11 @@ fn bisect(c: &Polynomial, order: usize, mut from: f64, mut to: f64) -> f64 {
         if value == 0.0 {
             return t;
         }
-        if value > 0.0 { from = t } else { to = t }
+        if value > 0.0 {
+            from = t
+        } else {
+            to = t
+        }
         let newton = t - value / slope(c, order, t);
         let next = if newton > from && newton < to { newton } else { 0.5 * (from + to) };
         if next == t || to - from <= f64::EPSILON * to.abs() {

@@ -6,7 +6,7 @@ use super::first_fall::first_fall;
 use super::integrator::RowState;
 use crate::network::channel::Cell;
 use crate::network::{Mode, Network};
-use crate::number::{evaluate, slope, Real, Series, TERMS};
+use crate::number::{Real, Series, TERMS, evaluate, slope};
 
 /// What happens when a guard falls.
 #[derive(Clone, Copy, Debug, PartialEq)]

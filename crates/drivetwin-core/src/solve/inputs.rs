@@ -32,7 +32,9 @@ pub enum InputError {
         values: usize,
     },
     /// Times decrease or are not finite, or a time stands more than twice.
-    #[error("input {name:?}: times must be finite and not decrease, at most two equal (sample {index})")]
+    #[error(
+        "input {name:?}: times must be finite and not decrease, at most two equal (sample {index})"
+    )]
     Time {
         /// Name of the input.
         name: String,

@@ -12,6 +12,7 @@ mod guard;
 mod inputs;
 mod integrator;
 mod status;
+mod transition;
 
 pub use expansion::Expansion;
 pub use inputs::{InputError, Inputs};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A friction clutch, or a brake where one side is the ground (paper eqs. 4-6).
 
-use crate::model::error::{require, require_apart, ModelError};
+use crate::model::error::{ModelError, require, require_apart};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Friction, Inertia, Mechanism, Normal};
 use crate::number::Real;
@@ -45,11 +45,8 @@ impl<T: Real> Clutch<T> {
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let row = m.row(&[(&self.a, T::of(1.0)), (&self.b, T::of(-1.0))]);
-        let normal = Normal::Pressure {
-            input: m.input(&self.pressure),
-            gain: self.gain,
-            p0: self.p0,
-        };
+        let normal =
+            Normal::Pressure { input: m.input(&self.pressure), gain: self.gain, p0: self.p0 };
         m.inertias.push(Inertia { row: row.clone(), inertia: self.drum_inertia });
         m.frictions.push(Friction {
             element: self.name.clone(),

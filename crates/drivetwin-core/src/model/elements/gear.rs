@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A gear pair, with a lumped efficiency where stated (THEORY section 3).
 
-use crate::model::error::{require, require_apart, ModelError};
+use crate::model::error::{ModelError, require, require_apart};
 use crate::model::mechanism::{Constraint, Loss, LossLaw, Mechanism};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A rotating mass.
 
-use crate::model::error::{require, ModelError};
+use crate::model::error::{ModelError, require};
 use crate::model::mechanism::{self, Mechanism};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A planetary gear set.
 
-use crate::model::error::{require, ModelError};
+use crate::model::error::{ModelError, require};
 use crate::model::mechanism::{Constraint, Mechanism};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
@@ -30,11 +30,8 @@ impl<T: Real> Planetary<T> {
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let one = T::of(1.0);
-        let row = m.row(&[
-            (&self.sun, one),
-            (&self.ring, self.z),
-            (&self.carrier, -(self.z + 1.0)),
-        ]);
+        let row =
+            m.row(&[(&self.sun, one), (&self.ring, self.z), (&self.carrier, -(self.z + 1.0))]);
         m.constraints.push(Constraint { element: self.name.clone(), row, loss: None });
     }
 }

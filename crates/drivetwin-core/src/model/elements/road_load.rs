@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! External resistance of the vehicle (paper eq. 9): grade, rolling, aerodynamic.
 
-use crate::model::error::{require, ModelError};
+use crate::model::error::{ModelError, require};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Account, Force, ForceLaw, Friction, Mechanism, Normal};
 use crate::number::Real;

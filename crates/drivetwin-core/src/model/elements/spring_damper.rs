@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A compliant shaft (paper eq. 8).
 
-use crate::model::error::{require, require_apart, ModelError};
+use crate::model::error::{ModelError, require, require_apart};
 use crate::model::mechanism::{Mechanism, Spring};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
