@@ -107,7 +107,7 @@ def fit_of(measured: FloatArray, simulated: FloatArray, mean: float) -> SignalFi
     miss = float(np.linalg.norm(measured - simulated))
     spread = float(np.linalg.norm(measured - mean))
     percent = 100.0 * (1.0 - miss / spread) if spread > 0.0 else float("nan")
-    return SignalFit(miss / np.sqrt(measured.size), percent)
+    return SignalFit(miss / float(np.sqrt(measured.size)), percent)
 
 
 def phases_of(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[float, float]]:

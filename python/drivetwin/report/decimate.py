@@ -10,6 +10,8 @@ import numpy as np
 from drivetwin.identify.result import FloatArray
 
 MAX_POINTS = 4000
+_OUTSIDE = 600
+"""Points on either side of a focus: enough for a view of the whole log."""
 
 
 def envelope(
@@ -28,6 +30,24 @@ def envelope(
         start + offset for start, end in pairwise(bins) for offset in _picked(values[start:end])
     ]
     return time[kept], values[kept]
+
+
+def focused(
+    time: FloatArray, values: FloatArray, focus: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Envelope of a trace (n,) that keeps its points where they are looked at: inside `focus` [s].
+
+    Traces of up to MAX_POINTS come back unchanged.
+    """
+    if time.size <= MAX_POINTS:
+        return time, values
+    first, last = np.searchsorted(time, focus)
+    parts = [
+        envelope(time[:first], values[:first], _OUTSIDE),
+        envelope(time[first:last], values[first:last], MAX_POINTS - 2 * _OUTSIDE),
+        envelope(time[last:], values[last:], _OUTSIDE),
+    ]
+    return np.concatenate([t for t, _ in parts]), np.concatenate([v for _, v in parts])
 
 
 def _picked(values: FloatArray) -> list[int]:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Colours and layout shared by all figures: Okabe-Ito, safe for colour-blind readers."""
+"""Colours and layout shared by all figures: Okabe-Ito, safe for colour-blind readers.
+
+The blue is a little lighter than the original so that it also reads on a dark page.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-MEASURED = "#0072B2"
+MEASURED = "#1A7FC4"
 SIMULATED = "#D55E00"
 FITTED = "#D55E00"
 COMPARED = "#009E73"
@@ -52,6 +55,7 @@ def layout(height: int, **extra: Any) -> dict[str, Any]:
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
         "font": {"family": FONT, "size": 12, "color": "#333a44"},
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": MEASURED},
         "hoverlabel": {"font": {"family": FONT, "size": 12}},
         "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
         **extra,

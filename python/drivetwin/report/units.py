@@ -27,7 +27,7 @@ NM = Display("Nm")
 RAD_PER_S = Display("rad/s")
 
 _BY_SI = {
-    "1": Display(""),
+    "1": Display("–"),
     "kg*m^2": Display("kg·m²"),
     "N*m": NM,
     "N*m/rad": Display("Nm/rad"),

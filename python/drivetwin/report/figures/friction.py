@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.identify.result import FloatArray, FrictionCurve
+from drivetwin.driveline import Stribeck
+from drivetwin.identify.result import FrictionCurve
 from drivetwin.report.decimate import MAX_POINTS
 from drivetwin.report.style import COMPARED, FITTED, MEASURED, axis, layout
 
@@ -47,7 +48,7 @@ def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
     if curve.stribeck is not None:
         figure.add_scatter(
             x=curve.slip,
-            y=stribeck_mu(curve.stribeck, curve.slip),
+            y=Stribeck(**curve.stribeck).at(curve.slip),
             mode="lines",
             name="Stribeck law",
             line={"color": COMPARED, "width": 1.6, "dash": "dash"},
@@ -61,13 +62,6 @@ def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
         )
     )
     return figure
-
-
-def stribeck_mu(law: dict[str, float], slip: FloatArray) -> FloatArray:
-    """μ(|slip|) of a Stribeck law; slip (n,) in rad/s."""
-    size = np.abs(slip)
-    drop = (law["mu_s"] - law["mu_c"]) * np.exp(-size / law["v_s"])
-    return np.asarray(law["mu_c"] + drop + law["mu_v"] * size)
 
 
 def _mu_range(curve: FrictionCurve) -> tuple[float, float]:

@@ -16,12 +16,12 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     shown = [one for one in estimates.values() if one.value and one.std_total]
     figure = go.Figure()
     names = [one.id for one in shown]
-    figure.add_bar(
+    figure.add_scatter(
         y=names,
         x=[_percent(one, one.std_total) for one in shown],
-        orientation="h",
+        mode="markers",
         name="total: noise and sensor tolerances",
-        marker={"color": [VERDICT_COLOURS[one.verdict.value] for one in shown]},
+        marker={"color": [VERDICT_COLOURS[one.verdict.value] for one in shown], "size": 11},
         hovertemplate="%{y}: ±%{x:.2g} %<extra></extra>",
     )
     figure.add_scatter(
@@ -37,7 +37,6 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
             90 + 26 * len(shown),
             xaxis=axis("half width of the 95 % interval [% of the value]", type="log"),
             yaxis=axis("", autorange="reversed"),
-            bargap=0.35,
         )
     )
     return figure

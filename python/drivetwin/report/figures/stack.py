@@ -10,7 +10,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from drivetwin.identify.result import FloatArray
-from drivetwin.report.decimate import envelope
+from drivetwin.report.decimate import focused
 from drivetwin.report.style import PHASE_FILL, PHASE_NUMBER, axis, layout
 from drivetwin.report.units import Display
 
@@ -51,12 +51,14 @@ def stacked(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
     shift, buttons zoom to the phases.
     """
     figure = go.Figure()
+    view = _view(phases)
     domains = _domains([panel.weight for panel in panels])
     options: dict[str, Any] = {}
     for number, (panel, domain) in enumerate(zip(panels, domains, strict=True), start=1):
         suffix = "" if number == 1 else str(number)
-        title = f"{panel.quantity} [{panel.display.label}]"
-        options[f"yaxis{suffix}"] = axis(title, domain=domain, anchor="x")
+        title = f"{panel.quantity}<br>[{panel.display.label}]"
+        ticks = 3 + round(12 * (domain[1] - domain[0]))
+        options[f"yaxis{suffix}"] = axis(title, domain=domain, anchor="x", nticks=ticks)
         options[f"legend{suffix}"] = {
             "x": 1.01,
             "y": domain[1],
@@ -64,8 +66,7 @@ def stacked(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
             "bgcolor": "rgba(0,0,0,0)",
         }
         for curve in panel.curves:
-            figure.add_trace(_trace(curve, panel.display, suffix, len(panel.curves) > 1))
-    view = _view(phases)
+            figure.add_trace(_trace(curve, panel, suffix, view))
     options["xaxis"] = axis(
         "time [s]",
         anchor=f"y{len(panels)}" if len(panels) > 1 else "y",
@@ -98,11 +99,11 @@ def _domains(weights: Sequence[float]) -> list[tuple[float, float]]:
     return domains
 
 
-def _trace(curve: Curve, display: Display, suffix: str, in_legend: bool) -> go.Scatter:
-    time, values = envelope(curve.time, curve.values)
+def _trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -> go.Scatter:
+    time, values = focused(curve.time, curve.values, view)
     return go.Scatter(
         x=time.astype("float32"),
-        y=display.of(values).astype("float32"),
+        y=panel.display.of(values).astype("float32"),
         name=curve.name,
         mode="lines",
         line={
@@ -114,8 +115,8 @@ def _trace(curve: Curve, display: Display, suffix: str, in_legend: bool) -> go.S
         xaxis="x",
         yaxis=f"y{suffix}",
         legend=f"legend{suffix}",
-        showlegend=in_legend,
-        hovertemplate=f"%{{y:.5~g}} {display.label}",
+        showlegend=len(panel.curves) > 1,
+        hovertemplate=f"%{{y:.5~g}} {panel.display.label}",
     )
 
 

@@ -45,8 +45,8 @@ def validation_figure(validation: Validation) -> go.Figure:
         if name in validation.traces:
             trace = validation.traces[name]
             panels.append(Panel(title, display, _pair(trace), weight))
-            panels.append(Panel("residual", display, [_residual(trace)], 0.45))
-    return stacked(panels, validation.phases, height=1000)
+            panels.append(Panel("residual", display, [_residual(trace)], 0.5))
+    return stacked(panels, validation.phases, height=1180)
 
 
 def _pair(trace: SignalTrace) -> list[Curve]:

@@ -23,7 +23,11 @@
     return Promise.all(plots.map((plot) => Plotly.relayout(plot, theme(plot.layout, isDark))));
   }
 
-  const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
+  const options = {
+    responsive: true,
+    displaylogo: false,
+    modeBarButtons: [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
+  };
   document.querySelectorAll(".plot").forEach((plot) => {
     const source = plot.querySelector("script");
     const figure = JSON.parse(source.textContent);

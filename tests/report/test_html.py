@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""The report page: one file, offline, complete, safe against names with markup in them."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.identify.result import Identification
+from drivetwin.report.html import render_report, report_sections, save_report
+from drivetwin.validate import with_fit
+from tests.report.sample import identification, log, validation
+
+
+@pytest.fixture(scope="module")
+def found() -> Identification:
+    return with_fit(identification(), [validation()])
+
+
+@pytest.fixture(scope="module")
+def page(found: Identification) -> str:
+    return render_report(found, log())
+
+
+def test_opens_offline(page: str) -> None:
+    markup = _without_scripts(page)
+    assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#)""", markup)
+    assert "@import" not in markup
+    assert "url(" not in markup
+
+
+def test_plotly_stands_in_it_once(page: str) -> None:
+    assert len(re.findall(r"\* plotly\.js v", page)) == 1
+
+
+def test_first_section_answers_the_question_of_trust(found: Identification) -> None:
+    first = report_sections(found, log())[0]
+    assert first.title == "Can I trust this model?"
+    assert "10 of 12 parameters are identified, 1 only weakly, 1 cannot be told" in first.intro
+
+
+def test_every_parameter_and_reason_is_shown(page: str, found: Identification) -> None:
+    markup = _without_scripts(page)
+    for estimate in found.estimates.values():
+        assert estimate.id in markup
+        assert estimate.reason in markup
+    for text in (*found.warnings, *found.assumptions, *found.inputs.values()):
+        assert text in markup
+
+
+def test_names_from_files_are_escaped(page: str) -> None:
+    assert "sample <1>" not in page
+    assert "sample &lt;1&gt;.csv" in page
+
+
+def test_figures_are_json_with_units_on_their_axes(page: str) -> None:
+    figures = [json.loads(text) for text in re.findall(r'application/json">(.*?)</script>', page)]
+    assert len(figures) == 5
+    titles = [
+        axis["title"]["text"]
+        for figure in figures
+        for name, axis in figure["layout"].items()
+        if name.startswith(("xaxis", "yaxis"))
+    ]
+    assert all("[" in title for title in titles if title)
+    assert any("[rpm]" in title for title in titles)
+
+
+def test_equal_inputs_give_equal_text(page: str, found: Identification) -> None:
+    assert render_report(found, log()) == page
+
+
+def test_stays_small_for_long_logs(found: Identification, tmp_path: Path) -> None:
+    long = log(np.arange(0.0, 200.0, 1e-3))
+    save_report(tmp_path / "report.html", found, long)
+    assert (tmp_path / "report.html").stat().st_size < 6_000_000
+
+
+def test_sparse_identification_leaves_sections_out(found: Identification) -> None:
+    sparse = replace(
+        found, estimates={}, friction={}, fit={}, evidence={}, correlation=None, warnings=()
+    )
+    titles = [section.anchor for section in report_sections(sparse, log())]
+    assert "friction" not in titles
+    assert "validation" not in titles
+    assert render_report(sparse, log()).startswith("<!DOCTYPE html>")
+
+
+def _without_scripts(page: str) -> str:
+    return re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
