@@ -16,7 +16,7 @@ from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.start_state import start_state
 from drivetwin.twin import Twin, TwinElement, TwinGear
-from drivetwin.validate import fit_of, validate, with_fit
+from drivetwin.validate import fit_of, validate, validated, with_fit
 from tests.report.sample import identification
 
 REFERENCE = Path(__file__).parents[2] / "shared" / "reference"
@@ -45,7 +45,7 @@ def truth() -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def log(truth: dict[str, Any]) -> ShiftLog:
     path = REFERENCE / f"{CASE}.csv"
-    names = path.open(encoding="utf-8").readline().strip().split(",")
+    names = path.read_text(encoding="utf-8").split("\n", 1)[0].split(",")
     rows = np.loadtxt(path, delimiter=",", skiprows=1, dtype=np.float64)
     table = dict(zip(names, np.ascontiguousarray(rows.T), strict=True))
     time = table["time_s"]
@@ -185,3 +185,15 @@ def test_fits_of_several_shifts_are_pooled(twin: Twin, log: ShiftLog, shift: Shi
     pooled = found.fit["output_torque"]["inertia"]
     assert pooled.rmse == pytest.approx(one.fit["output_torque"]["inertia"].rmse)
     assert len(found.evidence["validation"]) == 2
+
+
+def test_incomplete_model_leaves_a_warning_and_no_fit(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    told = {key: one for key, one in twin.parameters.items() if key != "k_o"}
+    found = replace(identification(), shifts=(shift,))
+    incomplete = validated(found, replace(twin, parameters=told), log)
+    assert incomplete.fit == {}
+    assert "no validation" in incomplete.warnings[-1]
+    assert "k_o" in incomplete.warnings[-1]
+    assert validated(found, twin, log).fit["output_torque"]["all"].fit_percent > 99.8

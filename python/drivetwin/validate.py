@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.driveline import DualClutch, Signal, Trajectory, simulate
+from drivetwin.errors import MissingParameterError
 from drivetwin.identify.result import FloatArray, Identification, SignalFit
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
@@ -95,6 +96,18 @@ def with_fit(found: Identification, validations: Sequence[Validation]) -> Identi
         evidence={**found.evidence, "validation": tuple(validations)},
         warnings=found.warnings + warnings,
     )
+
+
+def validated(found: Identification, twin: Twin, log: ShiftLog) -> Identification:
+    """Identification with all its shifts simulated and compared.
+
+    Where the log could not tell a parameter that the simulation needs, the fit stays empty and a
+    warning says which: the other parameters stand all the same. Raises MissingChannelError.
+    """
+    try:
+        return with_fit(found, [validate(twin, log, shift) for shift in found.shifts])
+    except MissingParameterError as incomplete:
+        return replace(found, warnings=(*found.warnings, f"no validation: {incomplete.what}"))
 
 
 def fit_of(measured: FloatArray, simulated: FloatArray, mean: float) -> SignalFit:

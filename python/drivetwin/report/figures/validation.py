@@ -51,8 +51,8 @@ def validation_figure(validation: Validation) -> go.Figure:
 
 def _pair(trace: SignalTrace) -> list[Curve]:
     return [
-        Curve("measured", trace.time, trace.measured, MEASURED),
-        Curve("simulated", trace.time, trace.simulated, SIMULATED, width=1.6),
+        Curve("measured", trace.time, trace.measured, MEASURED, width=2.4),
+        Curve("simulated", trace.time, trace.simulated, SIMULATED, width=1.2),
     ]
 
 

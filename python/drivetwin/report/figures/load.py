@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""Torque balance behind the output shaft (eq. 11) in momentum form: its windows and the line."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from drivetwin.identify.load import LoadFit
+from drivetwin.report.style import FITTED, MEASURED, axis, layout
+
+
+def load_figure(fit: LoadFit, final_drive: float) -> go.Figure:
+    """Surplus torque over wheel acceleration, one point per window, with the slope J3/i_f."""
+    J_vehicle = float(fit.fit.theta[1])
+    ends = np.array([min(0.0, float(fit.acceleration.min())), max(0.0, fit.acceleration.max())])
+    figure = go.Figure()
+    figure.add_scatter(
+        x=fit.acceleration,
+        y=fit.torque,
+        mode="markers",
+        name="windows",
+        marker={"color": MEASURED, "size": 6, "opacity": 0.7},
+    )
+    figure.add_scatter(
+        x=ends,
+        y=ends * J_vehicle / final_drive,
+        mode="lines",
+        name=f"J3 = {J_vehicle:.4g} kg·m²",
+        line={"color": FITTED, "width": 1.8},
+    )
+    figure.update_layout(
+        layout(
+            400,
+            xaxis=axis("wheel acceleration ω_w′, window mean [rad/s²]"),
+            yaxis=axis("T_o − T_v/i_f, window mean [Nm]"),
+        )
+    )
+    return figure
