@@ -9,6 +9,7 @@ its column, so each column keeps its own time base.
 from __future__ import annotations
 
 import codecs
+import contextlib
 import csv
 import re
 from collections.abc import Sequence
@@ -32,7 +33,7 @@ _TIME_NAMES = frozenset(
 )
 _COMMENT_MARKS = ("#", "%", "//")
 _EXPORT = "export the log as text: one row of names, one of units, then one row for each sample"
-_CONTROL_BYTES = frozenset(range(32)) - frozenset(b"\t\n\r\f")
+_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,9 @@ def _decode(data: bytes, file: str) -> str:
         raise FileFormatError("the file is empty", "record or export the log again", where)
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", errors="replace")
-    if not _CONTROL_BYTES.isdisjoint(data[:65536]):
-        raise FileFormatError("the file is binary, no text of a known format", _EXPORT, where)
+    if match := _NO_TEXT.search(data):
+        what = f"the file is binary or damaged: byte {match.start()} is no text"
+        raise FileFormatError(what, _EXPORT, where)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -130,26 +132,31 @@ def _table(text: str, file: str) -> _Table:
     numbers, content = zip(*kept, strict=True)
     if delimiter is None:
         delimiter = _delimiter(content, file)
-    if '"' not in text:
-        return _even([line.split(delimiter) for line in content], numbers, file)
-    rows, ends = [], []
-    reader = csv.reader((line + "\n" for line in content), delimiter=delimiter)
-    try:
-        for row in reader:
-            rows.append(row)
-            ends.append(numbers[reader.line_num - 1])
-    except csv.Error as fault:
-        line = numbers[min(reader.line_num, len(numbers)) - 1]
-        raise FileFormatError(f"line {line}: {fault}", _EXPORT, Where(file=file)) from None
-    return _even(rows, ends, file)
+    rows = []
+    for number, line in kept:
+        try:
+            rows.append(_fields(line, delimiter))
+        except csv.Error as fault:
+            what = f"line {number}: a quoted field does not end where it should ({fault})"
+            raise FileFormatError(what, _EXPORT, Where(file=file)) from None
+    return _even(rows, numbers, file)
+
+
+def _fields(line: str, delimiter: str) -> list[str]:
+    """Fields of one line; raises csv.Error where a quote does not close on it."""
+    if '"' not in line:
+        return line.split(delimiter)
+    reader = csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True)
+    return next(reader)
 
 
 def _delimiter(lines: Sequence[str], file: str) -> str:
     """The sign that splits names and first row into equally many fields."""
     for sign in ("\t", ";", ","):
-        counts = [len(next(csv.reader([line], delimiter=sign))) for line in lines[:2]]
-        if min(counts) > 1 and max(counts) - min(counts) <= 1:
-            return sign
+        with contextlib.suppress(csv.Error):
+            counts = [len(_fields(line, sign)) for line in lines[:2]]
+            if min(counts) > 1 and max(counts) - min(counts) <= 1:
+                return sign
     raise FileFormatError(
         f"no columns found: no tab, semicolon or comma splits {lines[0][:60]!r} and the line "
         "below alike",

@@ -15,11 +15,17 @@ from numpy.typing import NDArray
 
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 
-MIN_CHANGES = 8
+MIN_CHANGES = 10
 """Fewer changes of value cannot prove a raster."""
 
+MAX_PERIOD = 0.25
+"""Longest update period looked for [s]; CAN messages of interest come every 5 to 100 ms."""
+
 _JITTER = 0.2
-"""How far a change may lie from the raster, as part of the period."""
+"""How far a change may lie from the raster, as part of the period ..."""
+
+_JITTER_SAMPLES = 1.5
+"""... and in samples of the logger."""
 
 
 @dataclass(frozen=True)
@@ -41,23 +47,24 @@ def find_raster(channel: Channel) -> Raster | None:
     changes = channel.time[1:][np.diff(channel.values) != 0.0]
     if changes.size < MIN_CHANGES:
         return None
-    distance = np.diff(changes)
-    longest = round(float(distance.min()) / channel.step * (1.0 + _JITTER))
-    for samples in range(longest, 1, -1):
-        raster = _fit(changes, distance, samples * channel.step)
-        if raster is not None and raster.period > 1.5 * channel.step:
+    longest = min(float(np.diff(changes).min()) * (1.0 + _JITTER), MAX_PERIOD)
+    for samples in range(round(longest / channel.step), 1, -1):
+        raster = _fit(changes, samples * channel.step, channel.step)
+        if raster is not None:
             return raster
     return None
 
 
-def _fit(changes: FloatArray, distance: FloatArray, period: float) -> Raster | None:
-    steps = np.round(distance / period)
+def _fit(changes: FloatArray, period: float, step: float) -> Raster | None:
+    """Least-squares raster near `period` through the changes; None if they do not lie on one."""
+    steps = np.round(np.diff(changes) / period)
     if steps.min() < 1.0:
         return None
     count = np.concatenate(([0.0], np.cumsum(steps)))
     slope, start = np.polyfit(count, changes, 1)
     residual = np.abs(changes - start - slope * count).max()
-    return Raster(float(start), float(slope)) if residual <= _JITTER * slope else None
+    on_raster = residual <= min(_JITTER * slope, _JITTER_SAMPLES * step)
+    return Raster(float(start), float(slope)) if on_raster and slope > 1.5 * step else None
 
 
 def _update_indices(channel: Channel, raster: Raster) -> NDArray[np.intp]:

@@ -121,6 +121,7 @@ def resolve(
     exist or a needed role has several candidates, MissingChannelError where a needed role has none.
     """
     needed = tuple(needed)
+    _refuse_unknown_elements(stated, elements, file)
     channels = {role: _existing(role, spec, names, file) for role, spec in stated.items()}
     taken = {spec.source for spec in stated.values()}
     guessed = guess([name for name in names if name not in taken], elements)
@@ -151,6 +152,20 @@ def resolve(
         {role: channels[role] for role in (*ROLES, *pressures) if role in channels},
         warnings=tuple(warnings),
     )
+
+
+def _refuse_unknown_elements(
+    stated: Mapping[str, ChannelSpec], elements: Mapping[str, str], file: str
+) -> None:
+    for role in stated:
+        element = role.removeprefix(PRESSURE)
+        if role.startswith(PRESSURE) and element not in elements:
+            raise MappingError(
+                f"the mapping has a pressure of {element!r}, which is no element of the vehicle "
+                f"card{did_you_mean(element, elements)}",
+                "use the element names of the card: [channels.pressure.<element>]",
+                Where(file=file),
+            )
 
 
 def _unclaimed(

@@ -4,19 +4,20 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin.errors import DamagedChannelError, FileFormatError, TimeError, Where
+from drivetwin.errors import DamagedChannelError, FileFormatError, Where
+from drivetwin.logs.agreement import check_common_span, check_gearing
 from drivetwin.logs.csv import read_csv
 from drivetwin.logs.held import find_raster
 from drivetwin.logs.mapping import ChannelSpec, Mapped, resolve
 from drivetwin.logs.profile import read_mapping
-from drivetwin.logs.raw import RawChannel, RawLog, TimeColumn
+from drivetwin.logs.raw import RawLog, TimeColumn
 from drivetwin.logs.roles import NEEDED, quantity_of
 from drivetwin.logs.shiftlog import Channel, ShiftLog
-from drivetwin.logs.units import channel_unit
+from drivetwin.logs.units import channel_unit, lookup
 from drivetwin.logs.validate import check_channel
 from drivetwin.vehicle.card import VehicleCard
 
@@ -65,8 +66,9 @@ def read_log(
         checked = check_channel(_channel(role, spec, raw, str(path)), str(path))
         held = find_raster(checked.channel) is not None
         channels[role] = replace(checked.channel, held=held)
-        warnings += checked.warnings
-    _check_common_span(channels, str(path))
+        warnings += [*checked.warnings, *_asserted(spec, raw)]
+    check_common_span(channels, str(path))
+    check_gearing(channels, card, str(path))
     return ShiftLog(channels, str(path), hashlib.sha256(data).hexdigest(), tuple(warnings))
 
 
@@ -100,7 +102,7 @@ def _channel(role: str, spec: ChannelSpec, raw: RawLog, file: str) -> Channel:
         raise DamagedChannelError(
             raw.unreadable[spec.source], "repair or empty the cell, or map another column", where
         )
-    source: RawChannel = raw.named(spec.source)[0]
+    source = raw.named(spec.source)[0]
     quantity = quantity_of(role)
     unit_text = spec.unit if spec.unit is not None else source.unit
     unit = channel_unit(unit_text, quantity, where)
@@ -114,14 +116,9 @@ def _channel(role: str, spec: ChannelSpec, raw: RawLog, file: str) -> Channel:
     )
 
 
-def _check_common_span(channels: Mapping[str, Channel], file: str) -> None:
-    """All channels must overlap in time, else a time base is wrong."""
-    latest = max(channels.values(), key=lambda channel: float(channel.time[0]))
-    earliest = min(channels.values(), key=lambda channel: float(channel.time[-1]))
-    if latest.time[0] >= earliest.time[-1]:
-        raise TimeError(
-            f"no common time span: {latest.source_name!r} starts at {latest.time[0]:.6g} s, "
-            f"{earliest.source_name!r} ends at {earliest.time[-1]:.6g} s",
-            "set time_shift_s in the channel mapping, or export the channels on one clock",
-            Where(file=file),
-        )
+def _asserted(spec: ChannelSpec, raw: RawLog) -> list[str]:
+    """A warning where the mapping asserts another unit than the file states."""
+    stated = raw.named(spec.source)[0].unit
+    if spec.unit is None or stated is None or lookup(stated) == lookup(spec.unit):
+        return []
+    return [f"channel {spec.source!r}: read in {spec.unit!r} as mapped, the file says {stated!r}"]

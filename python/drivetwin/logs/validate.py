@@ -21,15 +21,18 @@ BAR = 1e5
 
 _PLAUSIBLE: dict[Quantity, tuple[float, float]] = {
     Quantity.PRESSURE: (1e-3 * BAR, 100 * BAR),
-    Quantity.SPEED: (0.1, 3e3),
+    Quantity.SPEED: (0.1, 1.2e3),
     Quantity.TORQUE: (1.0, 1e5),
     Quantity.FRACTION: (1e-3, 2.0),
 }
 """Limits of max|value| in SI over a recording that contains a shift."""
 
+_IDLE = 30.0
+"""Largest speed [rad/s] that engine and gearbox input exceed in any shift."""
+
 _TYPICAL: dict[Quantity, tuple[float, float]] = {
     Quantity.PRESSURE: (1 * BAR, 60 * BAR),
-    Quantity.SPEED: (10.0, 1e3),
+    Quantity.SPEED: (10.0, 700.0),
     Quantity.TORQUE: (50.0, 3e4),
     Quantity.FRACTION: (0.05, 1.0),
 }
@@ -121,9 +124,13 @@ def _check_variation(channel: Channel, where: Where) -> None:
 
 
 def _check_magnitude(channel: Channel, where: Where) -> None:
-    limits = _PLAUSIBLE.get(channel.quantity)
+    if channel.quantity not in _PLAUSIBLE:
+        return
+    lowest, highest = _PLAUSIBLE[channel.quantity]
+    if channel.role in ("input_speed", "engine_speed"):
+        lowest = _IDLE
     largest = float(np.abs(channel.values).max())
-    if limits is None or largest == 0.0 or limits[0] <= largest <= limits[1]:
+    if largest == 0.0 or lowest <= largest <= highest:
         return
     low, high = _TYPICAL[channel.quantity]
     fitting = [
@@ -131,14 +138,13 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
         for name, factor in usual_units(channel.quantity, channel.source_unit)
         if low <= factor * largest <= high
     ]
-    side = "above" if largest > limits[1] else "below"
+    side, limit = ("above", highest) if largest > highest else ("below", lowest)
     remedy = (
         f"the numbers would fit {' or '.join(map(repr, fitting))}: assert the unit in the channel "
         f'mapping, [channels.{channel.role}] unit = "{fitting[0]}"'
         if fitting
         else f"correct unit or scale in the channel mapping, [channels.{channel.role}]"
     )
-    limit = limits[1] if side == "above" else limits[0]
     raise PlausibilityError(
         f"largest {channel.quantity} is {_show(largest, channel.quantity)}, {side} "
         f"{_show(limit, channel.quantity)}, with unit {channel.source_unit!r}",

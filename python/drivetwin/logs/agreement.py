@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""What the channels of one log must satisfy together: one clock, speeds that fit the gearing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from drivetwin.errors import PlausibilityError, TimeError, Where
+from drivetwin.logs.shiftlog import Channel
+from drivetwin.vehicle.spec import VehicleCard
+
+STANDSTILL = 1.0
+"""Median speed [rad/s] below which a log does not show the gearing."""
+
+FINAL_DRIVE_TOLERANCE = 0.2
+"""Relative; generous to one-wheel sensors in a bend, far below any mistaken unit."""
+
+GEAR_MARGIN = 3.0
+"""Factor around the card's gears, for logs that also hold other gears; rpm/(rad/s) is 9.5."""
+
+
+def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
+    """Raise TimeError where no time belongs to all channels: then a time base is wrong."""
+    latest = max(channels.values(), key=lambda channel: float(channel.time[0]))
+    earliest = min(channels.values(), key=lambda channel: float(channel.time[-1]))
+    if latest.time[0] >= earliest.time[-1]:
+        raise TimeError(
+            f"no common time span: {latest.source_name!r} starts at {latest.time[0]:.6g} s, "
+            f"{earliest.source_name!r} ends at {earliest.time[-1]:.6g} s",
+            "set time_shift_s in the channel mapping, or export the channels on one clock",
+            Where(file=file),
+        )
+
+
+def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str) -> None:
+    """Raise PlausibilityError where two speeds contradict final drive or gears of the card.
+
+    Finds a speed with the unit of another (rpm taken as rad/s) and exchanged columns.
+    """
+    ratios = [gear.ratio for gear in card.gears]
+    final = card.final_drive
+    low, high = 1.0 - FINAL_DRIVE_TOLERANCE, 1.0 + FINAL_DRIVE_TOLERANCE
+    limits = (
+        ("output_speed", "wheel_speed", low * final, high * final, f"the final drive {final:g}"),
+        (
+            "input_speed",
+            "output_speed",
+            min(ratios) / GEAR_MARGIN,
+            max(ratios) * GEAR_MARGIN,
+            f"the gears {', '.join(f'{ratio:g}' for ratio in ratios)}",
+        ),
+    )
+    for faster, slower, lowest, highest, gearing in limits:
+        if faster not in channels or slower not in channels:
+            continue
+        fast, slow = channels[faster], channels[slower]
+        denominator = float(np.median(slow.values))
+        if denominator < STANDSTILL:
+            continue
+        ratio = float(np.median(fast.values)) / denominator
+        if not lowest <= ratio <= highest:
+            raise PlausibilityError(
+                f"{faster} ({fast.source_name!r}, {fast.source_unit}) over {slower} "
+                f"({slow.source_name!r}, {slow.source_unit}) is {ratio:.4g}, but the card has "
+                f"{gearing}",
+                "check the units of both and whether the columns are exchanged (channel mapping), "
+                "or correct the card",
+                Where(file=file),
+            )

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""Channels against each other and the card: gearing that fits, or a refusal that names both."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import PlausibilityError
+from drivetwin.logs.agreement import check_gearing
+from drivetwin.logs.roles import quantity_of
+from drivetwin.logs.shiftlog import Channel
+from tests.logs.made import card
+
+TIME = np.linspace(0.0, 0.5, 50)
+
+
+def speeds(**levels: float) -> dict[str, Channel]:
+    return {
+        role: Channel(role, quantity_of(role), TIME, np.full(50, level), f"n_{role}", "rad/s")
+        for role, level in levels.items()
+    }
+
+
+def test_the_gears_of_the_card_and_their_neighbours_pass(tmp_path: Path) -> None:
+    for ratio in (1.8, 1.4, 1.0, 3.5):
+        channels = speeds(input_speed=100.0 * ratio, output_speed=100.0, wheel_speed=20.3)
+        check_gearing(channels, card(tmp_path), "log.csv")
+
+
+def test_exchanged_columns_are_told(tmp_path: Path) -> None:
+    channels = speeds(output_speed=20.0, wheel_speed=100.0)
+    with pytest.raises(PlausibilityError) as caught:
+        check_gearing(channels, card(tmp_path), "log.csv")
+    assert caught.value.what == (
+        "output_speed ('n_output_speed', rad/s) over wheel_speed ('n_wheel_speed', rad/s) is 0.2, "
+        "but the card has the final drive 5"
+    )
+    assert "columns are exchanged" in caught.value.remedy
+
+
+def test_standstill_and_absent_speeds_show_no_gearing(tmp_path: Path) -> None:
+    vehicle = card(tmp_path)
+    check_gearing(speeds(input_speed=70.0, output_speed=0.0), vehicle, "log.csv")
+    check_gearing(speeds(input_speed=70.0), vehicle, "log.csv")

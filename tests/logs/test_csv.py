@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""The CSV reader: layouts found in practice, and files that are none."""
+
+from __future__ import annotations
+
+import time as clock
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import (
+    DrivetwinError,
+    FileFormatError,
+    MappingError,
+    MissingChannelError,
+    TimeError,
+    UnitError,
+)
+from drivetwin.logs.csv import read_csv
+from drivetwin.logs.raw import RawLog, TimeColumn
+
+
+def read(text: str | bytes, time: TimeColumn | None = None) -> RawLog:
+    data = text.encode() if isinstance(text, str) else text
+    return read_csv(data, "log.csv", time or TimeColumn())
+
+
+def values(log: RawLog, name: str) -> list[float]:
+    (channel,) = log.named(name)
+    return [float(value) for value in channel.values]
+
+
+PLAIN = "time,EngTrq,nAb\ns,Nm,1/min\n0.0,1000,700.5\n0.1,1001,701\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN,
+        PLAIN.replace("\n", "\r\n"),
+        PLAIN.replace(",", ";"),
+        PLAIN.replace(",", "\t"),
+        PLAIN.replace(",", ";").replace(".", ","),
+        PLAIN.replace(",", "\t").replace(".", ","),
+        "\ufeff" + PLAIN,
+        "# truck\n% 2nd to 3rd, 60 % pedal\n// x\n\n" + PLAIN,
+        PLAIN.replace("s,Nm", "# units follow\ns,Nm"),
+        "sep=;\n" + PLAIN.replace(",", ";"),
+        PLAIN.replace("\n", ",\n"),
+        PLAIN.rstrip("\n"),
+        "time [s],EngTrq [Nm],nAb [1/min]\n0.0,1000,700.5\n0.1,1001,701\n",
+        "time (s),EngTrq (Nm), nAb (1/min)\n0.0,1000,700.5\n0.1,1001,701\n",
+        "time,EngTrq,nAb\n[s],[Nm],[1/min]\n0.0,1000,700.5\n0.1,1001,701\n",
+        '"time","EngTrq","nAb"\n"s","Nm","1/min"\n"0,0","1000","700,5"\n"0,1","1001","701,0"\n',
+        "EngTrq,nAb,time\nNm,1/min,ms\n1000,700.5,0\n1001,701,100\n",
+        "Zeit;EngTrq;nAb\ns;Nm;1/min\n0,0;1,000E3;7,005e2\n,1;1001,;701\n",
+    ],
+)
+def test_every_layout_gives_the_same_channels(text: str) -> None:
+    log = read(text)
+    assert [channel.name for channel in log.channels] == ["EngTrq", "nAb"]
+    assert [(channel.unit or "").strip("[]") for channel in log.channels] == ["Nm", "1/min"]
+    assert values(log, "EngTrq") == [1000.0, 1001.0]
+    assert values(log, "nAb") == [700.5, 701.0]
+    assert log.channels[0].time == pytest.approx([0.0, 0.1])
+    assert log.warnings == ()
+
+
+def test_utf16_and_latin1_text() -> None:
+    text = "time;Öltemp\ns;°C\n0;80\n1;81\n"
+    for data in (text.encode("utf-16"), text.encode("cp1252")):
+        (channel,) = read(data).channels
+        assert (channel.name, channel.unit) == ("Öltemp", "°C")
+
+
+def test_an_empty_cell_is_no_sample_of_its_column_alone() -> None:
+    log = read("time,slow,fast\ns,Nm,bar\n0,1,10\n1,,11\n2,3,12\n3, ,13\n")
+    (slow,), (fast,) = log.named("slow"), log.named("fast")
+    assert slow.time.tolist() == [0.0, 2.0]
+    assert slow.values.tolist() == [1.0, 3.0]
+    assert fast.values.tolist() == [10.0, 11.0, 12.0, 13.0]
+
+
+def test_words_for_no_number_become_nan() -> None:
+    log = read("time,x\ns,Nm\n0,1\n1,NaN\n2,n/a\n3,inf\n")
+    assert np.isnan(values(log, "x")).tolist() == [False, True, True, True]
+
+
+def test_a_text_column_is_set_aside_with_its_first_cell() -> None:
+    log = read("time,state,x\ns,-,Nm\n0,D,1\n1,D,2\n")
+    assert [channel.name for channel in log.channels] == ["x"]
+    assert log.unreadable == {"state": "line 3: 'D' is no number"}
+
+
+def test_an_underscore_is_no_part_of_a_number() -> None:
+    assert "'1_0'" in read("time,x\ns,Nm\n0,1_0\n1,2\n").unreadable["x"]
+
+
+def test_an_index_in_a_name_is_no_unit() -> None:
+    log = read("time [s],p[2],p [1]\n0,1,2\n1,3,4\n")
+    assert [(channel.name, channel.unit) for channel in log.channels] == [
+        ("p[2]", None),
+        ("p", "1"),
+    ]
+
+
+def test_a_cut_last_line_is_left_out_and_told() -> None:
+    log = read("time,a,b\ns,Nm,Nm\n0,1,2\n1,3,4\n2,5")
+    assert values(log, "b") == [2.0, 4.0]
+    assert log.warnings == ("the file is cut: line 5, the last, has 2 of 3 fields and is left out",)
+
+
+def test_the_time_column_can_be_stated() -> None:
+    log = read("clock,x\n,Nm\n0,1\n10,2\n", TimeColumn("clock", "ms"))
+    assert log.channels[0].time.tolist() == [0.0, 0.01]
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "words"),
+    [
+        ("", FileFormatError, "the file is empty"),
+        ("  \n\n", FileFormatError, "the file is empty"),
+        (b"\x00\x01\x02MDF", FileFormatError, "binary or damaged: byte 0"),
+        (PLAIN.encode() + b"\x00" * 9, FileFormatError, "byte 55 is no text"),
+        ("# only\n# comments\n", FileFormatError, "only comments"),
+        ("hello world\n", FileFormatError, "no columns found"),
+        ("time,x\n", FileFormatError, "names but no samples"),
+        ("time,x\ns,Nm\n", FileFormatError, "names but no samples"),
+        ("0,1\n1,2\n", FileFormatError, "numbers where the names should stand"),
+        ("time,x\ns,Nm\n0,1\n1\n2,3\n", FileFormatError, "line 4 has 1 fields, the names have 2"),
+        ("time,x\ns,Nm\n0,1\n1,2,9\n2,3\n", FileFormatError, "line 4 has 3 fields"),
+        ("time;x\ns;Nm\n0.5;1.000,5\n1.5;2,5\n", FileFormatError, "with point ('0.5')"),
+        ('time,x\ns,Nm\n0,"1\n1,2\n', FileFormatError, "line 3: a quoted field does not end"),
+        ("clock,x\ns,Nm\n0,1\n", MissingChannelError, "no time column among clock, x"),
+        ("time,t,x\ns,s,Nm\n0,0,1\n", MappingError, "several time columns: time, t"),
+        ("time,x\n,Nm\n0,1\n", UnitError, "no unit for its time column"),
+        ("time,x\nparsec,Nm\n0,1\n", UnitError, "unknown time unit 'parsec'"),
+        ("time,x\ns,Nm\n0,1\n12:01,2\n", TimeError, "line 4: '12:01' is no number"),
+        ("time,x\ns,Nm\n0,1\n,2\n2,3\n", TimeError, "line 4 has no time stamp"),
+    ],
+)
+def test_what_is_no_log_is_told(text: str | bytes, error: type[DrivetwinError], words: str) -> None:
+    with pytest.raises(error) as caught:
+        read(text)
+    assert words in caught.value.what
+    assert caught.value.remedy
+    assert str(caught.value).startswith("log.csv")
+
+
+def test_a_misspelt_time_column_gets_the_nearest_name() -> None:
+    with pytest.raises(MissingChannelError, match="did you mean 'clock'"):
+        read("clock,x\ns,Nm\n0,1\n", TimeColumn("Clok", "s"))
+
+
+def test_reading_is_fast() -> None:
+    rows = "".join(f"{i / 1e3:.3f}," + ",".join(["1234.5"] * 7) + "\n" for i in range(7600))
+    data = "time,a,b,c,d,e,f,g\ns,Nm,Nm,Nm,Nm,Nm,Nm,Nm\n" + rows
+    fastest = np.inf
+    for _ in range(3):
+        start = clock.perf_counter()
+        read(data)
+        fastest = min(fastest, clock.perf_counter() - start)
+    assert fastest < 0.2

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""Held signals: the update instants are found from the changes, through rounding and jitter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from drivetwin.logs.held import find_raster, fresh_samples
+from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
+
+STEP = 1e-3
+
+
+def channel(values: FloatArray, quantity: Quantity = Quantity.TORQUE) -> Channel:
+    time = np.round(np.arange(values.size) * STEP, 3)
+    return Channel("engine_torque", quantity, time, values, "EngTrq", "Nm", held=True)
+
+
+def hold(updates: FloatArray, period: int, phase: int = 0) -> FloatArray:
+    """Repeat each update for `period` samples; the first is already `phase` samples old."""
+    return np.repeat(updates, period)[phase:]
+
+
+def wave(count: int, rounding: float) -> FloatArray:
+    k = np.arange(count)
+    torque = 1000.0 + 300.0 * np.sin(0.05 * k) + 40.0 * np.sin(k)
+    return np.asarray(rounding * np.round(torque / rounding), dtype=np.float64)
+
+
+@given(period=st.integers(5, 40), data=st.data(), rounding=st.sampled_from([0.01, 1.0, 11.0, 25.0]))
+def test_every_update_is_found_and_no_other_sample(
+    period: int, data: st.DataObject, rounding: float
+) -> None:
+    phase = data.draw(st.integers(0, period - 1))
+    updates = wave(150, rounding)
+    fresh = fresh_samples(channel(hold(updates, period, phase)))
+    first = 0 if phase == 0 else 1
+    expected = (np.arange(first, 150) * period - phase) * STEP
+    assert fresh.time == pytest.approx(expected)
+    assert fresh.values.tolist() == updates[first:].tolist()
+    assert not fresh.held
+
+
+def test_updates_that_repeat_the_value_are_fresh_too() -> None:
+    updates = np.repeat(wave(40, 1.0), 3)  # two of three updates change nothing
+    updates[::17] += 5.0
+    fresh = fresh_samples(channel(hold(updates, 10)))
+    assert fresh.time == pytest.approx(np.arange(120) * 0.01)
+
+
+def assert_within_a_sample(found: FloatArray, true: NDArray[np.floating]) -> None:
+    """Off the logger's grid an update that changes nothing is placed to a sample."""
+    assert found.shape == true.shape
+    assert np.abs(found - true).max() < 1.01 * STEP
+    assert np.mean(np.abs(found - true) < 1e-9) > 0.99
+
+
+def test_message_jitter_of_a_sample_does_not_hide_the_raster() -> None:
+    rng = np.random.default_rng(7)
+    at = np.arange(200) * 10 + np.concatenate(([0], rng.integers(0, 2, 199)))
+    values = np.repeat(wave(200, 0.01), np.diff(np.append(at, 2000)))
+    assert_within_a_sample(fresh_samples(channel(values)).time, at * STEP)
+
+
+def test_clock_drift_does_not_add_up() -> None:
+    at = np.ceil(np.arange(1000) * 10.004).astype(int)
+    values = np.repeat(wave(1000, 0.01), np.diff(np.append(at, at[-1] + 10)))
+    assert_within_a_sample(fresh_samples(channel(values)).time, at * STEP)
+
+
+@pytest.mark.parametrize("rounding", [0.01, 1.0, 25.0])
+def test_a_signal_sampled_at_every_stamp_is_not_held(rounding: float) -> None:
+    noise = np.random.default_rng(1).normal(0.0, 5.0, 2000)
+    values = rounding * np.round((1000.0 + noise) / rounding)
+    assert find_raster(channel(values)) is None
+
+
+def test_a_coarse_slow_signal_without_raster_is_not_held() -> None:
+    ramp = np.round(30.0 * np.sin(np.linspace(0.0, 2.0, 4000)) ** 2)
+    assert find_raster(channel(ramp)) is None
+
+
+def test_constants_and_states_are_not_held() -> None:
+    assert find_raster(channel(np.full(500, 7.0))) is None
+    assert find_raster(channel(hold(wave(50, 1.0), 10), Quantity.STATE)) is None
+
+
+def test_a_channel_that_is_not_held_stays_as_it_is() -> None:
+    every = channel(np.random.default_rng(2).normal(size=100))
+    assert fresh_samples(every) is every

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""Which column is which role: guesses from names in use, ambiguity and absence told."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivetwin.errors import MappingError, MissingChannelError
+from drivetwin.logs.mapping import ChannelSpec, guess, plain, resolve
+from drivetwin.logs.roles import NEEDED
+
+ELEMENTS = {"B2": "brake", "B3": "brake"}
+ENGLISH = ["EngTrq", "PrsBrk2", "PrsBrk3", "TrqOut", "SpdIn", "SpdOut", "SpdWhl"]
+
+
+@pytest.mark.parametrize(
+    ("role", "names"),
+    [
+        ("engine_torque", "EngTrq TqEng TqEng_c Motormoment MMot_Ist_c engine_torque te M_Mot"),
+        ("output_torque", "TrqOut MAbtr_Mess Abtriebsmoment output_torque TqOut M_ab"),
+        ("input_speed", "SpdIn nGetrEin n_ein Eingangsdrehzahl w_in input_speed n_turb"),
+        ("engine_speed", "EngSpd nMot Motordrehzahl engine_speed n_eng"),
+        ("output_speed", "SpdOut n_ab nGetrAus Abtriebsdrehzahl w_out output_speed N_Ab"),
+        ("wheel_speed", "SpdWhl nRad Raddrehzahl w_wheel wheel_speed WheelSpeed"),
+        ("throttle", "throttle AccelPedal Fahrpedal accel_pedal_pos"),
+        ("gear", "gear Gang current_gear IstGang"),
+        ("pressure.B2", "PrsBrk2 p2 pB2 p_B2 PBrake2 DruckBremse2 Druck_B2 B2_pressure"),
+    ],
+)
+def test_names_in_use_are_recognised(role: str, names: str) -> None:
+    for name in names.split():
+        assert guess([name], ELEMENTS) == {role: [name]}
+
+
+def test_a_clutch_and_a_brake_of_one_number_are_told_apart_by_kind() -> None:
+    elements = {"B2": "brake", "K2": "clutch"}
+    found = guess(["PrsBrk2", "pKup2", "p_Temp"], elements)
+    assert found == {"pressure.B2": ["PrsBrk2"], "pressure.K2": ["pKup2"]}
+
+
+def test_plain_names() -> None:
+    assert plain("n_Ab [1/min]") == "nab"
+    assert plain("Öldruck\\XCP:1") == "oeldruck"
+
+
+def test_resolve_orders_roles_and_prefers_what_is_stated() -> None:
+    stated = {"output_torque": ChannelSpec("Sensor7", unit="Nm", sign=-1)}
+    mapped = resolve([*ENGLISH, "Sensor7"], stated, ELEMENTS, NEEDED, "log.csv")
+    assert list(mapped.channels) == [
+        "engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed",
+        "pressure.B2", "pressure.B3",
+    ]  # fmt: skip
+    assert mapped.channels["output_torque"].source == "Sensor7"
+    assert mapped.channels["pressure.B3"] == ChannelSpec("PrsBrk3")
+    assert mapped.warnings == ()
+
+
+def test_a_stated_column_is_not_guessed_for_another_role() -> None:
+    stated = {"engine_speed": ChannelSpec("SpdIn")}
+    with pytest.raises(MissingChannelError, match="'input_speed'"):
+        resolve(ENGLISH, stated, ELEMENTS, NEEDED, "log.csv")
+
+
+def test_missing_roles_are_all_named_with_columns_and_remedy() -> None:
+    names = [name for name in ENGLISH if name not in ("TrqOut", "PrsBrk3")]
+    with pytest.raises(MissingChannelError) as caught:
+        resolve(names, {}, ELEMENTS, NEEDED, "log.csv")
+    assert str(caught.value) == (
+        "log.csv: no column for 'output_torque' nor 'pressure.B3' among EngTrq, PrsBrk2, SpdIn, "
+        "SpdOut, SpdWhl\n"
+        "  -> name its column in the channel mapping (--channels): [channels.output_torque] "
+        'source = "..."; `drivetwin inspect` lists the columns'
+    )
+
+
+def test_a_third_element_may_lack_its_pressure() -> None:
+    elements = {**ELEMENTS, "K2": "clutch"}
+    mapped = resolve(ENGLISH, {}, elements, NEEDED, "log.csv")
+    assert "pressure.K2" not in mapped.channels
+    assert mapped.warnings == ("no column for 'pressure.K2': its shifts cannot be told",)
+
+
+def test_several_candidates_for_a_needed_role_are_an_error() -> None:
+    with pytest.raises(MappingError) as caught:
+        resolve([*ENGLISH, "Motormoment"], {}, ELEMENTS, NEEDED, "log.csv")
+    assert caught.value.what == "'engine_torque' may be any of the columns EngTrq, Motormoment"
+    assert "[channels.engine_torque] source" in caught.value.remedy
+
+
+def test_several_candidates_for_another_role_are_a_warning() -> None:
+    mapped = resolve([*ENGLISH, "Gang", "gear"], {}, ELEMENTS, NEEDED, "log.csv")
+    assert "gear" not in mapped.channels
+    assert mapped.warnings == (
+        "'gear' may be any of the columns Gang, gear; none is used, name one in a channel mapping",
+    )
+
+
+def test_a_repeated_column_name_is_ambiguous() -> None:
+    with pytest.raises(MappingError, match="EngTrq, EngTrq"):
+        resolve([*ENGLISH, "EngTrq"], {}, ELEMENTS, NEEDED, "log.csv")
+    stated = {"engine_torque": ChannelSpec("EngTrq")}
+    with pytest.raises(MappingError, match="the file has 2 columns 'EngTrq'"):
+        resolve([*ENGLISH, "EngTrq"], stated, ELEMENTS, NEEDED, "log.csv")
+
+
+def test_one_column_for_two_elements_is_ambiguous() -> None:
+    names = [name for name in ENGLISH if not name.startswith("Prs")]
+    with pytest.raises(MappingError, match=r"column 'p2' may be pressure\.B2 or pressure\.K2"):
+        resolve([*names, "p2"], {}, {"B2": "brake", "K2": "clutch"}, NEEDED, "log.csv")
+
+
+def test_a_stated_column_must_exist() -> None:
+    with pytest.raises(MappingError, match=r"'Trq_Out' for 'output_torque'.* mean 'TrqOut'"):
+        resolve(ENGLISH, {"output_torque": ChannelSpec("Trq_Out")}, ELEMENTS, NEEDED, "log.csv")
+
+
+def test_a_stated_element_must_be_on_the_card() -> None:
+    with pytest.raises(MappingError, match="'B4', which is no element"):
+        resolve(ENGLISH, {"pressure.B4": ChannelSpec("PrsBrk2")}, ELEMENTS, NEEDED, "log.csv")

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: MIT
+"""From file to ShiftLog: SI values, and every kind of bad input with what it tells the user."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import (
+    DamagedChannelError,
+    FileFormatError,
+    InputError,
+    MissingChannelError,
+    PlausibilityError,
+    TimeError,
+    UnitError,
+)
+from drivetwin.logs.read import read_log, read_raw
+from drivetwin.logs.shiftlog import FloatArray, Quantity, ShiftLog
+from drivetwin.vehicle.card import load_card
+from tests.logs.made import UNITS, card, columns, write
+
+ROOT = Path(__file__).resolve().parents[2]
+SHARED = ROOT.parent / "shared" / "logs"
+RPM = np.pi / 30.0
+
+Table = dict[str, FloatArray]
+
+
+def read(folder: Path, table: Table | None = None, units: dict[str, str] | None = None) -> ShiftLog:
+    return read_log(write(folder, table, units or UNITS), card(folder))
+
+
+def test_channels_are_in_si_by_role(tmp_path: Path) -> None:
+    log, source = read(tmp_path), columns()
+    assert log["input_speed"].values == pytest.approx(source["SpdIn"] * RPM, rel=1e-12)
+    assert log.pressure("B3").values == pytest.approx(source["PrsBrk3"] * 1e5)
+    assert log["engine_torque"].values.tolist() == source["EngTrq"].tolist()
+    assert log["output_torque"].quantity is Quantity.TORQUE
+    assert (log["wheel_speed"].source_name, log["wheel_speed"].source_unit) == ("SpdWhl", "rpm")
+    path = tmp_path / "log.csv"
+    assert log.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert log.source == str(path)
+    assert log.warnings == ()
+
+
+def test_another_unit_and_column_order_give_the_same_log(tmp_path: Path) -> None:
+    table = columns()
+    table["SpdIn"] = table["SpdIn"] * RPM
+    table["PrsBrk2"] = table["PrsBrk2"] * 100.0
+    units = {**UNITS, "SpdIn": "rad/s", "PrsBrk2": "kPa"}
+    other = read(tmp_path, dict(reversed(table.items())), units)
+    log = read(tmp_path)
+    for role, channel in log.channels.items():
+        assert other[role].values == pytest.approx(channel.values, rel=1e-12)
+
+
+def mapped(folder: Path, table: Table, units: dict[str, str], mapping: str) -> ShiftLog:
+    path = folder / "map.toml"
+    path.write_text(mapping, encoding="utf-8")
+    return read_log(write(folder, table, units), card(folder), path)
+
+
+def test_a_mapping_asserts_unit_sign_scale_offset_and_time(tmp_path: Path) -> None:
+    table = columns()
+    table["Sensor"] = -(table.pop("TrqOut") - 30.0) / 2.0
+    log = mapped(
+        tmp_path,
+        table,
+        {**UNITS, "Sensor": ""},
+        '[channels.output_torque]\nsource = "Sensor"\nunit = "Nm"\nsign = -1\nscale = 2.0\n'
+        "offset = -30.0\ntime_shift_s = 0.02\n",
+    )
+    torque = log["output_torque"]
+    assert torque.values == pytest.approx(columns()["TrqOut"])
+    assert torque.time == pytest.approx(columns()["time"] + 0.02)
+    assert log.warnings == ()
+
+
+def test_a_unit_asserted_against_the_file_is_told(tmp_path: Path) -> None:
+    table = columns()
+    table["PrsBrk2"] = table["PrsBrk2"] * 1e5
+    mapping = '[channels.pressure.B2]\nsource = "PrsBrk2"\nunit = "Pa"\n'
+    log = mapped(tmp_path, table, UNITS, mapping)
+    assert log.pressure("B2").values.max() == pytest.approx(14e5)
+    assert log.warnings == ("channel 'PrsBrk2': read in 'Pa' as mapped, the file says 'bar'",)
+
+
+def drop(name: str) -> Callable[[Table], None]:
+    def change(table: Table) -> None:
+        del table[name]
+
+    return change
+
+
+def put(name: str, rows: slice, value: float) -> Callable[[Table], None]:
+    def change(table: Table) -> None:
+        table[name][rows] = value
+
+    return change
+
+
+def scale(name: str, factor: float) -> Callable[[Table], None]:
+    def change(table: Table) -> None:
+        table[name] = table[name] * factor
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "what", "remedy"),
+    [
+        (drop("SpdIn"), MissingChannelError, "no column for 'input_speed' among", "--channels"),
+        (drop("PrsBrk3"), MissingChannelError, "'pressure.B3'", "[channels.pressure.B3] source"),
+        (put("time", slice(50, 51), 0.1), TimeError, "does not increase: sample 50", "remove"),
+        (put("TrqOut", slice(50, 70), np.nan), DamagedChannelError, "0.5 s to 0.69 s", "cut the"),
+        (put("SpdOut", slice(None), 800.0), DamagedChannelError, "constant throughout", "sensor"),
+        (scale("PrsBrk2", 1e5), PlausibilityError, "above 100 bar", 'unit = "Pa"'),
+        (scale("PrsBrk3", 1e-5), PlausibilityError, "below 0.001 bar", "scale"),
+        (scale("SpdWhl", -1.0), PlausibilityError, "negative", "sign = -1"),
+        (scale("SpdWhl", RPM), PlausibilityError, "the final drive 5", "check the units"),
+        (scale("SpdIn", 0.25), PlausibilityError, "the gears 1.8, 1.4", "check the units"),
+    ],
+)
+def test_bad_logs(
+    tmp_path: Path,
+    change: Callable[[Table], None],
+    error: type[InputError],
+    what: str,
+    remedy: str,
+) -> None:
+    table = columns()
+    change(table)
+    with pytest.raises(error) as caught:
+        read(tmp_path, table)
+    assert what in str(caught.value)
+    assert remedy in caught.value.remedy
+    assert caught.value.where.file == str(tmp_path / "log.csv")
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize(("unit", "words"), [("", "names no unit"), ("Mn", "unknown unit 'Mn'")])
+def test_bad_units(tmp_path: Path, unit: str, words: str) -> None:
+    with pytest.raises(UnitError, match=words) as caught:
+        read(tmp_path, units={**UNITS, "TrqOut": unit})
+    assert caught.value.where.channel == "TrqOut"
+    assert 'unit = "..."' in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "the file is empty"),
+        (bytes(range(256)) * 8, "binary or damaged"),
+        (b"MDF     4.10    ", "this is an MDF measurement file"),
+        (b"MATLAB 5.0 MAT-file", "this is a MATLAB file"),
+        (b"PK\x03\x04...", "zip archive or Excel workbook"),
+    ],
+)
+def test_files_that_are_no_text_log(tmp_path: Path, data: bytes, words: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(data)
+    with pytest.raises(FileFormatError, match=words) as caught:
+        read_log(path, card(tmp_path))
+    assert caught.value.remedy
+
+
+def test_a_missing_file_is_told(tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match="cannot read the file"):
+        read_log(tmp_path / "none.csv", card(tmp_path))
+
+
+def test_a_text_cell_in_a_needed_column_is_told_with_its_line(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    lines[11] = lines[11].replace("1500.0", "error")
+    path.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(DamagedChannelError, match="line 12: 'error' is no number"):
+        read_log(path, card(tmp_path))
+
+
+def test_channels_without_common_time_are_told(tmp_path: Path) -> None:
+    mapping = '[channels.output_torque]\nsource = "TrqOut"\ntime_shift_s = 100.0\n'
+    with pytest.raises(TimeError, match="no common time span: 'TrqOut' starts at 100 s"):
+        mapped(tmp_path, columns(), UNITS, mapping)
+
+
+def test_raw_columns_need_no_card(tmp_path: Path) -> None:
+    raw = read_raw(write(tmp_path))
+    assert [channel.name for channel in raw.channels] == list(UNITS)[1:]
+    assert [channel.unit for channel in raw.channels] == list(UNITS.values())[1:]
+
+
+@pytest.mark.parametrize(("name", "samples"), [("truck_a", 7600), ("paper_like", 5600)])
+def test_recorded_logs(name: str, samples: int) -> None:
+    path = SHARED / f"{name}.csv"
+    if not path.exists():
+        pytest.skip("the shared logs are not beside the repository")
+    log = read_log(path, load_card(ROOT / "examples" / "vehicles" / f"{name}.toml"))
+    assert {channel.time.size for channel in log.channels.values()} == {samples}
+    assert [role for role, channel in log.channels.items() if channel.held] == ["engine_torque"]
+    assert 12e5 < log.pressure("B2").values.max() < 16e5
+    assert log.warnings == ()

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""Damaged and implausible channels: the error names channel, place and remedy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError
+from drivetwin.logs.roles import quantity_of
+from drivetwin.logs.shiftlog import Channel, FloatArray
+from drivetwin.logs.validate import check_channel
+
+TIME = np.round(np.arange(100) * 0.01, 2)
+RPM = np.pi / 30.0
+
+
+def channel(role: str, values: FloatArray, unit: str = "", time: FloatArray = TIME) -> Channel:
+    return Channel(role, quantity_of(role), time, values, "X", unit)
+
+
+def ramp(low: float, high: float) -> FloatArray:
+    return np.linspace(low, high, TIME.size)
+
+
+def test_a_sound_channel_passes_unchanged() -> None:
+    sound = channel("input_speed", ramp(100.0, 150.0), "rad/s")
+    checked = check_channel(sound, "log.csv")
+    assert checked.channel is sound
+    assert checked.warnings == ()
+
+
+def test_time_must_increase() -> None:
+    time = TIME.copy()
+    time[40] = time[39]
+    with pytest.raises(TimeError) as caught:
+        check_channel(channel("input_speed", ramp(100, 150), time=time), "log.csv")
+    assert "sample 40 repeats the stamp before it" in caught.value.what
+    assert caught.value.where.time == 0.39
+    time[40] = 0.25
+    with pytest.raises(TimeError, match=r"sample 40 lies 0\.14 s before the last"):
+        check_channel(channel("input_speed", ramp(100, 150), time=time), "log.csv")
+    time[40] = np.nan
+    with pytest.raises(TimeError, match="sample 40 has no time stamp"):
+        check_channel(channel("input_speed", ramp(100, 150), time=time), "log.csv")
+
+
+def test_single_samples_without_number_are_left_out_and_told() -> None:
+    values = ramp(100.0, 150.0)
+    values[[10, 50, 51, 52]] = np.nan
+    checked = check_channel(channel("input_speed", values), "log.csv")
+    assert checked.channel.time.tolist() == np.delete(TIME, [10, 50, 51, 52]).tolist()
+    assert np.isfinite(checked.channel.values).all()
+    assert checked.warnings == (
+        "channel 'X': 4 samples without a number left out, the first at 0.1 s",
+    )
+
+
+def test_a_run_without_numbers_is_damage_with_its_span() -> None:
+    values = ramp(100.0, 150.0)
+    values[20:30] = np.nan
+    values[60:66] = np.inf
+    with pytest.raises(DamagedChannelError) as caught:
+        check_channel(channel("input_speed", values), "log.csv")
+    assert caught.value.what == (
+        "10 samples in a row hold no number, from 0.2 s to 0.29 s; 2 such runs"
+    )
+    assert str(caught.value).startswith("log.csv, channel 'X', t = 0.2 s: ")
+
+
+def test_too_few_samples() -> None:
+    short = channel("input_speed", ramp(1, 2)[:5], time=TIME[:5])
+    with pytest.raises(DamagedChannelError, match="only 5 samples"):
+        check_channel(short, "log.csv")
+
+
+@pytest.mark.parametrize(
+    "role", ["input_speed", "output_speed", "wheel_speed", "output_torque", "engine_speed"]
+)
+def test_what_must_vary_may_not_be_constant(role: str) -> None:
+    with pytest.raises(DamagedChannelError, match=f"constant throughout.*{role} must vary"):
+        check_channel(channel(role, np.full(100, 100.0)), "log.csv")
+
+
+@pytest.mark.parametrize("role", ["engine_torque", "pressure.B2"])
+def test_what_may_be_constant(role: str) -> None:
+    check_channel(channel(role, np.full(100, 1500.0)), "log.csv")
+
+
+def test_a_pressure_of_zero_throughout_is_an_open_element() -> None:
+    check_channel(channel("pressure.B2", np.zeros(100), "bar"), "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("role", "largest", "unit", "fits"),
+    [
+        ("pressure.B2", 14e5 * 1e5, "bar", "'Pa'"),  # Pa taken as bar
+        ("pressure.B2", 14.0, "Pa", "'bar'"),  # bar taken as Pa
+        ("pressure.B2", 1400e5, "bar", "'kPa'"),
+        ("pressure.B2", 200e5, "bar", "'psi'"),
+        ("input_speed", 1800.0, "rad/s", "'rpm'"),
+        ("input_speed", 180.0 * RPM, "rpm", "'rad/s'"),
+        ("output_torque", 2.5e6, "kNm", "'Nm'"),
+    ],
+)
+def test_a_wrong_unit_is_told_with_the_one_that_fits(
+    role: str, largest: float, unit: str, fits: str
+) -> None:
+    with pytest.raises(PlausibilityError) as caught:
+        check_channel(channel(role, ramp(0.5, 1.0) * largest, unit), "log.csv")
+    assert f"with unit {unit!r}" in caught.value.what
+    assert fits in caught.value.remedy
+    assert f"[channels.{role}] unit = " in caught.value.remedy
+
+
+def test_a_pressure_off_by_1e5_names_both_figures_in_bar() -> None:
+    wrong = channel("pressure.B2", ramp(0.0, 14e5 * 1e5), "bar")
+    with pytest.raises(PlausibilityError) as caught:
+        check_channel(wrong, "log.csv")
+    assert caught.value.what == "largest pressure is 1.4e+06 bar, above 100 bar, with unit 'bar'"
+
+
+def test_a_negative_speed_asks_for_the_sign() -> None:
+    backward = channel("wheel_speed", -ramp(10.0, 20.0), "rad/s")
+    with pytest.raises(PlausibilityError, match="negative") as caught:
+        check_channel(backward, "log.csv")
+    assert "[channels.wheel_speed] sign = -1" in caught.value.remedy
+    check_channel(replace(backward, values=-backward.values), "log.csv")
