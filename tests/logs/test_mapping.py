@@ -68,8 +68,8 @@ def test_missing_roles_are_all_named_with_columns_and_remedy() -> None:
     assert str(caught.value) == (
         "log.csv: no column for 'output_torque' nor 'pressure.B3' among EngTrq, PrsBrk2, SpdIn, "
         "SpdOut, SpdWhl\n"
-        "  -> name its column in the channel mapping (--channels): [channels.output_torque] "
-        'source = "..."; `drivetwin inspect` lists the columns'
+        "  -> name its column in a channel mapping (--channels): channels.output_torque = "
+        '{ source = "..." }; `drivetwin inspect` lists the columns'
     )
 
 
@@ -84,7 +84,7 @@ def test_several_candidates_for_a_needed_role_are_an_error() -> None:
     with pytest.raises(MappingError) as caught:
         resolve([*ENGLISH, "Motormoment"], {}, ELEMENTS, NEEDED, "log.csv")
     assert caught.value.what == "'engine_torque' may be any of the columns EngTrq, Motormoment"
-    assert "[channels.engine_torque] source" in caught.value.remedy
+    assert "channels.engine_torque = { source" in caught.value.remedy
 
 
 def test_several_candidates_for_another_role_are_a_warning() -> None:
@@ -96,8 +96,9 @@ def test_several_candidates_for_another_role_are_a_warning() -> None:
 
 
 def test_a_repeated_column_name_is_ambiguous() -> None:
-    with pytest.raises(MappingError, match="EngTrq, EngTrq"):
+    with pytest.raises(MappingError, match="EngTrq, EngTrq") as caught:
         resolve([*ENGLISH, "EngTrq"], {}, ELEMENTS, NEEDED, "log.csv")
+    assert caught.value.remedy == "rename the repeated column in the file"
     stated = {"engine_torque": ChannelSpec("EngTrq")}
     with pytest.raises(MappingError, match="the file has 2 columns 'EngTrq'"):
         resolve([*ENGLISH, "EngTrq"], stated, ELEMENTS, NEEDED, "log.csv")

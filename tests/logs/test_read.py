@@ -115,7 +115,7 @@ def scale(name: str, factor: float) -> Callable[[Table], None]:
     ("change", "error", "what", "remedy"),
     [
         (drop("SpdIn"), MissingChannelError, "no column for 'input_speed' among", "--channels"),
-        (drop("PrsBrk3"), MissingChannelError, "'pressure.B3'", "[channels.pressure.B3] source"),
+        (drop("PrsBrk3"), MissingChannelError, "'pressure.B3'", "channels.pressure.B3 = { source"),
         (put("time", slice(50, 51), 0.1), TimeError, "does not increase: sample 50", "remove"),
         (put("TrqOut", slice(50, 70), np.nan), DamagedChannelError, "0.5 s to 0.69 s", "cut the"),
         (put("SpdOut", slice(None), 800.0), DamagedChannelError, "constant throughout", "sensor"),
@@ -205,3 +205,13 @@ def test_recorded_logs(name: str, samples: int) -> None:
     assert [role for role, channel in log.channels.items() if channel.held] == ["engine_torque"]
     assert 12e5 < log.pressure("B2").values.max() < 16e5
     assert log.warnings == ()
+
+
+def test_the_remedy_of_a_refusal_is_a_mapping_that_cures_it(tmp_path: Path) -> None:
+    table = columns()
+    table["PrsBrk2"] = table["PrsBrk2"] * 1e5
+    with pytest.raises(PlausibilityError) as caught:
+        read(tmp_path, table)
+    cure = caught.value.remedy.split("channel mapping, ")[1]
+    assert cure == 'channels.pressure.B2 = { source = "PrsBrk2", unit = "Pa" }'
+    assert mapped(tmp_path, table, UNITS, cure).pressure("B2").values.max() == pytest.approx(14e5)

@@ -123,7 +123,7 @@ def test_time_units(spelling: str, factor: float) -> None:
 
 @pytest.mark.parametrize("spelling", [None, "", "bar"])
 def test_time_without_unit_is_refused(spelling: str | None) -> None:
-    with pytest.raises(UnitError, match=r'\[time\] unit = "s"'):
+    with pytest.raises(UnitError, match=r'time = { unit = "s" }'):
         time_factor(spelling, HERE)
 
 

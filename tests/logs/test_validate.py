@@ -112,7 +112,7 @@ def test_a_wrong_unit_is_told_with_the_one_that_fits(
         check_channel(channel(role, ramp(0.5, 1.0) * largest, unit), "log.csv")
     assert f"with unit {unit!r}" in caught.value.what
     assert fits in caught.value.remedy
-    assert f"[channels.{role}] unit = " in caught.value.remedy
+    assert f'channels.{role} = {{ source = "X", unit = ' in caught.value.remedy
 
 
 def test_a_pressure_off_by_1e5_names_both_figures_in_bar() -> None:
@@ -126,5 +126,5 @@ def test_a_negative_speed_asks_for_the_sign() -> None:
     backward = channel("wheel_speed", -ramp(10.0, 20.0), "rad/s")
     with pytest.raises(PlausibilityError, match="negative") as caught:
         check_channel(backward, "log.csv")
-    assert "[channels.wheel_speed] sign = -1" in caught.value.remedy
+    assert 'channels.wheel_speed = { source = "X", sign = -1 }' in caught.value.remedy
     check_channel(replace(backward, values=-backward.values), "log.csv")

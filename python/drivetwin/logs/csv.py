@@ -234,7 +234,7 @@ def _time_index(names: Sequence[str], time: TimeColumn, file: str) -> int:
     if len(found) == 1:
         return found[0]
     where = Where(file=file)
-    remedy = 'name the time column in a channel mapping: [time] source = "..."'
+    remedy = 'name the time column in a channel mapping: time = { source = "...", unit = "s" }'
     if found:
         listed = ", ".join(names[index] for index in found)
         raise MappingError(f"several time columns: {listed}", remedy, where)

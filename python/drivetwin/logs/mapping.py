@@ -132,7 +132,9 @@ def resolve(
             continue
         what = f"{role!r} may be any of the columns {', '.join(candidates)}"
         if role in needed or role.startswith(PRESSURE):
-            raise MappingError(what, _remedy(role), Where(file=file))
+            repeated = len(set(candidates)) < len(candidates)
+            remedy = "rename the repeated column in the file" if repeated else _remedy(role)
+            raise MappingError(what, remedy, Where(file=file))
         warnings.append(f"{what}; none is used, name one in a channel mapping")
     _refuse_shared(channels, stated, file)
     pressures = [PRESSURE + element for element in elements]
@@ -206,6 +208,6 @@ def _refuse_shared(
 
 def _remedy(role: str) -> str:
     return (
-        f'name its column in the channel mapping (--channels): [channels.{role}] source = "..."; '
-        "`drivetwin inspect` lists the columns"
+        f"name its column in a channel mapping (--channels): channels.{role} = "
+        '{ source = "..." }; `drivetwin inspect` lists the columns'
     )

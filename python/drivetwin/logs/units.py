@@ -69,7 +69,7 @@ _CELSIUS = "°C degC deg_C Celsius C"
 _FAHRENHEIT = "°F degF deg_F Fahrenheit"
 
 _REFUSED = {
-    "revolutions or radians are meant": "1/s /s s-1 s^-1 Hz",
+    "revolutions or radians may be meant": "1/s /s s-1 s^-1 Hz",
     "a vehicle speed needs the tyre radius to become a wheel speed: give scale = 1/r_w for m/s, "
     "1/(3.6·r_w) for km/h and unit = 'rad/s'": "km/h kmh kph m/s mph",
     "milli- or megapascal may be meant": "mPa mpa MPA",
@@ -148,13 +148,17 @@ def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit
     if quantity is Quantity.STATE:
         return Unit(1.0, 0.0, Quantity.STATE)
     usual = ", ".join(repr(text.split()[0]) for text in _SPELLINGS[quantity].values())
-    remedy = f'assert it in the channel mapping: unit = "...", for a {quantity} one of {usual}'
+    source = where.channel or "..."
+    remedy = (
+        f'assert it in the channel mapping: channels.<role> = {{ source = "{source}", '
+        f'unit = "..." }}, for a {quantity} one of {usual}'
+    )
     if spelling is None or not spelling.strip():
         raise UnitError("the file names no unit for this channel", remedy, where)
     unit = lookup(spelling)
     if unit is None:
         reason = _REASONS_FOLDED.get(_normal(spelling).casefold())
-        what = f"unit {spelling!r} is ambiguous: {reason}" if reason else None
+        what = f"unit {spelling!r} cannot stand as it is: {reason}" if reason else None
         raise UnitError(what or f"unknown unit {spelling!r}", remedy, where)
     if unit.quantity is not quantity:
         percent = unit.quantity is Quantity.FRACTION and quantity is Quantity.TORQUE
@@ -168,7 +172,7 @@ def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit
 
 def time_factor(spelling: str | None, where: Where) -> float:
     """Return the factor to seconds of a time unit; raises UnitError if missing or unknown."""
-    remedy = 'assert it in the channel mapping: [time] unit = "s" (or "ms", "us", "min")'
+    remedy = 'assert it in the channel mapping: time = { unit = "s" } (or "ms", "us", "min")'
     if spelling is None or not spelling.strip():
         raise UnitError("the file names no unit for its time column", remedy, where)
     try:

@@ -91,7 +91,8 @@ def _check_time(time: FloatArray, where: Where) -> None:
         how = "repeats the stamp before it" if step == 0 else f"lies {-step:.6g} s before the last"
         raise TimeError(
             f"time does not increase: sample {index} {how} ({backward.size} such samples)",
-            "remove the repeated or misplaced samples, or map the right time column: [time] source",
+            "remove the repeated or misplaced samples, or map the right time column: "
+            'time = { source = "...", unit = "s" }',
             Where(file=where.file, channel=where.channel, time=float(time[index])),
         )
 
@@ -141,9 +142,10 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
     side, limit = ("above", highest) if largest > highest else ("below", lowest)
     remedy = (
         f"the numbers would fit {' or '.join(map(repr, fitting))}: assert the unit in the channel "
-        f'mapping, [channels.{channel.role}] unit = "{fitting[0]}"'
+        f'mapping, channels.{channel.role} = {{ source = "{channel.source_name}", '
+        f'unit = "{fitting[0]}" }}'
         if fitting
-        else f"correct unit or scale in the channel mapping, [channels.{channel.role}]"
+        else f"correct unit or scale of channels.{channel.role} in the channel mapping"
     )
     raise PlausibilityError(
         f"largest {channel.quantity} is {_show(largest, channel.quantity)}, {side} "
@@ -167,6 +169,7 @@ def _check_sign(channel: Channel, where: Where) -> None:
     if channel.quantity is Quantity.SPEED and float(np.median(channel.values)) < 0.0:
         raise PlausibilityError(
             "the speed is negative for most of the log; forward motion counts positive",
-            f"set the sign in the channel mapping: [channels.{channel.role}] sign = -1",
+            f"set the sign in the channel mapping: channels.{channel.role} = "
+            f'{{ source = "{channel.source_name}", sign = -1 }}',
             where,
         )
