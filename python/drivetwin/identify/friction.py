@@ -20,6 +20,7 @@ from drivetwin.identify.momentum import FIRST_DRUM, MomentumFit, known
 from drivetwin.identify.regression import Fit, Prior, Term, solve
 from drivetwin.identify.result import FrictionCurve
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
+from drivetwin.identify.wlse import window_edges, window_means
 
 MU_C, MU_DROP, MU_V, LOG_V, P0 = range(5)
 NUISANCE = 5
@@ -69,6 +70,11 @@ def stribeck(theta: FloatArray, slip: FloatArray) -> tuple[FloatArray, FloatArra
     bend = theta[MU_DROP] * fall * s / np.exp(theta[LOG_V])
     slopes = np.vstack([np.ones_like(s), fall, s, bend])
     return theta[MU_C] + theta[MU_DROP] * fall + theta[MU_V] * s, slopes
+
+
+def stribeck_at(fit: FrictionFit, slip: FloatArray) -> FloatArray:
+    """μ (n,) of a fitted law over |slip| (n,)."""
+    return stribeck(fit.fit.theta, slip)[0]
 
 
 def slip_of(signals: ShiftSignals, driveline: Driveline, time: FloatArray) -> FloatArray:
@@ -283,3 +289,63 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
     return FrictionFit(
         equations.element.name, fit, curve, equations.in_torque_phase.astype(np.float64)
     )
+
+
+@dataclass(frozen=True)
+class PaperFriction:
+    """The paper's μ-slip points: extremes of T_o in the inertia phase and the curve through them."""
+
+    element: str
+    curve: FrictionCurve
+    extremes_time: FloatArray
+
+
+def paper_friction(
+    signals: ShiftSignals, driveline: Driveline, points: int = 40
+) -> PaperFriction:
+    """T_c ≈ T_o/i_out (eq. 16) at the extremes of T_o over the inertia phase, slip by eq. 15.
+
+    T_o is averaged over 10 ms windows before its extremes are taken; where it does not oscillate
+    (fewer than eight extremes) every window counts. The curve is the points' running mean by slip;
+    the Stribeck law is fitted to the points. Raises IdentificationError for a short inertia phase.
+    """
+    element, span = driveline.oncoming, signals.shift.inertia_phase
+    edges = window_edges((span[0] + 0.01, span[1] - 0.005))
+    torque = window_means(signals.output_torque, edges)
+    pressure = window_means(signals.pressures[element.name], edges)
+    time = 0.5 * (edges[1:] + edges[:-1])
+    slip = np.abs(slip_of(signals, driveline, time))
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(torque))) != 0) + 1
+    picked = turns if turns.size >= 8 else np.arange(time.size)
+    capacity = element.gain * (pressure[picked] - element.P0.value)
+    usable = capacity > 0.0
+    picked = picked[usable]
+    if picked.size < 5:
+        raise IdentificationError(
+            f"only {picked.size} points of the inertia phase have pressure above P0",
+            "check P0 on the card and the pressure channel of the on-coming element",
+        )
+    mu = np.abs(torque[picked] / element.b) / capacity[usable]
+    order = np.argsort(slip[picked])
+    s, m = slip[picked][order], mu[order]
+    grid = np.linspace(float(s[0]), float(s[-1]), points)
+    bandwidth = 1.5 * float(np.ptp(s)) / np.sqrt(s.size)
+    kernel = np.exp(-0.5 * ((grid[:, None] - s) / bandwidth) ** 2)
+    smooth = (kernel @ m) / kernel.sum(axis=1)
+    nothing = np.full(points, np.nan)
+    curve = FrictionCurve(grid, smooth, nothing, nothing, s, m, fit_law(s, m), "paper")
+    return PaperFriction(element.name, curve, time[picked])
+
+
+def fit_law(slip: FloatArray, mu: FloatArray) -> dict[str, float]:
+    """Stribeck law by least squares on μ-slip points (n,): linear in three, v_s on a grid."""
+    best: tuple[float, FloatArray, float] | None = None
+    for v_s in np.geomspace(2.0, 100.0, 40):
+        basis = np.column_stack([np.ones_like(slip), np.exp(-slip / v_s), slip])
+        found = np.linalg.lstsq(basis, mu, rcond=1e-8)[0]
+        error = float(np.sum((basis @ found - mu) ** 2))
+        if best is None or error < best[0]:
+            best = (error, found, float(v_s))
+    assert best is not None
+    mu_c, drop, mu_v = (float(v) for v in best[1])
+    return {"mu_c": mu_c, "mu_s": mu_c + drop, "v_s": best[2], "mu_v": mu_v}

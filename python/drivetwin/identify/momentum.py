@@ -23,7 +23,15 @@ import numpy as np
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.modulating import Kernels, Windows, hann_kernels, join, windows_in
 from drivetwin.identify.regression import Fit, Prior, Term, regressors, solve, whitening
-from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals, Span
+from drivetwin.identify.signals import (
+    Driveline,
+    FloatArray,
+    PriorValue,
+    Sampled,
+    ShiftSignals,
+    Span,
+)
+from drivetwin.shifts.shift import Shift
 
 
 @dataclass(frozen=True)
@@ -41,6 +49,10 @@ class MomentumSettings:
     margin: float = 0.01
     delay_prior: PriorValue = PriorValue(0.02, 0.03)
     delay_grid: tuple[float, ...] = tuple(np.linspace(-0.02, 0.08, 21).tolist())
+
+    def guard(self, boundary: str, shift: Shift) -> float:
+        """Distance kept from a phase boundary [s]: the margin and three standard deviations."""
+        return self.margin + 3.0 * shift.sigma.get(boundary, 0.0)
 
 
 @dataclass(frozen=True)
@@ -115,18 +127,36 @@ def momentum_names(driveline: Driveline) -> tuple[str, ...]:
     return ("eta", "J_e", "J_out", "te_delay", *(f"drum.{c.name}" for c in driveline.drums))
 
 
-def _vented(signals: ShiftSignals, driveline: Driveline, start: float) -> float:
-    """First instant from `start` [s] on at which the off-going element carries nothing."""
+def off_going_free(
+    signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
+) -> float:
+    """First instant of the inertia phase at which the off-going element carries nothing [s].
+
+    Its pressure must have fallen for good below P0, less two standard deviations of P0.
+    """
+    shift = signals.shift
+    start = shift.inertia_phase[0] + settings.guard("inertia_start", shift)
     element = driveline.offgoing
-    if element.name not in signals.pressures:
-        return start
     pressure = signals.pressures[element.name]
     limit = element.P0.value - 2.0 * element.P0.std
-    kernel = np.ones(5) / 5.0
-    smooth = np.convolve(pressure.values, kernel, mode="same")
-    after = pressure.time[(pressure.time >= start) & (smooth >= limit)]
-    held = after[after < signals.shift.inertia_phase[1]]
-    return start if held.size == 0 else float(held[-1])
+    smooth = np.convolve(pressure.values, np.ones(5) / 5.0, mode="same")
+    inside = (pressure.time >= start) & (pressure.time < shift.lockup_time)
+    held = pressure.time[inside & (smooth >= limit)]
+    return float(held[-1]) if held.size else start
+
+
+def _driving(torque: Sampled, windows: Windows) -> Windows:
+    """The windows in which torque flows from engine to wheels throughout.
+
+    Elsewhere the dissipative loss law has another efficiency (THEORY section 3). The output
+    torque, averaged over 21 samples, must stay four standard errors above zero.
+    """
+    mean = np.convolve(torque.values, np.ones(21) / 21.0, mode="same")
+    reversed_at = torque.time[mean < 4.0 * torque.sigma / np.sqrt(21.0)]
+    first = np.searchsorted(reversed_at, windows.start)
+    last = np.searchsorted(reversed_at, windows.start + windows.width)
+    keep = first == last
+    return Windows(windows.start[keep], windows.width[keep])
 
 
 def stretches(
@@ -134,12 +164,10 @@ def stretches(
 ) -> tuple[Stretch, ...]:
     """The stretches of a shift that carry an equation, with their windows."""
     shift = signals.shift
-    guard = {k: settings.margin + 3.0 * s for k, s in shift.sigma.items()}
-    default = settings.margin
-    lockup = guard.get("lockup", default)
-    free = _vented(signals, driveline, shift.inertia_phase[0] + guard.get("inertia_start", default))
+    lockup = settings.guard("lockup", shift)
+    free = off_going_free(signals, driveline, settings)
     spans = (
-        ("before", (shift.before[0], shift.before[1] - guard.get("torque_start", default)), True),
+        ("before", (shift.before[0], shift.before[1] - settings.guard("torque_start", shift)), True),
         ("inertia", (free, shift.lockup_time - lockup), False),
         ("after", (shift.lockup_time + lockup, shift.after[1]), True),
     )
@@ -152,7 +180,11 @@ def stretches(
         width = settings.share * length if short else settings.width
         step = settings.step * width / settings.width
         ratio = driveline.i_before if name == "before" else driveline.i_after
-        found.append(Stretch(name, span, ratio, tied, windows_in(span, width, step)))
+        windows = windows_in(span, width, step)
+        if driveline.loss_law == "dissipative":
+            windows = _driving(signals.output_torque, windows)
+        if windows.count:
+            found.append(Stretch(name, span, ratio, tied, windows))
     if not found:
         raise IdentificationError(
             "no stretch of the log is long enough for the momentum balance",

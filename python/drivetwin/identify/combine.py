@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT
+"""Several shifts of one log: one value per parameter, weighted by covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drivetwin.identify.integral import IntegralShift
+from drivetwin.identify.signals import FloatArray, PriorValue
+
+
+def combine(
+    shifts: Sequence[IntegralShift], J_out: PriorValue | None
+) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+    """Generalised least squares over the shifts' estimates: ids, values (q,), covariance (q, q).
+
+    The design prior of Jo′ is in every shift's estimate but counts once: its information is taken
+    out for all shifts but the first.
+    """
+    if len(shifts) == 1:
+        return shifts[0].ids, shifts[0].values, shifts[0].covariance
+    ids = tuple(dict.fromkeys(name for shift in shifts for name in shift.ids))
+    information = np.zeros((len(ids), len(ids)))
+    pull = np.zeros(len(ids))
+    scale = np.ones(len(ids))
+    for shift in shifts:
+        place = [ids.index(name) for name in shift.ids]
+        scale[place] = np.sqrt(np.diag(shift.covariance))
+    for shift in shifts:
+        place = [ids.index(name) for name in shift.ids]
+        unit = scale[place]
+        weight = np.linalg.pinv(
+            shift.covariance / np.outer(unit, unit), rcond=1e-12, hermitian=True
+        )
+        information[np.ix_(place, place)] += weight
+        pull[place] += weight @ (shift.values / unit)
+    if J_out is not None and J_out.std > 0.0:
+        k = ids.index("J_out")
+        surplus = (len(shifts) - 1) * (scale[k] / J_out.std) ** 2
+        information[k, k] -= surplus
+        pull[k] -= surplus * J_out.value / scale[k]
+    covariance = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
+    return ids, (covariance @ pull) * scale, covariance * np.outer(scale, scale)

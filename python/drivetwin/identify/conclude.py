@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: MIT
+"""Conclusions of the default method: estimates, verdicts, curves, warnings and assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.identify.combine import combine
+from drivetwin.identify.integral import IntegralShift
+from drivetwin.identify.result import Estimate, FrictionCurve
+from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
+from drivetwin.identify.uncertainty import correlation, judge, refused
+
+METHOD = "integral"
+PRIOR_SHARE = 0.8
+"""A posterior standard deviation above this share of the prior's says the prior decided."""
+CHI2_WARN = 1.6
+"""Residual power over stated noise above which a warning is due."""
+
+
+@dataclass(frozen=True)
+class Conclusions:
+    """What the pipeline puts into the Identification."""
+
+    estimates: dict[str, Estimate]
+    friction: dict[str, FrictionCurve]
+    correlation_ids: tuple[str, ...]
+    correlation: FloatArray
+    warnings: tuple[str, ...]
+
+
+def _low_gear_note(signals: ShiftSignals, gear: str) -> str:
+    """What to say where the engine torque stands still in the lower gear; empty otherwise."""
+    torque = signals.engine_torque.within(signals.shift.before).values
+    moving, level = float(np.std(torque)), abs(float(np.mean(torque)))
+    if moving > 0.03 * level:
+        return ""
+    return (
+        f"the engine torque moves by {100 * moving / max(level, 1e-9):.1f} % only in gear {gear}, "
+        "which by itself cannot tell η from J′; the value rests on the inertia phase of the shift"
+    )
+
+
+def conclude(
+    shifts: Sequence[IntegralShift],
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    systematic: dict[str, float],
+) -> Conclusions:
+    """Judge every parameter of one or several shifts.
+
+    `systematic` holds standard deviations from sensor tolerances by parameter id; empty where the
+    card states none.
+    """
+    J_out = drivelines[0].J_out
+    ids, values, covariance = combine(shifts, J_out)
+    std = np.sqrt(np.diag(covariance))
+    notes = _notes(signals)
+    estimates = {}
+    for name, value, noise in zip(ids, values, std, strict=True):
+        method, note = METHOD, notes.get(name, "")
+        prior = J_out if name == "J_out" else _fill_prior(name, drivelines)
+        if prior is not None and noise >= PRIOR_SHARE * prior.std:
+            method, note = "prior", "the log adds little to the design value of the card"
+        estimates[name] = judge(
+            name, float(value), float(noise), method, systematic.get(name), note
+        )
+    estimates |= _card_values(estimates, drivelines)
+    estimates |= _refusals(shifts, signals, estimates)
+    return Conclusions(
+        estimates,
+        _curves(shifts),
+        ids,
+        correlation(covariance),
+        _warnings(shifts, signals, notes),
+    )
+
+
+def _notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
+    notes: dict[str, str] = {}
+    for s in signals:
+        note = _low_gear_note(s, s.shift.start_gear)
+        if note:
+            notes |= {"eta": note}
+            notes |= {f"J_prime_{g}": note for g in (s.shift.start_gear, s.shift.end_gear)}
+    return notes
+
+
+def _fill_prior(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
+    """Design P0 behind an id `P0.<element>`; None for other ids."""
+    if not name.startswith("P0."):
+        return None
+    return drivelines[0].couplings[name.removeprefix("P0.")].P0
+
+
+def _card_values(
+    known: dict[str, Estimate], drivelines: Sequence[Driveline]
+) -> dict[str, Estimate]:
+    """Design values of what no shift could tell: P0 of elements that never came on."""
+    found = {}
+    for driveline in drivelines:
+        for element in (driveline.offgoing, driveline.oncoming):
+            name = f"P0.{element.name}"
+            if name not in known:
+                note = "design value of the card; the log does not show this element filling"
+                found[name] = judge(
+                    name, element.P0.value, element.P0.std, "prior", note=note
+                )
+    return found
+
+
+def _refusals(
+    shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], known: dict[str, Estimate]
+) -> dict[str, Estimate]:
+    """Estimates without a value for what no shift could tell."""
+    found = {}
+    for shift, s in zip(shifts, signals, strict=True):
+        gear = s.shift.end_gear
+        concerned = {
+            "shaft": ("k_o", "c_o", f"f_d_{gear}", f"zeta_{gear}"),
+            "te_delay": ("te_delay",),
+        }
+        for stage, why in shift.refusals.items():
+            for name in concerned.get(stage, ()):
+                if name not in known:
+                    found[name] = refused(name, METHOD, why)
+    return found
+
+
+def _curves(shifts: Sequence[IntegralShift]) -> dict[str, FrictionCurve]:
+    """One curve per element: of several shifts onto it, the one with the narrowest band."""
+    best: dict[str, FrictionCurve] = {}
+    for shift in shifts:
+        if shift.friction is None:
+            continue
+        curve, name = shift.friction.curve, shift.friction.element
+        if name not in best or _width(curve) < _width(best[name]):
+            best[name] = curve
+    return best
+
+
+def _width(curve: FrictionCurve) -> float:
+    return float(np.mean(curve.mu_hi - curve.mu_lo))
+
+
+def _warnings(
+    shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: dict[str, str]
+) -> tuple[str, ...]:
+    texts = list(dict.fromkeys(notes.values()))
+    for shift, s in zip(shifts, signals, strict=True):
+        label = f"shift {s.shift.start_gear}-{s.shift.end_gear}"
+        texts += list(s.shift.warnings)
+        fits = [("momentum balance", shift.momentum.fit.chi2), ("load", shift.load.fit.chi2)]
+        if shift.friction is not None:
+            fits.append(("friction", shift.friction.fit.chi2))
+        texts += [
+            f"{label}: the {name} leaves {chi2:.1f} times the noise power; intervals are widened"
+            for name, chi2 in fits
+            if chi2 > CHI2_WARN
+        ]
+        if abs(shift.load.speed_trend) > 4.0:
+            texts.append(
+                f"{label}: the load torque changes with speed (t = {shift.load.speed_trend:.1f}); "
+                f"T_v/i_f holds at {shift.load.mean_speed:.3g} rad/s of the wheel"
+            )
+        if "friction" in shift.refusals:
+            texts.append(f"{label}: no friction curve, {shift.refusals['friction']}")
+    return tuple(texts)
+
+
+def with_systematic_band(curve: FrictionCurve, std: FloatArray) -> FrictionCurve:
+    """`curve` with its band widened by the sensors' systematic errors `std` (n,) of μ."""
+    noise = (curve.mu_hi - curve.mu_lo) / (2.0 * 1.96)
+    half = 1.96 * np.hypot(noise, std)
+    return replace(curve, mu_lo=curve.mu - half, mu_hi=curve.mu + half)

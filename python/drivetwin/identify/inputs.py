@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+"""From log and vehicle card to what the estimators see."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError, Where
+from drivetwin.identify.noise import resolution, white_noise
+from drivetwin.identify.signals import Coupling, Driveline, PriorValue, Sampled, ShiftSignals
+from drivetwin.logs.held import fresh_samples
+from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import Prior, VehicleCard
+
+
+def _prior(prior: Prior) -> PriorValue:
+    return PriorValue(prior.value, prior.std)
+
+
+def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
+    """Known structure of the driveline during `shift`, ratios referred to the engine speed."""
+    couplings = {}
+    for name, spec in card.elements.items():
+        i_c, i_out = card.clutch_ratios(name)
+        couplings[name] = Coupling(
+            name, 1.0 / (card.i_in * i_c), i_out, spec.gain, _prior(spec.P0), _prior(spec.drum_inertia)
+        )
+    return Driveline(
+        i_f=card.final_drive,
+        offgoing=couplings[shift.offgoing],
+        oncoming=couplings[shift.oncoming],
+        couplings=couplings,
+        J_out=None if card.J_out is None else _prior(card.J_out),
+        loss_law=card.loss_law,
+    )
+
+
+def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
+    """A channel's finite samples times `factor`, with their noise estimated from themselves."""
+    fresh = fresh_samples(channel)
+    good = np.isfinite(fresh.values)
+    values = factor * fresh.values[good]
+    floor = resolution(values) / np.sqrt(12.0)
+    return Sampled(fresh.time[good], values, max(white_noise(values), float(floor)))
+
+
+def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
+    """The signals of a log that the estimators need, around `shift`.
+
+    Raises MissingChannelError for a missing channel, IdentificationError where there is no
+    output-torque sensor: without it nothing torque-like can be told.
+    """
+    if "output_torque" not in log:
+        raise IdentificationError(
+            "the log has no output torque: inertias, load, shaft and friction share one unknown "
+            "scale without it",
+            "map an output-shaft torque sensor as `output_torque`, or log a run with one",
+            Where(file=log.source),
+        )
+    if "engine_speed" in log:
+        engine_speed = sampled(log["engine_speed"])
+    else:
+        engine_speed = sampled(log["input_speed"], card.i_in)
+    engine_torque = sampled(log["engine_torque"])
+    elements = {shift.offgoing, shift.oncoming}
+    return ShiftSignals(
+        engine_torque=engine_torque,
+        output_torque=sampled(log["output_torque"]),
+        engine_speed=engine_speed,
+        output_speed=sampled(log["output_speed"]),
+        wheel_speed=sampled(log["wheel_speed"]) if "wheel_speed" in log else None,
+        pressures={name: sampled(log.pressure(name)) for name in sorted(elements)},
+        shift=shift,
+        torque_resolution=resolution(engine_torque.values),
+    )
+
+
+def disturbed(signals: ShiftSignals, role: str, gain: float, offset: float) -> ShiftSignals:
+    """The same signals with one sensor reading `gain` (relative) and `offset` (SI) too much."""
+
+    def changed(s: Sampled) -> Sampled:
+        return replace(s, values=s.values * (1.0 + gain) + offset)
+
+    if role.startswith("pressure."):
+        name = role.removeprefix("pressure.")
+        if name not in signals.pressures:
+            return signals
+        pressures = {**signals.pressures, name: changed(signals.pressures[name])}
+        return replace(signals, pressures=pressures)
+    attribute = "engine_speed" if role == "input_speed" else role
+    signal = getattr(signals, attribute, None)
+    if not isinstance(signal, Sampled):
+        return signals
+    return replace(signals, **{attribute: changed(signal)})

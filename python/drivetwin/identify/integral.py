@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: MIT
+"""The default method on one shift: all stages in momentum form, and what follows from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.friction import FrictionFit, FrictionSettings, momentum_friction
+from drivetwin.identify.load import SETTLING, LoadFit, momentum_load
+from drivetwin.identify.momentum import (
+    MomentumFit,
+    MomentumSettings,
+    momentum_inertia,
+    off_going_free,
+)
+from drivetwin.identify.ringdown import Drive, RingDown, fit_ringdown, quiet
+from drivetwin.identify.shaft import stiffness_and_damping
+from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
+from drivetwin.identify.uncertainty import independent, propagate
+
+
+@dataclass(frozen=True)
+class IntegralShift:
+    """All stages for one shift; a stage the data could not carry is None, and `refusals` says why.
+
+    `ids`, `values` (q,), `covariance` (q, q): the parameters that follow, in SI.
+    """
+
+    momentum: MomentumFit
+    load: LoadFit
+    ring: RingDown | None
+    friction: FrictionFit | None
+    ids: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    refusals: dict[str, str]
+
+
+def load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
+    """Where eq. 11 is used: throughout with a wheel speed, else away from the shift."""
+    shift = signals.shift
+    if signals.wheel_speed is not None:
+        return ((shift.before[0], shift.after[1]),)
+    return (shift.before, (shift.lockup_time + SETTLING, shift.after[1]))
+
+
+def _gear_inertia(driveline: Driveline, momentum: MomentumFit, ratio: float) -> FloatArray:
+    """Row (p,) that gives the inertia at the engine with all couplings locked at `ratio`.
+
+    Drums of open elements included: they swing with the rest.
+    """
+    row = np.zeros(len(momentum.names))
+    row[momentum.index("J_e")] = 1.0
+    row[momentum.index("J_out")] = ratio**-2
+    for element in driveline.drums:
+        row[momentum.index(f"drum.{element.name}")] = (element.a - element.b / ratio) ** 2
+    return row
+
+
+def _ring(
+    signals: ShiftSignals, driveline: Driveline, momentum: MomentumFit, load: LoadFit
+) -> RingDown:
+    """Ring-down fit, with the engine torque's own motion put in."""
+    ratio = driveline.i_after
+    J4 = float(_gear_inertia(driveline, momentum, ratio) @ momentum.fit.theta) * ratio**2
+    J5 = load.J_vehicle / driveline.i_f**2
+    steady = quiet(signals.engine_torque)
+    acting = Sampled(steady.time - momentum.value("te_delay"), steady.values, steady.sigma)
+    gain = momentum.value("eta") * ratio * J5 / (J4 + J5)
+    shift = signals.shift
+    return fit_ringdown(
+        signals.output_torque, shift.lockup_time, shift.after[1], Drive(acting, gain)
+    )
+
+
+def _derived(
+    driveline: Driveline, momentum: MomentumFit, load: LoadFit, ring: RingDown | None, gear: str
+) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+    """Shaft parameters with all that they share: ids, values, covariance."""
+    size = len(momentum.names)
+    after = _gear_inertia(driveline, momentum, driveline.i_after) * driveline.i_after**2
+    parts = [momentum.fit.theta, load.fit.theta]
+    blocks = [momentum.fit.covariance, load.fit.covariance]
+    ids: tuple[str, ...] = ()
+    if ring is not None:
+        parts.append(np.array([ring.decay_rate, ring.omega_d]))
+        blocks.append(ring.covariance)
+        ids = ("k_o", "c_o", f"f_d_{gear}", f"zeta_{gear}")
+
+    def values(x: FloatArray) -> FloatArray:
+        theta, (tv, J3) = x[:size], x[size : size + 2]
+        before, then = (theta[1] + theta[2] / i**2 for i in (driveline.i_before, driveline.i_after))
+        common = [theta[0], before, then, theta[2], theta[3], J3, tv]
+        if ring is None:
+            return np.array(common)
+        rate, omega = x[size + 2 :]
+        shaft = stiffness_and_damping(rate, omega, float(after @ theta), J3 / driveline.i_f**2)
+        zeta = rate / np.hypot(rate, omega)
+        return np.array([*common, *shaft, omega / (2.0 * np.pi), zeta])
+
+    found, covariance = propagate(values, np.concatenate(parts), independent(*blocks))
+    return ids, found, covariance
+
+
+def identify_shift(
+    signals: ShiftSignals, driveline: Driveline, start_inertia: float
+) -> IntegralShift:
+    """Run all stages on one shift. `start_inertia` [kg m^2]: any plausible J′.
+
+    Raises IdentificationError where inertia or load cannot be told; a missing oscillation or too
+    short an inertia phase only costs its own parameters.
+    """
+    settings = MomentumSettings()
+    shift = signals.shift
+    momentum = momentum_inertia(signals, driveline, settings, start_inertia)
+    load = momentum_load(signals, driveline.i_f, load_spans(signals))
+    refusals: dict[str, str] = {}
+    ring: RingDown | None = None
+    friction: FrictionFit | None = None
+    try:
+        ring = _ring(signals, driveline, momentum, load)
+    except IdentificationError as error:
+        refusals["shaft"] = error.what
+    try:
+        free = off_going_free(signals, driveline, settings)
+        friction = momentum_friction(signals, driveline, momentum, free, FrictionSettings())
+    except IdentificationError as error:
+        refusals["friction"] = error.what
+    shaft_ids, values, covariance = _derived(driveline, momentum, load, ring, shift.end_gear)
+    ids = ("eta", f"J_prime_{shift.start_gear}", f"J_prime_{shift.end_gear}", "J_out", "te_delay")
+    ids = (*ids, "J_vehicle", "Tv_over_if", *shaft_ids)
+    if momentum.scan.best is None:
+        keep = [k for k, name in enumerate(ids) if name != "te_delay"]
+        ids = tuple(ids[k] for k in keep)
+        values, covariance = values[keep], covariance[np.ix_(keep, keep)]
+        refusals["te_delay"] = "the engine torque moves too little for its age to show"
+    if friction is not None:
+        ids = (*ids, f"P0.{friction.element}")
+        values = np.append(values, friction.P0)
+        covariance = independent(covariance, np.array([[friction.P0_std**2]]))
+    return IntegralShift(momentum, load, ring, friction, ids, values, covariance, refusals)

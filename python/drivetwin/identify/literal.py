@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""The paper's procedure on one shift, stage by stage as published."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.friction import PaperFriction, paper_friction
+from drivetwin.identify.inertia import PaperInertiaSettings, paper_inertia
+from drivetwin.identify.load import PaperLoadSettings, paper_load
+from drivetwin.identify.ringdown import RingDown, paper_ringdown
+from drivetwin.identify.shaft import stiffness_and_damping
+from drivetwin.identify.signals import Driveline, ShiftSignals
+from drivetwin.identify.wlse import GridFit, Weighting
+
+EXCITATION = 0.03
+"""Least relative variation of the engine torque in gear for eq. 10 to tell η from J′."""
+
+
+@dataclass(frozen=True)
+class PaperShift:
+    """The stages of the paper on one shift; `values` by parameter id, `doubts` by parameter id.
+
+    `inertia` and `load` are the two tables (Table 1, Fig. 6), `inertia_after` the fit of eq. 10 in
+    the next gear at the η found, from which J4 comes.
+    """
+
+    inertia: GridFit
+    inertia_after: GridFit
+    load: GridFit
+    ring: RingDown | None
+    friction: PaperFriction | None
+    values: dict[str, float]
+    doubts: dict[str, str]
+    refusals: dict[str, str]
+
+
+def _doubts(
+    signals: ShiftSignals, fit: GridFit, low: float, high: float, gear: str
+) -> dict[str, str]:
+    """Why η and J′ of the grid search deserve little trust, by parameter id."""
+    torque = signals.engine_torque.within(signals.shift.before).values
+    moving = float(np.std(torque)) / max(abs(float(np.mean(torque))), 1e-9)
+    reasons = []
+    if moving < EXCITATION:
+        reasons.append(
+            f"the engine torque moves by {100 * moving:.1f} % only while gear {gear} is held, so "
+            "eq. 10 cannot tell η from J′"
+        )
+    if not low <= fit.best.inertia <= high:
+        reasons.append(
+            f"J′ = {fit.best.inertia:.3g} kg m^2 lies outside its design range "
+            f"{low:g} to {high:g} kg m^2"
+        )
+    if fit.best in (fit.rows[0], fit.rows[-1]):
+        reasons.append("the least error lies at the end of the grid of η")
+    text = "; ".join(reasons)
+    return {"eta": text, f"J_prime_{gear}": text} if text else {}
+
+
+def paper_shift(
+    signals: ShiftSignals,
+    driveline: Driveline,
+    J_prime_range: tuple[float, float],
+    J_vehicle_range: tuple[float, float],
+) -> PaperShift:
+    """Run the paper's stages. The ranges [kg m^2] set the weights of the two grid searches."""
+    shift = signals.shift
+    weighting = Weighting(*J_prime_range)
+    inertia = paper_inertia(
+        signals, driveline.i_before, shift.before, PaperInertiaSettings(weighting)
+    )
+    held = PaperInertiaSettings(weighting, (inertia.best.value,))
+    after = paper_inertia(signals, driveline.i_after, shift.after, held)
+    load = paper_load(
+        signals, driveline.i_f, shift.before, PaperLoadSettings(Weighting(*J_vehicle_range))
+    )
+    values = {
+        "eta": inertia.best.value,
+        f"J_prime_{shift.start_gear}": inertia.best.inertia,
+        f"J_prime_{shift.end_gear}": after.best.inertia,
+        "Tv_over_if": load.best.value,
+        "J_vehicle": load.best.inertia,
+    }
+    refusals: dict[str, str] = {}
+    ring: RingDown | None = None
+    friction: PaperFriction | None = None
+    try:
+        ring = paper_ringdown(signals.output_torque, shift.lockup_time, shift.after[1])
+        values[f"f_d_{shift.end_gear}"] = ring.f_d
+        values[f"zeta_{shift.end_gear}"] = ring.zeta
+        J4 = after.best.inertia * driveline.i_after**2
+        J5 = load.best.inertia / driveline.i_f**2
+        k_o, c_o = stiffness_and_damping(ring.decay_rate, ring.omega_d, J4, J5)
+        values |= {"k_o": float(k_o), "c_o": float(c_o)}
+    except IdentificationError as error:
+        refusals["shaft"] = error.what
+    try:
+        friction = paper_friction(signals, driveline)
+    except IdentificationError as error:
+        refusals["friction"] = error.what
+    doubts = _doubts(signals, inertia, *J_prime_range, shift.start_gear)
+    return PaperShift(inertia, after, load, ring, friction, values, doubts, refusals)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""Conclusions from the paper's procedure, which states no intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drivetwin.identify.conclude import Conclusions
+from drivetwin.identify.literal import PaperShift
+from drivetwin.identify.result import Estimate, Verdict
+from drivetwin.identify.signals import Driveline, ShiftSignals
+from drivetwin.identify.uncertainty import experiment_for, judge, refused
+
+METHOD = "paper"
+_NO_INTERVAL = "the paper's procedure gives no interval"
+
+
+def paper_conclusions(
+    shifts: Sequence[PaperShift], signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]
+) -> Conclusions:
+    """Values of the first shift that tells them, with a verdict from the doubts it raised.
+
+    Jo′ and P0 are the card's: the paper takes them as known.
+    """
+    estimates: dict[str, Estimate] = {}
+    for shift, s in zip(shifts, signals, strict=True):
+        for name, value in shift.values.items():
+            if name in estimates:
+                continue
+            doubt = shift.doubts.get(name, "")
+            reason = f"{doubt}; {experiment_for(name)}" if doubt else _NO_INTERVAL
+            verdict = Verdict.WEAK if doubt else Verdict.IDENTIFIED
+            estimates[name] = Estimate(name, value, None, verdict, METHOD, reason=reason)
+        gear = s.shift.end_gear
+        for name in ("k_o", "c_o", f"f_d_{gear}", f"zeta_{gear}"):
+            if name not in shift.values and name not in estimates:
+                estimates[name] = refused(name, METHOD, shift.refusals["shaft"])
+    for driveline in drivelines:
+        if driveline.J_out is not None:
+            prior = driveline.J_out
+            estimates["J_out"] = judge("J_out", prior.value, prior.std, "prior")
+        for element in (driveline.offgoing, driveline.oncoming):
+            name = f"P0.{element.name}"
+            estimates[name] = judge(name, element.P0.value, element.P0.std, "prior")
+    friction = {s.friction.element: s.friction.curve for s in shifts if s.friction is not None}
+    doubts = dict.fromkeys(text for shift in shifts for text in shift.doubts.values())
+    warnings = (
+        "the paper's procedure is biased by speed noise: its slope enters the regression as if "
+        "it were exact (errors in variables)",
+        *doubts,
+    )
+    return Conclusions(estimates, friction, (), np.empty((0, 0)), warnings)

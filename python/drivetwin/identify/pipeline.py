@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: MIT
+"""identify(): from a log, a vehicle card and its shifts to an Identification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError, InputError, NoShiftError, Where
+from drivetwin.identify.conclude import Conclusions, conclude, with_systematic_band
+from drivetwin.identify.friction import FrictionSettings, stribeck_at
+from drivetwin.identify.inputs import driveline_of, signals_of
+from drivetwin.identify.integral import IntegralShift, identify_shift
+from drivetwin.identify.literal import PaperShift, paper_shift
+from drivetwin.identify.literal_result import paper_conclusions
+from drivetwin.identify.method import Method
+from drivetwin.identify.momentum import MomentumSettings
+from drivetwin.identify.result import FloatArray, Identification
+from drivetwin.identify.signals import Driveline, ShiftSignals
+from drivetwin.identify.uncertainty import systematic_std
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.vehicle.spec import VehicleCard
+
+
+class Shifts(Protocol):
+    """What shift detection hands over."""
+
+    @property
+    def shifts(self) -> tuple[Shift, ...]:
+        """Usable shifts."""
+
+    @property
+    def rejected(self) -> tuple[RejectedShift, ...]:
+        """Candidates that were refused, with the reason."""
+
+
+def identify(
+    log: ShiftLog, card: VehicleCard, shifts: Shifts, method: Method = Method.INTEGRAL
+) -> Identification:
+    """Identify the driveline from all usable shifts of a log.
+
+    `evidence["paper"]` holds a PaperShift and `evidence["integral"]` an IntegralShift per shift;
+    the paper's stages run beside the default method for comparison.
+    Raises NoShiftError without a shift, IdentificationError where the data cannot carry it,
+    MissingChannelError for a missing channel.
+    """
+    if method is Method.LIKELIHOOD:
+        raise InputError(
+            "the likelihood method is not part of this version",
+            f"use --method {Method.INTEGRAL} or {Method.PAPER}",
+        )
+    if not shifts.shifts:
+        raise NoShiftError(
+            "the log holds no usable gear shift",
+            "record from a second before the torque phase to a second after lock-up",
+            Where(file=log.source),
+        )
+    signals = [signals_of(log, card, shift) for shift in shifts.shifts]
+    drivelines = [driveline_of(card, shift) for shift in shifts.shifts]
+    evidence: dict[str, Any] = {}
+    if method is Method.PAPER:
+        paper = _paper_shifts(signals, drivelines, card)
+        found = paper_conclusions(paper, signals, drivelines)
+    else:
+        found, evidence["integral"] = _integral(signals, drivelines, card)
+        try:
+            paper = _paper_shifts(signals, drivelines, card)
+        except IdentificationError as error:
+            paper = ()
+            found = replace(found, warnings=(*found.warnings, f"paper's method: {error.what}"))
+    evidence["paper"] = paper
+    return Identification(
+        estimates=found.estimates,
+        friction=found.friction,
+        shifts=shifts.shifts,
+        rejected=shifts.rejected,
+        fit={},
+        method=method,
+        loss_law=card.loss_law,
+        validity=_validity(signals, found),
+        inputs={log.source: log.sha256},
+        settings=_settings(card, method),
+        evidence=evidence,
+        warnings=(*log.warnings, *found.warnings),
+        assumptions=_assumptions(card, method),
+        correlation_ids=found.correlation_ids,
+        correlation=found.correlation,
+    )
+
+
+def _paper_shifts(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
+) -> tuple[PaperShift, ...]:
+    return tuple(
+        paper_shift(s, d, card.J_prime_range, card.J_vehicle_range)
+        for s, d in zip(signals, drivelines, strict=True)
+    )
+
+
+def _integral(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
+) -> tuple[Conclusions, tuple[IntegralShift, ...]]:
+    start = float(np.sqrt(card.J_prime_range[0] * card.J_prime_range[1]))
+    shifts = tuple(
+        identify_shift(s, d, start) for s, d in zip(signals, drivelines, strict=True)
+    )
+    systematic, bands = _systematic(signals, drivelines, shifts, card, start)
+    found = conclude(shifts, signals, drivelines, systematic)
+    friction = {
+        name: with_systematic_band(curve, bands[name]) if name in bands else curve
+        for name, curve in found.friction.items()
+    }
+    return replace(found, friction=friction), shifts
+
+
+def _systematic(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    shifts: Sequence[IntegralShift],
+    card: VehicleCard,
+    start: float,
+) -> tuple[dict[str, float], Mapping[str, FloatArray]]:
+    """Standard deviations from the card's sensor tolerances: by parameter id, and of μ by element.
+
+    A sensor's error is the same in all shifts of a log, so several shifts do not average it out:
+    the largest counts. Empty where the card states no tolerance.
+    """
+    parameters: dict[str, float] = {}
+    bands: dict[str, FloatArray] = {}
+    if not card.sensors:
+        return parameters, bands
+    for s, d, base in zip(signals, drivelines, shifts, strict=True):
+
+        def values(x: ShiftSignals, d: Driveline = d, base: IntegralShift = base) -> FloatArray:
+            run = identify_shift(x, d, start)
+            found = dict(zip(run.ids, run.values, strict=True))
+            told = [found.get(k, v) for k, v in zip(base.ids, base.values, strict=True)]
+            if base.friction is None:
+                return np.array(told)
+            fit = base.friction if run.friction is None else run.friction
+            return np.append(told, stribeck_at(fit, base.friction.curve.slip))
+
+        std = systematic_std(values, s, card.sensors)
+        for name, value in zip(base.ids, std[: len(base.ids)], strict=True):
+            parameters[name] = max(parameters.get(name, 0.0), float(value))
+        if base.friction is not None:
+            bands[base.friction.element] = std[len(base.ids) :]
+    return parameters, bands
+
+
+def _validity(
+    signals: Sequence[ShiftSignals], found: Conclusions
+) -> dict[str, tuple[float, float]]:
+    """Ranges that the identification saw: slip, pressure, torque, speed; SI."""
+
+    def span(arrays: list[FloatArray]) -> tuple[float, float]:
+        return min(float(a.min()) for a in arrays), max(float(a.max()) for a in arrays)
+
+    ranges = {
+        "pressure": span([p.values for s in signals for p in s.pressures.values()]),
+        "torque": span([s.engine_torque.values for s in signals]),
+        "speed": span([s.engine_speed.values for s in signals]),
+    }
+    if found.friction:
+        ranges["slip"] = (0.0, span([c.slip for c in found.friction.values()])[1])
+    return ranges
+
+
+def _settings(card: VehicleCard, method: Method) -> dict[str, Any]:
+    ranges = {"J_prime_range": card.J_prime_range, "J_vehicle_range": card.J_vehicle_range}
+    if method is Method.PAPER:
+        return ranges
+    return {"momentum": asdict(MomentumSettings()), "friction": asdict(FrictionSettings()), **ranges}
+
+
+def _assumptions(card: VehicleCard, method: Method) -> tuple[str, ...]:
+    texts = [
+        f"loss law `{card.loss_law}` (THEORY section 3)",
+        "gear ratios, final drive and clutch gains are as on the card",
+        "the load torque is constant over the log",
+        "the off-going element carries no torque once its pressure is below P0",
+    ]
+    if method is Method.PAPER:
+        texts.append("T_c = T_o/i_out in the inertia phase (eq. 16), P0 as on the card")
+    else:
+        texts.append("sensor noise is white, at the level found in the log")
+    if not card.sensors:
+        texts.append("no sensor gain or offset tolerance is stated: intervals cover noise only")
+    if card.J_out is not None:
+        texts.append(
+            f"design prior of J_out: {card.J_out.value:g} ± {card.J_out.std:g} kg m^2 (1 sigma)"
+        )
+    return tuple(texts)

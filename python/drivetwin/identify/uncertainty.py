@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""From values and covariances to estimates with a verdict in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from drivetwin.identify.inputs import disturbed
+from drivetwin.identify.result import Estimate, Verdict
+from drivetwin.identify.signals import FloatArray, ShiftSignals
+from drivetwin.parameters import spec_of
+from drivetwin.vehicle.spec import SensorTolerance
+
+DELAY_IDENTIFIED = 0.005
+"""Half width of the 95 % interval of a delay [s] below which it counts as identified."""
+
+_EXPERIMENT = {
+    "eta": "step the pedal in the lower gear: engine torque must change while the gear is held",
+    "J_prime": "step the pedal in the lower gear, or record a shift with a longer inertia phase",
+    "J_out": "state J_out on the vehicle card from design, or add a shift at another torque",
+    "J_vehicle": "let the vehicle speed up and slow down in gear, or add a coast-down",
+    "Tv_over_if": "record a longer stretch in gear, or add a coast-down",
+    "k_o": "hold the pedal still for a second after a firm lock-up",
+    "c_o": "hold the pedal still for a second after a firm lock-up",
+    "f_d": "hold the pedal still for a second after a firm lock-up",
+    "zeta": "hold the pedal still for a second after a firm lock-up",
+    "P0": "record a shift with a slower pressure ramp, or shifts at two torque levels",
+    "te_delay": "step the pedal in gear: a constant torque has no visible age",
+}
+
+
+def experiment_for(parameter_id: str) -> str:
+    """What to record so that a parameter becomes known better."""
+    return _EXPERIMENT[spec_of(parameter_id).stem]
+
+
+def judge(
+    parameter_id: str,
+    value: float,
+    std_noise: float,
+    method: str,
+    std_systematic: float | None = None,
+    note: str = "",
+) -> Estimate:
+    """Estimate with its verdict from the width of the total 95 % interval.
+
+    Up to `weak_above` of the value: identified; up to the value itself: weak; wider, or a value
+    outside the parameter's bounds: not identifiable, and no value is given. Delays are judged by
+    absolute width, since zero is a sound value for them.
+    """
+    spec = spec_of(parameter_id)
+    half = 1.96 * float(np.hypot(std_noise, std_systematic or 0.0))
+    if spec.stem == "te_delay":
+        width, limit, end = half, DELAY_IDENTIFIED, 4.0 * DELAY_IDENTIFIED
+    else:
+        width, limit, end = half / max(abs(value), 1e-300), spec.weak_above, 1.0
+    inside = spec.lower <= value <= spec.upper
+    if not np.isfinite(width) or width > end or not inside:
+        shown = f"the 95 % interval {value:.4g} ± {half:.2g} {spec.unit} says nothing"
+        return Estimate(
+            parameter_id,
+            None,
+            None,
+            Verdict.NOT_IDENTIFIABLE,
+            method,
+            reason=f"{shown}; {experiment_for(parameter_id)}",
+        )
+    if width > limit:
+        reason = f"the 95 % interval is ± {half:.2g} {spec.unit}; {experiment_for(parameter_id)}"
+        verdict = Verdict.WEAK
+    else:
+        reason, verdict = "", Verdict.IDENTIFIED
+    text = "; ".join(part for part in (note, reason) if part)
+    return Estimate(parameter_id, value, std_noise, verdict, method, std_systematic, text)
+
+
+def refused(parameter_id: str, method: str, why: str) -> Estimate:
+    """A parameter that the log cannot tell, with the reason and the experiment that would."""
+    reason = f"{why}; {experiment_for(parameter_id)}"
+    return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
+
+
+def propagate(
+    function: Callable[[FloatArray], FloatArray], mean: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Values (q,) of `function` at `mean` (p,) and their covariance (q, q), to first order.
+
+    Derivatives are central differences over a hundredth of a standard deviation.
+    """
+    std = np.sqrt(np.diag(covariance))
+    columns = []
+    for k, step in enumerate(0.01 * std):
+        shift = np.zeros_like(mean)
+        shift[k] = max(step, 1e-9 * abs(mean[k]), 1e-300)
+        columns.append((function(mean + shift) - function(mean - shift)) / (2.0 * shift[k]))
+    slopes = np.column_stack(columns)
+    return function(mean), slopes @ covariance @ slopes.T
+
+
+def independent(*blocks: FloatArray) -> FloatArray:
+    """Covariance of estimates whose errors are independent between the blocks."""
+    return np.asarray(block_diag(*blocks), dtype=float)
+
+
+def correlation(covariance: FloatArray) -> FloatArray:
+    """Correlation matrix; a parameter without uncertainty correlates with nothing."""
+    std = np.sqrt(np.diag(covariance))
+    scale = np.where(std > 0.0, std, np.inf)
+    matrix = covariance / np.outer(scale, scale)
+    matrix[np.diag_indices_from(matrix)] = 1.0
+    return np.asarray(np.clip(matrix, -1.0, 1.0), dtype=float)
+
+
+def systematic_std(
+    values: Callable[[ShiftSignals], FloatArray],
+    signals: ShiftSignals,
+    tolerances: Mapping[str, SensorTolerance],
+) -> FloatArray:
+    """Standard deviation (q,) of `values` from the sensors' stated gain and offset errors.
+
+    Each tolerance is applied alone; the shifts of the result add in quadrature.
+    """
+    base = values(signals)
+    total = np.zeros_like(base)
+    for role, tolerance in tolerances.items():
+        for gain, offset in ((tolerance.gain, 0.0), (0.0, tolerance.offset)):
+            if gain or offset:
+                total += (values(disturbed(signals, role, gain, offset)) - base) ** 2
+    return np.asarray(np.sqrt(total), dtype=float)
