@@ -6,6 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["simulate"]
+
 _Array = NDArray[np.float64]
 
 def simulate(
