@@ -59,6 +59,10 @@ wheel: $(venv)/.dev ## the abi3 wheel, into dist/
 test-wheel: wheel ## run the demo from the wheel where there is no Rust
 	tools/try_wheel.sh $(bin)/python dist/drivetwin-*.whl
 
+.PHONY: bench
+bench: $(venv)/.native ## measure what has a stated limit
+	for program in benchmarks/*.py; do $(bin)/python "$$program"; done
+
 .PHONY: fmt
 fmt: $(venv)/.dev ## format Rust and Python sources
 	cargo fmt --all
