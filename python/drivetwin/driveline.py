@@ -7,7 +7,7 @@ The physics itself stands in the Rust core; these classes only describe and carr
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
@@ -202,7 +202,7 @@ def simulate(
     options = (accuracy.tolerance, accuracy.max_step, accuracy.order, audit)
     try:
         columns, events, status, energy = _native.simulate(
-            json.dumps(asdict(model)),
+            _as_json(model),
             [(name, _array(s.time), _array(s.values)) for name, s in signals.items()],
             (
                 start.engine_speed,
@@ -217,15 +217,42 @@ def simulate(
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the time grid") from error
     names = [element.name for element in model.elements]
+    engine, output, wheel, twist, shaft = columns[:5]
     return Trajectory(
         time,
-        *columns[:5],
+        engine,
+        output,
+        wheel,
+        twist,
+        shaft,
         clutch_torque=dict(zip(names, columns[5::2], strict=True)),
         slip=dict(zip(names, columns[6::2], strict=True)),
         events=tuple(Event(*event) for event in events),
         status=status,
         audit=EnergyAudit(*energy) if energy is not None else None,
     )
+
+
+def _as_json(model: DualClutch) -> str:
+    """The model as the core reads it; JSON has no NaN, so these are refused by name here."""
+    fields = asdict(model)
+    bad = [key for key, value in _leaves("", fields) if not np.isfinite(value)]
+    if bad:
+        raise InputError(
+            f"not a finite number: {', '.join(bad)}", "give every parameter of the model a value"
+        )
+    return json.dumps(fields)
+
+
+def _leaves(path: str, value: object) -> Iterator[tuple[str, float]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _leaves(f"{path}.{key}" if path else str(key), item)
+    elif isinstance(value, list | tuple):
+        for i, item in enumerate(value):
+            yield from _leaves(f"{path}[{i}]", item)
+    elif isinstance(value, float):
+        yield path, value
 
 
 def _array(values: FloatArray) -> FloatArray:

@@ -13,7 +13,11 @@ use std::sync::Arc;
 /// A trial assignment: the state of every friction element and the direction of every lossy gear.
 type Assignment = (Vec<RowState>, u32);
 
+/// What counts as zero in a sum, relative to the size of its terms.
+const ROUND_OFF: f64 = 1e-10;
+
 /// What is wrong with an assignment.
+#[derive(Debug)]
 enum Fault {
     /// A stuck element carries more than its static capacity; the torque's sign.
     Overloaded(usize, f64),
@@ -30,10 +34,13 @@ impl<T: Real> Integrator<'_, T> {
         let candidates = self.at_zero_slip();
         let mut rows = self.rows.clone();
         for &j in &candidates {
-            rows[j] = RowState::Stuck;
+            // An overload asks for more: what is at its capacity already stays there.
+            if overloaded.is_none() || !matches!(rows[j], RowState::Saturated { .. }) {
+                rows[j] = RowState::Stuck;
+            }
         }
         if let Some((j, sign)) = overloaded {
-            rows[j] = RowState::Slipping { sign };
+            self.give_way(&mut rows, j, sign);
         }
         let mut visited: Vec<Assignment> = Vec::new();
         loop {
@@ -50,7 +57,7 @@ impl<T: Real> Integrator<'_, T> {
             }
             visited.push(assignment);
             match fault {
-                Fault::Overloaded(j, sign) => rows[j] = self.yielding(&rows, j, sign),
+                Fault::Overloaded(j, sign) => self.give_way(&mut rows, j, sign),
                 Fault::Returning(j) => rows[j] = RowState::Stuck,
                 Fault::Reversed(i) => self.backward ^= 1 << i,
             }
@@ -166,17 +173,17 @@ impl<T: Real> Integrator<'_, T> {
         for &j in candidates {
             if let RowState::Slipping { sign } = rows[j] {
                 let (a, scale) = self.slip_acceleration(j, mode, basis);
-                if a * sign < -1e-10 * scale {
+                if a * sign < -ROUND_OFF * scale {
                     return Some(Fault::Returning(j));
                 }
             }
         }
         for i in 0..self.network.losses.len() {
             if self.network.is_directional(i) {
-                let torque = apply(&mode.gear_torque, i, basis).re();
+                let (torque, scale) = sum_and_scale(mode.gear_torque.row(i), basis);
                 let power = torque * self.gear_speed_sign[i];
                 let backward = self.backward >> i & 1 == 1;
-                if power != 0.0 && (power < 0.0) != backward && torque.abs() > 1e-12 {
+                if torque.abs() > ROUND_OFF * scale && (power < 0.0) != backward {
                     return Some(Fault::Reversed(i));
                 }
             }
@@ -187,35 +194,40 @@ impl<T: Real> Integrator<'_, T> {
     /// Slip acceleration [rad/s²] and the size of the terms it is the sum of.
     fn slip_acceleration(&self, j: usize, mode: &Mode<T>, basis: &[T]) -> (f64, f64) {
         let (mut sum, mut scale) = (0.0, 0.0);
-        for (i, &c) in self.network.frictions[j].slip.iter().enumerate() {
-            for (&d, &b) in mode.derivative.row(i).iter().zip(basis) {
-                let term = (c * d * b).re();
-                sum += term;
-                scale += term.abs();
-            }
+        for (i, c) in self.network.frictions[j].slip.iter().enumerate() {
+            let (part, size) = sum_and_scale(mode.derivative.row(i), basis);
+            sum += c.re() * part;
+            scale += c.re().abs() * size;
         }
         (sum, scale)
     }
 
     /// An overloaded element slips, unless others hold the same speed: then it stays at its
-    /// capacity and they carry the rest.
-    fn yielding(&self, rows: &[RowState], j: usize, sign: f64) -> RowState {
-        let mut slips = Matrix::zeros(rows.len(), self.network.speeds());
-        let mut others = Vec::new();
-        for (i, row) in self.network.frictions.iter().enumerate() {
-            slips.row_mut(i).copy_from_slice(&row.slip);
-            if i != j && rows[i] == RowState::Stuck {
-                others.push(i);
+    /// capacity and they carry the rest. Elements at their capacity slip with the last that held.
+    fn give_way(&self, rows: &mut [RowState], j: usize, sign: f64) {
+        rows[j] = RowState::Saturated { sign };
+        for i in 0..rows.len() {
+            if let RowState::Saturated { sign } = rows[i]
+                && !self.held_by_others(rows, i)
+            {
+                rows[i] = RowState::Slipping { sign };
             }
         }
-        let rank = |index: &[usize]| independent_rows(&slips.select_rows(index)).len();
-        let alone = rank(&others);
-        others.push(j);
-        if rank(&others) == alone {
-            RowState::Saturated { sign }
-        } else {
-            RowState::Slipping { sign }
-        }
+    }
+
+    /// Whether the stuck elements alone keep element `j` from slipping.
+    fn held_by_others(&self, rows: &[RowState], j: usize) -> bool {
+        let mut stuck: Vec<usize> = self.key_of(rows).stuck_rows().collect();
+        let rank = |index: &[usize]| {
+            let mut slips = Matrix::zeros(index.len(), self.network.speeds());
+            for (i, &k) in index.iter().enumerate() {
+                slips.row_mut(i).copy_from_slice(&self.network.frictions[k].slip);
+            }
+            independent_rows(&slips).len()
+        };
+        let alone = rank(&stuck);
+        stuck.push(j);
+        rank(&stuck) == alone
     }
 
     /// Make an assignment the state of the run.
@@ -238,4 +250,13 @@ impl<T: Real> Integrator<'_, T> {
         }
         self.mode = mode;
     }
+}
+
+/// Real part of the scalar product and of the sum of the magnitudes of its terms, which tells
+/// zero from round-off.
+fn sum_and_scale<T: Real>(row: &[T], basis: &[T]) -> (f64, f64) {
+    row.iter().zip(basis).fold((0.0, 0.0), |(sum, scale), (a, b)| {
+        let term = a.re() * b.re();
+        (sum + term, scale + term.abs())
+    })
 }

@@ -84,8 +84,10 @@ pub struct Step<T> {
 
 /// Most steps without progress before a run counts as chattering.
 const MAX_STALLED: usize = 60;
-/// Most events within one input segment before a run counts as chattering.
-const MAX_EVENTS_PER_SEGMENT: usize = 2000;
+/// Events over which a run must advance by at least [`MIN_PROGRESS`].
+const PROGRESS_WINDOW: usize = 1000;
+/// Least advance over a window of events, s; below lies Zeno behaviour.
+const MIN_PROGRESS: f64 = 1e-7;
 
 /// A run in progress.
 pub struct Integrator<'a, T> {
@@ -112,7 +114,7 @@ pub struct Integrator<'a, T> {
     pub(super) segment: usize,
     pub(super) pending: Option<Cause>,
     stalled: usize,
-    events_in_segment: usize,
+    window: (usize, f64),
 }
 
 impl<'a, T: Real> Integrator<'a, T> {
@@ -147,7 +149,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             segment: 0,
             pending: None,
             stalled: 0,
-            events_in_segment: 0,
+            window: (0, t),
         };
         run.bring_to_rest(locked);
         for (i, loss) in network.losses.iter().enumerate() {
@@ -169,7 +171,6 @@ impl<'a, T: Real> Integrator<'a, T> {
         if !self.enter_segment()? {
             return Ok(None);
         }
-        self.released_by_redundancy()?;
         let end = self.inputs.span(self.segment).1;
         let remaining = (-self.t + end).re();
         let wish = remaining.min(self.settings.max_step);
@@ -222,19 +223,21 @@ impl<'a, T: Real> Integrator<'a, T> {
 
     /// Step into the next segment where the present one is used up; false at the end.
     fn enter_segment(&mut self) -> Result<bool, Status> {
-        let mut jumped = false;
+        let (mut entered, mut jumped) = (false, false);
         while self.t.re() >= self.inputs.span(self.segment).1 {
             if self.segment + 1 == self.inputs.segments() {
                 return Ok(false);
             }
             self.segment += 1;
-            self.events_in_segment = 0;
+            entered = true;
             let (from, to) = self.inputs.span(self.segment);
             jumped |= from == to;
         }
         self.inputs.at(self.segment, self.t, &mut self.expansion.inputs);
         if jumped {
             self.refresh()?;
+        } else if entered {
+            self.refresh_split()?;
         }
         Ok(true)
     }
@@ -248,9 +251,14 @@ impl<'a, T: Real> Integrator<'a, T> {
             self.stalled = 0;
             return Ok(());
         };
-        self.events_in_segment += 1;
         self.stalled = if length > 1e-13 * (1.0 + time.abs()) { 0 } else { self.stalled + 1 };
-        if self.stalled > MAX_STALLED || self.events_in_segment > MAX_EVENTS_PER_SEGMENT {
+        self.window.0 += 1;
+        let mut creeping = false;
+        if self.window.0 == PROGRESS_WINDOW {
+            creeping = time - self.window.1 < MIN_PROGRESS;
+            self.window = (0, time);
+        }
+        if self.stalled > MAX_STALLED || creeping {
             return Err(Status::Chattering { time, element: self.culprit(cause) });
         }
         Ok(())

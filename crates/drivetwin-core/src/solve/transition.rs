@@ -66,7 +66,7 @@ impl<T: Real> Integrator<'_, T> {
 
     /// Locks of which one carries its full capacity, or whose split follows the capacities, are
     /// decided anew at every sample; accelerations do not depend on the split.
-    pub(super) fn released_by_redundancy(&mut self) -> Result<(), Status> {
+    pub(super) fn refresh_split(&mut self) -> Result<(), Status> {
         let saturated = |row: &RowState| matches!(row, RowState::Saturated { .. });
         if self.mode.redundant || self.rows.iter().any(saturated) {
             self.decide(None)?;

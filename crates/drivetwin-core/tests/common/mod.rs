@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+//! Small drivelines for tests.
+
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use drivetwin_core::model::dual_clutch::{DualClutch, Load, ShiftElement};
+use drivetwin_core::model::elements::{
+    Clutch, Element, Gear, Inertia, RoadLoad, SpringDamper, Torque,
+};
+use drivetwin_core::model::mechanism::LossLaw;
+use drivetwin_core::model::{Driveline, FrictionLaw, Stribeck};
+use drivetwin_core::network::Network;
+use drivetwin_core::number::Real;
+use drivetwin_core::simulate::{DualClutchStart, Output, Start, Trajectory, run};
+use drivetwin_core::solve::Settings;
+use std::marker::PhantomData;
+
+/// A signal: input name, times, values.
+pub type Signal = (&'static str, Vec<f64>, Vec<f64>);
+
+pub fn inertia(node: &str, inertia: f64) -> Element<f64> {
+    let name = format!("J {node}");
+    Element::Inertia(Inertia { name, node: node.into(), inertia })
+}
+
+pub fn torque(node: &str, input: &str) -> Element<f64> {
+    let (name, node, input) = (format!("source {input}"), node.into(), input.into());
+    Element::Torque(Torque { name, node, input, number: PhantomData })
+}
+
+pub fn gear(a: &str, b: &str, ratio: f64) -> Element<f64> {
+    let name = format!("gear {a} {b}");
+    Element::Gear(Gear { name, a: a.into(), b: b.into(), ratio, loss: None })
+}
+
+pub fn shaft(a: &str, b: &str, stiffness: f64, damping: f64) -> Element<f64> {
+    let name = format!("shaft {a} {b}");
+    Element::SpringDamper(SpringDamper { name, a: a.into(), b: b.into(), stiffness, damping })
+}
+
+pub fn load(node: &str, constant: f64, rolling: f64, aero: f64) -> Element<f64> {
+    let name = format!("load {node}");
+    Element::RoadLoad(RoadLoad { name, node: node.into(), constant, rolling, aero })
+}
+
+/// A clutch of constant μ = 1 and gain 1, so that its capacity is the pressure in N·m.
+pub fn clutch(name: &str, a: &str, b: &str) -> Clutch<f64> {
+    Clutch {
+        name: name.into(),
+        a: a.into(),
+        b: b.into(),
+        friction: FrictionLaw::constant(1.0),
+        gain: 1.0,
+        p0: 0.0,
+        peak: 1.0,
+        pressure: format!("P {name}"),
+        drum_inertia: 0.0,
+    }
+}
+
+pub fn compile(elements: Vec<Element<f64>>) -> Network<f64> {
+    Network::compile(&Driveline { elements }).expect("the driveline is sound")
+}
+
+pub fn grid(end: f64, points: usize) -> Vec<f64> {
+    (0..points).map(|i| end * i as f64 / (points - 1) as f64).collect()
+}
+
+pub fn start(speeds: &[(&str, f64)], locked: &[&str]) -> Start<f64> {
+    Start {
+        speeds: speeds.iter().map(|&(n, v)| (n.to_owned(), v)).collect(),
+        twists: Vec::new(),
+        locked: locked.iter().map(|&n| n.to_owned()).collect(),
+    }
+}
+
+pub fn simulate(
+    network: &Network<f64>,
+    signals: &[Signal],
+    start: &Start<f64>,
+    grid: &[f64],
+    outputs: &[Output],
+) -> Trajectory<f64> {
+    let signals: Vec<(&str, &[f64], &[f64])> =
+        signals.iter().map(|(n, t, v)| (*n, t.as_slice(), v.as_slice())).collect();
+    run(network, &signals, start, grid, outputs, (Settings::default(), true)).expect("sound inputs")
+}
+
+pub fn constant(name: &'static str, value: f64, end: f64) -> Signal {
+    (name, vec![0.0, end], vec![value, value])
+}
+
+/// The driveline of the paper with the numbers of PARAMETERS section 4.
+pub fn paper_driveline<T: Real>(law: LossLaw) -> DualClutch<T> {
+    let of = T::of;
+    let mu = || {
+        let (mu_c, mu_s, v_s, mu_v) = (of(0.110), of(0.135), of(15.0), of(1e-4));
+        FrictionLaw::Stribeck(Stribeck { mu_c, mu_s, v_s, mu_v })
+    };
+    let element = |name: &str, i: f64, gain: f64| ShiftElement {
+        name: name.into(),
+        i_c: of(i - 1.0),
+        i_out: of(i / (i - 1.0)),
+        gain: of(gain),
+        p0: of(0.8e5),
+        friction: mu(),
+        peak: of(1.0),
+        drum_inertia: of(0.0),
+    };
+    DualClutch {
+        J1: of(20.3),
+        J2e: of(0.0),
+        eta: of(0.85),
+        loss_law: law,
+        i_in: of(1.0),
+        J_out: of(0.9),
+        i_f: of(5.38),
+        J_v: of(6056.0),
+        k_o: of(1.76e5),
+        c_o: of(280.0),
+        load: Load { constant: of(2300.0 * 5.38), rolling: of(0.0), aero: of(0.0) },
+        elements: vec![element("B2", 1.91, 3.78e-2), element("B3", 1.43, 2.7e-2)],
+    }
+}
+
+/// Start in steady 2nd gear at 178 rad/s.
+pub fn second_gear<T: Real>() -> DualClutchStart<T> {
+    let (engine, ratio) = (178.0, 1.91);
+    DualClutchStart {
+        engine_speed: T::of(engine),
+        output_speed: T::of(engine / ratio),
+        wheel_speed: T::of(engine / ratio / 5.38),
+        twist: T::of(2461.0 / 1.76e5),
+        locked: vec!["B2".into()],
+    }
+}
+
+/// Pressures and engine torque of a power-on upshift at 1 kHz; `weak` scales the on-coming one.
+pub fn upshift(weak: f64) -> Vec<Signal> {
+    let times = grid(1.5, 1501);
+    let line = |points: &[(f64, f64)]| -> Vec<f64> {
+        times.iter().map(|&t| interpolate(points, t)).collect()
+    };
+    let torque =
+        line(&[(0.0, 1545.0), (0.45, 1545.0), (0.5, 1100.0), (0.8, 1100.0), (0.9, 1545.0)]);
+    let b2 = line(&[(0.0, 14e5), (0.3, 14e5), (0.36, 5e5), (0.45, 0.0)]);
+    let b3 =
+        line(&[(0.0, 0.0), (0.2, 0.0), (0.3, 1.5e5), (0.45, 5.5e5), (0.9, 6.5e5), (1.1, 14e5)]);
+    let ripple = |t: f64| 0.2e5 * (2.0 * std::f64::consts::PI * 22.0 * t).sin();
+    let b3 = times
+        .iter()
+        .zip(b3)
+        .map(|(&t, p)| weak * if (0.5..0.9).contains(&t) { p + ripple(t) } else { p })
+        .collect();
+    vec![("engine torque", times.clone(), torque), ("B2", times.clone(), b2), ("B3", times, b3)]
+}
+
+fn interpolate(points: &[(f64, f64)], t: f64) -> f64 {
+    let next = points.partition_point(|p| p.0 <= t);
+    if next == 0 {
+        return points[0].1;
+    }
+    if next == points.len() {
+        return points[next - 1].1;
+    }
+    let ((a, x), (b, y)) = (points[next - 1], points[next]);
+    x + (y - x) * (t - a) / (b - a)
+}

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: MIT
+//! Loads, maps and tables against closed forms.
+
+mod common;
+
+use common::{clutch, compile, constant, grid, inertia, load, shaft, simulate, start, torque};
+use drivetwin_core::model::FrictionLaw;
+use drivetwin_core::model::FrictionTable;
+use drivetwin_core::model::elements::{Clutch, Element, EngineMap, Planetary};
+use drivetwin_core::model::torque_map::TorqueMap;
+use drivetwin_core::network::CompileError;
+use drivetwin_core::simulate::Output;
+use drivetwin_core::solve::Status;
+use std::marker::PhantomData;
+
+fn speed(node: &str) -> Output {
+    Output::Speed(node.into())
+}
+
+#[test]
+fn air_drag_slows_a_coasting_wheel_hyperbolically() {
+    let network = compile(vec![inertia("wheel", 2.0), load("wheel", 0.0, 0.0, 0.5)]);
+    let run =
+        simulate(&network, &[], &start(&[("wheel", 40.0)], &[]), &grid(2.0, 21), &[speed("wheel")]);
+    for (t, w) in run.time.iter().zip(&run.columns[0]) {
+        assert!((w - 40.0 / (1.0 + 40.0 * 0.25 * t)).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn rolling_resistance_stops_a_wheel_and_holds_it() {
+    let network = compile(vec![inertia("wheel", 2.0), load("wheel", 3.0, 10.0, 0.0)]);
+    let run =
+        simulate(&network, &[], &start(&[("wheel", 6.5)], &[]), &grid(2.0, 21), &[speed("wheel")]);
+    assert!((run.events[0].time - 1.0).abs() < 1e-12);
+    assert_eq!(run.columns[0][20], 0.0);
+}
+
+#[test]
+fn a_grade_steeper_than_rolling_resistance_pulls_the_wheel_back() {
+    let network = compile(vec![inertia("wheel", 2.0), load("wheel", 14.0, 10.0, 0.0)]);
+    let run =
+        simulate(&network, &[], &start(&[("wheel", 6.0)], &[]), &grid(2.0, 21), &[speed("wheel")]);
+    // 6 - 12 t until 0.5 s, then -2 (t - 0.5)
+    assert!((run.columns[0][20] + 3.0).abs() < 1e-9, "{:?}", run.columns[0]);
+}
+
+#[test]
+fn an_engine_map_that_falls_with_speed_settles_exponentially() {
+    let map = TorqueMap {
+        throttle: vec![0.0, 1.0],
+        speed: vec![0.0, 50.0, 100.0],
+        torque: vec![vec![0.0, -50.0, -100.0], vec![200.0, 150.0, 100.0]],
+    };
+    let network = compile(vec![
+        inertia("engine", 2.0),
+        Element::EngineMap(EngineMap {
+            name: "engine".into(),
+            node: "engine".into(),
+            throttle: "pedal".into(),
+            map,
+            number: PhantomData,
+        }),
+    ]);
+    let signals = [constant("pedal", 0.25, 4.0)];
+    let run = simulate(
+        &network,
+        &signals,
+        &start(&[("engine", 20.0)], &[]),
+        &grid(4.0, 41),
+        &[speed("engine")],
+    );
+    // T = 200·0.25 - ω
+    for (t, w) in run.time.iter().zip(&run.columns[0]) {
+        assert!((w - (50.0 - 30.0 * (-t / 2.0).exp())).abs() < 1e-9, "{t}: {w}");
+    }
+}
+
+#[test]
+fn a_map_is_followed_through_its_cells_and_held_beyond_its_border() {
+    let map = TorqueMap {
+        throttle: vec![0.0, 1.0],
+        speed: vec![0.0, 10.0],
+        torque: vec![vec![0.0; 2], vec![40.0, 20.0]],
+    };
+    let network = compile(vec![
+        inertia("engine", 1.0),
+        Element::EngineMap(EngineMap {
+            name: "engine".into(),
+            node: "engine".into(),
+            throttle: "pedal".into(),
+            map,
+            number: PhantomData,
+        }),
+    ]);
+    let signals = [constant("pedal", 1.0, 1.0)];
+    let run = simulate(
+        &network,
+        &signals,
+        &start(&[("engine", 0.0)], &[]),
+        &grid(1.0, 101),
+        &[speed("engine")],
+    );
+    // 20 - 20 exp(-2 t) until 10 rad/s at ln(2)/2, then 20 N·m constantly
+    let border = 0.5 * 2.0_f64.ln();
+    assert!((run.columns[0][100] - (10.0 + 20.0 * (1.0 - border))).abs() < 1e-9);
+}
+
+#[test]
+fn a_friction_table_is_followed_piece_by_piece() {
+    let table = FrictionTable { slip: vec![0.0, 10.0, 20.0], mu: vec![1.0, 1.0, 2.0] };
+    let brake =
+        Clutch { friction: FrictionLaw::Table(table), ..clutch("brake", "shaft", "ground") };
+    let network = compile(vec![inertia("shaft", 1.0), Element::Clutch(brake)]);
+    let signals = [constant("P brake", 10.0, 3.0)];
+    let run = simulate(
+        &network,
+        &signals,
+        &start(&[("shaft", 20.0)], &[]),
+        &grid(3.0, 301),
+        &[speed("shaft")],
+    );
+    // s' = -s above 10 rad/s, reached at ln 2; then -10, at rest at ln 2 + 1
+    let rest = 2.0_f64.ln() + 1.0;
+    assert!((run.events[0].time - rest).abs() < 1e-10, "{:?}", run.events);
+    assert_eq!(run.status, Status::Completed);
+    assert!((run.columns[0][50] - 20.0 * (-0.5_f64).exp()).abs() < 1e-9);
+}
+
+#[test]
+fn two_masses_on_a_shaft_swing_at_their_natural_frequency() {
+    let network = compile(vec![inertia("a", 2.0), inertia("b", 6.0), shaft("a", "b", 600.0, 0.0)]);
+    let run = simulate(
+        &network,
+        &[],
+        &start(&[("a", 1.0), ("b", 0.0)], &[]),
+        &grid(1.0, 101),
+        &[speed("a"), speed("b")],
+    );
+    let omega = (600.0_f64 * (0.5 + 1.0 / 6.0)).sqrt();
+    for (i, t) in run.time.iter().enumerate() {
+        let relative = run.columns[0][i] - run.columns[1][i];
+        assert!((relative - (omega * t).cos()).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_torque_on_a_planetary_set_splits_by_willis() {
+    let network = compile(vec![
+        inertia("sun", 1.0),
+        inertia("carrier", 10.0),
+        torque("sun", "T"),
+        Element::Planetary(Planetary {
+            name: "set".into(),
+            sun: "sun".into(),
+            ring: "ring".into(),
+            carrier: "carrier".into(),
+            z: 1.5,
+        }),
+        Element::Clutch(clutch("brake", "ring", "ground")),
+    ]);
+    let signals = [constant("T", 20.0, 1.0), constant("P brake", 1000.0, 1.0)];
+    let outputs = [speed("sun"), speed("carrier"), Output::FrictionTorque("brake".into())];
+    let rest = start(&[("sun", 0.0), ("carrier", 0.0)], &[]);
+    let run = simulate(&network, &signals, &rest, &grid(1.0, 11), &outputs);
+    // sun = 2.5 carrier; (1·2.5² + 10) ω' = 2.5·20
+    let acceleration = 50.0 / 16.25;
+    assert!((run.columns[1][10] - acceleration).abs() < 1e-12);
+    assert!((run.columns[0][10] - 2.5 * acceleration).abs() < 1e-12);
+    let ring_torque = 1.5 * (20.0 - 2.5 * acceleration);
+    assert!(
+        (run.columns[2][5] + ring_torque).abs() < 1e-9
+            || (run.columns[2][5] - ring_torque).abs() < 1e-9
+    );
+}
+
+#[test]
+fn repeated_couplings_are_named() {
+    let twice = vec![
+        inertia("a", 1.0),
+        common::gear("a", "b", 2.0),
+        common::gear("b", "c", 2.0),
+        Element::Gear(drivetwin_core::model::elements::Gear {
+            name: "again".into(),
+            a: "a".into(),
+            b: "c".into(),
+            ratio: 4.0,
+            loss: None,
+        }),
+    ];
+    let error = drivetwin_core::network::Network::compile(&drivetwin_core::model::Driveline {
+        elements: twice,
+    });
+    match error.unwrap_err() {
+        CompileError::DependentConstraints { elements } => {
+            assert_eq!(elements, ["gear a b", "gear b c", "again"]);
+        }
+        other => panic!("{other}"),
+    }
+}

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: MIT
+//! Who stays locked (THEORY section 1): redundant locks, tie-up, grazing, pass-through.
+
+mod common;
+
+use common::{clutch, compile, constant, gear, grid, inertia, simulate, start, torque};
+use drivetwin_core::model::elements::{Clutch, Element};
+use drivetwin_core::simulate::Output;
+use drivetwin_core::solve::{EventKind, Status};
+
+fn friction_torque(name: &str) -> Output {
+    Output::FrictionTorque(name.into())
+}
+
+fn speed(node: &str) -> Output {
+    Output::Speed(node.into())
+}
+
+/// One shaft held by two parallel brakes.
+fn two_brakes() -> Vec<Element<f64>> {
+    vec![
+        inertia("shaft", 2.0),
+        torque("shaft", "T"),
+        Element::Clutch(clutch("A", "shaft", "ground")),
+        Element::Clutch(clutch("B", "shaft", "ground")),
+    ]
+}
+
+#[test]
+fn redundant_locks_split_by_least_squares_of_their_utilisation() {
+    let network = compile(two_brakes());
+    let signals =
+        [constant("T", 50.0, 1.0), constant("P A", 100.0, 1.0), constant("P B", 200.0, 1.0)];
+    let outputs = [friction_torque("A"), friction_torque("B"), speed("shaft")];
+    let run =
+        simulate(&network, &signals, &start(&[("shaft", 0.0)], &[]), &grid(1.0, 11), &outputs);
+    assert_eq!(run.status, Status::Completed);
+    for i in 0..11 {
+        // minimise (a/100)² + (b/200)² with a + b = 50
+        assert!((run.columns[0][i] - 10.0).abs() < 1e-9, "{}", run.columns[0][i]);
+        assert!((run.columns[1][i] - 40.0).abs() < 1e-9);
+        assert!(run.columns[2][i].abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_redundant_lock_at_its_capacity_leaves_the_rest_to_the_other() {
+    // The unbounded split of 10.5 would load B (capacity 10) with 10.4.
+    let network = compile(two_brakes());
+    let signals = [constant("T", 10.5, 1.0), constant("P A", 1.0, 1.0), constant("P B", 10.0, 1.0)];
+    let outputs = [friction_torque("A"), friction_torque("B"), speed("shaft")];
+    let run =
+        simulate(&network, &signals, &start(&[("shaft", 0.0)], &[]), &grid(1.0, 11), &outputs);
+    assert_eq!(run.status, Status::Completed);
+    assert!((run.columns[0][5] - 0.5).abs() < 1e-9, "{}", run.columns[0][5]);
+    assert!((run.columns[1][5] - 10.0).abs() < 1e-9);
+    assert!(run.columns[2][10].abs() < 1e-12);
+}
+
+#[test]
+fn redundant_locks_let_go_together_when_their_sum_is_exceeded() {
+    let network = compile(two_brakes());
+    let ramp = ("T", vec![0.0, 1.0], vec![0.0, 40.0]);
+    let signals = [ramp, constant("P A", 10.0, 1.0), constant("P B", 20.0, 1.0)];
+    let outputs = [speed("shaft"), friction_torque("A"), friction_torque("B")];
+    let run =
+        simulate(&network, &signals, &start(&[("shaft", 0.0)], &[]), &grid(1.0, 101), &outputs);
+    assert_eq!(run.status, Status::Completed);
+    let released: Vec<_> = run.events.iter().filter(|e| e.kind == EventKind::BreakAway).collect();
+    assert_eq!(released.len(), 2);
+    assert!(released.iter().all(|e| (e.time - 0.75).abs() < 1e-9), "{:?}", run.events);
+    // 2 ω' = 40 (t - 0.75)
+    let expected = 0.5 * 40.0 * 0.25 * 0.25 / 2.0;
+    assert!((run.columns[0][100] - expected).abs() < 1e-9);
+}
+
+/// Engine and vehicle joined by two clutches of ratios 1 and 2 (two gears at once).
+fn two_gears() -> Vec<Element<f64>> {
+    vec![
+        inertia("engine", 1.0),
+        inertia("vehicle", 10.0),
+        torque("engine", "T"),
+        gear("low", "vehicle", 2.0),
+        Element::Clutch(clutch("direct", "engine", "vehicle")),
+        Element::Clutch(clutch("reduced", "engine", "low")),
+    ]
+}
+
+#[test]
+fn in_a_tie_up_one_element_slips_against_the_motion() {
+    let network = compile(two_gears());
+    let signals = [
+        constant("T", 0.0, 8.0),
+        constant("P direct", 50.0, 8.0),
+        ("P reduced", vec![0.0, 0.5, 1.0, 8.0], vec![0.0, 0.0, 200.0, 200.0]),
+    ];
+    let moving = start(&[("engine", 20.0), ("vehicle", 20.0)], &["direct"]);
+    let outputs = [
+        speed("engine"),
+        speed("vehicle"),
+        Output::Slip("direct".into()),
+        Output::Slip("reduced".into()),
+        friction_torque("direct"),
+        friction_torque("reduced"),
+    ];
+    let run = simulate(&network, &signals, &moving, &grid(8.0, 2001), &outputs);
+    assert_eq!(run.status, Status::Completed);
+    let audit = run.audit.unwrap();
+    assert!(audit.friction > 0.0 && audit.error.abs() < 1e-9 * audit.friction);
+    for i in 0..run.time.len() {
+        let (direct, reduced) = (run.columns[2][i], run.columns[3][i]);
+        let moves = run.columns[1][i].abs() > 1e-6;
+        assert!(!(moves && direct.abs() < 1e-9 && reduced.abs() < 1e-9));
+        assert!(direct * run.columns[4][i] >= -1e-9, "friction opposes slip");
+        assert!(reduced * run.columns[5][i] >= -1e-9, "friction opposes slip");
+    }
+    // Both hold together only at rest: the tie-up brakes the vehicle to standstill.
+    assert!(run.columns[1][2000].abs() < 1e-9);
+}
+
+#[test]
+fn both_elements_hold_at_standstill() {
+    let network = compile(two_gears());
+    let signals = [
+        constant("T", 30.0, 1.0),
+        constant("P direct", 100.0, 1.0),
+        constant("P reduced", 100.0, 1.0),
+    ];
+    let rest = start(&[("engine", 0.0), ("vehicle", 0.0)], &[]);
+    let outputs = [speed("engine"), friction_torque("direct"), friction_torque("reduced")];
+    let run = simulate(&network, &signals, &rest, &grid(1.0, 11), &outputs);
+    assert_eq!(run.status, Status::Completed);
+    assert!(run.columns[0].iter().all(|w| w.abs() < 1e-12));
+    // Engine: d + r = 30; vehicle: d + 2 r = 0.
+    assert!((run.columns[1][5] - 60.0).abs() < 1e-9);
+    assert!((run.columns[2][5] + 30.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_load_that_only_touches_the_capacity_does_not_break_away() {
+    let network = compile(vec![
+        inertia("shaft", 1.0),
+        torque("shaft", "T"),
+        Element::Clutch(clutch("brake", "shaft", "ground")),
+    ]);
+    let touch = ("T", vec![0.0, 0.5, 1.0], vec![0.0, 10.0, 0.0]);
+    let signals = [touch, constant("P brake", 10.0, 1.0)];
+    let rest = start(&[("shaft", 0.0)], &[]);
+    let run = simulate(&network, &signals, &rest, &grid(1.0, 11), &[speed("shaft")]);
+    assert_eq!(run.status, Status::Completed);
+    assert!(run.columns[0].iter().all(|w| w.abs() < 1e-12), "{:?}", run.columns[0]);
+}
+
+#[test]
+fn break_away_is_at_the_static_peak_and_slip_at_the_kinetic_level() {
+    let network = compile(vec![
+        inertia("shaft", 1.0),
+        torque("shaft", "T"),
+        Element::Clutch(Clutch { peak: 1.25, ..clutch("brake", "shaft", "ground") }),
+    ]);
+    let ramp = ("T", vec![0.0, 1.0], vec![0.0, 20.0]);
+    let signals = [ramp, constant("P brake", 8.0, 1.0)];
+    let rest = start(&[("shaft", 0.0)], &[]);
+    let run = simulate(&network, &signals, &rest, &grid(1.0, 101), &[speed("shaft")]);
+    assert_eq!(run.events.len(), 1);
+    assert!((run.events[0].time - 0.5).abs() < 1e-12);
+    // ω = ∫ (20 t - 8) dt from 0.5 to 1
+    assert!((run.columns[0][100] - (7.5 - 4.0)).abs() < 1e-9);
+}
+
+#[test]
+fn a_brake_too_weak_to_hold_lets_the_slip_pass_through_zero() {
+    let network = compile(vec![
+        inertia("shaft", 1.0),
+        torque("shaft", "T"),
+        Element::Clutch(clutch("brake", "shaft", "ground")),
+    ]);
+    let signals = [constant("T", 10.0, 1.0), constant("P brake", 4.0, 1.0)];
+    let run = simulate(
+        &network,
+        &signals,
+        &start(&[("shaft", -7.0)], &[]),
+        &grid(1.0, 101),
+        &[speed("shaft")],
+    );
+    assert_eq!(run.events.len(), 1);
+    assert_eq!(run.events[0].kind, EventKind::Reverse);
+    // -7 + 14 t = 0 at 0.5, then 6 (t - 0.5)
+    assert!((run.events[0].time - 0.5).abs() < 1e-12);
+    assert!((run.columns[0][100] - 3.0).abs() < 1e-9);
+}
+
+#[test]
+fn an_element_without_pressure_transmits_nothing_even_at_zero_slip() {
+    let network = compile(vec![
+        inertia("shaft", 1.0),
+        torque("shaft", "T"),
+        Element::Clutch(clutch("brake", "shaft", "ground")),
+    ]);
+    let signals = [constant("T", 1.0, 1.0), constant("P brake", 0.0, 1.0)];
+    let rest = start(&[("shaft", 0.0)], &["brake"]);
+    let run = simulate(&network, &signals, &rest, &grid(1.0, 11), &[speed("shaft")]);
+    assert!((run.columns[0][10] - 1.0).abs() < 1e-12);
+    assert!(run.events.is_empty());
+}

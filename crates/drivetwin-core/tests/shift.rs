@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+//! The dual-clutch shift: power balance, loss laws, order of the integrator, derivatives.
+
+mod common;
+
+use common::{paper_driveline, second_gear, upshift};
+use drivetwin_core::model::DualClutch;
+use drivetwin_core::model::mechanism::LossLaw;
+use drivetwin_core::number::Real;
+use drivetwin_core::simulate::{DualClutchRun, simulate_dual_clutch};
+use drivetwin_core::solve::{EventKind, Settings, Status};
+use num_dual::Dual64;
+
+const SHAFT_TORQUE: usize = 4;
+
+fn shift<T: Real>(model: &DualClutch<T>, weak: f64, settings: Settings) -> DualClutchRun<T> {
+    let signals = upshift(weak);
+    let lifted: Vec<Vec<T>> =
+        signals.iter().map(|s| s.2.iter().map(|&v| T::of(v)).collect()).collect();
+    let borrowed: Vec<(&str, &[f64], &[T])> =
+        signals.iter().zip(&lifted).map(|(s, v)| (s.0, s.1.as_slice(), v.as_slice())).collect();
+    let grid = signals[0].1.clone();
+    simulate_dual_clutch(model, &borrowed, &second_gear(), &grid, (settings, true)).unwrap()
+}
+
+#[test]
+fn power_balance_closes_over_a_shift() {
+    for law in [LossLaw::Paper, LossLaw::Dissipative] {
+        let run = shift(&paper_driveline::<f64>(law), 1.0, Settings::default());
+        assert_eq!(run.status, Status::Completed);
+        let audit = run.audit.unwrap();
+        assert!(audit.error.abs() < 1e-9 * audit.source, "{audit:?}");
+        assert!(audit.friction > 0.0 && audit.shaft > 0.0 && audit.load > 0.0);
+    }
+}
+
+#[test]
+fn dissipative_gears_never_create_energy_and_paper_gears_say_how_much() {
+    let run = |law| shift(&paper_driveline::<f64>(law), 1.0, Settings::default()).audit.unwrap();
+    let paper = run(LossLaw::Paper);
+    assert!(paper.created > 100.0, "the lock-up oscillation reverses the torque: {paper:?}");
+    assert_eq!(run(LossLaw::Dissipative).created, 0.0);
+}
+
+#[test]
+fn events_of_an_upshift_come_in_order() {
+    let run = shift(&paper_driveline::<f64>(LossLaw::Paper), 1.0, Settings::default());
+    let kinds: Vec<EventKind> = run.events.iter().map(|e| e.kind).collect();
+    assert_eq!(
+        kinds,
+        [EventKind::Fill, EventKind::BreakAway, EventKind::Vent, EventKind::Lock],
+        "{:?}",
+        run.events
+    );
+    assert!(run.events.windows(2).all(|w| w[0].time < w[1].time));
+}
+
+/// Error in shaft torque of a fixed order and step against round-off accuracy.
+fn error(order: usize, max_step: f64, exact: &DualClutchRun<f64>) -> f64 {
+    let settings = Settings { order: Some(order), max_step, ..Settings::default() };
+    let run = shift(&paper_driveline(LossLaw::Paper), 1.0, settings);
+    let pairs = run.columns[SHAFT_TORQUE].iter().zip(&exact.columns[SHAFT_TORQUE]);
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn halving_the_step_divides_the_error_by_two_to_the_order() {
+    let exact = shift(&paper_driveline::<f64>(LossLaw::Paper), 1.0, Settings::default());
+    for order in [2, 3, 4] {
+        let (coarse, fine) = (error(order, 1e-3, &exact), error(order, 0.5e-3, &exact));
+        let observed = (coarse / fine).log2();
+        assert!(
+            (observed - order as f64).abs() < 0.35,
+            "order {order}: {coarse:.3e} -> {fine:.3e}, observed {observed:.2}"
+        );
+    }
+}
+
+/// Change one parameter of the driveline.
+type Perturb<T> = fn(&mut DualClutch<T>, T);
+
+const PARAMETERS: [(&str, Perturb<Dual64>, Perturb<f64>, f64); 5] = [
+    ("eta", |m, d| m.eta += d, |m, d| m.eta += d, 0.85),
+    ("J1", |m, d| m.J1 += d, |m, d| m.J1 += d, 20.3),
+    ("k_o", |m, d| m.k_o += d, |m, d| m.k_o += d, 1.76e5),
+    ("i_f", |m, d| m.i_f += d, |m, d| m.i_f += d, 5.38),
+    ("P0", |m, d| m.elements[1].p0 += d, |m, d| m.elements[1].p0 += d, 8e4),
+];
+
+#[test]
+fn dual_numbers_carry_exact_derivatives_through_lock_and_break_away() {
+    for (name, dual, plain, scale) in PARAMETERS {
+        let mut model = paper_driveline::<Dual64>(LossLaw::Paper);
+        dual(&mut model, Dual64::new(0.0, scale));
+        let exact = shift(&model, 1.0, Settings::default());
+        let at = |step: f64| {
+            let mut model = paper_driveline::<f64>(LossLaw::Paper);
+            plain(&mut model, step * scale);
+            shift(&model, 1.0, Settings::default())
+        };
+        let h = 1e-5;
+        let (up, down) = (at(h), at(-h));
+        let last = up.time.len() - 1;
+        for column in [0, 1, 2] {
+            let derivative = exact.columns[column][last].eps;
+            let difference = (up.columns[column][last] - down.columns[column][last]) / (2.0 * h);
+            let size = difference.abs().max(1e-3);
+            assert!(
+                (derivative - difference).abs() < 2e-5 * size,
+                "{name}, column {column}: {derivative} against {difference}"
+            );
+        }
+        for (i, event) in exact.events.iter().enumerate() {
+            let difference = (up.events[i].time - down.events[i].time) / (2.0 * h);
+            assert!(
+                (event.time.eps - difference).abs() < 2e-5 * difference.abs().max(1e-2),
+                "{name}, event {i}: {} against {difference}",
+                event.time.eps
+            );
+        }
+        assert!(exact.events[3].time.re > 0.5);
+    }
+}

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: MIT
+"""The simulation from Python: an independent solver's references, energy, errors, failures."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivetwin.driveline import (
+    Accuracy,
+    DualClutch,
+    FrictionTable,
+    RoadLoad,
+    ShiftElement,
+    Signal,
+    State,
+    Stribeck,
+    simulate,
+)
+from drivetwin.errors import InputError
+
+REFERENCE = Path(__file__).resolve().parents[2] / "shared" / "reference"
+CASES = ["dual_clutch_upshift", "dual_clutch_drum_inertia", "dual_clutch_weak_then_catch"]
+
+
+def paper_model() -> DualClutch:
+    """The coherent parameter set of the paper's driveline."""
+    mu = Stribeck(0.110, 0.135, 15.0, 1e-4)
+    elements = tuple(
+        ShiftElement(name, i - 1.0, i / (i - 1.0), gain, 80e3, mu)
+        for name, i, gain in (("B2", 1.91, 0.0378), ("B3", 1.43, 0.027))
+    )
+    load = RoadLoad(2300.0 * 5.38)
+    return DualClutch(
+        20.3, 0.0, 0.85, "paper", 1.0, 0.9, 5.38, 6056.0, 1.76e5, 280.0, load, elements
+    )
+
+
+def held_second_gear(seconds: float = 1.0) -> tuple[Signal, dict[str, Signal], State]:
+    span = np.array([0.0, seconds])
+    pressures = {"B2": Signal(span, np.full(2, 14e5)), "B3": Signal(span, np.zeros(2))}
+    speed = 178.0 / 1.91
+    start = State(178.0, speed, speed / 5.38, 2461.0 / 1.76e5, ("B2",))
+    return Signal(span, np.full(2, 1545.0)), pressures, start
+
+
+def reference_case(name: str) -> tuple[DualClutch, Any, Any, State]:
+    if not REFERENCE.is_dir():
+        pytest.skip("the solver references are not beside this checkout")
+    case = json.loads((REFERENCE / f"{name}.json").read_text())
+    rows = np.genfromtxt(REFERENCE / f"{name}.csv", delimiter=",", names=True)
+    d, start = case["driveline"], case["initial"]
+    elements = tuple(
+        ShiftElement(
+            f"B{k}",
+            c["i_c"],
+            c["i_out"],
+            c["gain_m3"],
+            c["P0_Pa"],
+            Stribeck(c["mu_c"], c["mu_s"], c["v_s"], c["mu_v"]),
+            drum_inertia=c["drum_inertia"],
+        )
+        for k, c in zip((2, 3), case["clutches"], strict=True)
+    )
+    model = DualClutch(
+        d["J1"],
+        d["J2_at_engine"],
+        d["eta"],
+        "paper",
+        d["i_in"],
+        d["J_out"],
+        d["i_f"],
+        d["J_v"],
+        d["k_o"],
+        d["c_o"],
+        RoadLoad(d["T_v_over_i_f"] * d["i_f"]),
+        elements,
+    )
+    speeds = (start["omega_e"], start["omega_out"], start["omega_w"])
+    return model, case, rows, State(*speeds, start["twist"], ("B2",))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_agrees_with_the_reference_solver(name: str) -> None:
+    model, case, rows, start = reference_case(name)
+    time = rows["time_s"]
+    pressures = {"B2": Signal(time, rows["P_2_Pa"]), "B3": Signal(time, rows["P_3_Pa"])}
+    run = simulate(model, Signal(time, rows["T_e_Nm"]), pressures, start, time, audit=True)
+    assert run.status == "completed"
+    assert np.abs(run.shaft_torque - rows["T_o_Nm"]).max() < 1e-3
+    assert np.abs(run.engine_speed - rows["omega_e_rad_s"]).max() < 1e-7
+    assert np.abs(run.output_speed - rows["omega_out_rad_s"]).max() < 1e-7
+    assert np.abs(run.wheel_speed - rows["omega_w_rad_s"]).max() < 1e-7
+    kinds = {"slip": "break_away", "stick": "lock"}
+    expected = [
+        (f"B{e['clutch']}", kinds[e["to"]], e["time"]) for e in case["events"] if e["to"] in kinds
+    ]
+    seen = [(e.element, e.kind, e.time) for e in run.events if e.kind in kinds.values()]
+    assert [e[:2] for e in seen] == [e[:2] for e in expected]
+    assert [e[2] for e in seen] == pytest.approx([e[2] for e in expected], abs=1e-8)
+    assert run.audit is not None
+    assert abs(run.audit.error) < 1e-9 * run.audit.source
+
+
+def test_energy_created_by_the_paper_law_is_reported_and_absent_with_the_dissipative_law() -> None:
+    torque, pressures, start = held_second_gear()
+    overrun = Signal(torque.time, np.array([1545.0, -800.0]))
+    time = np.linspace(0.0, 1.0, 101)
+    created = {}
+    for law in ("paper", "dissipative"):
+        model = replace(paper_model(), loss_law=law)
+        run = simulate(model, overrun, pressures, start, time, audit=True)
+        assert run.audit is not None
+        assert abs(run.audit.error) < 1e-9 * run.audit.source
+        created[law] = run.audit.created
+    assert created["paper"] > 0.0
+    assert created["dissipative"] == 0.0
+
+
+def test_a_table_and_its_stribeck_law_agree_where_the_table_is_fine() -> None:
+    law = Stribeck(0.110, 0.135, 15.0, 1e-4)
+    slip = np.linspace(0.0, 150.0, 3001)
+    table = FrictionTable(tuple(slip), tuple(law.at(slip)))
+    torque, _, start = held_second_gear(0.3)
+    pressures = {
+        "B2": Signal(torque.time, np.zeros(2)),
+        "B3": Signal(torque.time, np.full(2, 5e5)),
+    }
+    time = np.linspace(0.0, 0.3, 31)
+    start = replace(start, locked=())
+    runs = []
+    for friction in (law, table):
+        base = paper_model()
+        elements = tuple(replace(element, friction=friction) for element in base.elements)
+        runs.append(simulate(replace(base, elements=elements), torque, pressures, start, time))
+    assert runs[0].status == runs[1].status == "completed"
+    difference = runs[0].shaft_torque - runs[1].shaft_torque
+    assert np.abs(difference).max() < 0.01
+
+
+def test_rolling_resistance_does_not_shift_the_names_of_events() -> None:
+    torque, pressures, start = held_second_gear()
+    model = replace(paper_model(), load=RoadLoad(0.0, rolling=100.0, aero=1.0))
+    released = pressures | {"B2": Signal(torque.time, np.array([14e5, 0.0]))}
+    run = simulate(model, torque, released, start, np.linspace(0.0, 1.0, 11))
+    assert [(e.element, e.kind) for e in run.events] == [("B2", "break_away"), ("B2", "vent")]
+
+
+def test_a_fixed_order_is_less_exact() -> None:
+    torque, pressures, start = held_second_gear(0.2)
+    time = np.linspace(0.0, 0.2, 3)
+    coarse = Accuracy(order=2, max_step=5e-3)
+    exact = simulate(paper_model(), torque, pressures, start, time)
+    rough = simulate(paper_model(), torque, pressures, start, time, accuracy=coarse)
+    assert 1e-9 < np.abs(exact.shaft_torque - rough.shaft_torque).max() < 50.0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"k_o": -1.0}, "stiffness = -1 is impossible"),
+        ({"J_v": float("nan")}, "not a finite number: J_v"),
+        ({"eta": 0.0}, "eta = 0 is impossible"),
+        ({"J_out": 0.0}, "nothing determines the acceleration of"),
+    ],
+)
+def test_impossible_models_are_refused_by_name(change: dict[str, Any], message: str) -> None:
+    torque, pressures, start = held_second_gear()
+    with pytest.raises(InputError, match=message):
+        simulate(replace(paper_model(), **change), torque, pressures, start, np.array([0.0, 1.0]))
+
+
+def test_inputs_that_do_not_span_the_run_are_refused() -> None:
+    torque, pressures, start = held_second_gear(0.5)
+    with pytest.raises(InputError, match=r"spans 0 s to 0\.5 s, the run needs 0 s to 1 s"):
+        simulate(paper_model(), torque, pressures, start, np.array([0.0, 1.0]))
+
+
+def test_a_missing_pressure_is_named() -> None:
+    torque, pressures, start = held_second_gear()
+    with pytest.raises(InputError, match='input "B3" has no signal'):
+        simulate(paper_model(), torque, {"B2": pressures["B2"]}, start, np.array([0.0, 1.0]))
+
+
+def test_the_same_run_twice_is_bit_identical() -> None:
+    torque, pressures, start = held_second_gear()
+    time = np.linspace(0.0, 1.0, 101)
+    first, second = (simulate(paper_model(), torque, pressures, start, time) for _ in range(2))
+    assert np.array_equal(first.shaft_torque, second.shaft_torque)
