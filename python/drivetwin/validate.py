@@ -42,6 +42,7 @@ class Validation:
     """
 
     shift: Shift
+    model: DualClutch
     phases: Mapping[str, tuple[float, float]]
     engine_torque: Signal
     pressures: Mapping[str, Signal]
@@ -73,6 +74,7 @@ def validate(
     phases = phases_of(shift, window)
     validation = Validation(
         shift=shift,
+        model=model,
         phases=phases,
         engine_torque=engine_torque,
         pressures=pressures,

@@ -16,6 +16,7 @@ from drivetwin.identify.result import (
 )
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
+from drivetwin.twin import Twin
 from drivetwin.validate import SignalTrace, Validation, fit_of, phases_of
 from drivetwin.vehicle.card import ElementSpec, Gear, Prior, VehicleCard
 
@@ -170,6 +171,7 @@ def validation() -> Validation:
     }
     return Validation(
         shift=SHIFT,
+        model=Twin.from_identification(identification(), card()).dual_clutch(SHIFT),
         phases=phases_of(SHIFT, (0.0, 2.999)),
         engine_torque=Signal(TIME, measured["engine_torque"].values),
         pressures={name: _pressure(measured, name) for name in ("B2", "B3")},

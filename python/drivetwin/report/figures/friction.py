@@ -70,7 +70,7 @@ def _mu_range(curve: FrictionCurve) -> tuple[float, float]:
     values = values[np.isfinite(values)]
     middle = curve.points_mu[np.isfinite(curve.points_mu)]
     if middle.size:
-        values = np.concatenate((values, np.percentile(middle, [2, 98])))
+        values = np.concatenate((values, np.percentile(middle, [10, 90])))
     low, high = float(values.min()), float(values.max())
     margin = 0.15 * (high - low) + 0.002
     return low - margin, high + margin

@@ -10,10 +10,11 @@ from drivetwin.identify.load import LoadFit
 from drivetwin.report.style import FITTED, MEASURED, axis, layout
 
 
-def load_figure(fit: LoadFit, final_drive: float) -> go.Figure:
-    """Surplus torque over wheel acceleration, one point per window, with the slope J3/i_f."""
-    J_vehicle = float(fit.fit.theta[1])
-    ends = np.array([min(0.0, float(fit.acceleration.min())), max(0.0, fit.acceleration.max())])
+def load_figure(fit: LoadFit, final_drive: float | None) -> go.Figure:
+    """Surplus torque over wheel acceleration, one point per window, with the slope J3/i_f.
+
+    Without `final_drive` only the points are drawn.
+    """
     figure = go.Figure()
     figure.add_scatter(
         x=fit.acceleration,
@@ -22,13 +23,15 @@ def load_figure(fit: LoadFit, final_drive: float) -> go.Figure:
         name="windows",
         marker={"color": MEASURED, "size": 6, "opacity": 0.7},
     )
-    figure.add_scatter(
-        x=ends,
-        y=ends * J_vehicle / final_drive,
-        mode="lines",
-        name=f"J3 = {J_vehicle:.4g} kg·m²",
-        line={"color": FITTED, "width": 1.8},
-    )
+    if final_drive is not None:
+        ends = np.array([min(0.0, fit.acceleration.min()), max(0.0, fit.acceleration.max())])
+        figure.add_scatter(
+            x=ends,
+            y=ends * fit.J_vehicle / final_drive,
+            mode="lines",
+            name=f"J3 = {fit.J_vehicle:.4g} kg·m²",
+            line={"color": FITTED, "width": 1.8},
+        )
     figure.update_layout(
         layout(
             400,

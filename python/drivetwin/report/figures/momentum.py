@@ -17,52 +17,62 @@ _STRETCHES = {
 }
 
 
+_SCAN_VIEW = 0.025
+"""Ages shown on either side of the best one [s]."""
+
+
 def momentum_figure(fit: MomentumFit) -> go.Figure:
-    """Driving torque against fitted inertia torque, one point per window; Q over the age beside."""
-    figure = make_subplots(cols=2, column_widths=[0.62, 0.38], horizontal_spacing=0.12)
+    """Driving against fitted inertia torque, one point per window; what is left; delay scan."""
+    figure = make_subplots(
+        rows=2,
+        cols=2,
+        specs=[[{}, {"rowspan": 2}], [{}, None]],
+        column_widths=[0.64, 0.36],
+        row_heights=[0.62, 0.38],
+        horizontal_spacing=0.12,
+        vertical_spacing=0.2,
+    )
     names = np.asarray(fit.stretch)
     for stretch, (label, colour) in _STRETCHES.items():
         inside = names == stretch
         if inside.any():
-            figure.add_scatter(
-                x=fit.inertia_torque[inside],
-                y=fit.drive[inside],
-                mode="markers",
-                name=label,
-                marker={"color": colour, "size": 6, "opacity": 0.7},
-                row=1,
-                col=1,
-            )
+            points = {
+                "mode": "markers",
+                "name": label,
+                "legendgroup": stretch,
+                "marker": {"color": colour, "size": 6, "opacity": 0.7},
+            }
+            drive, inertia = fit.drive[inside], fit.inertia_torque[inside]
+            figure.add_scatter(x=inertia, y=drive, **points, row=1, col=1)
+            left = drive - inertia
+            figure.add_scatter(x=fit.time[inside], y=left, **points, showlegend=False, row=2, col=1)
     both = np.concatenate((fit.inertia_torque, fit.drive))
     ends = [float(both.min()), float(both.max())]
-    figure.add_scatter(
-        x=ends,
-        y=ends,
-        mode="lines",
-        name="balance",
-        line={"color": FITTED, "width": 1.8},
-        row=1,
-        col=1,
-    )
-    figure.update_layout(layout(430))
+    line = {"color": FITTED, "width": 1.6}
+    figure.add_scatter(x=ends, y=ends, mode="lines", name="balance", line=line, row=1, col=1)
+    figure.update_layout(layout(560))
     figure.update_layout(
         xaxis=axis("inertia torque Σ J·ω′, window mean [Nm]"),
-        yaxis=axis("driving torque η·T_e − T_o/i, window mean [Nm]"),
+        yaxis=axis("η·T_e − T_o/i,<br>window mean [Nm]"),
+        xaxis3=axis("time [s]"),
+        yaxis3=axis("difference [Nm]"),
     )
     _add_scan(figure, fit)
     return figure
 
 
 def _add_scan(figure: go.Figure, fit: MomentumFit) -> None:
+    scan = fit.scan
+    shown = np.ones(scan.delay.size, dtype=bool)
+    if scan.best is not None:
+        shown = np.abs(scan.delay - scan.best) <= _SCAN_VIEW
     figure.update_layout(
         xaxis2=axis("assumed age of the engine torque [ms]"),
         yaxis2=axis("misfit Q − min Q [–]", rangemode="tozero"),
     )
-    if fit.scan is None:
-        return
     figure.add_scatter(
-        x=1e3 * fit.scan.delay,
-        y=fit.scan.q - fit.scan.q.min(),
+        x=1e3 * scan.delay[shown],
+        y=(scan.q - scan.q.min())[shown],
         mode="lines+markers",
         name="delay scan",
         showlegend=False,
@@ -70,5 +80,5 @@ def _add_scan(figure: go.Figure, fit: MomentumFit) -> None:
         row=1,
         col=2,
     )
-    if fit.scan.best is not None:
-        figure.add_vline(x=1e3 * fit.scan.best, line={"color": FITTED, "width": 1.6}, row=1, col=2)
+    if scan.best is not None:
+        figure.add_vline(x=1e3 * scan.best, line={"color": FITTED, "width": 1.6}, row=1, col=2)

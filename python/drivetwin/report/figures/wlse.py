@@ -16,16 +16,13 @@ from drivetwin.report.style import COMPARED, FITTED, MEASURED, MUTED, axis, layo
 
 @dataclass(frozen=True)
 class WlseLabels:
-    """Texts of one grid search; `slope` is the inertia's share in the drawn line.
-
-    Eq. 10 draws torque = J′·ω_e' (slope 1); eq. 11 draws torque = (J3/i_f)·ω_w' (slope 1/i_f).
-    """
+    """Texts of one grid search; `unit` is that of the grid value."""
 
     grid: str
+    unit: str
     acceleration: str
     torque: str
     inertia: str
-    slope: float = 1.0
 
 
 def wlse_figure(fit: GridFit, labels: WlseLabels) -> go.Figure:
@@ -51,7 +48,7 @@ def wlse_figure(fit: GridFit, labels: WlseLabels) -> go.Figure:
     ends = _ends(fit.acceleration)
     figure.add_scatter(
         x=ends,
-        y=ends * fit.best.inertia * labels.slope,
+        y=ends * _slope(fit),
         mode="lines",
         name=f"{labels.inertia} = {fit.best.inertia:.4g} kg·m²",
         line={"color": FITTED, "width": 2},
@@ -82,10 +79,16 @@ def wlse_figure(fit: GridFit, labels: WlseLabels) -> go.Figure:
     figure.update_layout(
         xaxis=axis(labels.acceleration),
         yaxis=axis(labels.torque),
-        xaxis2=axis(labels.grid),
+        xaxis2=axis(f"{labels.grid} [{labels.unit}]"),
         yaxis2=axis("RMS error at the output shaft [Nm]", rangemode="tozero"),
     )
     return figure
+
+
+def _slope(fit: GridFit) -> float:
+    """Weighted least-squares slope of the scatter: J′ for eq. 10, J3/i_f for eq. 11."""
+    normal = float(fit.weights @ fit.acceleration**2)
+    return float(fit.weights @ (fit.acceleration * fit.torque)) / normal
 
 
 def _ends(values: FloatArray) -> FloatArray:

@@ -95,7 +95,9 @@ def friction_section(found: Identification) -> Section:
         "Friction of the on-coming element",
         "The clutch torque follows from the output torque (eq. 16, with the output side's "
         "inertia), the slip from both speeds (eq. 15); μ = T_c / (N·D·A·r·(P − P0)). Only the "
-        "product of μ and N·D·A·r can be told from a log: an error of the geometry scales the whole curve.",
+        "product of μ and N·D·A·r can be told from a log: an error of the geometry scales the "
+        "whole curve. Points that scatter at one slip are of the torque phase, where the element "
+        "carries little.",
         blocks,
     )
 

@@ -37,9 +37,15 @@
   });
   paint(dark.matches);
   dark.addEventListener("change", (event) => paint(event.matches));
+
+  /* Paper is narrower than the screen and always light. */
+  const paperWidth = 690;
   window.addEventListener("beforeprint", () => {
     paint(false);
-    plots.forEach((plot) => Plotly.Plots.resize(plot));
+    plots.forEach((plot) => Plotly.relayout(plot, { width: paperWidth }));
   });
-  window.addEventListener("afterprint", () => paint(dark.matches));
+  window.addEventListener("afterprint", () => {
+    paint(dark.matches);
+    plots.forEach((plot) => Plotly.relayout(plot, { width: null, autosize: true }));
+  });
 })();
