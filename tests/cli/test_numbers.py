@@ -17,6 +17,10 @@ def test_display_units() -> None:
     assert shown(0.0101, (0.0098, 0.0104), "s") == ("10.10", "± 0.30", "ms")
 
 
+def test_a_known_value_has_no_interval() -> None:
+    assert shown(80000.0, (80000.0 - 1e-5, 80000.0 + 1e-5), "Pa") == ("0.8000", "", "bar")
+
+
 def test_what_is_not_known_is_a_dash() -> None:
     assert shown(None, None, "1")[0] == "-"
     assert quantity(None, "N*m") == "-"
@@ -25,7 +29,7 @@ def test_what_is_not_known_is_a_dash() -> None:
 
 @pytest.mark.parametrize(
     ("value", "truth", "text"),
-    [(18.0, 17.5, "+2.9 %"), (17.5, 17.5, "+0 %"), (None, 17.5, ""), (0.01, 0.0, "")],
+    [(18.0, 17.5, "+2.86"), (17.5, 17.5, "+0.00"), (None, 17.5, ""), (0.01, 0.0, "")],
 )
 def test_deviation(value: float | None, truth: float, text: str) -> None:
     assert deviation(value, truth) == text

@@ -59,8 +59,9 @@ def _table(rows: list[Row], scenario: ScenarioName) -> Table:
     from drivetwin.cli.numbers import deviation, shown
 
     table = table_of(
-        f"Scenario {scenario}: truth and what the log tells", "parameter", "truth", "paper", "off",
-        "integral", "95 %", "off", "unit", right=("truth", "paper", "off", "integral", "95 %"),
+        f"Scenario {scenario}: truth and what the log tells",
+        "parameter", "truth", "paper", "off %",
+        "integral", "95 %", "off %", "unit", right=("truth", "paper", "off %", "integral", "95 %"),
     )  # fmt: skip
     for row in rows:
         paper, default = row.found[Method.PAPER], row.found[Method.INTEGRAL]

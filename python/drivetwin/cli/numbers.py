@@ -9,6 +9,9 @@ from drivetwin.report.units import display_of, significant, with_uncertainty
 
 Interval = tuple[float, float]
 
+_EXACT = 1e-6
+"""Relative half width below which a value is shown as known."""
+
 
 def shown(value: float | None, interval: Interval | None, si_unit: str) -> tuple[str, str, str]:
     """Value, `± half width` of its interval, and the unit they are in; a dash for None."""
@@ -16,6 +19,8 @@ def shown(value: float | None, interval: Interval | None, si_unit: str) -> tuple
     if value is None:
         return "-", "", display.label
     half = None if interval is None else (interval[1] - interval[0]) / 2.0 * display.factor
+    if half is not None and half < _EXACT * abs(value * display.factor):
+        half = None
     number, width = with_uncertainty(value * display.factor, half)
     return number, f"± {width}" if width else "", display.label
 
@@ -35,4 +40,4 @@ def percent(value: float | None) -> str:
 
 def deviation(value: float | None, truth: float) -> str:
     """Deviation from a known truth in percent; empty where either gives none."""
-    return "" if value is None or truth == 0.0 else f"{100.0 * (value / truth - 1.0):+.2g} %"
+    return "" if value is None or truth == 0.0 else f"{100.0 * (value / truth - 1.0):+.2f}"

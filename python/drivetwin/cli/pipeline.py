@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin.cli.arguments import load
 from drivetwin.cli.output import step
 from drivetwin.cli.staging import staged
-from drivetwin.errors import MissingParameterError, NoShiftError, Where
+from drivetwin.errors import NoShiftError, Where
 
 if TYPE_CHECKING:
     from drivetwin.identify.method import Method
@@ -42,6 +42,7 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
     from drivetwin.identify.pipeline import identify
     from drivetwin.shifts.find import find_shifts
     from drivetwin.twin import Twin
+    from drivetwin.validate import validated
 
     with step(f"reading {log.name}"):
         recording, card = load(log, vehicle, channels)
@@ -52,18 +53,8 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
         found = identify(recording, card, shifts, method)
         twin = Twin.from_identification(found, card)
     with step("simulating the shifts"):
-        found = _validated(found, twin, recording)
+        found = validated(found, twin, recording)
     return Outcome(recording, card, found, twin)
-
-
-def _validated(found: Identification, twin: Twin, log: ShiftLog) -> Identification:
-    """Enter the fit of the simulated shifts; a log that cannot tell enough says so instead."""
-    from drivetwin.validate import validate, with_fit
-
-    try:
-        return with_fit(found, [validate(twin, log, shift) for shift in found.shifts])
-    except MissingParameterError as error:
-        return replace(found, warnings=(*found.warnings, f"no validation: {error.what}"))
 
 
 def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:

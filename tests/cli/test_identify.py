@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin identify`, and the commands that read what it writes."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli import main
+from drivetwin.errors import IdentificationError
+from tests.cli.conftest import Files
+
+
+@pytest.fixture(scope="module")
+def written(bench_files: Files, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with result, twin and report of the bench log."""
+    out = tmp_path_factory.mktemp("identified") / "out"
+    arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
+    assert main([*arguments, "-o", str(out)]) == 0
+    return out
+
+
+def test_writes_exactly_three_files(written: Path) -> None:
+    assert {path.name for path in written.iterdir()} == {"result.json", "twin.toml", "report.html"}
+    assert [path.name for path in written.parent.iterdir()] == ["out"]
+
+
+def test_json_is_the_result_file_and_the_files_written(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
+    assert main([*arguments, "-o", str(out), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document.pop("files") == [
+        str(out / name) for name in ("result.json", "twin.toml", "report.html")
+    ]
+    assert document == json.loads((out / "result.json").read_text())
+
+
+def test_text_fits_80_columns_and_names_the_report(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
+    assert main([*arguments, "-o", str(tmp_path / "out")]) == 0
+    text = capsys.readouterr().out
+    tables, _, _ = text.partition("wrote")
+    assert "J_vehicle" in tables
+    assert "\x1b" not in text
+    assert f"wrote {tmp_path / 'out' / 'report.html'}" in text
+
+
+def test_several_logs_go_to_folders_of_their_own(bench_files: Files, tmp_path: Path) -> None:
+    second = tmp_path / "second.csv"
+    shutil.copy(bench_files.log, second)
+    out = tmp_path / "out"
+    arguments = [str(bench_files.log), str(second), "--vehicle", str(bench_files.card)]
+    assert main(["identify", *arguments, "-o", str(out)]) == 0
+    assert {path.name for path in out.iterdir()} == {"bench", "second"}
+
+
+def test_two_logs_of_one_name_are_refused_before_any_work(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = [str(bench_files.log), str(bench_files.log), "--vehicle", str(bench_files.card)]
+    assert main(["identify", *arguments, "-o", str(tmp_path / "out")]) == 2
+    assert "bench" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_stage_that_fails_last_leaves_nothing(
+    bench_files: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise IdentificationError("the report cannot be drawn", "look at the log")
+
+    monkeypatch.setattr("drivetwin.report.html.save_report", broken)
+    arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
+    assert main([*arguments, "-o", str(tmp_path / "out")]) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_simulate_reproduces_the_fit_of_the_identification(
+    written: Path, bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    traces = tmp_path / "traces.csv"
+    arguments = [str(written / "twin.toml"), str(bench_files.log)]
+    options = ["--vehicle", str(bench_files.card), "-o", str(traces), "--json"]
+    assert main(["simulate", *arguments, *options]) == 0
+    (shift,) = json.loads(capsys.readouterr().out)["shifts"]
+    fit = json.loads((written / "result.json").read_text())["fit"]
+    assert shift["status"] == "completed"
+    for signal, phases in fit.items():
+        found = shift["fit"][signal]["all"]["fit_percent"]
+        assert found == pytest.approx(phases["all"]["fit_percent"], abs=0.01)
+    names, units, *rows = traces.read_text().splitlines()
+    assert names == "time,output_torque,input_speed,output_speed"
+    assert units == "s,N*m,rad/s,rad/s"
+    assert len(rows) > 4000
+
+
+def test_report_names_the_page(written: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for source in (written, written / "result.json"):
+        assert main(["report", str(source)]) == 0
+        assert capsys.readouterr().out.strip() == str(written / "report.html")
+
+
+def test_report_says_what_is_missing(
+    written: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["report", str(tmp_path)]) == 2
+    assert "drivetwin identify" in capsys.readouterr().err
+    shutil.copy(written / "result.json", tmp_path)
+    assert main(["report", str(tmp_path)]) == 2
+    assert "report.html" in capsys.readouterr().err

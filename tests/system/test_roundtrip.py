@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""From known parameters to a log and back: what goes in comes out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.cli.pipeline import run
+from drivetwin.cli.synth import write_run
+from drivetwin.driveline import FrictionTable, Stribeck
+from drivetwin.dyno import dyno
+from drivetwin.dyno.files import card_text
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenarios import SCENARIOS
+from drivetwin.dyno.truth import Truth
+from drivetwin.identify.method import Method
+from drivetwin.identify.result import FrictionCurve, Identification, Verdict
+
+MODULATED = (ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS)
+WITHIN_HALF_A_PERCENT = (
+    "eta", "J_prime_2", "J_prime_3", "J_vehicle", "Tv_over_if", "k_o", "c_o", "f_d_3", "zeta_3",
+)  # fmt: skip
+
+
+def _identified(
+    folder: Path, scenario: ScenarioName, method: Method, noise: float
+) -> tuple[Identification, Truth]:
+    bench = dyno.run(SCENARIOS[scenario](), seed=11, noise=noise)
+    log, card, _ = write_run(folder / "run.csv", bench)
+    return run(log, card, None, method).found, bench.truth
+
+
+def _friction_error(curve: FrictionCurve, law: Stribeck | FrictionTable) -> float:
+    """Largest relative error of μ over the slip range seen."""
+    return float(np.abs(curve.mu / law.at(curve.slip) - 1.0).max())
+
+
+@pytest.fixture(scope="module", params=MODULATED)
+def noise_free(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Identification, Truth]:
+    return _identified(tmp_path_factory.mktemp("run"), request.param, Method.INTEGRAL, 0.0)
+
+
+@pytest.mark.parametrize("parameter", WITHIN_HALF_A_PERCENT)
+def test_noise_free_every_parameter_returns_within_half_a_percent(
+    parameter: str, noise_free: tuple[Identification, Truth]
+) -> None:
+    found, truth = noise_free
+    assert found.estimates[parameter].value == pytest.approx(truth.parameters[parameter], rel=5e-3)
+
+
+def test_noise_free_friction_returns_within_one_percent(
+    noise_free: tuple[Identification, Truth],
+) -> None:
+    found, truth = noise_free
+    curve = found.friction["B3"]
+    assert curve.slip[-1] - curve.slip[0] > 30.0
+    assert _friction_error(curve, truth.friction["B3"]) < 0.01
+
+
+def test_noise_free_delay_of_the_engine_torque_returns(
+    noise_free: tuple[Identification, Truth],
+) -> None:
+    found, truth = noise_free
+    assert found.estimates["te_delay"].value == pytest.approx(
+        truth.parameters["te_delay"], abs=5e-4
+    )
+
+
+def test_paper_method_returns_the_grid_points_of_the_truth(tmp_path: Path) -> None:
+    found, truth = _identified(tmp_path, ScenarioName.THROTTLE_STEPS, Method.PAPER, 0.0)
+    estimates = found.estimates
+    assert estimates["eta"].value == pytest.approx(0.85, abs=1e-12)
+    assert estimates["Tv_over_if"].value == pytest.approx(2300.0, abs=1e-9)
+    assert estimates["J_prime_2"].value == pytest.approx(truth.parameters["J_prime_2"], rel=0.01)
+
+
+@pytest.mark.parametrize("scenario", MODULATED)
+def test_with_noise_the_intervals_hold_the_truth(scenario: ScenarioName, tmp_path: Path) -> None:
+    """Within three standard deviations each: chance alone fails this in one run of fifty."""
+    found, truth = _identified(tmp_path, scenario, Method.INTEGRAL, 1.0)
+    for key in ("eta", "J_prime_2", "J_vehicle", "Tv_over_if", "k_o", "f_d_3"):
+        estimate = found.estimates[key]
+        assert estimate.value is not None
+        assert estimate.std_total is not None
+        assert abs(estimate.value - truth.parameters[key]) < 3.0 * estimate.std_total, key
+
+
+def test_constant_engine_torque_is_said_not_to_tell_efficiency_and_inertia(tmp_path: Path) -> None:
+    found, _ = _identified(tmp_path, ScenarioName.PAPER, Method.INTEGRAL, 1.0)
+    for key in ("eta", "J_prime_2"):
+        estimate = found.estimates[key]
+        assert estimate.verdict is not Verdict.IDENTIFIED
+        assert estimate.reason
+
+
+REFERENCE = Path(__file__).resolve().parents[3] / "shared" / "reference"
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+    """The identification of a log cut from another program's solution of the paper's upshift."""
+    source = REFERENCE / "dual_clutch_upshift.csv"
+    if not source.is_file():
+        pytest.skip("the shared reference solutions are not at hand")
+    folder = tmp_path_factory.mktemp("reference")
+    columns = {
+        "time_s": ("time", "s"),
+        "T_e_Nm": ("EngTrq", "Nm"),
+        "P_2_Pa": ("PrsBrk2", "Pa"),
+        "P_3_Pa": ("PrsBrk3", "Pa"),
+        "T_o_Nm": ("TrqOut", "Nm"),
+        "omega_e_rad_s": ("SpdIn", "rad/s"),
+        "omega_out_rad_s": ("SpdOut", "rad/s"),
+        "omega_w_rad_s": ("SpdWhl", "rad/s"),
+    }
+    table = np.genfromtxt(source, delimiter=",", names=True)
+    rows = np.column_stack([table[name] for name in columns])
+    head = [",".join(name for name, _ in columns.values())]
+    head += [",".join(unit for _, unit in columns.values())]
+    np.savetxt(
+        folder / "log.csv", rows, fmt="%.12g", delimiter=",", header="\n".join(head), comments=""
+    )
+    card = folder / "card.toml"
+    card.write_text(card_text(SCENARIOS[ScenarioName.PAPER]()), encoding="utf-8")
+    return run(folder / "log.csv", card, None, Method.INTEGRAL).found
+
+
+@pytest.mark.parametrize("parameter", WITHIN_HALF_A_PERCENT)
+def test_log_cut_from_a_reference_solution_returns_its_parameters(
+    parameter: str, reference: Identification
+) -> None:
+    truth = dyno.run(SCENARIOS[ScenarioName.PAPER](), noise=0.0).truth
+    value = reference.estimates[parameter].value
+    assert value == pytest.approx(truth.parameters[parameter], rel=5e-3)
+
+
+def test_log_cut_from_a_reference_solution_returns_its_friction(
+    reference: Identification,
+) -> None:
+    law = dyno.run(SCENARIOS[ScenarioName.PAPER](), noise=0.0).truth.friction["B3"]
+    assert _friction_error(reference.friction["B3"], law) < 0.01
