@@ -133,9 +133,11 @@ def validation_section(validations: tuple[Validation, ...]) -> Section:
 
 
 def _event_table(validation: Validation) -> TableBlock:
+    """Changes of friction mode; filling and venting repeat with every ripple of the pressure."""
     rows = [
         cells(f"{event.time:.4f} s", event.element, event.kind.replace("_", " "))
         for event in validation.trajectory.events
+        if event.kind not in ("fill", "vent")
     ]
     return TableBlock(
         f"Events of the simulation (status: {validation.status}).",

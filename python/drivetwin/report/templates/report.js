@@ -39,13 +39,19 @@
   dark.addEventListener("change", (event) => paint(event.matches));
 
   /* Paper is narrower than the screen and always light. */
-  const paperWidth = 690;
+  const paper = { width: 690, tallest: 900 };
+  const heights = plots.map((plot) => plot.layout.height);
   window.addEventListener("beforeprint", () => {
     paint(false);
-    plots.forEach((plot) => Plotly.relayout(plot, { width: paperWidth }));
+    plots.forEach((plot, index) => {
+      const height = Math.min(heights[index], paper.tallest);
+      Plotly.relayout(plot, { width: paper.width, height });
+    });
   });
   window.addEventListener("afterprint", () => {
     paint(dark.matches);
-    plots.forEach((plot) => Plotly.relayout(plot, { width: null, autosize: true }));
+    plots.forEach((plot, index) => {
+      Plotly.relayout(plot, { width: null, height: heights[index], autosize: true });
+    });
   });
 })();

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+"""μ over slip: the band closes, a missing band or law is left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.report.figures.friction import friction_figure
+from tests.report.sample import friction
+
+
+def test_band_encloses_the_curve() -> None:
+    figure = friction_figure("B3", friction())
+    traces = {trace.name: trace for trace in figure.data}
+    band, curve = traces["95 % band, sensors included"], traces["curve of B3"]
+    half = len(band.y) // 2
+    assert np.all(band.y[:half] > curve.y)
+    assert np.all(band.y[half:][::-1] < curve.y)
+    assert traces["Stribeck law"].y == pytest.approx(curve.y)
+
+
+def test_curve_without_interval_or_law_is_still_drawn() -> None:
+    nothing = np.full(60, np.nan)
+    bare = replace(friction(), mu_lo=nothing, mu_hi=nothing, stribeck=None)
+    figure = friction_figure("B3", bare)
+    assert [trace.name for trace in figure.data] == ["points from the log", "curve of B3"]
+    low, high = figure.layout.yaxis.range
+    assert low < bare.mu.min() < bare.mu.max() < high

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""Stacked time panels: one time axis, phases marked, peaks kept, display units."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from drivetwin.report.figures.shift_phases import shift_phases, shift_spans
+from drivetwin.report.figures.stack import Curve, Panel, stacked
+from drivetwin.report.figures.validation import validation_figure
+from drivetwin.report.style import MEASURED, SIMULATED
+from drivetwin.report.units import BAR, RPM
+from tests.report.sample import SHIFT, TIME, log, validation
+
+
+def test_panels_share_time_and_do_not_overlap() -> None:
+    figure = shift_phases(log(), SHIFT)
+    assert {trace.xaxis for trace in figure.data} == {"x"}
+    names = ("yaxis", "yaxis2", "yaxis3", "yaxis4")
+    domains = sorted(tuple(figure.layout[name].domain) for name in names)
+    assert all(low[1] < high[0] for low, high in pairwise(domains))
+    assert (domains[0][0], domains[-1][1]) == pytest.approx((0.0, 1.0))
+
+
+def test_phases_are_marked_where_they_are() -> None:
+    figure = shift_phases(log(), SHIFT)
+    bands = [(shape.x0, shape.x1) for shape in figure.layout.shapes]
+    assert bands == [SHIFT.torque_phase, SHIFT.inertia_phase]
+    assert [note.text for note in figure.layout.annotations] == [
+        "<b>1</b>",
+        "<b>2</b>",
+        "<b>3</b>",
+        "<b>4</b>",
+    ]
+
+
+def test_view_opens_on_the_shift_and_buttons_zoom() -> None:
+    figure = shift_phases(log(), SHIFT)
+    assert tuple(figure.layout.xaxis.range) == pytest.approx((0.5, 2.6))
+    buttons = {b.label: b.args[0]["xaxis.range"] for b in figure.layout.updatemenus[0].buttons}
+    assert buttons["whole"] == pytest.approx([0.0, 2.999])
+    assert buttons["inertia phase"] == pytest.approx([1.16, 1.64])
+
+
+def test_values_are_shown_in_display_units() -> None:
+    curves = [Curve("P", TIME, np.full_like(TIME, 5e5), MEASURED)]
+    speeds = [Curve("n", TIME, np.full_like(TIME, np.pi), MEASURED)]
+    panels = [Panel("pressure", BAR, curves), Panel("speed", RPM, speeds)]
+    pressure, speed = stacked(panels, shift_spans(SHIFT), 400).data
+    assert pressure.y[0] == pytest.approx(5.0)
+    assert speed.y[0] == pytest.approx(30.0)
+
+
+def test_measured_and_simulated_keep_their_colours() -> None:
+    figure = validation_figure(validation())
+    colours = {trace.name: trace.line.color for trace in figure.data}
+    assert colours["measured"] == MEASURED
+    assert colours["simulated"] == SIMULATED
+
+
+def test_residual_is_measured_minus_simulated() -> None:
+    figure = validation_figure(validation())
+    residual = next(trace for trace in figure.data if trace.name.startswith("measured -"))
+    assert np.mean(residual.y) == pytest.approx(-20.0, abs=1.0)
