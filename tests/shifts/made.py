@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from drivetwin.logs.read import read_log
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.spec import ElementSpec, Gear, Prior, VehicleCard
 
 FloatArray = NDArray[np.float64]
 
-SHARED = Path(__file__).parents[3] / "shared"
+ROOT = Path(__file__).parents[2]
+SHARED = ROOT.parent / "shared"
 P0_MADE = 0.8e5
 _P0 = Prior(P0_MADE)
 
@@ -155,20 +158,7 @@ def load_reference(name: str, noise: tuple[float, float] = (0.0, 0.0), seed: int
     return Reference(log, columns, events[0]["time"], events[-1]["time"])
 
 
-def load_measured(name: str) -> ShiftLog:
-    """One of the given 1 kHz tables: a name row, a unit row, seven signals."""
-    table = np.loadtxt(shared(f"logs/{name}.csv"), delimiter=",", skiprows=2)
-    rpm, bar = np.pi / 30.0, 1e5
-    roles = {
-        "engine_torque": 1.0,
-        "pressure.B2": bar,
-        "pressure.B3": bar,
-        "output_torque": 1.0,
-        "input_speed": rpm,
-        "output_speed": rpm,
-        "wheel_speed": rpm,
-    }
-    time = table[:, 0]
-    return make_log(
-        {role: (time, scale * table[:, k + 1]) for k, (role, scale) in enumerate(roles.items())}
-    )
+def load_measured(name: str) -> tuple[ShiftLog, VehicleCard]:
+    """One of the given CSV logs with its vehicle card, as the program reads them."""
+    card = load_card(ROOT / "examples" / "vehicles" / f"{name}.toml")
+    return read_log(shared(f"logs/{name}.csv"), card), card

@@ -221,6 +221,13 @@ def test_refused_pressure_below_P0() -> None:
     assert "B3" in text
 
 
+def test_refused_swapped_pressures() -> None:
+    log = _UP.log()
+    swapped = {"pressure.B2": log["pressure.B3"], "pressure.B3": log["pressure.B2"]}
+    text = _refused(replace(log, channels={**log.channels, **swapped}), _CARD)
+    assert "pressures contradict" in text
+
+
 def test_refused_slip_without_change_of_gear() -> None:
     plan = Plan(gears=(("2", 1.91), ("3", 1.7), ("2", 1.91)), break_aways=(1.5, 1.75), duration=0.3)
     assert "held again" in _refused(plan.log(), {"2": 1.91, "4": 1.0})

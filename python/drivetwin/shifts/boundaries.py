@@ -19,10 +19,16 @@ _REST = 0.3
 _QUIET = 0.04
 """Span [s] over which the slip must stay at rest to count as held."""
 _SMOOTH = 0.01
+_LEAST = 10
+"""Fewest samples on either side of a boundary that a fit is made from."""
 _LIMIT = 4.0
 """Standard deviations beyond which a smoothed slip is no longer at rest."""
 _WINDOWS = (1.0, 0.5, 0.25)
-"""Parts of `hinge_window` tried from wide to narrow."""
+"""Parts of the first window tried from wide to narrow."""
+_CLEAR = 10.0
+"""Standard deviations by which the slip has left rest at the end of the first window."""
+_WIDEN = 4
+"""Most times `hinge_window` that the first window may be."""
 _ROUNDING = 2e-5
 """Least noise of a speed, relative: resolution of two decimals in rpm."""
 
@@ -42,14 +48,16 @@ def break_away(
 
     `stop` is the first sample at which the next gear is held.
     """
-    error = speeds.sync_error(ratio)[: stop + 1]
     first, last = held
     rest = slice(max(first, last + 1 - speeds.samples(_REST, 8)), last + 1)
-    quiet = _quiet(speeds, error, rest)
+    slip = _slip(speeds, ratio, rest)
     run = speeds.samples(_QUIET, 3)
-    still = _runs_of_true(quiet[: last + 1], run)
+    still = _runs_of_true(slip.departure[: last + 1] < _LIMIT, run)
     anchor = max(int(still.max()) + run - 1, first) if len(still) else last
-    return _locate(speeds, error, anchor, Moving.AFTER, (first, stop, settings))
+    window = _first_window(
+        slip, anchor, Moving.AFTER, speeds.samples(settings.hinge_window, _LEAST)
+    )
+    return _locate(slip, (anchor, window), Moving.AFTER, (first, stop))
 
 
 def lock_up(
@@ -59,25 +67,55 @@ def lock_up(
 
     `start` is the last sample at which the gear before is held.
     """
-    error = speeds.sync_error(ratio)
     first, last = held
     rest = slice(first, min(last + 1, first + speeds.samples(_REST, 8)))
-    quiet = _quiet(speeds, error, rest)
+    slip = _slip(speeds, ratio, rest)
     run = speeds.samples(_QUIET, 3)
-    still = _runs_of_true(quiet[first : last + 1], run)
+    still = _runs_of_true(slip.departure[first : last + 1] < _LIMIT, run)
     anchor = first + int(still.min()) if len(still) else first
-    return _locate(speeds, error, anchor, Moving.BEFORE, (start, last, settings))
+    window = _first_window(
+        slip, anchor, Moving.BEFORE, speeds.samples(settings.hinge_window, _LEAST)
+    )
+    return _locate(slip, (anchor, window), Moving.BEFORE, (start, last))
 
 
-def _quiet(speeds: GearboxSpeeds, error: FloatArray, rest: slice) -> NDArray[np.bool_]:
-    """Where the slip, smoothed over _SMOOTH, is that of the gear held in `rest`; (n,)."""
+@dataclass(frozen=True)
+class _Slip:
+    """Synchronisation error (n,) on `time` [s], and how far it is from that of the gear held.
+
+    `noise` [rad/s] is that of one sample at rest, at least `floor`. `departure` (n,) is the
+    distance, smoothed over _SMOOTH, in standard deviations of the smoothed error; divided by
+    `root` in those of a sample.
+    """
+
+    time: FloatArray
+    error: FloatArray
+    floor: float
+    noise: float
+    departure: FloatArray
+    root: float
+
+
+def _slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
+    """Slip of a gear that is held in the samples `rest`."""
+    error = speeds.sync_error(ratio)
     width = speeds.samples(_SMOOTH, 3)
     level = float(np.median(error[rest]))
     noise = 1.4826 * float(np.median(np.abs(error[rest] - level)))
     floor = _ROUNDING * float(np.median(np.abs(speeds.input[rest])))
+    noise = max(noise, floor)
+    root = float(np.sqrt(width))
     mean = np.convolve(np.pad(error - level, width // 2, mode="edge"), np.ones(width), "same")
-    mean = mean[width // 2 : width // 2 + len(error)] / width
-    return np.asarray(np.abs(mean) < _LIMIT * max(noise, floor) / np.sqrt(width))
+    mean = np.abs(mean[width // 2 : width // 2 + len(error)]) / width
+    return _Slip(speeds.time, error, floor, noise, mean * root / noise, root)
+
+
+def _first_window(slip: _Slip, anchor: int, moving: Moving, shortest: int) -> int:
+    """Samples from `anchor` on to where the slip has clearly left rest, within bounds."""
+    ahead = slip.departure[anchor:] if moving is Moving.AFTER else slip.departure[anchor::-1]
+    clear = np.flatnonzero(ahead > _CLEAR * slip.root)
+    reached = int(clear[0]) if len(clear) else _WIDEN * shortest
+    return int(np.clip(reached, shortest, _WIDEN * shortest))
 
 
 def _runs_of_true(flags: NDArray[np.bool_], length: int) -> NDArray[np.intp]:
@@ -89,58 +127,50 @@ def _runs_of_true(flags: NDArray[np.bool_], length: int) -> NDArray[np.intp]:
 
 
 def _locate(
-    speeds: GearboxSpeeds,
-    error: FloatArray,
-    anchor: int,
-    moving: Moving,
-    limits: tuple[int, int, ShiftSettings],
+    slip: _Slip, where: tuple[int, int], moving: Moving, limits: tuple[int, int]
 ) -> Boundary | None:
-    """Fit the hinge in the widest window that the curve follows to within the noise.
+    """Fit the hinge around sample `where[0]` in the widest window that the curve can follow.
 
+    The widest tried has `where[1]` samples on either side; `limits` bound it in the log.
     Pressure vibration and a steep end bend the slip more than the curve can; narrower windows are
     tried then, and what the last narrowing moved counts as uncertainty.
     """
-    first, stop, settings = limits
-    floor = _ROUNDING * float(np.abs(speeds.input[anchor]))
+    anchor, widest = where
     time, sigma = float("nan"), float("inf")
     for part in _WINDOWS:
-        span = speeds.samples(part * settings.hinge_window, 6)
-        hinge = _centred(speeds, error, (anchor, span), moving, (first, stop, floor))
+        span = max(round(part * widest), _LEAST)
+        hinge = _centred(slip, (anchor, span), moving, limits)
         if hinge is None:
             break
         moved = 0.0 if np.isnan(time) else abs(hinge.time - time)
         time, sigma = hinge.time, float(np.hypot(hinge.sigma, 0.5 * moved))
-        anchor = int(np.searchsorted(speeds.time, time))
-        if hinge.noise_moving < hinge.noise_still * (1.0 + 2.0 / np.sqrt(2.0 * span)):
+        anchor = int(np.searchsorted(slip.time, time))
+        if hinge.noise_moving < slip.noise * (1.0 + 2.0 / np.sqrt(2.0 * span)):
             break
     if np.isnan(time):
         return None
     # Clocks of the two speeds are read to the sample: a uniform error of one step.
-    return Boundary(time, float(np.hypot(sigma, speeds.step / np.sqrt(12.0))))
+    step = float(np.median(np.diff(slip.time)))
+    return Boundary(time, float(np.hypot(sigma, step / np.sqrt(12.0))))
 
 
 def _centred(
-    speeds: GearboxSpeeds,
-    error: FloatArray,
-    where: tuple[int, int],
-    moving: Moving,
-    limits: tuple[int, int, float],
+    slip: _Slip, where: tuple[int, int], moving: Moving, limits: tuple[int, int]
 ) -> Hinge | None:
     """Fit the hinge around sample `where[0]` ± `where[1]`, then again around what was found."""
     anchor, span = where
-    first, stop, floor = limits
     hinge: Hinge | None = None
     for _ in range(2):
-        low, high = max(first, anchor - span), min(stop, anchor + span)
+        low, high = max(limits[0], anchor - span), min(limits[1], anchor + span)
         rest, motion = span // 2, (2 * span) // 3
         begin, end = (rest, motion) if moving is Moving.AFTER else (motion, rest)
         begin, end = max(anchor - begin, low + 2), min(anchor + end, high - 2)
         if end <= begin:
             return hinge
         window = slice(low, high + 1)
-        interval = (float(speeds.time[begin]), float(speeds.time[end]))
-        hinge = fit_hinge(speeds.time[window], error[window], moving, interval, floor)
+        interval = (float(slip.time[begin]), float(slip.time[end]))
+        hinge = fit_hinge(slip.time[window], slip.error[window], moving, interval, slip.floor)
         if hinge is None:
             return None
-        anchor = int(np.searchsorted(speeds.time, hinge.time))
+        anchor = int(np.searchsorted(slip.time, hinge.time))
     return hinge

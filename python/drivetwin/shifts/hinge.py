@@ -38,13 +38,12 @@ class Moving(Enum):
 class Hinge:
     """A hinge in time: `time` ± `sigma` [s].
 
-    `noise_still` and `noise_moving` are the RMS residuals of the best fit on its two sides, in the
-    signal's unit; a larger one on the moving side says that the curve cannot follow the signal.
+    `noise_moving` is the RMS residual of the best fit on the moving side, in the signal's unit; more
+    than the signal's noise says that the curve cannot follow it.
     """
 
     time: float
     sigma: float
-    noise_still: float
     noise_moving: float
 
 
@@ -52,7 +51,6 @@ class Hinge:
 class _Fit:
     time: float
     sigma: float
-    noise_still: float
     noise_moving: float
     information: float
     """Bayesian information criterion of the fit."""
@@ -68,8 +66,9 @@ def fit_hinge(
     """Locate the hinge of y = level + Σ a_p·x^p, x = time on the moving side of the hinge, else 0.
 
     `time`, `values` (n,) hold both sides; the hinge is sought within `search` [s]. Fits of several
-    orders are averaged with weights exp(-BIC/2) (Schwarz 1978; Hoeting et al. 1999), so that
-    `sigma` has a part from noise and a part from not knowing the form of the onset. `noise_floor`
+    orders are averaged with weights exp(-BIC/4) (Schwarz 1978; Hoeting et al. 1999; half the usual
+    exponent, because the caller chooses the window from the same data), so that `sigma` has a part
+    from noise and a part from not knowing the form of the onset. `noise_floor`
     (signal unit) keeps noise-free data from claiming certainty. None where nothing moves.
     """
     direction = _direction(time, values, moving, search)
@@ -81,13 +80,13 @@ def fit_hinge(
     if not fits:
         return None
     information = np.array([fit.information for fit in fits])
-    weight = np.exp(-0.5 * (information - information.min()))
+    weight = np.exp(-0.25 * (information - information.min()))
     weight /= weight.sum()
     times = np.array([fit.time for fit in fits])
     centre = float(weight @ times)
     variance = weight @ (np.array([fit.sigma for fit in fits]) ** 2 + (times - centre) ** 2)
     best = fits[int(information.argmin())]
-    return Hinge(centre, float(np.sqrt(variance)), best.noise_still, best.noise_moving)
+    return Hinge(centre, float(np.sqrt(variance)), best.noise_moving)
 
 
 def _direction(
@@ -148,7 +147,6 @@ def _fit(
     return _Fit(
         hinge,
         min(float(sigma), limit),
-        _rms(residual[~ahead], floor),
         _rms(residual[ahead], floor),
         float(likelihood + unknowns * np.log(len(time))),
     )

@@ -31,7 +31,8 @@ class ShiftSettings:
     unknown_torque_phase: float = 0.2
     """Standard deviation of `torque_start` where no channel tells it."""
     hinge_window: float = 0.06
-    """Span of moving slip that a boundary is fitted to (more where samples are sparse)."""
+    """Span of moving slip that a boundary is fitted to; up to four times as long where it starts or
+    ends gently, and longer where samples are sparse."""
 
     def __post_init__(self) -> None:
         for item in fields(self):

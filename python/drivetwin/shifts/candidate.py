@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: MIT
+"""From two gears held to the shift between them, or the reason why there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.shifts.boundaries import Boundary, break_away, lock_up
+from drivetwin.shifts.held import Run
+from drivetwin.shifts.kind import shift_kind
+from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds
+from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.torque_onset import pressure_onset, smoothed, torque_dip_onset
+from drivetwin.vehicle.spec import VehicleCard
+
+_RATIO_DRIFT = 0.002
+"""Relative deviation of a held ratio from the card that is worth a warning."""
+_STEADY = 0.003
+"""Relative spread below which an unknown ratio counts as a gear missing on the card."""
+_GRIP = 0.05
+"""Around lock-up [s] the pressure of the on-coming element must be above P0 at some time."""
+
+
+class CandidateRefusedError(Exception):
+    """A candidate turned out to be no usable shift; the text is the reason."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """What every step of the search needs."""
+
+    log: ShiftLog
+    card: VehicleCard
+    speeds: GearboxSpeeds
+    ratios: dict[str, float]
+    settings: ShiftSettings
+
+
+def ratio_in(speeds: GearboxSpeeds, first: int, last: int) -> FloatArray:
+    """ω_in/ω_out of samples `first` to `last`, both included."""
+    part = slice(first, last + 1)
+    return speeds.input[part] / speeds.output[part]
+
+
+def build_shift(search: Search, before: Run, after: Run) -> Shift:
+    """Build the shift between two gears held; CandidateRefusedError says why there is none."""
+    speeds, settings = search.speeds, search.settings
+    start_gear, end_gear = before.gear or "", after.gear or ""
+    if start_gear == end_gear:
+        raise CandidateRefusedError(f"gear {start_gear} slips and is held again: no change of gear")
+    begin = break_away(
+        speeds, search.ratios[start_gear], (before.first, before.last), after.first, settings
+    )
+    lock = lock_up(
+        speeds, search.ratios[end_gear], (after.first, after.last), before.last, settings
+    )
+    if begin is None or lock is None:
+        what = "break-away of the off-going" if begin is None else "lock-up of the on-coming"
+        raise CandidateRefusedError(f"the {what} element cannot be located in its slip")
+    _check_inertia_phase(search, begin, lock)
+    offgoing, oncoming = search.card.element_of(start_gear), search.card.element_of(end_gear)
+    _check_passage(search, begin, lock)
+    span = _usable(search, before, after)
+    kind, warnings = shift_kind(
+        search.log, search.ratios[start_gear] > search.ratios[end_gear], begin.time
+    )
+    onset, more = _torque_start(search, (kind, oncoming), span[0], (begin, lock))
+    if onset.time - span[0] < settings.min_hold:
+        raise CandidateRefusedError(
+            f"gear {start_gear} is recorded for {onset.time - span[0]:.3f} s before the torque "
+            f"phase, less than min_hold = {settings.min_hold:g} s"
+        )
+    return Shift(
+        start_gear=start_gear,
+        end_gear=end_gear,
+        offgoing=offgoing,
+        oncoming=oncoming,
+        kind=kind,
+        before=(span[0], onset.time),
+        torque_phase=(onset.time, begin.time),
+        inertia_phase=(begin.time, lock.time),
+        after=(lock.time, span[1]),
+        lockup_time=lock.time,
+        sigma={"torque_start": onset.sigma, "inertia_start": begin.sigma, "lockup": lock.sigma},
+        warnings=(*speeds.warnings, *warnings, *more, *_ratio_warnings(search, before, after)),
+    )
+
+
+def _check_inertia_phase(search: Search, begin: Boundary, lock: Boundary) -> None:
+    time = search.speeds.time
+    inside = int(np.count_nonzero((time > begin.time) & (time < lock.time)))
+    if inside < search.settings.min_inertia_samples:
+        raise CandidateRefusedError(
+            f"too short: {inside} speed samples between break-away and lock-up, "
+            f"at least {search.settings.min_inertia_samples} are needed"
+        )
+    gap = float(np.diff(time[(time >= begin.time) & (time <= lock.time)]).max())
+    if gap > 10.0 * search.speeds.step and gap > 0.2 * (lock.time - begin.time):
+        raise CandidateRefusedError(f"the speeds are missing for {gap:.3f} s of the inertia phase")
+
+
+def _check_passage(search: Search, begin: Boundary, lock: Boundary) -> None:
+    """Refuse what takes too long, and what rests at a ratio that the card does not have."""
+    taken, longest = lock.time - begin.time, search.settings.max_inertia_phase
+    resting = resting_ratio(search, begin.time, lock.time)
+    if resting is not None:
+        raise CandidateRefusedError(
+            f"between the gears the ratio rests at {resting:.4g}, "
+            f"which is no gear of the card ({gear_list(search)})"
+        )
+    if taken > longest:
+        raise CandidateRefusedError(
+            f"{taken:.2f} s from break-away to lock-up, more than max_inertia_phase = {longest:g} s"
+        )
+
+
+def resting_ratio(search: Search, start: float, end: float) -> float | None:
+    """First ratio held steadily for twice `min_hold` between two times [s], or None."""
+    speeds, window = search.speeds, 2.0 * search.settings.min_hold
+    for begin in np.arange(start, end - window, 0.5 * window):
+        first, stop = np.searchsorted(speeds.time, [begin, begin + window])
+        if stop - first < search.settings.min_inertia_samples:
+            continue
+        ratio = ratio_in(speeds, int(first), int(stop) - 1)
+        if np.ptp(np.percentile(ratio, [5, 95])) < _STEADY * np.median(ratio):
+            return float(np.median(ratio))
+    return None
+
+
+def _usable(search: Search, before: Run, after: Run) -> tuple[float, float]:
+    """Times from and to which the two gears are held; clear of slip where a run was cut."""
+    time, settle = search.speeds.time, search.settings.settle
+    start = time[before.first] + (settle if before.first > 0 else 0.0)
+    end = time[after.last] - (settle if after.last < len(time) - 1 else 0.0)
+    return float(start), float(end)
+
+
+def gear_list(search: Search) -> str:
+    """Gears of the card with their ratios, for messages."""
+    return ", ".join(f"{name} {value:.4g}" for name, value in search.ratios.items())
+
+
+def _torque_start(
+    search: Search,
+    what: tuple[ShiftKind, str],
+    earliest: float,
+    phase: tuple[Boundary, Boundary],
+) -> tuple[Boundary, tuple[str, ...]]:
+    """Onset of the on-coming element's torque in a shift `what` (kind, on-coming element).
+
+    The warnings say where it is not what it should be, and where it was not told by the pressure.
+
+    Where the on-coming element takes hold only after break-away (power-off upshift, power-on
+    downshift) the torque phase before it is empty and starts at break-away.
+    """
+    kind, oncoming = what
+    begin, lock = phase
+    earliest = max(earliest, begin.time - search.settings.max_torque_phase)
+    role = f"pressure.{oncoming}"
+    if role in search.log:
+        P0 = search.card.elements[oncoming].P0
+        pressure = smoothed(search.log[role], (earliest, lock.time + _GRIP))
+        grip = pressure.values[pressure.time >= lock.time - _GRIP]
+        if not len(grip):
+            raise CandidateRefusedError(f"the pressure of {oncoming} is missing at lock-up")
+        if grip.max() < P0.value - 3.0 * P0.std - pressure.noise:
+            raise CandidateRefusedError(
+                f"pressures contradict the speeds: {oncoming} locks, but its pressure is only "
+                f"{grip.max():.4g} Pa then, below P0 = {P0.value:.4g} Pa"
+            )
+        onset = pressure_onset(pressure, (P0.value, P0.std), begin.time)
+        if onset is not None and onset.time <= begin.time:
+            return onset, ()
+        when = "never" if onset is None else f"at {onset.time:.3f} s, after break-away"
+        return begin, (f"{oncoming} exceeds P0 {when}: the torque phase is empty",)
+    if "output_torque" in search.log and kind is ShiftKind.POWER_ON_UP:
+        torque = smoothed(search.log["output_torque"], (earliest, begin.time))
+        dip = torque_dip_onset(torque, begin.time)
+        if dip is not None:
+            return dip, (f"no pressure of {oncoming}: torque phase read from the output torque",)
+    sigma = float(np.hypot(begin.sigma, search.settings.unknown_torque_phase))
+    reason = f"no channel tells when {oncoming} takes up torque: torque phase set empty"
+    return Boundary(begin.time, sigma), (reason,)
+
+
+def _ratio_warnings(search: Search, *runs: Run) -> tuple[str, ...]:
+    """Say where the ratio held differs from the card's: rounded ratios, scaled speeds."""
+    texts = []
+    for run in runs:
+        gear = run.gear or ""
+        ratio = float(np.median(ratio_in(search.speeds, run.first, run.last)))
+        if abs(ratio / search.ratios[gear] - 1.0) > _RATIO_DRIFT:
+            texts.append(
+                f"ratio held in gear {gear} is {ratio:.5g}, the card says {search.ratios[gear]:.5g}"
+            )
+    return tuple(texts)
