@@ -38,8 +38,8 @@ class Moving(Enum):
 class Hinge:
     """A hinge in time: `time` ± `sigma` [s].
 
-    `noise_moving` is the RMS residual of the best fit on the moving side, in the signal's unit; more
-    than the signal's noise says that the curve cannot follow it.
+    `noise_moving` is the RMS residual of the best fit on the moving side, in the signal's unit;
+    more than the signal's noise says that the curve cannot follow it.
     """
 
     time: float
