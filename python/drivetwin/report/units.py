@@ -46,13 +46,14 @@ def display_of(si_unit: str) -> Display:
 def with_uncertainty(value: float, half_width: float | None) -> tuple[str, str]:
     """Value and half width as text, both cut to two digits of the half width.
 
-    Without a usable half width the value has four digits and the second text is empty.
+    Without a usable half width the value has four digits and the second text is empty; with a very
+    small one the value has six.
     """
     if half_width is None or not math.isfinite(half_width) or half_width <= 0.0:
         return significant(value), ""
     digits = 1 - math.floor(math.log10(half_width))
-    if not -15 < digits < 15:
-        return significant(value), significant(half_width, 2)
+    if half_width < 1e-5 * abs(value) or abs(digits) > 12:
+        return significant(value, 6), significant(half_width, 2)
     return _rounded(value, digits), _rounded(half_width, digits)
 
 

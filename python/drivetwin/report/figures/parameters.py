@@ -10,15 +10,21 @@ import plotly.graph_objects as go
 from drivetwin.identify.result import Estimate, FloatArray
 from drivetwin.report.style import MUTED, VERDICT_COLOURS, axis, layout
 
+_KNOWN = 1e-5
+"""Relative standard deviation below which a parameter was given, not found."""
+
 
 def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
-    """Half width of the 95 % interval relative to the value, total and noise alone, log axis."""
-    shown = [one for one in estimates.values() if one.value and one.std_total]
+    """Half width of the 95 % interval relative to the value, total and noise alone, log axis.
+
+    Parameters that were not told, or are taken as known, are left out.
+    """
+    shown = [one for one in estimates.values() if _relative(one.value, one.std_total) > _KNOWN]
     figure = go.Figure()
     names = [one.id for one in shown]
     figure.add_scatter(
         y=names,
-        x=[_percent(one, one.std_total) for one in shown],
+        x=[_percent(one.value, one.std_total) for one in shown],
         mode="markers",
         name="total: noise and sensor tolerances",
         marker={"color": [VERDICT_COLOURS[one.verdict.value] for one in shown], "size": 11},
@@ -26,7 +32,7 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     )
     figure.add_scatter(
         y=names,
-        x=[_percent(one, one.std_noise) for one in shown],
+        x=[_percent(one.value, one.std_noise) for one in shown],
         mode="markers",
         name="noise alone",
         marker={"color": MUTED, "symbol": "line-ns-open", "size": 12, "line": {"width": 2.5}},
@@ -42,10 +48,12 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     return figure
 
 
-def _percent(estimate: Estimate, std: float | None) -> float | None:
-    if not estimate.value or not std:
-        return None
-    return 100.0 * 1.96 * std / abs(estimate.value)
+def _relative(value: float | None, std: float | None) -> float:
+    return abs(std / value) if value and std else 0.0
+
+
+def _percent(value: float | None, std: float | None) -> float | None:
+    return 196.0 * _relative(value, std) or None
 
 
 def correlation_figure(ids: tuple[str, ...], correlation: FloatArray) -> go.Figure:
@@ -60,7 +68,6 @@ def correlation_figure(ids: tuple[str, ...], correlation: FloatArray) -> go.Figu
             colorscale=[[0, "#D55E00"], [0.5, "#f4f4f4"], [1, "#0072B2"]],
             colorbar={"title": {"text": "correlation"}, "thickness": 12},
             texttemplate="%{z:.2f}",
-            textfont={"color": "#222222"},
         )
     )
     figure.update_layout(

@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator
 
 from drivetwin.identify.result import Identification, Verdict
-from drivetwin.parameters import spec_of
 from drivetwin.report.figures.parameters import correlation_figure
 from drivetwin.report.sections.blocks import (
     Block,
@@ -17,6 +16,7 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     cells,
 )
+from drivetwin.report.sections.trust import TONES, parameter_label
 from drivetwin.report.units import BAR, NM, RAD_PER_S, RPM, Display, significant
 from drivetwin.results.result_file import plain
 from drivetwin.results.version import program_version
@@ -39,20 +39,24 @@ _INSEPARABLE = (
 def limits_section(found: Identification) -> Section:
     """What the log cannot tell, and which experiment would help."""
     blocks: list[Block] = []
-    doubtful = [one for one in found.estimates.values() if one.verdict is not Verdict.IDENTIFIED]
-    if doubtful:
+    remarked = [
+        one
+        for one in found.estimates.values()
+        if one.reason or one.verdict is not Verdict.IDENTIFIED
+    ]
+    if remarked:
         rows = [
             (
-                Cell(f"{spec_of(one.id).symbol}", note=one.id),
-                Cell(one.verdict.value),
+                Cell(parameter_label(one), note=one.id),
+                Cell(one.verdict.value, badge=True, tone=TONES[one.verdict]),
                 Cell(one.reason),
             )
-            for one in doubtful
+            for one in remarked
         ]
         blocks.append(
             TableBlock(
-                "Parameters without a firm value.",
-                cells("parameter", "verdict", "why, and which experiment would help"),
+                "Parameters that call for a remark.",
+                cells("parameter", "verdict", "remark: why, and which experiment would help"),
                 rows,
             )
         )
@@ -86,8 +90,8 @@ def provenance_section(found: Identification) -> Section:
         )
     )
     settings = {"method": found.method.value, "loss law": found.loss_law, **found.settings}
-    rows = [cells(name, _setting(value)) for name, value in settings.items()]
-    blocks.append(TableBlock("Settings.", cells("setting", "value"), rows))
+    rows = [cells(name, value) for name, value in _flat("", plain(settings))]
+    blocks.append(TableBlock("Settings, SI.", cells("setting", "value"), rows))
     return Section(
         "provenance",
         "Assumptions, settings, origin",
@@ -112,6 +116,16 @@ def _validity_table(found: Identification) -> TableBlock:
     return TableBlock("Range the log covered; the model is not proven outside it.", head, rows)
 
 
-def _setting(value: object) -> str:
-    reduced = plain(value)
-    return reduced if isinstance(reduced, str) else json.dumps(reduced, ensure_ascii=False)
+def _flat(name: str, value: object) -> Iterator[tuple[str, str]]:
+    """Rows of nested settings: dotted name and short text."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _flat(f"{name}.{key}" if name else str(key), item)
+    elif isinstance(value, list):
+        yield name, ", ".join(_short(item) for item in value)
+    else:
+        yield name, _short(value)
+
+
+def _short(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -110,9 +110,19 @@ def parameter_table(found: Identification) -> TableBlock:
         Cell("verdict"),
         Cell("method"),
     )
-    return TableBlock(
-        "Identified parameters.", head, [_parameter_row(one) for one in found.estimates.values()]
-    )
+    caption = "Identified parameters."
+    if not any(one.std_systematic for one in found.estimates.values()):
+        caption += (
+            " The vehicle card states no sensor tolerance, so both intervals are of noise alone."
+        )
+    return TableBlock(caption, head, [_parameter_row(one) for one in found.estimates.values()])
+
+
+def parameter_label(estimate: Estimate) -> str:
+    """Symbol with the gear or element it belongs to, e.g. `J′ (2)`."""
+    spec = spec_of(estimate.id)
+    suffix = estimate.id.removeprefix(spec.stem).lstrip("_.")
+    return f"{spec.symbol} ({suffix})" if suffix else spec.symbol
 
 
 def _parameter_row(estimate: Estimate) -> tuple[Cell, ...]:
@@ -120,10 +130,8 @@ def _parameter_row(estimate: Estimate) -> tuple[Cell, ...]:
     display = display_of(estimate.unit)
     value, total = _shown(estimate, estimate.std_total, display)
     _, noise = _shown(estimate, estimate.std_noise, display)
-    suffix = estimate.id.removeprefix(spec.stem).lstrip("_.")
-    label = f"{spec.symbol} ({suffix})" if suffix else spec.symbol
     return (
-        Cell(label, note=f"{spec.meaning} · {estimate.id}"),
+        Cell(parameter_label(estimate), note=f"{spec.meaning} · {estimate.id}"),
         Cell(value, number=True),
         Cell(total, number=True),
         Cell(noise, number=True),

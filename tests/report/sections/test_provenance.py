@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""End of the report: remarks, assumptions, settings, hashes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from drivetwin.report.sections.blocks import TableBlock
+from drivetwin.report.sections.provenance import limits_section, provenance_section
+from tests.report.sample import identification
+
+
+def _rows(blocks: object, caption: str) -> dict[str, str]:
+    assert isinstance(blocks, list)
+    table = next(b for b in blocks if isinstance(b, TableBlock) and b.caption.startswith(caption))
+    return {row[0].text: row[-1].text for row in table.rows}
+
+
+def test_remarks_name_the_experiment_that_would_help() -> None:
+    rows = _rows(limits_section(identification()).blocks, "Parameters that call")
+    assert rows == {
+        "c_o": "the oscillation is short",
+        "τ_e": "the engine torque is constant; record throttle steps",
+    }
+
+
+def test_settings_are_flat_and_short() -> None:
+    nested = {"momentum": {"width": 0.4, "grid": (0.005000000000000001, 1)}, "card": "a"}
+    rows = _rows(provenance_section(replace(identification(), settings=nested)).blocks, "Settings")
+    assert rows["momentum.width"] == "0.4"
+    assert rows["momentum.grid"] == "0.005, 1"
+    assert rows["card"] == "a"
+    assert rows["loss law"] == "paper"
+
+
+def test_inputs_and_range_of_validity_are_stated() -> None:
+    blocks = provenance_section(identification()).blocks
+    assert _rows(blocks, "Inputs") == {"sample <1>.csv": "ab" * 32}
+    assert _rows(blocks, "Range")["pressure"] == "bar"

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""First page: verdicts, agreement, intervals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from drivetwin.report.figures.parameters import interval_figure
+from drivetwin.report.sections.blocks import Tone
+from drivetwin.report.sections.trust import fit_table, parameter_table, trust_section
+from drivetwin.report.units import RPM, significant
+from drivetwin.validate import with_fit
+from tests.report.sample import identification, validation
+
+
+def test_rows_carry_value_interval_unit_and_verdict() -> None:
+    rows = {row[0].note.split(" · ")[1]: row for row in parameter_table(identification()).rows}
+    texts = [cell.text for cell in rows["J_prime_2"]]
+    assert texts[0] == "J′ (2)"
+    assert texts[1:] == ["17.50", "0.42", "0.16", "kg·m²", "identified", "integral"]
+    assert rows["P0.B3"][1].text == "0.820"
+    assert rows["P0.B3"][4].text == "bar"
+    assert rows["c_o"][5].tone is Tone.DOUBTFUL
+
+
+def test_parameter_that_cannot_be_told_shows_no_number() -> None:
+    rows = {row[0].note.split(" · ")[1]: row for row in parameter_table(identification()).rows}
+    assert [cell.text for cell in rows["te_delay"][1:4]] == ["–", "–", "–"]
+
+
+def test_missing_sensor_tolerances_are_said() -> None:
+    found = identification()
+    plain = {key: replace(one, std_systematic=None) for key, one in found.estimates.items()}
+    assert "no sensor tolerance" not in parameter_table(found).caption
+    assert "no sensor tolerance" in parameter_table(replace(found, estimates=plain)).caption
+
+
+def test_fit_table_shows_percent_and_rmse_in_display_units() -> None:
+    found = with_fit(identification(), [validation()])
+    speed = next(row for row in fit_table(found).rows if row[0].text == "input speed")
+    rmse = found.fit["input_speed"]["all"].rmse
+    assert speed[1].note == f"{significant(rmse * RPM.factor, 3)} rpm"
+
+
+def test_warnings_stand_above_the_table() -> None:
+    kinds = [block.kind for block in trust_section(identification()).blocks]
+    assert kinds == ["tiles", "notes", "table", "figure"]
+
+
+def test_intervals_of_what_was_found_only() -> None:
+    estimates = identification().estimates
+    estimates["J_out"] = replace(estimates["J_out"], std_noise=1e-7)
+    total, noise = interval_figure(estimates).data
+    assert "te_delay" not in total.y
+    assert "J_out" not in total.y
+    assert all(n <= t for n, t in zip(noise.x, total.x, strict=True))
