@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -24,12 +23,3 @@ def test_demo_compares_both_methods_with_the_truth(
         assert word in text
     table = text.partition("± is")[0]
     assert max(len(line) for line in table.splitlines()) <= 80
-
-
-def test_demo_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["demo", "-o", str(tmp_path), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    rows = {row["id"]: row for row in document["parameters"]}
-    assert rows["J_vehicle"]["truth"] == 6056.0
-    assert rows["J_vehicle"]["integral"]["value"] == pytest.approx(6056.0, rel=0.03)
-    assert Path(document["report"]).is_file()

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import json
 import shutil
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -14,41 +17,52 @@ from drivetwin.errors import IdentificationError
 from tests.cli.conftest import Files
 
 
+@dataclass(frozen=True)
+class Written:
+    """Folder with result, twin and report of the bench log, and what was printed."""
+
+    folder: Path
+    printed: str
+
+
 @pytest.fixture(scope="module")
-def written(bench_files: Files, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with result, twin and report of the bench log."""
+def written(bench_files: Files, tmp_path_factory: pytest.TempPathFactory) -> Written:
+    """`identify --json -o` of the bench log by the default method."""
     out = tmp_path_factory.mktemp("identified") / "out"
     arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
-    assert main([*arguments, "-o", str(out)]) == 0
-    return out
+    with redirect_stdout(StringIO()) as printed:
+        assert main([*arguments, "-o", str(out), "--json"]) == 0
+    return Written(out, printed.getvalue())
 
 
-def test_writes_exactly_three_files(written: Path) -> None:
-    assert {path.name for path in written.iterdir()} == {"result.json", "twin.toml", "report.html"}
-    assert [path.name for path in written.parent.iterdir()] == ["out"]
+def _by_the_paper(bench_files: Files, out: Path, *more_logs: Path) -> list[str]:
+    logs = [str(bench_files.log), *map(str, more_logs)]
+    options = ["--vehicle", str(bench_files.card), "--method", "paper", "-o", str(out)]
+    return ["identify", *logs, *options]
 
 
-def test_json_is_the_result_file_and_the_files_written(
-    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
-    assert main([*arguments, "-o", str(out), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
+def test_writes_exactly_three_files(written: Written) -> None:
+    names = {path.name for path in written.folder.iterdir()}
+    assert names == {"result.json", "twin.toml", "report.html"}
+    assert [path.name for path in written.folder.parent.iterdir()] == ["out"]
+
+
+def test_json_is_the_result_file_and_the_files_written(written: Written) -> None:
+    document = json.loads(written.printed)
     assert document.pop("files") == [
-        str(out / name) for name in ("result.json", "twin.toml", "report.html")
+        str(written.folder / name) for name in ("result.json", "twin.toml", "report.html")
     ]
-    assert document == json.loads((out / "result.json").read_text())
+    assert document == json.loads((written.folder / "result.json").read_text())
 
 
 def test_text_fits_80_columns_and_names_the_report(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
-    assert main([*arguments, "-o", str(tmp_path / "out")]) == 0
+    assert main(_by_the_paper(bench_files, tmp_path / "out")) == 0
     text = capsys.readouterr().out
-    tables, _, _ = text.partition("wrote")
-    assert "J_vehicle" in tables
+    results, _, _ = text.partition("wrote")
+    assert "J_vehicle" in results
+    assert max(len(line) for line in results.splitlines()) <= 80
     assert "\x1b" not in text
     assert f"wrote {tmp_path / 'out' / 'report.html'}" in text
 
@@ -57,16 +71,14 @@ def test_several_logs_go_to_folders_of_their_own(bench_files: Files, tmp_path: P
     second = tmp_path / "second.csv"
     shutil.copy(bench_files.log, second)
     out = tmp_path / "out"
-    arguments = [str(bench_files.log), str(second), "--vehicle", str(bench_files.card)]
-    assert main(["identify", *arguments, "-o", str(out)]) == 0
+    assert main(_by_the_paper(bench_files, out, second)) == 0
     assert {path.name for path in out.iterdir()} == {"bench", "second"}
 
 
 def test_two_logs_of_one_name_are_refused_before_any_work(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = [str(bench_files.log), str(bench_files.log), "--vehicle", str(bench_files.card)]
-    assert main(["identify", *arguments, "-o", str(tmp_path / "out")]) == 2
+    assert main(_by_the_paper(bench_files, tmp_path / "out", bench_files.log)) == 2
     assert "bench" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
@@ -78,20 +90,19 @@ def test_a_stage_that_fails_last_leaves_nothing(
         raise IdentificationError("the report cannot be drawn", "look at the log")
 
     monkeypatch.setattr("drivetwin.report.html.save_report", broken)
-    arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
-    assert main([*arguments, "-o", str(tmp_path / "out")]) == 2
+    assert main(_by_the_paper(bench_files, tmp_path / "out")) == 2
     assert list(tmp_path.iterdir()) == []
 
 
 def test_simulate_reproduces_the_fit_of_the_identification(
-    written: Path, bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    written: Written, bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     traces = tmp_path / "traces.csv"
-    arguments = [str(written / "twin.toml"), str(bench_files.log)]
+    arguments = [str(written.folder / "twin.toml"), str(bench_files.log)]
     options = ["--vehicle", str(bench_files.card), "-o", str(traces), "--json"]
     assert main(["simulate", *arguments, *options]) == 0
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
-    fit = json.loads((written / "result.json").read_text())["fit"]
+    fit = json.loads((written.folder / "result.json").read_text())["fit"]
     assert shift["status"] == "completed"
     for signal, phases in fit.items():
         found = shift["fit"][signal]["all"]["fit_percent"]
@@ -102,17 +113,17 @@ def test_simulate_reproduces_the_fit_of_the_identification(
     assert len(rows) > 4000
 
 
-def test_report_names_the_page(written: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for source in (written, written / "result.json"):
+def test_report_names_the_page(written: Written, capsys: pytest.CaptureFixture[str]) -> None:
+    for source in (written.folder, written.folder / "result.json"):
         assert main(["report", str(source)]) == 0
-        assert capsys.readouterr().out.strip() == str(written / "report.html")
+        assert capsys.readouterr().out.strip() == str(written.folder / "report.html")
 
 
 def test_report_says_what_is_missing(
-    written: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    written: Written, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["report", str(tmp_path)]) == 2
     assert "drivetwin identify" in capsys.readouterr().err
-    shutil.copy(written / "result.json", tmp_path)
+    shutil.copy(written.folder / "result.json", tmp_path)
     assert main(["report", str(tmp_path)]) == 2
     assert "report.html" in capsys.readouterr().err

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, VehicleFile
-from drivetwin.cli.output import JsonFlag, print_json, say, show
+from drivetwin.cli.output import JsonFlag, note, print_json, say, show
 from drivetwin.errors import InputError, Where
 from drivetwin.identify.method import Method
 
@@ -80,13 +80,22 @@ def _document(outcome: Outcome, files: tuple[Path, ...]) -> dict[str, Any]:
 
 
 def _print(outcome: Outcome, source: str) -> None:
-    from drivetwin.cli.tables import fit_table, parameter_table, reasons, shift_table
+    from drivetwin.cli.tables import (
+        fit_table,
+        friction_table,
+        parameter_table,
+        reasons,
+        shift_table,
+    )
 
     found = outcome.found
     show(shift_table(found.shifts, source))
     show(parameter_table(found.estimates, f"Parameters ({found.method} method)"))
     for line in reasons(found.estimates):
-        say(f"  {line}")
-    show(fit_table(found.fit, "Simulation over measurement"))
+        note(line)
+    if found.friction:
+        show(friction_table(found.friction))
+    if found.fit:
+        show(fit_table(found.fit, "Simulation over measurement"))
     for warning in found.warnings:
-        say(f"warning: {warning}")
+        note(f"warning: {warning}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile
-from drivetwin.cli.output import JsonFlag, print_json, say, show, table_of
+from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -42,8 +42,8 @@ def inspect(
         print_json(found.document())
         return
     show(_table([column.document() for column in found.columns], log.name))
-    for note in found.notes:
-        say(f"note: {note}")
+    for text in found.notes:
+        note(text)
     if write_mapping is not None:
         say(f"wrote {write_mapping}")
 

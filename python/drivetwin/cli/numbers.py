@@ -9,7 +9,7 @@ from drivetwin.report.units import display_of, significant, with_uncertainty
 
 Interval = tuple[float, float]
 
-_EXACT = 1e-6
+_EXACT = 1e-5
 """Relative half width below which a value is shown as known."""
 
 

@@ -34,6 +34,14 @@ def say(text: str) -> None:
     console().print(text, markup=False, soft_wrap=True)
 
 
+def note(text: str) -> None:
+    """Print a paragraph on stdout, indented and wrapped to the width at hand."""
+    from rich.padding import Padding
+    from rich.text import Text
+
+    console().print(Padding(Text(text), (0, 0, 0, 2)))
+
+
 def show(table: Table) -> None:
     """Print a table on stdout."""
     console().print(table)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load
-from drivetwin.cli.output import JsonFlag, print_json, say, show, step
+from drivetwin.cli.output import JsonFlag, note, print_json, show, step
 
 
 def shifts(
@@ -30,6 +30,6 @@ def shifts(
     show(shift_table(found.shifts, log.name))
     for candidate in found.rejected:
         start, end = candidate.time
-        say(f"rejected, {start:.3f} s to {end:.3f} s: {candidate.reason}")
+        note(f"rejected, {start:.3f} s to {end:.3f} s: {candidate.reason}")
     for warning in recording.warnings:
-        say(f"warning: {warning}")
+        note(f"warning: {warning}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load
-from drivetwin.cli.output import JsonFlag, print_json, say, show, step
+from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step
 
 if TYPE_CHECKING:
     from drivetwin.validate import Validation
@@ -55,7 +55,7 @@ def simulate(
     for run in runs:
         show(fit_table(run.fit, f"Shift {run.shift.start_gear}→{run.shift.end_gear}: {run.status}"))
         for warning in run.warnings:
-            say(f"warning: {warning}")
+            note(f"warning: {warning}")
     if output is not None:
         say(f"wrote {output}")
 

@@ -12,7 +12,7 @@ from drivetwin.cli.output import table_of
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from drivetwin.identify.result import Estimate, SignalFit
+    from drivetwin.identify.result import Estimate, FrictionCurve, SignalFit
     from drivetwin.shifts.shift import Shift
 
 _PHASES = ("all", "before", "torque", "inertia", "after")
@@ -55,8 +55,27 @@ def parameter_table(estimates: Mapping[str, Estimate], title: str) -> Table:
 
 
 def reasons(estimates: Mapping[str, Estimate]) -> list[str]:
-    """Why a verdict is not `identified`, one line for each reason given."""
-    return [f"{one.id}: {one.reason}" for one in estimates.values() if one.reason]
+    """What limits each verdict: one line for each reason given, with all parameters it is for."""
+    by_reason: dict[str, list[str]] = {}
+    for estimate in estimates.values():
+        if estimate.reason:
+            by_reason.setdefault(estimate.reason, []).append(estimate.id)
+    return [f"{', '.join(ids)}: {reason}" for reason, ids in by_reason.items()]
+
+
+def friction_table(friction: Mapping[str, FrictionCurve]) -> Table:
+    """μ with its 95 % band at the ends and in the middle of the slip range seen."""
+    table = table_of(
+        "Friction", "element", "slip rad/s", "μ", "95 %", right=("slip rad/s", "μ", "95 %")
+    )
+    for element, curve in friction.items():
+        for place, index in enumerate((0, curve.slip.size // 2, curve.slip.size - 1)):
+            band = (float(curve.mu_lo[index]), float(curve.mu_hi[index]))
+            value, interval, _ = shown(float(curve.mu[index]), band, "1")
+            table.add_row(
+                element if place == 0 else "", f"{curve.slip[index]:.1f}", value, interval
+            )
+    return table
 
 
 def fit_table(fit: Mapping[str, Mapping[str, SignalFit]], title: str) -> Table:
