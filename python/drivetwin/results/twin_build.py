@@ -32,7 +32,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
     assumptions = list(found.assumptions)
     if "J_out" not in parameters and card.J_out is not None:
         parameters["J_out"] = Estimate(
-            "J_out", card.J_out.value, card.J_out.std, Verdict.IDENTIFIED, "design prior"
+            "J_out", card.J_out.value, card.J_out.std, Verdict.IDENTIFIED, "prior"
         )
         assumptions.append("Jo′ is the vehicle card's value")
     assumptions += _borrowed_friction(found)

@@ -54,3 +54,11 @@ def test_intervals_of_what_was_found_only() -> None:
     assert "te_delay" not in total.y
     assert "J_out" not in total.y
     assert all(n <= t for n, t in zip(noise.x, total.x, strict=True))
+
+
+def test_design_values_do_not_count_as_identified() -> None:
+    found = identification()
+    estimates = {**found.estimates, "J_out": replace(found.estimates["J_out"], method="prior")}
+    intro = trust_section(replace(found, estimates=estimates)).intro
+    assert "9 of 12 parameters are identified" in intro
+    assert "1 taken from the vehicle card" in intro

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 
 from drivetwin.identify.result import Estimate, Identification, SignalFit, Verdict
 from drivetwin.parameters import spec_of
@@ -21,6 +22,8 @@ from drivetwin.report.sections.blocks import (
 )
 from drivetwin.report.units import NM, RPM, Display, display_of, significant, with_uncertainty
 
+PRIOR = "prior"
+"""Method of an estimate that is the vehicle card's design value."""
 TONES = {
     Verdict.IDENTIFIED: Tone.GOOD,
     Verdict.WEAK: Tone.DOUBTFUL,
@@ -67,6 +70,8 @@ def _headline(found: Identification) -> str:
         text += f", {count[Verdict.WEAK]} only weakly"
     if count[Verdict.NOT_IDENTIFIABLE]:
         text += f", {count[Verdict.NOT_IDENTIFIABLE]} cannot be told from this log"
+    if given:
+        text += f", {given} taken from the vehicle card"
     text += "."
     fit = found.fit.get("output_torque", {}).get("all")
     if fit is not None and math.isfinite(fit.fit_percent):
@@ -77,6 +82,15 @@ def _headline(found: Identification) -> str:
     return text
 
 
+def _told(found: Identification) -> list[Estimate]:
+    """Estimates that the log told; a design value that it adds nothing to is none of them."""
+    return [
+        one
+        for one in found.estimates.values()
+        if one.verdict is Verdict.IDENTIFIED and one.method != PRIOR
+    ]
+
+
 def _tiles(found: Identification) -> list[Tile]:
     tiles = []
     for name, (label, display) in SIGNALS.items():
@@ -84,8 +98,8 @@ def _tiles(found: Identification) -> list[Tile]:
         if fit is not None:
             note = f"rmse {significant(fit.rmse * display.factor, 3)} {display.label}"
             tiles.append(Tile(f"fit of {label}", _percent(fit), _fit_tone(fit), note))
-    told = [one for one in found.estimates.values() if one.verdict is Verdict.IDENTIFIED]
-    complete = len(told) == len(found.estimates)
+    told = _told(found)
+    complete = all(one.verdict is Verdict.IDENTIFIED for one in found.estimates.values())
     tiles.append(
         Tile(
             "identified",
