@@ -106,9 +106,7 @@ def _card_values(
             name = f"P0.{element.name}"
             if name not in known:
                 note = "design value of the card; the log does not show this element filling"
-                found[name] = judge(
-                    name, element.P0.value, element.P0.std, "prior", note=note
-                )
+                found[name] = judge(name, element.P0.value, element.P0.std, "prior", note=note)
     return found
 
 

@@ -155,7 +155,10 @@ class _Equations:
         zero = np.zeros(tp.size)
         self.by_eta = np.where(tp, 1.0 / share, zero)
         self.by_to = np.where(tp, -1.0 / (i * share), 1.0 / b)
-        self.by_we = {1: np.where(tp, -1.0 / share, zero), 2: np.where(tp, -1.0 / (i * i * share), zero)}
+        self.by_we = {
+            1: np.where(tp, -1.0 / share, zero),
+            2: np.where(tp, -1.0 / (i * i * share), zero),
+        }
         self.by_wo = {2: np.where(tp, zero, 1.0 / b)}
         for k, c in enumerate(driveline.drums):
             locked = -((c.a - c.b / i) ** 2) / share
@@ -224,9 +227,9 @@ def _prior(driveline: Driveline, momentum: MomentumFit) -> Prior:
     prior.mean[NUISANCE:] = momentum.fit.theta
     cov = momentum.fit.covariance
     scale = np.sqrt(np.diag(cov))
-    prior.precision[NUISANCE:, NUISANCE:] = np.linalg.inv(
-        cov / np.outer(scale, scale)
-    ) / np.outer(scale, scale)
+    prior.precision[NUISANCE:, NUISANCE:] = np.linalg.inv(cov / np.outer(scale, scale)) / np.outer(
+        scale, scale
+    )
     return prior
 
 
@@ -258,7 +261,10 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
     area = 0.5 * equations.windows.width
     slip = np.abs(kernel @ equations.slip) / area
     torque = sum(
-        (t.factor * (t.quadrature.matrix @ t.values) for t in equations.measured(fit.theta[NUISANCE:])),
+        (
+            t.factor * (t.quadrature.matrix @ t.values)
+            for t in equations.measured(fit.theta[NUISANCE:])
+        ),
         np.zeros_like(area),
     )
     above = kernel @ (equations.pressure.values - fit.theta[P0])
@@ -293,16 +299,14 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
 
 @dataclass(frozen=True)
 class PaperFriction:
-    """The paper's μ-slip points: extremes of T_o in the inertia phase and the curve through them."""
+    """The paper's μ-slip points, from extremes of T_o in the inertia phase, and their curve."""
 
     element: str
     curve: FrictionCurve
     extremes_time: FloatArray
 
 
-def paper_friction(
-    signals: ShiftSignals, driveline: Driveline, points: int = 40
-) -> PaperFriction:
+def paper_friction(signals: ShiftSignals, driveline: Driveline, points: int = 40) -> PaperFriction:
     """T_c ≈ T_o/i_out (eq. 16) at the extremes of T_o over the inertia phase, slip by eq. 15.
 
     T_o is averaged over 10 ms windows before its extremes are taken; where it does not oscillate
@@ -338,9 +342,12 @@ def paper_friction(
 
 
 def fit_law(slip: FloatArray, mu: FloatArray) -> dict[str, float]:
-    """Stribeck law by least squares on μ-slip points (n,): linear in three, v_s on a grid."""
+    """Stribeck law by least squares on μ-slip points (n,): linear in three, v_s on a grid.
+
+    v_s is not taken below the least slip seen, where nothing would show the law's rise.
+    """
     best: tuple[float, FloatArray, float] | None = None
-    for v_s in np.geomspace(2.0, 100.0, 40):
+    for v_s in np.geomspace(max(2.0, float(slip.min())), 100.0, 40):
         basis = np.column_stack([np.ones_like(slip), np.exp(-slip / v_s), slip])
         found = np.linalg.lstsq(basis, mu, rcond=1e-8)[0]
         error = float(np.sum((basis @ found - mu) ** 2))

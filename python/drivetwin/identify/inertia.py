@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Gear efficiency η and lumped inertia J′ (eq. 10), the paper's way and in momentum form.
 
-    η·T_e - T_o/i_g = J′·ω_e'        J′ = Je + Jo′/i_g²,  Je = J1·η + J2e
+η·T_e - T_o/i_g = J′·ω_e'        J′ = Je + Jo′/i_g²,  Je = J1·η + J2e
 """
 
 from __future__ import annotations

@@ -26,7 +26,12 @@ def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
     for name, spec in card.elements.items():
         i_c, i_out = card.clutch_ratios(name)
         couplings[name] = Coupling(
-            name, 1.0 / (card.i_in * i_c), i_out, spec.gain, _prior(spec.P0), _prior(spec.drum_inertia)
+            name,
+            1.0 / (card.i_in * i_c),
+            i_out,
+            spec.gain,
+            _prior(spec.P0),
+            _prior(spec.drum_inertia),
         )
     return Driveline(
         i_f=card.final_drive,
@@ -90,8 +95,16 @@ def disturbed(signals: ShiftSignals, role: str, gain: float, offset: float) -> S
             return signals
         pressures = {**signals.pressures, name: changed(signals.pressures[name])}
         return replace(signals, pressures=pressures)
-    attribute = "engine_speed" if role == "input_speed" else role
-    signal = getattr(signals, attribute, None)
-    if not isinstance(signal, Sampled):
-        return signals
-    return replace(signals, **{attribute: changed(signal)})
+    match role:
+        case "engine_torque":
+            return replace(signals, engine_torque=changed(signals.engine_torque))
+        case "output_torque":
+            return replace(signals, output_torque=changed(signals.output_torque))
+        case "engine_speed" | "input_speed":
+            return replace(signals, engine_speed=changed(signals.engine_speed))
+        case "output_speed":
+            return replace(signals, output_speed=changed(signals.output_speed))
+        case "wheel_speed" if signals.wheel_speed is not None:
+            return replace(signals, wheel_speed=changed(signals.wheel_speed))
+        case _:
+            return signals

@@ -130,8 +130,9 @@ def identify_shift(
     except IdentificationError as error:
         refusals["friction"] = error.what
     shaft_ids, values, covariance = _derived(driveline, momentum, load, ring, shift.end_gear)
-    ids = ("eta", f"J_prime_{shift.start_gear}", f"J_prime_{shift.end_gear}", "J_out", "te_delay")
-    ids = (*ids, "J_vehicle", "Tv_over_if", *shaft_ids)
+    gears = (f"J_prime_{shift.start_gear}", f"J_prime_{shift.end_gear}")
+    ids: tuple[str, ...] = ("eta", *gears, "J_out", "te_delay", "J_vehicle", "Tv_over_if")
+    ids = (*ids, *shaft_ids)
     if momentum.scan.best is None:
         keep = [k for k, name in enumerate(ids) if name != "te_delay"]
         ids = tuple(ids[k] for k in keep)

@@ -38,27 +38,35 @@ class PaperShift:
     refusals: dict[str, str]
 
 
-def _doubts(
-    signals: ShiftSignals, fit: GridFit, low: float, high: float, gear: str
+def _inertia_doubts(
+    signals: ShiftSignals, fit: GridFit, bounds: tuple[float, float], gear: str
 ) -> dict[str, str]:
     """Why η and J′ of the grid search deserve little trust, by parameter id."""
     torque = signals.engine_torque.within(signals.shift.before).values
     moving = float(np.std(torque)) / max(abs(float(np.mean(torque))), 1e-9)
-    reasons = []
+    reasons = [_outside("J′", fit.best.inertia, bounds), _at_the_end("η", fit)]
     if moving < EXCITATION:
         reasons.append(
             f"the engine torque moves by {100 * moving:.1f} % only while gear {gear} is held, so "
             "eq. 10 cannot tell η from J′"
         )
-    if not low <= fit.best.inertia <= high:
-        reasons.append(
-            f"J′ = {fit.best.inertia:.3g} kg m^2 lies outside its design range "
-            f"{low:g} to {high:g} kg m^2"
-        )
-    if fit.best in (fit.rows[0], fit.rows[-1]):
-        reasons.append("the least error lies at the end of the grid of η")
-    text = "; ".join(reasons)
-    return {"eta": text, f"J_prime_{gear}": text} if text else {}
+    text = "; ".join(reason for reason in reasons if reason)
+    return dict.fromkeys(("eta", f"J_prime_{gear}"), text) if text else {}
+
+
+def _outside(symbol: str, value: float, bounds: tuple[float, float]) -> str:
+    if bounds[0] <= value <= bounds[1]:
+        return ""
+    return (
+        f"{symbol} = {value:.4g} kg m^2 lies outside its design range "
+        f"{bounds[0]:g} to {bounds[1]:g} kg m^2"
+    )
+
+
+def _at_the_end(symbol: str, fit: GridFit) -> str:
+    if fit.best not in (fit.rows[0], fit.rows[-1]):
+        return ""
+    return f"the least error lies at the end of the grid of {symbol}"
 
 
 def paper_shift(
@@ -102,5 +110,11 @@ def paper_shift(
         friction = paper_friction(signals, driveline)
     except IdentificationError as error:
         refusals["friction"] = error.what
-    doubts = _doubts(signals, inertia, *J_prime_range, shift.start_gear)
+    doubts = _inertia_doubts(signals, inertia, J_prime_range, shift.start_gear)
+    reasons = [_outside("J3", load.best.inertia, J_vehicle_range), _at_the_end("T_v/i_f", load)]
+    if text := "; ".join(reason for reason in reasons if reason):
+        doubts |= dict.fromkeys(("Tv_over_if", "J_vehicle"), text)
+    if text := _outside("J′", after.best.inertia, J_prime_range):
+        doubts[f"J_prime_{shift.end_gear}"] = text
+    doubts |= {k: "it rests on doubtful inertias" for k in ("k_o", "c_o") if doubts and k in values}
     return PaperShift(inertia, after, load, ring, friction, values, doubts, refusals)

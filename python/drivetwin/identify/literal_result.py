@@ -12,6 +12,7 @@ from drivetwin.identify.literal import PaperShift
 from drivetwin.identify.result import Estimate, Verdict
 from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.identify.uncertainty import experiment_for, judge, refused
+from drivetwin.parameters import spec_of
 
 METHOD = "paper"
 _NO_INTERVAL = "the paper's procedure gives no interval"
@@ -30,6 +31,9 @@ def paper_conclusions(
             if name in estimates:
                 continue
             doubt = shift.doubts.get(name, "")
+            if not spec_of(name).lower <= value <= spec_of(name).upper:
+                estimates[name] = refused(name, METHOD, doubt)
+                continue
             reason = f"{doubt}; {experiment_for(name)}" if doubt else _NO_INTERVAL
             verdict = Verdict.WEAK if doubt else Verdict.IDENTIFIED
             estimates[name] = Estimate(name, value, None, verdict, METHOD, reason=reason)

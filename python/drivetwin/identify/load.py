@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Load torque T_v/i_f and vehicle inertia J3 (eq. 11), the paper's way and in momentum form.
 
-    T_o - T_v/i_f = (J3/i_f)·ω_w'
+T_o - T_v/i_f = (J3/i_f)·ω_w'
 """
 
 from __future__ import annotations

@@ -16,12 +16,20 @@ their design priors; Jo′ has one too. The age of the engine torque is estimate
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.modulating import Kernels, Windows, hann_kernels, join, windows_in
+from drivetwin.identify.modulating import (
+    Kernels,
+    Quadrature,
+    Windows,
+    hann_kernels,
+    join,
+    windows_in,
+)
 from drivetwin.identify.regression import Fit, Prior, Term, regressors, solve, whitening
 from drivetwin.identify.signals import (
     Driveline,
@@ -47,7 +55,7 @@ class MomentumSettings:
     step: float = 0.025
     share: float = 0.4
     margin: float = 0.01
-    delay_prior: PriorValue = PriorValue(0.02, 0.03)
+    delay_prior: PriorValue = field(default_factory=lambda: PriorValue(0.02, 0.03))
     delay_grid: tuple[float, ...] = tuple(np.linspace(-0.02, 0.08, 21).tolist())
 
     def guard(self, boundary: str, shift: Shift) -> float:
@@ -123,8 +131,15 @@ class MomentumFit:
 
 
 def momentum_names(driveline: Driveline) -> tuple[str, ...]:
-    """Parameters of the regression: η, Je, Jo′, age of T_e, then the drums by element."""
-    return ("eta", "J_e", "J_out", "te_delay", *(f"drum.{c.name}" for c in driveline.drums))
+    """Parameters of the regression: η, Je, Jo′, age and mean rounding error of T_e, drums."""
+    return (
+        "eta",
+        "J_e",
+        "J_out",
+        "te_delay",
+        "te_rounding",
+        *(f"drum.{c.name}" for c in driveline.drums),
+    )
 
 
 def off_going_free(
@@ -167,7 +182,11 @@ def stretches(
     lockup = settings.guard("lockup", shift)
     free = off_going_free(signals, driveline, settings)
     spans = (
-        ("before", (shift.before[0], shift.before[1] - settings.guard("torque_start", shift)), True),
+        (
+            "before",
+            (shift.before[0], shift.before[1] - settings.guard("torque_start", shift)),
+            True,
+        ),
         ("inertia", (free, shift.lockup_time - lockup), False),
         ("after", (shift.lockup_time + lockup, shift.after[1]), True),
     )
@@ -193,7 +212,9 @@ def stretches(
     return tuple(found)
 
 
-FIRST_DRUM = 4
+ROUNDING = 4
+"""Index of the mean rounding error of the engine torque [N m] among the parameters."""
+FIRST_DRUM = 5
 """Index of the first drum inertia among the parameters."""
 
 
@@ -213,6 +234,7 @@ class _Equations:
         self.ratio = np.repeat([s.ratio for s in found], counts)
         self.stretch = tuple(np.repeat([s.name for s in found], counts).tolist())
         tied = np.repeat([s.tied for s in found], counts)
+        self.constant = Quadrature(csr_array(0.5 * self.windows.width[:, None]))
         self.torque = hann_kernels(signals.output_torque.time, self.windows).psi
         self.engine = hann_kernels(signals.engine_speed.time, self.windows).slope
         self.output = hann_kernels(signals.output_speed.time, self.windows).slope
@@ -259,13 +281,39 @@ class _Equations:
             terms.append(Term(signal.values, signal.sigma, quadrature, factor, slopes))
         return terms
 
+    def rounding(self, theta: FloatArray) -> Term:
+        """The part of the engine torque's mean rounding error, -η·θ[4]."""
+        area, factor = self.constant, np.full_like(self.ratio, -theta[0] * theta[ROUNDING])
+        slopes = {
+            0: (np.full_like(self.ratio, -theta[ROUNDING]), area),
+            ROUNDING: (np.full_like(self.ratio, -theta[0]), area),
+        }
+        return Term(np.ones(1), 0.0, area, factor, slopes)
+
     def terms(self, theta: FloatArray) -> list[Term]:
         """All parts of the equations at θ, the engine torque first."""
-        return [self.engine_torque(theta), *self.others(theta)]
+        return [self.engine_torque(theta), *self.others(theta), self.rounding(theta)]
 
 
-def _prior(driveline: Driveline, settings: MomentumSettings) -> Prior:
-    entries = {3: (settings.delay_prior.value, settings.delay_prior.std)}
+def rounding_error(torque: Sampled, step: float) -> float:
+    """Standard deviation [N m] of the mean error that rounding to `step` leaves.
+
+    Noise of standard deviation σ dithers the rounding; what stays of its mean error is periodic
+    in the level with amplitude (step/π)·exp(-2π²σ²/step²) (Widrow and Kollár 2008). `torque.sigma`
+    holds noise and rounding together.
+    """
+    if step == 0.0:
+        return 0.0
+    square = max(torque.sigma**2 - step**2 / 12.0, 0.0)
+    return float(step / np.pi * np.exp(-2.0 * np.pi**2 * square / step**2) / np.sqrt(2.0))
+
+
+def _prior(signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings) -> Prior:
+    rounding = rounding_error(signals.engine_torque, signals.torque_resolution)
+    entries = {
+        3: (settings.delay_prior.value, settings.delay_prior.std),
+        ROUNDING: (0.0, known(PriorValue(0.0, rounding))),
+    }
     if driveline.J_out is not None:
         entries[2] = (driveline.J_out.value, known(driveline.J_out))
     for k, element in enumerate(driveline.drums):
@@ -331,7 +379,7 @@ def momentum_inertia(
     found = stretches(signals, driveline, settings)
     equations = _Equations(signals, driveline, found)
     names = momentum_names(driveline)
-    prior = _prior(driveline, settings)
+    prior = _prior(signals, driveline, settings)
     start = prior.mean.copy()
     start[:2] = 0.9, start_inertia
     first = solve(equations.terms, start, prior.held(3, start[3]), tolerance=0.1)
@@ -349,7 +397,7 @@ def _with_evidence(
     equations: _Equations, names: tuple[str, ...], fit: Fit, scan: DelayScan
 ) -> MomentumFit:
     area = 0.5 * equations.windows.width
-    drive, load, *inertia = (
+    drive, load, engine, output, _ = (
         t.factor * (t.quadrature.matrix @ t.values) / area for t in equations.terms(fit.theta)
     )
     speed = equations.signals.engine_speed
@@ -361,5 +409,5 @@ def _with_evidence(
         equations.stretch,
         drive + load,
         (equations.engine.matrix @ speed.values) / area,
-        -sum(inertia, np.zeros_like(area)),
+        -(engine + output),
     )

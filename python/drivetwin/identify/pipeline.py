@@ -105,9 +105,7 @@ def _integral(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
 ) -> tuple[Conclusions, tuple[IntegralShift, ...]]:
     start = float(np.sqrt(card.J_prime_range[0] * card.J_prime_range[1]))
-    shifts = tuple(
-        identify_shift(s, d, start) for s, d in zip(signals, drivelines, strict=True)
-    )
+    shifts = tuple(identify_shift(s, d, start) for s, d in zip(signals, drivelines, strict=True))
     systematic, bands = _systematic(signals, drivelines, shifts, card, start)
     found = conclude(shifts, signals, drivelines, systematic)
     friction = {
@@ -174,7 +172,11 @@ def _settings(card: VehicleCard, method: Method) -> dict[str, Any]:
     ranges = {"J_prime_range": card.J_prime_range, "J_vehicle_range": card.J_vehicle_range}
     if method is Method.PAPER:
         return ranges
-    return {"momentum": asdict(MomentumSettings()), "friction": asdict(FrictionSettings()), **ranges}
+    return {
+        "momentum": asdict(MomentumSettings()),
+        "friction": asdict(FrictionSettings()),
+        **ranges,
+    }
 
 
 def _assumptions(card: VehicleCard, method: Method) -> tuple[str, ...]:

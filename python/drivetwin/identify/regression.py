@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_solve_banded, cholesky_banded, solve_banded
 
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.modulating import Quadrature
@@ -101,17 +101,45 @@ class Fit:
 
 
 @dataclass(frozen=True)
+class BandedCholesky:
+    """S = L·Lᵀ for a covariance that couples only windows near each other in the list.
+
+    `lower` (k+1, m) holds the diagonals of L.
+    """
+
+    lower: FloatArray
+
+    @classmethod
+    def of(cls, cov: FloatArray) -> BandedCholesky:
+        """Factor of `cov` (m, m), its bandwidth found from its zeros."""
+        row, column = np.nonzero(cov)
+        width = int(np.max(row - column))
+        band = np.zeros((width + 1, cov.shape[0]))
+        for k in range(width + 1):
+            band[k, : cov.shape[0] - k] = np.diagonal(cov, -k)
+        return cls(cholesky_banded(band, lower=True))
+
+    def solve(self, x: FloatArray) -> FloatArray:
+        """S⁻¹x for x (m,) or (m, r)."""
+        return np.asarray(cho_solve_banded((self.lower, True), x), dtype=float)
+
+    def whiten(self, x: FloatArray) -> FloatArray:
+        """L⁻¹x for x (m,) or (m, r)."""
+        return np.asarray(solve_banded((self.lower.shape[0] - 1, 0), self.lower, x), dtype=float)
+
+
+@dataclass(frozen=True)
 class _Point:
     residual: FloatArray
     q: float
     gradient: FloatArray
     regressors: FloatArray
-    factor: tuple[FloatArray, bool]
+    factor: BandedCholesky
     variance: FloatArray
 
     @property
     def hessian(self) -> FloatArray:
-        return np.asarray(self.regressors.T @ cho_solve(self.factor, self.regressors), dtype=float)
+        return np.asarray(self.regressors.T @ self.factor.solve(self.regressors), dtype=float)
 
 
 def _covariance(terms: Sequence[Term]) -> FloatArray:
@@ -126,8 +154,7 @@ def _covariance(terms: Sequence[Term]) -> FloatArray:
 
 def whitening(terms: Sequence[Term]) -> Callable[[FloatArray], FloatArray]:
     """The map x -> L⁻¹x with S = L·Lᵀ, under which the residuals have unit covariance."""
-    lower = np.linalg.cholesky(_covariance(terms))
-    return lambda x: np.asarray(solve_triangular(lower, x, lower=True), dtype=float)
+    return BandedCholesky.of(_covariance(terms)).whiten
 
 
 def regressors(terms: Sequence[Term], size: int) -> FloatArray:
@@ -146,8 +173,8 @@ def _evaluate(terms: Sequence[Term], size: int) -> _Point:
         residual += t.factor * (t.quadrature.matrix @ t.values)
     cov = _covariance(terms)
     variance = np.diag(cov).copy()
-    factor = cho_factor(cov, lower=True)
-    multiplier = cho_solve(factor, residual)
+    factor = BandedCholesky.of(cov)
+    multiplier = factor.solve(residual)
     columns = np.zeros((count, size))
     for t in terms:
         clean = t.values
@@ -161,7 +188,7 @@ def _evaluate(terms: Sequence[Term], size: int) -> _Point:
 
 def _spurious(terms: Sequence[Term], point: _Point, size: int) -> FloatArray:
     """Expected part of the information (p, p) that the noise left in the regressors feigns."""
-    inverse = cho_solve(point.factor, np.eye(point.residual.size))
+    inverse = point.factor.solve(np.eye(point.residual.size))
     cross = np.zeros((size, point.residual.size, point.residual.size))
     own = np.zeros((size, size))
     for t in terms:

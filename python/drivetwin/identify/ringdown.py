@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 from scipy.signal import cont2discrete, lfilter
 
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.signals import FloatArray, Sampled, Span
+from drivetwin.identify.signals import FloatArray, Sampled
 from drivetwin.identify.wlse import window_edges, window_means
 
 START_AFTER_LOCKUP = 0.05
@@ -139,7 +139,7 @@ def pencil_start(time: FloatArray, values: FloatArray, order: int = 6) -> tuple[
     h = thin * (time[-1] - time[0]) / (time.size - 1)
     length = y.size // 3
     hankel = np.lib.stride_tricks.sliding_window_view(y, length + 1)
-    basis = np.linalg.svd(hankel, full_matrices=False)[2][:order]
+    basis = np.linalg.eigh(hankel.T @ hankel)[1][:, -order:].T
     poles = np.linalg.eigvals(np.linalg.pinv(basis[:, :-1].T) @ basis[:, 1:].T)
     powers = np.vander(poles, y.size, increasing=True).T
     amplitude = np.abs(np.linalg.lstsq(powers, y.astype(complex), rcond=None)[0])
@@ -157,10 +157,11 @@ def forced_response(rate: float, omega: float, time: FloatArray, drive: FloatArr
 
     The two-mass shaft passes a torque on the one mass as (2σp + ω_n²)/(p² + 2σp + ω_n²).
     """
-    square = rate**2 + omega**2
-    system = ([2.0 * rate, square], [1.0, 2.0 * rate, square])
-    numerator, denominator, _ = cont2discrete(system, time[1] - time[0], method="foh")
-    return np.asarray(lfilter(numerator.ravel(), denominator, drive), dtype=float)
+    step, square = float(time[1] - time[0]), rate**2 + omega**2
+    numerator = np.array([2.0 * rate, square])
+    denominator = np.array([1.0, 2.0 * rate, square])
+    top, bottom, _ = cont2discrete((numerator, denominator), step, method="foh")
+    return np.asarray(lfilter(np.ravel(top), bottom, drive), dtype=float)
 
 
 def quiet(torque: Sampled, block: int = 4, still: int = 12) -> Sampled:
@@ -219,7 +220,8 @@ def fit_ringdown(torque: Sampled, lockup: float, end: float, drive: Drive | None
     rate, omega = (float(v) for v in found.x)
     residual = projected(found.x)
     noise = _power_near(residual, omega, time[1] - time[0], torque.sigma)
-    covariance = noise * np.linalg.inv(found.jac.T @ found.jac)
+    slopes = np.asarray(found.jac, dtype=float)
+    covariance = noise * np.linalg.inv(slopes.T @ slopes)
     if not (0.0 < rate < omega) or np.sqrt(covariance[1, 1]) > 0.05 * omega:
         raise _refuse(f"the fit ends at decay rate {rate:.3g} 1/s, {omega / (2 * np.pi):.3g} Hz")
     return RingDown(
@@ -235,4 +237,4 @@ def _power_near(residual: FloatArray, omega: float, step: float, sigma: float) -
     power = np.abs(np.fft.rfft(residual)) ** 2 / residual.size
     frequency = 2.0 * np.pi * np.fft.rfftfreq(residual.size, step)
     near = (frequency > 0.5 * omega) & (frequency < 2.0 * omega)
-    return float(max(np.mean(power[near]), np.mean(residual**2), sigma**2))
+    return max(float(np.mean(power[near])), float(np.mean(residual**2)), sigma**2)
