@@ -62,10 +62,10 @@ def trust_section(found: Identification) -> Section:
 
 
 def _headline(found: Identification) -> str:
-    count = dict.fromkeys(Verdict, 0)
-    for estimate in found.estimates.values():
-        count[estimate.verdict] += 1
-    text = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)} parameters are identified"
+    count = Counter(estimate.verdict for estimate in found.estimates.values())
+    told = len(_told(found))
+    given = count[Verdict.IDENTIFIED] - told
+    text = f"{told} of {len(found.estimates)} parameters are identified"
     if count[Verdict.WEAK]:
         text += f", {count[Verdict.WEAK]} only weakly"
     if count[Verdict.NOT_IDENTIFIABLE]:
