@@ -143,7 +143,11 @@ def python_function(body_lines: int, arguments: str = "", docstring: str = "") -
         ),
         (
             mirror_rule,
-            {"tests/logs/test_csv_limits.py": "", f"{PACKAGE}/logs/csv.py": ""},
+            {
+                "tests/logs/test_csv_limits.py": "",
+                "tests/logs/test_given_logs.py": "",
+                f"{PACKAGE}/logs/csv.py": "",
+            },
             {"tests/logs/test_csvx.py": "", f"{PACKAGE}/logs/csv.py": ""},
             1,
         ),
