@@ -276,7 +276,7 @@ def run(truth: Truth, manoeuvre: Manoeuvre, h: float = 2.5e-4, speed: float = 15
                 plant.mode = {"A": "slip", "slip": "B"}[plant.mode]
                 trial = plant.step(t + hi, x, h - hi)
             x = trial
-    time = 1e-3 * np.arange(count)
+    time = np.asarray(1e-3 * np.arange(count), dtype=np.float64)
     m = manoeuvre
     columns = {
         "engine_torque": np.array([m.engine_torque(t) for t in time]),

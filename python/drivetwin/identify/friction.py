@@ -333,7 +333,7 @@ def paper_friction(signals: ShiftSignals, driveline: Driveline, points: int = 40
     order = np.argsort(slip[picked])
     s, m = slip[picked][order], mu[order]
     grid = np.linspace(float(s[0]), float(s[-1]), points)
-    bandwidth = 1.5 * float(np.ptp(s)) / np.sqrt(s.size)
+    bandwidth = float(np.ptp(s)) / np.sqrt(s.size)
     kernel = np.exp(-0.5 * ((grid[:, None] - s) / bandwidth) ** 2)
     smooth = (kernel @ m) / kernel.sum(axis=1)
     nothing = np.full(points, np.nan)

@@ -67,13 +67,20 @@ def _ring(
     ratio = driveline.i_after
     J4 = float(_gear_inertia(driveline, momentum, ratio) @ momentum.fit.theta) * ratio**2
     J5 = load.J_vehicle / driveline.i_f**2
-    steady = quiet(signals.engine_torque)
-    acting = Sampled(steady.time - momentum.value("te_delay"), steady.values, steady.sigma)
     gain = momentum.value("eta") * ratio * J5 / (J4 + J5)
-    shift = signals.shift
-    return fit_ringdown(
-        signals.output_torque, shift.lockup_time, shift.after[1], Drive(acting, gain)
-    )
+    shift, measured, age = signals.shift, signals.engine_torque, momentum.value("te_delay")
+    # Jitter of the engine torque is either the engine's own, then it drives the oscillation, or
+    # its sensor's: the fit that leaves less of T_o decides.
+    fits = [
+        fit_ringdown(
+            signals.output_torque,
+            shift.lockup_time,
+            shift.after[1],
+            Drive(Sampled(acting.time - age, acting.values, acting.sigma), gain),
+        )
+        for acting in (quiet(measured), measured)
+    ]
+    return min(fits, key=lambda ring: float(np.mean((ring.torque - ring.fitted) ** 2)))
 
 
 def _derived(

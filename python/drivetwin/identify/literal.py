@@ -78,13 +78,12 @@ def paper_shift(
     """Run the paper's stages. The ranges [kg m^2] set the weights of the two grid searches."""
     shift = signals.shift
     weighting = Weighting(*J_prime_range)
-    inertia = paper_inertia(
-        signals, driveline.i_before, shift.before, PaperInertiaSettings(weighting)
-    )
+    before = (shift.before[0], shift.before[1] - 3.0 * shift.sigma.get("torque_start", 0.0))
+    inertia = paper_inertia(signals, driveline.i_before, before, PaperInertiaSettings(weighting))
     held = PaperInertiaSettings(weighting, (inertia.best.value,))
     after = paper_inertia(signals, driveline.i_after, shift.after, held)
     load = paper_load(
-        signals, driveline.i_f, shift.before, PaperLoadSettings(Weighting(*J_vehicle_range))
+        signals, driveline.i_f, before, PaperLoadSettings(Weighting(*J_vehicle_range))
     )
     values = {
         "eta": inertia.best.value,

@@ -112,19 +112,19 @@ def paper_ringdown(torque: Sampled, lockup: float, end: float) -> RingDown:
         picked.append(int(k))
     if len(picked) < 4:
         raise _refuse(f"only {len(picked)} extremes stand out of the noise")
-    k = np.asarray(picked)
-    bend = mean[k - 1] - 2.0 * mean[k] + mean[k + 1]
-    shift = 0.5 * (mean[k - 1] - mean[k + 1]) / bend
-    instants = centre[k] + shift * (centre[1] - centre[0])
-    order = np.arange(k.size)
+    at = np.asarray(picked)
+    bend = mean[at - 1] - 2.0 * mean[at] + mean[at + 1]
+    shift = 0.5 * (mean[at - 1] - mean[at + 1]) / bend
+    instants = centre[at] + shift * (centre[1] - centre[0])
+    order = np.arange(at.size)
     half_period = float(np.polyfit(order, instants, 1)[0])
-    swing = np.log(0.5 * np.abs(np.diff(mean[k])))
+    swing = np.log(0.5 * np.abs(np.diff(mean[at])))
     decrement = -float(np.polyfit(order[:-1], swing, 1)[0])
     rate, omega = decrement / half_period, np.pi / half_period
     if not (rate > 0.0 and BAND[0] < omega / (2 * np.pi) < BAND[1]):
         raise _refuse(f"decay rate {rate:.3g} 1/s at {omega / (2 * np.pi):.3g} Hz")
     return RingDown(
-        rate, omega, np.zeros((2, 2)), part.time, part.values, part.values, instants, mean[k]
+        rate, omega, np.zeros((2, 2)), part.time, part.values, part.values, instants, mean[at]
     )
 
 

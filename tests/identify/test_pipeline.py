@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""identify() from log and card: contract, verdicts, refusals, truth of the shared log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import IdentificationError, InputError, NoShiftError
+from drivetwin.identify.integral import IntegralShift
+from drivetwin.identify.literal import PaperShift
+from drivetwin.identify.method import Method
+from drivetwin.identify.pipeline import identify
+from drivetwin.identify.result import Identification, Verdict
+from drivetwin.logs.read import read_log
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.shifts.find import FoundShifts, find_shifts
+from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.spec import SensorTolerance, VehicleCard
+
+ROOT = Path(__file__).parents[2]
+LOGS = ROOT.parent / "shared" / "logs"
+
+
+@cache
+def recording(name: str) -> tuple[ShiftLog, VehicleCard, FoundShifts]:
+    path = LOGS / f"{name}.csv"
+    if not path.exists():
+        pytest.skip(f"{path.name} is not beside the repository")
+    card = load_card(ROOT / "examples" / "vehicles" / f"{name}.toml")
+    log = read_log(path, card)
+    return log, card, find_shifts(log, card)
+
+
+@cache
+def identified(name: str, method: Method) -> Identification:
+    return identify(*recording(name), method)
+
+
+def test_the_paper_like_log_returns_its_truth_within_the_intervals() -> None:
+    truth = {
+        "eta": 0.85,
+        "J_prime_2": 17.50,
+        "J_prime_3": 17.69,
+        "J_vehicle": 6056.0,
+        "Tv_over_if": 2300.0,
+        "k_o": 1.76e5,
+        "c_o": 280.0,
+        "f_d_3": 12.0,
+    }
+    found = identified("paper_like", Method.INTEGRAL)
+    for name, value in truth.items():
+        estimate = found.estimates[name]
+        assert estimate.value is not None
+        assert estimate.std_noise is not None
+        assert abs(estimate.value - value) < 3.0 * estimate.std_noise, name
+        assert abs(estimate.value / value - 1.0) < 0.01, name
+    curve = found.friction["B3"]
+    mu = 0.110 + 0.025 * np.exp(-curve.slip / 15.0) + 1e-4 * curve.slip
+    assert np.mean((mu >= curve.mu_lo) & (mu <= curve.mu_hi)) > 0.8
+    assert np.max(np.abs(curve.mu / mu - 1.0)) < 0.015
+
+
+def test_constant_engine_torque_is_said_in_words_not_hidden() -> None:
+    found = identified("paper_like", Method.INTEGRAL)
+    assert "cannot tell η from J′" in found.estimates["eta"].reason
+    assert "cannot tell η from J′" in found.estimates["J_prime_2"].reason
+    assert found.estimates["te_delay"].verdict is Verdict.NOT_IDENTIFIABLE
+    assert found.estimates["te_delay"].value is None
+    assert any("rests on the inertia phase" in text for text in found.warnings)
+
+
+def test_a_log_with_throttle_steps_tells_everything() -> None:
+    found = identified("truck_a", Method.INTEGRAL)
+    told = {name for name, e in found.estimates.items() if e.verdict is Verdict.IDENTIFIED}
+    assert {"eta", "J_prime_2", "J_prime_3", "J_vehicle", "Tv_over_if", "te_delay"} <= told
+    assert {"k_o", "c_o", "f_d_3", "zeta_3", "P0.B3"} <= told
+    assert found.correlation is not None
+    assert found.correlation.shape == (len(found.correlation_ids),) * 2
+    assert isinstance(found.evidence["integral"][0], IntegralShift)
+    assert isinstance(found.evidence["paper"][0], PaperShift)
+
+
+def test_the_papers_method_claims_no_interval_and_doubts_the_constant_torque() -> None:
+    found = identified("paper_like", Method.PAPER)
+    assert found.estimates["eta"].value == 0.85
+    assert found.estimates["eta"].std_noise is None
+    assert found.estimates["eta"].verdict is Verdict.WEAK
+    assert found.estimates["J_prime_2"].verdict is Verdict.WEAK
+
+
+def test_sensor_tolerances_widen_the_total_interval_only() -> None:
+    log, card, shifts = recording("truck_a")
+    strict = identified("truck_a", Method.INTEGRAL)
+    stated = replace(card, sensors={"output_torque": SensorTolerance(gain=0.01)})
+    found = identify(log, stated, shifts)
+    for name in ("k_o", "Tv_over_if", "J_vehicle"):
+        wide, narrow = found.estimates[name], strict.estimates[name]
+        assert wide.std_noise == pytest.approx(narrow.std_noise)
+        assert wide.value is not None
+        assert wide.std_systematic == pytest.approx(0.01 * wide.value, rel=0.1)
+    curve, before = found.friction["B3"], strict.friction["B3"]
+    assert np.all(curve.mu_hi - curve.mu_lo > before.mu_hi - before.mu_lo)
+
+
+def test_refusals() -> None:
+    log, card, shifts = recording("truck_a")
+    with pytest.raises(InputError, match="likelihood method is not part"):
+        identify(log, card, shifts, Method.LIKELIHOOD)
+    with pytest.raises(NoShiftError, match="no usable gear shift"):
+        identify(log, card, FoundShifts((), ()))
+    channels = {role: c for role, c in log.channels.items() if role != "output_torque"}
+    with pytest.raises(IdentificationError, match="no output torque"):
+        identify(replace(log, channels=channels), card, shifts)

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""Lock-up oscillation: frequency and damping from made signals, refusal without one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.ringdown import Drive, fit_ringdown, forced_response, paper_ringdown, quiet
+from drivetwin.identify.shaft import stiffness_and_damping
+from drivetwin.identify.signals import FloatArray, Sampled
+
+TIME = np.arange(0.0, 2.0, 1e-3)
+RATE, OMEGA = 4.5, 75.0
+
+
+def ring(amplitude: float = 2000.0) -> FloatArray:
+    wave = amplitude * np.exp(-RATE * TIME) * np.cos(OMEGA * TIME + 0.4)
+    return np.asarray(1800.0 + 50.0 * TIME + wave, dtype=float)
+
+
+def test_fit_is_unbiased_and_its_intervals_cover() -> None:
+    rates, omegas, inside = [], [], 0
+    for seed in range(30):
+        noise = 30.0 * np.random.default_rng(seed).standard_normal(TIME.size)
+        found = fit_ringdown(Sampled(TIME, ring() + noise, 30.0), 0.0, 2.0, None)
+        rates.append(found.decay_rate)
+        omegas.append(found.omega_d)
+        inside += abs(found.f_d - OMEGA / (2 * np.pi)) < 1.96 * found.f_d_std
+        inside += abs(found.zeta - RATE / np.hypot(RATE, OMEGA)) < 1.96 * found.zeta_std
+    assert np.mean(omegas) == pytest.approx(OMEGA, rel=5e-4)
+    assert np.mean(rates) == pytest.approx(RATE, rel=0.01)
+    assert inside >= 53
+
+
+def test_a_moving_engine_torque_is_accounted_for() -> None:
+    push = 800.0 * np.clip((TIME - 0.3) / 0.08, 0.0, 1.0)
+    torque = ring() + forced_response(RATE, OMEGA, TIME, push)
+    drive = Drive(Sampled(TIME, 500.0 + push / 1.2), 1.2)
+    told = fit_ringdown(Sampled(TIME, torque, 1.0), 0.0, 2.0, drive)
+    blind = fit_ringdown(Sampled(TIME, torque, 1.0), 0.0, 2.0, None)
+    assert told.decay_rate == pytest.approx(RATE, rel=2e-3)
+    assert abs(blind.decay_rate / RATE - 1.0) > 0.03
+
+
+def test_paper_reads_the_extremes() -> None:
+    found = paper_ringdown(Sampled(TIME, ring(), 10.0), 0.0, 2.0)
+    assert found.omega_d == pytest.approx(OMEGA, rel=5e-3)
+    assert found.decay_rate == pytest.approx(RATE, rel=0.05)
+    assert found.extremes_time.size >= 6
+
+
+def test_noise_alone_is_refused() -> None:
+    noise = 30.0 * np.random.default_rng(3).standard_normal(TIME.size)
+    with pytest.raises(IdentificationError, match="no clean lock-up oscillation"):
+        paper_ringdown(Sampled(TIME, 1800.0 + noise, 30.0), 0.0, 2.0)
+    with pytest.raises(IdentificationError, match="no clean lock-up oscillation"):
+        fit_ringdown(Sampled(TIME, 1800.0 + noise, 30.0), 0.0, 2.0, None)
+
+
+def test_too_short_a_stretch_is_refused() -> None:
+    with pytest.raises(IdentificationError, match=r"less than 0\.15 s"):
+        fit_ringdown(Sampled(TIME, ring(), 1.0), 1.85, 2.0, None)
+
+
+def test_quiet_straightens_jitter_and_keeps_steps() -> None:
+    time = np.arange(0.0, 2.0, 0.01)
+    level = np.where(time < 1.0, 1000.0, 1400.0)
+    noisy = level + 5.0 * np.random.default_rng(4).standard_normal(time.size)
+    calm = quiet(Sampled(time, noisy, 5.0)).values
+    away = np.abs(time - 1.0) > 0.1
+    assert np.max(np.abs(calm - level)[away]) < 4.0
+    assert np.max(np.abs(calm - level)) < 25.0
+
+
+def test_stiffness_and_damping_invert_the_two_mass_formulas() -> None:
+    k, c, J4, J5 = 1.76e5, 280.0, 36.18, 209.23
+    J = J4 * J5 / (J4 + J5)
+    rate = c / (2.0 * J)
+    omega = np.sqrt(k / J - rate**2)
+    assert stiffness_and_damping(rate, float(omega), J4, J5) == pytest.approx([k, c])
+    with pytest.raises(IdentificationError, match="both must be positive"):
+        stiffness_and_damping(rate, float(omega), J4, -1.0)
