@@ -63,7 +63,9 @@ def conclude(
     for name, value, noise in zip(ids, values, std, strict=True):
         method, note = METHOD, notes.get(name, "")
         prior = J_out if name == "J_out" else _fill_prior(name, drivelines)
-        if prior is not None and noise >= PRIOR_SHARE * prior.std:
+        if prior is not None and prior.std == 0.0:
+            method, note, noise = "prior", "known from design, as the card says", 0.0
+        elif prior is not None and noise >= PRIOR_SHARE * prior.std:
             method, note = "prior", "the log adds little to the design value of the card"
         estimates[name] = judge(
             name, float(value), float(noise), method, systematic.get(name), note
