@@ -20,5 +20,5 @@ def simulate(
     _Array,
     list[tuple[float, str, str]],
     str,
-    tuple[float, float, float, float, float, float, float, float] | None,
+    tuple[float, float, float, float, float, float, float, float, float] | None,
 ]: ...

@@ -144,7 +144,8 @@ class Event:
 
 @dataclass(frozen=True)
 class EnergyAudit:
-    """Work over the run [J]: source = stored + friction + gear_loss + shaft + load + error.
+    """Work over the run [J]: source = stored + friction + gear_loss + shaft + load +
+    converter + error.
 
     `gear_loss` is negative where the `paper` law creates energy; `created` is the sum of those
     negative parts, as a positive number.
@@ -156,6 +157,7 @@ class EnergyAudit:
     gear_loss: float
     shaft: float
     load: float
+    converter: float
     created: float
     error: float
 

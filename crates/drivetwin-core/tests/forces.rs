@@ -11,7 +11,6 @@ use drivetwin_core::model::torque_map::TorqueMap;
 use drivetwin_core::network::CompileError;
 use drivetwin_core::simulate::Output;
 use drivetwin_core::solve::Status;
-use std::marker::PhantomData;
 
 fn speed(node: &str) -> Output {
     Output::Speed(node.into())
@@ -59,7 +58,7 @@ fn an_engine_map_that_falls_with_speed_settles_exponentially() {
             node: "engine".into(),
             throttle: "pedal".into(),
             map,
-            number: PhantomData,
+            lag: None,
         }),
     ]);
     let signals = [constant("pedal", 0.25, 4.0)];
@@ -90,7 +89,7 @@ fn a_map_is_followed_through_its_cells_and_held_beyond_its_border() {
             node: "engine".into(),
             throttle: "pedal".into(),
             map,
-            number: PhantomData,
+            lag: None,
         }),
     ]);
     let signals = [constant("pedal", 1.0, 1.0)];
@@ -108,7 +107,8 @@ fn a_map_is_followed_through_its_cells_and_held_beyond_its_border() {
 
 #[test]
 fn a_friction_table_is_followed_piece_by_piece() {
-    let table = FrictionTable { slip: vec![0.0, 10.0, 20.0], mu: vec![1.0, 1.0, 2.0] };
+    let table =
+        FrictionTable { slip: vec![0.0, 10.0, 20.0], mu: vec![1.0, 1.0, 2.0], extend: false };
     let brake =
         Clutch { friction: FrictionLaw::Table(table), ..clutch("brake", "shaft", "ground") };
     let network = compile(vec![inertia("shaft", 1.0), Element::Clutch(brake)]);
@@ -156,6 +156,7 @@ fn a_torque_on_a_planetary_set_splits_by_willis() {
             ring: "ring".into(),
             carrier: "carrier".into(),
             z: 1.5,
+            planet_inertia: None,
         }),
         Element::Clutch(clutch("brake", "ring", "ground")),
     ]);

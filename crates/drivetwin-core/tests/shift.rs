@@ -8,7 +8,7 @@ use drivetwin_core::model::DualClutch;
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::number::Real;
 use drivetwin_core::simulate::{DualClutchRun, simulate_dual_clutch};
-use drivetwin_core::solve::{EventKind, Settings, Status};
+use drivetwin_core::solve::{EventKind, Settings, Signal, Status};
 use num_dual::Dual64;
 
 const SHAFT_TORQUE: usize = 4;
@@ -17,8 +17,8 @@ fn shift<T: Real>(model: &DualClutch<T>, weak: f64, settings: Settings) -> DualC
     let signals = upshift(weak);
     let lifted: Vec<Vec<T>> =
         signals.iter().map(|s| s.2.iter().map(|&v| T::of(v)).collect()).collect();
-    let borrowed: Vec<(&str, &[f64], &[T])> =
-        signals.iter().zip(&lifted).map(|(s, v)| (s.0, s.1.as_slice(), v.as_slice())).collect();
+    let borrowed: Vec<(&str, Signal<'_, T>)> =
+        signals.iter().zip(&lifted).map(|(s, v)| (s.0, Signal::Samples(&s.1, v))).collect();
     let grid = signals[0].1.clone();
     simulate_dual_clutch(model, &borrowed, &second_gear(), &grid, (settings, true)).unwrap()
 }

@@ -4,8 +4,8 @@
 //! Private to the package; `drivetwin.driveline` is its face.
 
 use drivetwin_core::model::DualClutch;
-use drivetwin_core::simulate::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
-use drivetwin_core::solve::{EventKind, Settings};
+use drivetwin_core::simulate::{DualClutchRun, DualClutchStart, EnergyAudit, simulate_dual_clutch};
+use drivetwin_core::solve::{EventKind, Settings, Signal as SamplesOrSine};
 use numpy::{PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -18,8 +18,8 @@ type Start = (f64, f64, f64, f64, Vec<String>);
 type Options = (f64, f64, Option<usize>, bool);
 /// Time [s], element, kind.
 type Event = (f64, String, &'static str);
-/// Source, stored, friction, gear loss, shaft, load, created, error [J].
-type Audit = (f64, f64, f64, f64, f64, f64, f64, f64);
+/// Source, stored, friction, gear loss, shaft, load, converter, created, error [J].
+type Audit = (f64, f64, f64, f64, f64, f64, f64, f64, f64);
 /// Columns (n_columns, n_time), events, status, audit.
 type Run<'py> = (Bound<'py, PyArray2<f64>>, Vec<Event>, String, Option<Audit>);
 
@@ -38,7 +38,9 @@ fn simulate<'py>(
     let grid = grid.as_slice()?;
     let signals = signals
         .iter()
-        .map(|(name, times, values)| Ok((name.as_str(), times.as_slice()?, values.as_slice()?)))
+        .map(|(name, times, values)| {
+            Ok((name.as_str(), SamplesOrSine::Samples(times.as_slice()?, values.as_slice()?)))
+        })
         .collect::<PyResult<Vec<_>>>()?;
     let (engine_speed, output_speed, wheel_speed, twist, locked) = start;
     let start = DualClutchStart { engine_speed, output_speed, wheel_speed, twist, locked };
@@ -55,11 +57,13 @@ fn as_python<'py>(py: Python<'py>, run: &DualClutchRun<f64>) -> PyResult<Run<'py
         (event.time, run.elements[event.element].clone(), kind_name(event.kind))
     };
     let events = run.events.iter().map(named).collect();
-    let audit = run.audit.map(|a| {
-        (a.source, a.stored, a.friction, a.gear_loss, a.shaft, a.load, a.created, a.error)
-    });
+    let audit = run.audit.map(as_tuple);
     let columns = PyArray2::from_vec2(py, &run.columns)?;
     Ok((columns, events, run.status.to_string(), audit))
+}
+
+fn as_tuple(a: EnergyAudit) -> Audit {
+    (a.source, a.stored, a.friction, a.gear_loss, a.shaft, a.load, a.converter, a.created, a.error)
 }
 
 fn kind_name(kind: EventKind) -> &'static str {

@@ -99,7 +99,7 @@ impl<T: Real> DualClutch<T> {
                 number: PhantomData,
             }),
             Element::Gear(Gear {
-                loss: Some(GearLoss { law: self.loss_law, eta: self.eta }),
+                loss: Some(GearLoss::by_efficiency(self.loss_law, self.eta)),
                 ..gear("i_in", ENGINE, input, self.i_in)
             }),
             inertia("J2e", input, self.J2e * self.i_in * self.i_in),

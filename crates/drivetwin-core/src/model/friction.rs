@@ -19,7 +19,7 @@ pub struct Stribeck<T> {
     pub mu_v: T,
 }
 
-/// μ linear between points of |slip|, constant beyond the last.
+/// μ linear between points of |slip|; beyond the last constant, or along the last piece.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionTable<T> {
@@ -27,6 +27,9 @@ pub struct FrictionTable<T> {
     pub slip: Vec<f64>,
     /// μ at each slip.
     pub mu: Vec<T>,
+    /// Whether the last piece goes on beyond the last point.
+    #[serde(default)]
+    pub extend: bool,
 }
 
 /// μ over |slip|.
@@ -42,7 +45,7 @@ pub enum FrictionLaw<T> {
 impl<T: Real> FrictionLaw<T> {
     /// μ independent of slip.
     pub fn constant(mu: T) -> Self {
-        Self::Table(FrictionTable { slip: vec![0.0], mu: vec![mu] })
+        Self::Table(FrictionTable { slip: vec![0.0], mu: vec![mu], extend: false })
     }
 
     /// μ at a slip of magnitude `s` ≥ 0 [rad/s].
@@ -90,22 +93,22 @@ impl<T: Real> Piece<T> {
 impl<T: Real> FrictionTable<T> {
     /// Index of the piece that holds |slip| `s`.
     pub fn cell(&self, s: f64) -> usize {
-        self.slip.partition_point(|&x| x <= s).saturating_sub(1)
+        let last =
+            if self.extend { self.slip.len().saturating_sub(2) } else { self.slip.len() - 1 };
+        self.slip.partition_point(|&x| x <= s).saturating_sub(1).min(last)
     }
 
     /// Piece `i` and its span of |slip| [rad/s].
     pub fn piece(&self, i: usize) -> (Piece<T>, (f64, f64)) {
         let from = self.slip[i];
-        match self.slip.get(i + 1) {
-            Some(&to) => {
-                let slope = (self.mu[i + 1] - self.mu[i]) / (to - from);
-                (Piece { from, value: self.mu[i], slope }, (from, to))
-            }
-            None => {
-                let flat = Piece { from, value: self.mu[i], slope: T::zero_() };
-                (flat, (from, f64::INFINITY))
-            }
-        }
+        let Some(&next) = self.slip.get(i + 1) else {
+            let flat = Piece { from, value: self.mu[i], slope: T::zero_() };
+            return (flat, (from, f64::INFINITY));
+        };
+        let slope = (self.mu[i + 1] - self.mu[i]) / (next - from);
+        let unbounded = self.extend && i + 2 == self.slip.len();
+        let to = if unbounded { f64::INFINITY } else { next };
+        (Piece { from, value: self.mu[i], slope }, (from, to))
     }
 
     fn check(&self, element: &str) -> Result<(), ModelError> {

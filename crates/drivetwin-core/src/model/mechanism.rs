@@ -3,6 +3,7 @@
 //! speeds, with scalar force laws and set-valued friction (THEORY section 1).
 
 use super::GROUND;
+use super::converter_map::ConverterMap;
 use super::friction::FrictionLaw;
 use super::torque_map::TorqueMap;
 use crate::number::Real;
@@ -21,13 +22,19 @@ pub enum LossLaw {
     Dissipative,
 }
 
-/// Loss of a constraint: the driven entries of its force row carry η (or 1/η).
+/// Loss of a constraint: the driven entries of its force row carry the efficiency.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loss<T> {
     /// Which law holds.
     pub law: LossLaw,
-    /// Efficiency, in (0, 1].
+    /// Efficiency with power from the driving to the driven side.
     pub eta: T,
+    /// Efficiency with power from the driven to the driving side.
+    pub eta_backward: T,
+    /// Drag torque on the driving side with power forward, N·m.
+    pub drag: T,
+    /// Drag torque on the driving side with power backward, N·m.
+    pub drag_backward: T,
     /// Node on the side where power is counted as entering.
     pub driving: usize,
 }
@@ -52,17 +59,37 @@ pub struct Inertia<T> {
     pub inertia: T,
 }
 
-/// Torque `k·twist + c·twist'` against `twist' = row · ω`; the twist is a state.
+/// Torque of a compliance over its twist.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SpringLaw<T> {
+    /// `k·twist + c·twist'`.
+    Linear {
+        /// Stiffness, N·m/rad.
+        stiffness: T,
+        /// Damping, N·m·s/rad.
+        damping: T,
+    },
+    /// No torque within half the gap to either side; beyond it a spring-damper that can only push:
+    /// the damping torque is at most the spring torque and never pulls.
+    Backlash {
+        /// Stiffness, N·m/rad.
+        stiffness: T,
+        /// Damping, N·m·s/rad.
+        damping: T,
+        /// Half the total gap, rad.
+        half_gap: T,
+    },
+}
+
+/// A compliance against `twist' = row · ω`; the twist is a state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spring<T> {
     /// Element that states it.
     pub element: String,
     /// Rate of twist.
     pub row: Row<T>,
-    /// Stiffness, N·m/rad.
-    pub stiffness: T,
-    /// Damping, N·m·s/rad.
-    pub damping: T,
+    /// Torque law.
+    pub law: SpringLaw<T>,
 }
 
 /// What presses the surfaces of a friction element together: capacity = μ · normal, N·m.
@@ -94,6 +121,8 @@ pub struct Friction<T> {
     pub normal: Normal<T>,
     /// Static over kinetic capacity at zero slip, ≥ 1.
     pub peak: T,
+    /// Positive slip is blocked whatever the torque (one-way clutch).
+    pub one_way: bool,
 }
 
 /// Which account of the energy audit a torque belongs to.
@@ -103,23 +132,43 @@ pub enum Account {
     Source,
     /// Taken by the load.
     Load,
+    /// Turned into heat in a torque converter.
+    Converter,
 }
 
-/// A scalar torque law.
+/// A scalar torque law over one or two node speeds and the inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ForceLaw<T> {
     /// The input itself, N·m.
     Input(usize),
     /// Always the same, N·m.
     Constant(T),
-    /// `coefficient · ω |ω|` of the driven node.
-    Quadratic(T),
-    /// Map over an input (throttle) and the node's speed.
+    /// `coefficient · ω |ω|` of a node.
+    Quadratic {
+        /// N·m·s²/rad².
+        coefficient: T,
+        /// The node.
+        node: usize,
+    },
+    /// Map over an input (throttle) and a node's speed.
     Map {
         /// Index of the throttle input.
         input: usize,
+        /// Node of the speed.
+        node: usize,
         /// Torque over throttle and speed.
         map: TorqueMap,
+    },
+    /// Torque taken at the pump (or given at the turbine) of a converter.
+    Converter {
+        /// Node of the pump.
+        pump: usize,
+        /// Node of the turbine.
+        turbine: usize,
+        /// Its map.
+        map: ConverterMap,
+        /// Whether the turbine's torque is meant.
+        at_turbine: bool,
     },
 }
 
@@ -132,8 +181,21 @@ pub struct Force<T> {
     pub node: usize,
     /// Its value.
     pub law: ForceLaw<T>,
+    /// Time constant of a first-order lag between law and torque, s.
+    pub lag: Option<T>,
     /// Where its work is booked.
     pub account: Account,
+}
+
+/// A node whose speed is an input.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Prescribed {
+    /// Element that states it.
+    pub element: String,
+    /// The node.
+    pub node: usize,
+    /// Index of the speed input, rad/s.
+    pub input: usize,
 }
 
 /// Everything the elements stated.
@@ -153,6 +215,8 @@ pub struct Mechanism<T> {
     pub frictions: Vec<Friction<T>>,
     /// Sources and loads.
     pub forces: Vec<Force<T>>,
+    /// Nodes whose speeds are inputs.
+    pub prescribed: Vec<Prescribed>,
 }
 
 impl<T> Default for Mechanism<T> {
@@ -165,6 +229,7 @@ impl<T> Default for Mechanism<T> {
             springs: Vec::new(),
             frictions: Vec::new(),
             forces: Vec::new(),
+            prescribed: Vec::new(),
         }
     }
 }

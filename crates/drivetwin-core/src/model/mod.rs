@@ -4,6 +4,7 @@
 //! Each element is one file that states its law in the vocabulary of [`mechanism`]. Elements know
 //! no integrator.
 
+pub mod converter_map;
 pub mod dual_clutch;
 pub mod elements;
 mod error;

@@ -4,17 +4,18 @@
 //! Within a cell (a direction of slip, a piece of a table) each is analytic; the solver watches the
 //! cell's borders.
 
-use super::linalg::Matrix;
+use super::cell::{Cell, Contact};
 use crate::model::FrictionLaw;
+use crate::model::converter_map::ConverterMap;
 use crate::model::friction::{Piece, Stribeck};
-use crate::model::mechanism::{ForceLaw, Friction, Normal};
-use crate::model::torque_map::{TorqueMap, span_index};
+use crate::model::mechanism::Normal;
+use crate::model::torque_map::TorqueMap;
 use crate::number::{Real, Series, TERMS, product_term};
 
-/// A law over one speed and the inputs.
+/// A law over one or two linear forms of the state, and the inputs.
 #[derive(Clone, Debug)]
 pub enum Law<T> {
-    /// Friction torque, slip as argument.
+    /// Friction torque over the slip.
     Friction {
         /// μ over |slip|.
         mu: FrictionLaw<T>,
@@ -32,52 +33,41 @@ pub enum Law<T> {
         /// The map.
         map: TorqueMap,
     },
+    /// Torque converter over pump and turbine speed.
+    Converter {
+        /// The map.
+        map: ConverterMap,
+        /// Torque given at the turbine, else taken at the pump.
+        at_turbine: bool,
+    },
+    /// Backlash over twist and its rate.
+    Backlash {
+        /// N·m/rad.
+        stiffness: T,
+        /// N·m·s/rad.
+        damping: T,
+        /// rad.
+        half_gap: T,
+    },
 }
 
-/// A channel: its law and the speed it depends on, over the independent speeds.
+/// A channel: its law and its arguments over the states.
 #[derive(Clone, Debug)]
 pub struct Channel<T> {
     /// Law.
     pub law: Law<T>,
-    /// Argument over the independent speeds.
-    pub speed: Vec<T>,
-}
-
-/// The analytic branch that is active.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Cell {
-    /// No torque.
-    #[default]
-    Off,
-    /// Friction at rest relative to the other side, loaded to its static capacity.
-    Saturated {
-        /// Sign of the torque.
-        sign: f64,
-    },
-    /// Moving in one direction, on piece `piece` of a table.
-    Moving {
-        /// Sign of the speed.
-        sign: f64,
-        /// Piece of the table, 0 without one.
-        piece: usize,
-    },
-    /// Cell of a map: spans of throttle and speed.
-    Map {
-        /// Throttle span.
-        throttle: usize,
-        /// Speed span.
-        speed: usize,
-    },
+    /// One or two linear forms over the states.
+    pub arguments: Vec<Vec<T>>,
 }
 
 /// Taylor coefficients of a channel over a step.
 #[derive(Clone, Debug)]
 pub struct ChannelSeries<T> {
-    /// The speed.
-    pub speed: Series<T>,
+    /// The arguments.
+    pub arguments: [Series<T>; 2],
     /// exp(-|s|/v_s) of a Stribeck law.
     exponential: Series<T>,
-    /// μ, or unused.
+    /// μ of a friction law.
     mu: Series<T>,
     /// The torque, N·m.
     pub torque: Series<T>,
@@ -86,119 +76,90 @@ pub struct ChannelSeries<T> {
 impl<T: Real> Default for ChannelSeries<T> {
     fn default() -> Self {
         let zero = [T::zero_(); TERMS];
-        Self { speed: zero, exponential: zero, mu: zero, torque: zero }
+        Self { arguments: [zero, zero], exponential: zero, mu: zero, torque: zero }
     }
 }
 
 impl<T: Real> Normal<T> {
-    /// Value and rate [N·m over μ, per s] of the normal load, not cut at zero; `inputs` holds value
-    /// and rate of every input.
-    pub fn line(&self, inputs: &[[T; 2]]) -> [T; 2] {
+    /// Coefficient `k` of the normal load (capacity over μ), not cut at zero.
+    pub fn term(&self, inputs: &[Series<T>], k: usize) -> T {
         match *self {
             Self::Pressure { input, gain, p0 } => {
-                [gain * (inputs[input][0] - p0), gain * inputs[input][1]]
+                let pressure = inputs[input][k];
+                gain * if k == 0 { pressure - p0 } else { pressure }
             }
-            Self::Constant(normal) => [normal, T::zero_()],
+            Self::Constant(normal) => {
+                if k == 0 {
+                    normal
+                } else {
+                    T::zero_()
+                }
+            }
         }
+    }
+
+    /// All coefficients of the normal load.
+    pub fn series(&self, inputs: &[Series<T>]) -> Series<T> {
+        std::array::from_fn(|k| self.term(inputs, k))
     }
 }
 
 impl<T: Real> Channel<T> {
-    /// Channel of a friction element.
-    pub fn friction(friction: &Friction<T>, slip: Vec<T>) -> Self {
-        let (mu, normal) = (friction.law.clone(), friction.normal.clone());
-        Self { law: Law::Friction { mu, normal, peak: friction.peak }, speed: slip }
+    /// Whether the active cell depends on an input and may change when that jumps.
+    pub fn follows_inputs(&self) -> bool {
+        matches!(self.law, Law::Map { .. })
     }
 
-    /// Channel of a force law, `None` for the linear ones.
-    pub fn force(law: &ForceLaw<T>, speed: Vec<T>) -> Option<Self> {
-        let law = match law {
-            ForceLaw::Input(_) | ForceLaw::Constant(_) => return None,
-            ForceLaw::Quadratic(coefficient) => Law::Quadratic(*coefficient),
-            ForceLaw::Map { input, map } => Law::Map { input: *input, map: map.clone() },
-        };
-        Some(Self { law, speed })
-    }
-
-    /// The cell that holds at speed `s` when moving with `sign`.
-    pub fn cell_at(&self, s: f64, sign: f64, inputs: &[[T; 2]]) -> Cell {
-        match &self.law {
-            Law::Friction { mu: FrictionLaw::Table(table), .. } => {
-                Cell::Moving { sign, piece: table.cell((s * sign).max(0.0)) }
-            }
-            Law::Friction { .. } | Law::Quadratic(_) => Cell::Moving { sign, piece: 0 },
-            Law::Map { input, map } => Cell::Map {
-                throttle: span_index(&map.throttle, inputs[*input][0].re()),
-                speed: span_index(&map.speed, s),
-            },
-        }
-    }
-
-    /// Fill in coefficient `k` of the torque; the speed's coefficients up to `k` are given.
-    pub fn term(&self, cell: Cell, inputs: &[[T; 2]], c: &mut ChannelSeries<T>, k: usize) {
+    /// Fill in coefficient `k` of the torque; the arguments' coefficients up to `k` are given.
+    pub fn term(&self, cell: Cell, inputs: &[Series<T>], c: &mut ChannelSeries<T>, k: usize) {
+        let [s, r] = &c.arguments;
         c.torque[k] = match (&self.law, cell) {
             (_, Cell::Off) => T::zero_(),
             (Law::Friction { mu, normal, peak }, Cell::Saturated { sign }) => {
-                let capacity = mu.at(T::zero_()) * *peak * sign;
-                if k < 2 { normal.line(inputs)[k] * capacity } else { T::zero_() }
+                normal.term(inputs, k) * mu.at(T::zero_()) * *peak * sign
             }
             (Law::Friction { mu, normal, .. }, Cell::Moving { sign, piece }) => {
                 c.mu[k] = mu_term(mu, sign, piece, c, k);
-                let [n0, n1] = normal.line(inputs);
-                let torque = c.mu[k] * n0;
-                (if k > 0 { torque + c.mu[k - 1] * n1 } else { torque }) * sign
+                let product = (0..=k).fold(T::zero_(), |sum, i| {
+                    let normal = normal.term(inputs, i);
+                    if normal.re() == 0.0 && i > 1 { sum } else { sum + normal * c.mu[k - i] }
+                });
+                product * sign
             }
             (Law::Quadratic(coefficient), Cell::Moving { sign, .. }) => {
-                *coefficient * product_term(&c.speed, &c.speed, k) * sign
+                *coefficient * product_term(s, s, k) * sign
             }
             (Law::Map { input, map }, Cell::Map { throttle, speed }) => {
                 let cell = map.cell(throttle, speed);
-                let [p0, p1] = inputs[*input];
-                let linear = c.speed[k] * (p0 * cell.t11 + cell.t01);
-                match k {
-                    0 => linear + p0 * cell.t10 + cell.t00,
-                    1 => linear + p1 * cell.t10 + p1 * c.speed[0] * cell.t11,
-                    _ => linear + p1 * c.speed[k - 1] * cell.t11,
+                let position = &inputs[*input];
+                let bilinear = product_term(position, s, k) * cell.t11;
+                let linear = bilinear + position[k] * cell.t10 + s[k] * cell.t01;
+                if k == 0 { linear + cell.t00 } else { linear }
+            }
+            (Law::Converter { map, at_turbine }, Cell::Converter { index }) => {
+                let cell = map.cell(index);
+                // torque = q0 ω_p² + q1 ω_p ω_t + q2 ω_t², with ν = ω_t / ω_p multiplied out
+                let ([c0, c1], [m0, m1]) = (cell.c, cell.m);
+                let q = if *at_turbine {
+                    [c0 * m0, c0 * m1 + c1 * m0, c1 * m1]
+                } else {
+                    [-c0, -c1, 0.0]
+                };
+                product_term(s, s, k) * q[0]
+                    + product_term(s, r, k) * q[1]
+                    + product_term(r, r, k) * q[2]
+            }
+            (Law::Backlash { stiffness, damping, half_gap }, Cell::Backlash { side, contact }) => {
+                let offset = if k == 0 { *half_gap * side } else { T::zero_() };
+                let spring = *stiffness * (s[k] - offset);
+                match contact {
+                    Contact::Free | Contact::Parting => T::zero_(),
+                    Contact::Spring => spring + *damping * r[k],
+                    Contact::Limited => spring * 2.0,
                 }
             }
             (law, cell) => unreachable!("cell {cell:?} does not belong to {law:?}"),
         };
-    }
-
-    /// Borders of the cell: each series must stay positive; crossing leads to the named cell.
-    pub fn borders(
-        &self,
-        cell: Cell,
-        inputs: &[[T; 2]],
-        c: &ChannelSeries<T>,
-    ) -> Vec<(Series<T>, Cell)> {
-        match (&self.law, cell) {
-            (Law::Friction { mu: FrictionLaw::Table(table), .. }, Cell::Moving { sign, piece }) => {
-                let (_, span) = table.piece(piece);
-                let slip = scaled(&c.speed, sign);
-                between(&slip, (if piece == 0 { f64::NEG_INFINITY } else { span.0 }, span.1))
-                    .map(|(series, step)| {
-                        (series, Cell::Moving { sign, piece: piece.wrapping_add_signed(step) })
-                    })
-                    .collect()
-            }
-            (Law::Quadratic(_), Cell::Moving { sign, piece }) => {
-                vec![(scaled(&c.speed, sign), Cell::Moving { sign: -sign, piece })]
-            }
-            (Law::Map { input, map }, Cell::Map { throttle, speed }) => {
-                let cell = map.cell(throttle, speed);
-                let mut position = [T::zero_(); TERMS];
-                position[..2].copy_from_slice(&inputs[*input]);
-                let across = between(&position, cell.throttle).map(|(series, step)| {
-                    (series, Cell::Map { throttle: throttle.wrapping_add_signed(step), speed })
-                });
-                let along = between(&c.speed, cell.speed).map(|(series, step)| {
-                    (series, Cell::Map { throttle, speed: speed.wrapping_add_signed(step) })
-                });
-                across.chain(along).collect()
-            }
-            _ => Vec::new(),
-        }
     }
 }
 
@@ -210,7 +171,8 @@ fn mu_term<T: Real>(
     c: &mut ChannelSeries<T>,
     k: usize,
 ) -> T {
-    let slip = c.speed[k] * sign;
+    let speed = &c.arguments[0];
+    let slip = speed[k] * sign;
     match law {
         FrictionLaw::Table(table) => {
             let (Piece { from, value, slope }, _) = table.piece(piece);
@@ -223,7 +185,7 @@ fn mu_term<T: Real>(
             } else {
                 let mut sum = T::zero_();
                 for i in 1..=k {
-                    sum += c.speed[i] * c.exponential[k - i] * i as f64;
+                    sum += speed[i] * c.exponential[k - i] * i as f64;
                 }
                 -sum * sign / (*v_s * k as f64)
             };
@@ -233,29 +195,7 @@ fn mu_term<T: Real>(
     }
 }
 
-fn scaled<T: Real>(series: &Series<T>, factor: f64) -> Series<T> {
-    series.map(|c| c * factor)
-}
-
-/// Distances to the ends of a span that exist, each with the step to the neighbouring cell.
-fn between<T: Real>(
-    series: &Series<T>,
-    span: (f64, f64),
-) -> impl Iterator<Item = (Series<T>, isize)> {
-    let mut above = *series;
-    above[0] -= span.0;
-    let mut below = scaled(series, -1.0);
-    below[0] += span.1;
-    let finite = [(span.0, (above, -1)), (span.1, (below, 1))];
-    finite.into_iter().filter(|(end, _)| end.is_finite()).map(|(_, border)| border)
-}
-
-/// Value of a linear form, given by its coefficients over the independent speeds.
-pub fn form<T: Real>(coefficients: &[T], speeds: &[T]) -> T {
-    coefficients.iter().zip(speeds).fold(T::zero_(), |sum, (&c, &v)| sum + c * v)
-}
-
-/// Product of a matrix row with a vector.
-pub fn apply<T: Real>(matrix: &Matrix<T>, row: usize, vector: &[T]) -> T {
-    form(matrix.row(row), vector)
+/// Value of a linear form, given by its coefficients.
+pub fn form<T: Real>(coefficients: &[T], values: &[T]) -> T {
+    coefficients.iter().zip(values).fold(T::zero_(), |sum, (&c, &v)| sum + c * v)
 }

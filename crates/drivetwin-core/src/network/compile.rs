@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: MIT
 //! From the stated mechanism to matrices in minimal coordinates.
 
-use super::channel::Channel;
+use super::channel::{Channel, Law};
 use super::constraints::{Coordinates, coordinates};
 use super::error::CompileError;
 use super::linalg::{Matrix, solve};
-use crate::model::mechanism::{Account, ForceLaw, LossLaw, Mechanism, Normal, Row};
+use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
 use crate::model::{Driveline, FrictionLaw};
 use crate::number::Real;
 
-/// Most friction elements a mode key can hold.
-pub const MAX_FRICTIONS: usize = 32;
+/// Most friction elements and lossy gears together: the bits of a mode key.
+pub const MAX_ROWS: usize = 32;
+
+/// Inertia given to a massless member that only friction elements touch, relative to the largest
+/// inertia: it then follows whichever element is stronger, within nanoseconds.
+const MASSLESS: f64 = 1e-12;
 
 /// A friction element as the solver sees it.
 #[derive(Clone, Debug)]
@@ -27,23 +31,41 @@ pub struct FrictionRow<T> {
     pub normal: Normal<T>,
     /// Static over kinetic capacity.
     pub peak: T,
-    /// Index of its channel.
-    pub channel: usize,
+    /// Positive slip is blocked.
+    pub one_way: bool,
 }
 
-/// A gear whose efficiency depends on the direction of power.
+/// A lossy gear as the solver sees it.
 #[derive(Clone, Debug)]
 pub struct LossyGear<T> {
+    /// Name for messages and events.
+    pub element: String,
     /// Index of its constraint.
     pub constraint: usize,
-    /// Name for messages.
-    pub element: String,
-    /// Law.
-    pub law: LossLaw,
-    /// Efficiency.
-    pub eta: T,
+    /// Its loss.
+    pub loss: Loss<T>,
     /// Speed of the driving side over the independent speeds.
     pub speed: Vec<T>,
+}
+
+/// A torque that is a channel or a lagging state.
+#[derive(Clone, Debug)]
+pub struct Drive<T> {
+    /// Position of its value in the basis.
+    pub basis: usize,
+    /// Nodes it acts on.
+    pub nodes: Row<T>,
+    /// Where its work is booked; none for compliances.
+    pub account: Option<Account>,
+}
+
+/// A first-order lag: `y' = (target - y) / time`.
+#[derive(Clone, Debug)]
+pub struct Lag<T> {
+    /// Position of the target in the basis.
+    pub target: usize,
+    /// Time constant, s.
+    pub time: T,
 }
 
 /// A compiled mechanism; immutable.
@@ -59,16 +81,20 @@ pub struct Network<T> {
     pub mass: Matrix<T>,
     /// Rates of twist over the independent speeds, springs × speeds.
     pub twist_rates: Matrix<T>,
-    /// Friction elements.
+    /// Friction elements; element j is channel j.
     pub frictions: Vec<FrictionRow<T>>,
     /// Lossy gears.
     pub losses: Vec<LossyGear<T>>,
-    /// Scalar channels: frictions first, then force laws that are not linear.
+    /// Prescribed speeds over the independent speeds, and their inputs.
+    pub prescribed: Vec<(Vec<T>, usize)>,
+    /// Scalar channels: frictions first.
     pub channels: Vec<Channel<T>>,
-    /// Account and node of every channel after the frictions.
-    pub channel_accounts: Vec<(usize, Account)>,
-    /// Node torques of everything but rigid couplings and stuck friction, over the basis
-    /// (x, u, 1, φ): nodes × basis.
+    /// Torques that are channels other than friction, or lagging states.
+    pub drives: Vec<Drive<T>>,
+    /// Lags; their states come after speeds and twists.
+    pub lags: Vec<Lag<T>>,
+    /// Node torques of everything but rigid couplings and stuck friction, over the basis: nodes ×
+    /// basis.
     pub node_torques: Matrix<T>,
 }
 
@@ -80,30 +106,32 @@ impl<T: Real> Network<T> {
 
     /// Compile a stated mechanism.
     pub fn from_mechanism(mechanism: Mechanism<T>) -> Result<Self, CompileError> {
-        if mechanism.frictions.len() > MAX_FRICTIONS {
-            let (count, limit) = (mechanism.frictions.len(), MAX_FRICTIONS);
-            return Err(CompileError::TooManyFrictions { count, limit });
+        let lossy = mechanism.constraints.iter().filter(|c| c.loss.is_some()).count();
+        let count = mechanism.frictions.len() + lossy;
+        if count > MAX_ROWS {
+            return Err(CompileError::TooManyRows { count, limit: MAX_ROWS });
         }
         let coordinates = coordinates(&mechanism)?;
-        let inertia = node_inertia(&mechanism);
-        let n = &coordinates.speeds;
+        let empty = Matrix::zeros(0, 0);
         let mut network = Self {
-            mass: n.transposed().times(&inertia).times(n),
-            inertia,
-            twist_rates: Matrix::zeros(mechanism.springs.len(), coordinates.independent.len()),
+            inertia: node_inertia(&mechanism),
+            mass: empty.clone(),
+            twist_rates: empty.clone(),
+            node_torques: empty,
             coordinates,
             mechanism,
             frictions: Vec::new(),
             losses: Vec::new(),
+            prescribed: Vec::new(),
             channels: Vec::new(),
-            channel_accounts: Vec::new(),
-            node_torques: Matrix::zeros(0, 0),
+            drives: Vec::new(),
+            lags: Vec::new(),
         };
+        network.set_mass();
+        network.give_mass_between_frictions();
         network.refuse_massless()?;
-        network.add_springs();
-        network.add_frictions();
-        network.add_losses();
-        network.add_force_channels();
+        network.add_rows();
+        network.add_drives();
         network.node_torques = network.assemble_node_torques();
         Ok(network)
     }
@@ -113,29 +141,39 @@ impl<T: Real> Network<T> {
         self.coordinates.independent.len()
     }
 
-    /// Number of states: speeds and twists.
-    pub fn states(&self) -> usize {
+    /// Position of the first lagging torque among the states.
+    pub fn first_lag(&self) -> usize {
         self.speeds() + self.mechanism.springs.len()
     }
 
-    /// Length of the basis (x, u, 1, φ).
-    pub fn basis(&self) -> usize {
-        self.one() + 1 + self.channels.len()
+    /// Number of states: speeds, twists, lagging torques.
+    pub fn states(&self) -> usize {
+        self.first_lag() + self.mechanism.forces.iter().filter(|f| f.lag.is_some()).count()
     }
 
-    /// Position of the first input in the basis.
+    /// Position of the first input in the basis (x, u, prescribed accelerations, 1, φ).
     pub fn first_input(&self) -> usize {
         self.states()
     }
 
+    /// Position of the first prescribed acceleration in the basis.
+    pub fn first_rate(&self) -> usize {
+        self.first_input() + self.mechanism.inputs.len()
+    }
+
     /// Position of the constant 1 in the basis.
     pub fn one(&self) -> usize {
-        self.states() + self.mechanism.inputs.len()
+        self.first_rate() + self.mechanism.prescribed.len()
     }
 
     /// Position of the first channel in the basis.
     pub fn first_channel(&self) -> usize {
         self.one() + 1
+    }
+
+    /// Length of the basis.
+    pub fn basis(&self) -> usize {
+        self.first_channel() + self.channels.len()
     }
 
     /// A linear form over nodes, expressed over the independent speeds.
@@ -146,86 +184,168 @@ impl<T: Real> Network<T> {
             .collect()
     }
 
-    fn refuse_massless(&self) -> Result<(), CompileError> {
+    fn node_speed(&self, node: usize) -> Vec<T> {
+        self.over_speeds(&vec![(node, T::of(1.0))])
+    }
+
+    fn set_mass(&mut self) {
         let n = &self.coordinates.speeds;
-        let nothing = Matrix::zeros(self.mass.rows, 1);
-        let Err(column) = solve(&self.mass, &nothing) else { return Ok(()) };
+        self.mass = n.transposed().times(&self.inertia).times(n);
+    }
+
+    /// Independent speed of a direction without mass, if there is one.
+    fn massless_speed(&self) -> Option<usize> {
+        solve(&self.mass, &Matrix::zeros(self.mass.rows, 1)).err()
+    }
+
+    /// Members without mass that only friction elements act on get a negligible one.
+    fn give_mass_between_frictions(&mut self) {
+        let floor = self.inertia.max_abs() * MASSLESS;
+        for j in 0..self.speeds() {
+            let node = self.coordinates.independent[j];
+            let touches = |row: &Row<T>| {
+                row.iter().any(|&(n, _)| self.coordinates.speeds[(n, j)].re() != 0.0)
+            };
+            let massless = self.mass[(j, j)].re() == 0.0;
+            let rubbed = self.mechanism.frictions.iter().any(|f| touches(&f.row));
+            let sprung = self.mechanism.springs.iter().any(|s| touches(&s.row));
+            if massless && rubbed && !sprung {
+                self.inertia[(node, node)] += floor;
+            }
+        }
+        self.set_mass();
+    }
+
+    fn refuse_massless(&self) -> Result<(), CompileError> {
+        let Some(column) = self.massless_speed() else { return Ok(()) };
+        let n = &self.coordinates.speeds;
         let moved = |&node: &usize| n[(node, column)].re() != 0.0;
         let members = (0..n.rows).filter(moved).map(|i| self.mechanism.nodes[i].clone()).collect();
         Err(CompileError::Massless { members })
     }
 
-    fn add_springs(&mut self) {
-        for (i, spring) in self.mechanism.springs.clone().iter().enumerate() {
-            let rate = self.over_speeds(&spring.row);
+    /// Everything that is a linear form over the speeds: twists, slips, gears, prescribed speeds.
+    fn add_rows(&mut self) {
+        self.twist_rates = Matrix::zeros(self.mechanism.springs.len(), self.speeds());
+        for i in 0..self.mechanism.springs.len() {
+            let rate = self.over_speeds(&self.mechanism.springs[i].row);
             self.twist_rates.row_mut(i).copy_from_slice(&rate);
         }
-    }
-
-    fn add_frictions(&mut self) {
-        for (channel, friction) in self.mechanism.frictions.clone().into_iter().enumerate() {
-            let slip = self.over_speeds(&friction.row);
-            self.channels.push(Channel::friction(&friction, slip.clone()));
+        for f in self.mechanism.frictions.clone() {
+            let slip = self.over_speeds(&f.row);
+            let (mu, normal) = (f.law.clone(), f.normal.clone());
+            self.channels.push(Channel {
+                law: Law::Friction { mu, normal, peak: f.peak },
+                arguments: vec![self.over_states(&slip)],
+            });
             self.frictions.push(FrictionRow {
-                element: friction.element,
+                element: f.element,
                 slip,
-                nodes: friction.row,
-                law: friction.law,
-                normal: friction.normal,
-                peak: friction.peak,
-                channel,
+                nodes: f.row,
+                law: f.law,
+                normal: f.normal,
+                peak: f.peak,
+                one_way: f.one_way,
             });
         }
-    }
-
-    fn add_losses(&mut self) {
-        for (constraint, c) in self.mechanism.constraints.iter().enumerate() {
-            if let Some(loss) = &c.loss {
-                self.losses.push(LossyGear {
-                    constraint,
-                    element: c.element.clone(),
-                    law: loss.law,
-                    eta: loss.eta,
-                    speed: self.over_speeds(&vec![(loss.driving, T::of(1.0))]),
-                });
+        for (constraint, c) in self.mechanism.constraints.clone().into_iter().enumerate() {
+            if let Some(loss) = c.loss {
+                let speed = self.node_speed(loss.driving);
+                self.losses.push(LossyGear { element: c.element, constraint, loss, speed });
             }
+        }
+        for p in self.mechanism.prescribed.clone() {
+            self.prescribed.push((self.node_speed(p.node), p.input));
         }
     }
 
-    fn add_force_channels(&mut self) {
+    fn over_states(&self, speeds: &[T]) -> Vec<T> {
+        let mut row = speeds.to_vec();
+        row.resize(self.states(), T::zero_());
+        row
+    }
+
+    /// Torques that are no linear function of the state and inputs become channels; lags become
+    /// states.
+    fn add_drives(&mut self) {
+        for i in 0..self.mechanism.springs.len() {
+            let spring = self.mechanism.springs[i].clone();
+            if let SpringLaw::Backlash { stiffness, damping, half_gap } = spring.law {
+                let mut twist = vec![T::zero_(); self.states()];
+                twist[self.speeds() + i] = T::of(1.0);
+                let arguments = vec![twist, self.over_states(self.twist_rates.row(i))];
+                let law = Law::Backlash { stiffness, damping, half_gap };
+                let basis = self.add_channel(Channel { law, arguments });
+                let nodes = spring.row.into_iter().map(|(node, c)| (node, -c)).collect();
+                self.drives.push(Drive { basis, nodes, account: None });
+            }
+        }
         for force in self.mechanism.forces.clone() {
-            let speed = self.over_speeds(&vec![(force.node, T::of(1.0))]);
-            if let Some(channel) = Channel::force(&force.law, speed) {
-                self.channels.push(channel);
-                self.channel_accounts.push((force.node, force.account));
+            let mut basis = self.value_of(&force.law);
+            if let Some(time) = force.lag {
+                self.lags.push(Lag { target: basis, time });
+                basis = self.first_lag() + self.lags.len() - 1;
             }
+            if let ForceLaw::Constant(_) = force.law {
+                continue;
+            }
+            let nodes = vec![(force.node, T::of(1.0))];
+            self.drives.push(Drive { basis, nodes, account: Some(force.account) });
         }
+    }
+
+    /// Position in the basis of the value of a force law; a new channel where it needs one.
+    fn value_of(&mut self, law: &ForceLaw<T>) -> usize {
+        let over = |network: &Self, node| network.over_states(&network.node_speed(node));
+        let channel = match law {
+            ForceLaw::Input(input) => return self.first_input() + input,
+            ForceLaw::Constant(_) => return self.one(),
+            ForceLaw::Quadratic { coefficient, node } => {
+                Channel { law: Law::Quadratic(*coefficient), arguments: vec![over(self, *node)] }
+            }
+            ForceLaw::Map { input, node, map } => Channel {
+                law: Law::Map { input: *input, map: map.clone() },
+                arguments: vec![over(self, *node)],
+            },
+            ForceLaw::Converter { pump, turbine, map, at_turbine } => Channel {
+                law: Law::Converter { map: map.clone(), at_turbine: *at_turbine },
+                arguments: vec![over(self, *pump), over(self, *turbine)],
+            },
+        };
+        self.add_channel(channel)
+    }
+
+    fn add_channel(&mut self, channel: Channel<T>) -> usize {
+        self.channels.push(channel);
+        self.first_channel() + self.channels.len() - 1
     }
 
     fn assemble_node_torques(&self) -> Matrix<T> {
         let mut f = Matrix::zeros(self.mechanism.nodes.len(), self.basis());
         for (i, spring) in self.mechanism.springs.iter().enumerate() {
-            for &(node, direction) in &spring.row {
-                f[(node, self.speeds() + i)] -= direction * spring.stiffness;
-                for (j, &rate) in self.twist_rates.row(i).iter().enumerate() {
-                    f[(node, j)] -= direction * spring.damping * rate;
+            if let SpringLaw::Linear { stiffness, damping } = spring.law {
+                for &(node, direction) in &spring.row {
+                    f[(node, self.speeds() + i)] -= direction * stiffness;
+                    for (j, &rate) in self.twist_rates.row(i).iter().enumerate() {
+                        f[(node, j)] -= direction * damping * rate;
+                    }
                 }
             }
         }
-        for row in &self.frictions {
+        for (j, row) in self.frictions.iter().enumerate() {
             for &(node, direction) in &row.nodes {
-                f[(node, self.first_channel() + row.channel)] -= direction;
+                f[(node, self.first_channel() + j)] -= direction;
             }
         }
         for force in &self.mechanism.forces {
-            match force.law {
-                ForceLaw::Input(input) => f[(force.node, self.first_input() + input)] += 1.0,
-                ForceLaw::Constant(torque) => f[(force.node, self.one())] += torque,
-                ForceLaw::Quadratic(_) | ForceLaw::Map { .. } => {}
+            if let ForceLaw::Constant(torque) = force.law {
+                f[(force.node, self.one())] += torque;
             }
         }
-        for (i, &(node, _)) in self.channel_accounts.iter().enumerate() {
-            f[(node, self.first_channel() + self.frictions.len() + i)] += 1.0;
+        for drive in &self.drives {
+            for &(node, direction) in &drive.nodes {
+                f[(node, drive.basis)] += direction;
+            }
         }
         f
     }
@@ -241,11 +361,4 @@ fn node_inertia<T: Real>(m: &Mechanism<T>) -> Matrix<T> {
         }
     }
     inertia
-}
-
-impl<T> Network<T> {
-    /// Whether the efficiency of lossy gear `i` depends on the direction of power.
-    pub fn is_directional(&self, i: usize) -> bool {
-        self.losses[i].law == LossLaw::Dissipative
-    }
 }

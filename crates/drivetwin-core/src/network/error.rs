@@ -31,9 +31,9 @@ pub enum CompileError {
     /// Everything is rigidly connected to the ground.
     #[error("the mechanism cannot move: its rigid couplings leave no independent speed")]
     Immobile,
-    /// More friction elements or lossy gears than mode keys can hold.
-    #[error("{count} friction elements; at most {limit} are supported")]
-    TooManyFrictions {
+    /// More friction elements and lossy gears than a mode key can hold.
+    #[error("{count} friction elements and lossy gears; at most {limit} are supported")]
+    TooManyRows {
         /// Number found.
         count: usize,
         /// Number supported.

@@ -1,24 +1,29 @@
 // SPDX-License-Identifier: MIT
 //! 2 The compiled mechanism: minimal coordinates, mass matrix, friction rows, modes.
 //!
-//! State `x = (v, z)`: independent speeds and twists. In one mode (which friction elements are
-//! stuck, which way power flows through lossy gears)
+//! State `x = (v, z, y)`: independent speeds, twists, lagging torques. In one mode (which friction
+//! elements and gears are stuck, which way power flows through lossy gears)
 //!
 //! ```text
-//! x' = D · (x, u, 1, φ)      τ_stuck = T · (x, u, 1, φ)      λ = L · (x, u, 1, φ)
+//! x' = D · b      τ_stuck = T · b      λ = L · b      b = (x, u, prescribed accelerations, 1, φ)
 //! ```
 //!
 //! with inputs u and scalar channels φ: the torque of every slipping friction element and of every
 //! force law that is not linear.
 
+pub mod cell;
 pub mod channel;
 mod compile;
 mod constraints;
+pub mod engaged;
 mod error;
 pub mod linalg;
 mod mode;
+pub mod reduction;
+pub mod statics;
 
-pub use channel::{Cell, Channel};
+pub use cell::Cell;
+pub use channel::Channel;
 pub use compile::{FrictionRow, LossyGear, Network};
 pub use error::CompileError;
-pub use mode::{Mode, ModeKey};
+pub use mode::{GearBounds, GearState, Mode, ModeKey, Row};

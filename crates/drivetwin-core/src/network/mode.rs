@@ -5,75 +5,171 @@
 use super::compile::Network;
 use super::constraints::force_map;
 use super::linalg::{Matrix, independent_rows, least_norm, solve};
-use crate::model::mechanism::LossLaw;
+use crate::model::mechanism::{Loss, LossLaw};
 use crate::number::Real;
 
-/// Which friction elements are stuck and through which lossy gears power flows backwards, as bits.
+/// How a lossy gear moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GearState {
+    /// Turning, its loss set by direction of motion and of power.
+    Rolling {
+        /// Sign of the driving side's speed.
+        sign: f64,
+        /// Power flows from the driven to the driving side.
+        backward: bool,
+    },
+    /// At rest, held by its own loss.
+    Held,
+}
+
+/// Something that keeps a speed at zero: friction element or lossy gear, by index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Row {
+    /// Friction element.
+    Friction(usize),
+    /// Lossy gear.
+    Gear(usize),
+}
+
+/// Which friction elements are stuck and how the lossy gears move, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ModeKey {
-    /// Bit j: friction element j is stuck.
-    pub stuck: u32,
-    /// Bit i: power flows from the driven to the driving side of lossy gear i.
-    pub backward: u32,
+    stuck: u32,
+    held: u32,
+    backward: u32,
+    reverse: u32,
 }
 
 impl ModeKey {
-    /// Indices of the stuck elements, in order.
-    pub fn stuck_rows(self) -> impl Iterator<Item = usize> {
-        (0..u32::BITS as usize).filter(move |j| self.stuck >> j & 1 == 1)
+    /// Key of the stuck elements and gear states.
+    pub fn new(stuck: impl Iterator<Item = usize>, gears: &[GearState]) -> Self {
+        let mut key = Self::default();
+        stuck.for_each(|j| key.stuck |= 1 << j);
+        for (i, gear) in gears.iter().enumerate() {
+            match *gear {
+                GearState::Held => key.held |= 1 << i,
+                GearState::Rolling { sign, backward } => {
+                    key.backward |= u32::from(backward) << i;
+                    key.reverse |= u32::from(sign < 0.0) << i;
+                }
+            }
+        }
+        key
     }
 
-    /// The key with element `j` stuck or not.
-    pub fn with_stuck(self, j: usize, stuck: bool) -> Self {
-        let bit = 1 << j;
-        Self { stuck: if stuck { self.stuck | bit } else { self.stuck & !bit }, ..self }
+    /// Rows that keep a speed at zero: friction elements, then gears.
+    pub fn rows(self) -> Vec<Row> {
+        let bits = |set: u32| (0..u32::BITS as usize).filter(move |j| set >> j & 1 == 1);
+        bits(self.stuck).map(Row::Friction).chain(bits(self.held).map(Row::Gear)).collect()
     }
 }
 
-/// Linear maps over the basis (x, u, 1, φ).
+/// Linear maps over the basis.
 #[derive(Clone, Debug)]
 pub struct Mode<T> {
     /// State derivatives, states × basis.
     pub derivative: Matrix<T>,
-    /// Torques of the stuck elements in the order of `stuck`, stuck × basis.
+    /// Rows at rest.
+    pub stuck: Vec<Row>,
+    /// Their torques in that order (a held gear's is its loss torque), then the torques of
+    /// prescribed speeds; rows × basis.
     pub stuck_torque: Matrix<T>,
-    /// The stuck elements.
-    pub stuck: Vec<usize>,
     /// Torque entering each lossy gear at its driving side, losses × basis.
     pub gear_torque: Matrix<T>,
-    /// Whether more elements are stuck than there are speeds to hold; the torque split then
-    /// depends on the capacities.
+    /// Whether more is stuck than there are speeds to hold; the torque split then depends on the
+    /// capacities.
     pub redundant: bool,
 }
 
+/// Bounds of the loss torque of a gear at rest, as lines over the torque through it: each bound is
+/// `slope · λ + drag`; the upper is the larger, the lower the smaller of its pair.
+#[derive(Clone, Copy, Debug)]
+pub struct GearBounds<T> {
+    /// Lines of the bound towards forward motion.
+    pub upper: [(T, T); 2],
+    /// Lines of the bound towards backward motion.
+    pub lower: [(T, T); 2],
+}
+
+impl<T: Real> Loss<T> {
+    /// Whether the loss depends on the direction of power.
+    pub fn is_directional(&self) -> bool {
+        self.law == LossLaw::Dissipative
+    }
+
+    /// Factor between the torque that enters at the driving side and what the driven side gets, and
+    /// the drag that is taken off before (with the sign of motion).
+    fn factor(&self, sign: f64, backward: bool) -> (T, T) {
+        match (self.law, backward) {
+            (LossLaw::Paper, _) => (self.eta, T::zero_()),
+            (LossLaw::Dissipative, false) => (self.eta, self.drag * sign),
+            (LossLaw::Dissipative, true) => (self.eta_backward.recip(), self.drag_backward * sign),
+        }
+    }
+
+    /// Torque lost at the driving side of a rolling gear that `torque` enters.
+    pub fn loss_torque(&self, torque: T, sign: f64, backward: bool) -> T {
+        let (factor, drag) = self.factor(sign, backward);
+        torque * (-factor + 1.0) + drag
+    }
+
+    /// Torque through the gear, in the direction of motion, above which power flows forward.
+    pub fn threshold(&self) -> T {
+        let slope = self.eta - self.eta_backward.recip();
+        if slope.re() == 0.0 { T::zero_() } else { (self.drag - self.drag_backward) / slope }
+    }
+
+    /// Bounds at rest.
+    pub fn bounds(&self) -> GearBounds<T> {
+        let forward = (-self.eta + 1.0, self.drag);
+        let backward = (-self.eta_backward.recip() + 1.0, self.drag_backward);
+        let mirrored = |(slope, drag): (T, T)| (slope, -drag);
+        GearBounds { upper: [forward, backward], lower: [mirrored(forward), mirrored(backward)] }
+    }
+}
+
 impl<T: Real> Network<T> {
+    /// Speed that a row keeps at zero, over the independent speeds.
+    pub fn slip_of(&self, row: Row) -> &[T] {
+        match row {
+            Row::Friction(j) => &self.frictions[j].slip,
+            Row::Gear(i) => &self.losses[i].speed,
+        }
+    }
+
+    /// Name of a row's element.
+    pub fn element_of(&self, row: Row) -> &str {
+        match row {
+            Row::Friction(j) => &self.frictions[j].element,
+            Row::Gear(i) => &self.losses[i].element,
+        }
+    }
+
     /// Compile one mode. `capacity[j]` weighs the torque split of redundant locks.
     /// `None` if the efficiencies leave the accelerations undetermined.
     pub fn mode(&self, key: ModeKey, capacity: &[T]) -> Option<Mode<T>> {
         let n = &self.coordinates.speeds;
         let efficiency = |_: &_, constraint: usize| self.efficiency(key, constraint);
         let (map, force_rows) = force_map(&self.mechanism, &self.coordinates, efficiency)?;
+        let node_torques = self.with_drag(key);
         let kt = map.transposed();
         let mass = kt.times(&self.inertia).times(n);
-        let free = solve(&mass, &kt.times(&self.node_torques)).ok()?;
+        let free = solve(&mass, &kt.times(&node_torques)).ok()?;
 
-        let stuck: Vec<usize> = key.stuck_rows().collect();
-        let mut slip = Matrix::zeros(stuck.len(), self.speeds());
-        let mut nodes = Matrix::zeros(self.mechanism.nodes.len(), stuck.len());
-        for (i, &j) in stuck.iter().enumerate() {
-            slip.row_mut(i).copy_from_slice(&self.frictions[j].slip);
-            for &(node, direction) in &self.frictions[j].nodes {
-                nodes[(node, i)] += direction;
-            }
-        }
+        let stuck = key.rows();
+        let (speeds, nodes) = self.held_speeds(&stuck);
         let response = solve(&mass, &kt.times(&nodes)).ok()?;
+        let mut needed = speeds.times(&free);
+        for i in 0..self.prescribed.len() {
+            needed[(stuck.len() + i, self.first_rate() + i)] -= 1.0;
+        }
         let (stuck_torque, redundant) =
-            holding_torque(&slip.times(&response), &slip.times(&free), &stuck, capacity);
+            holding_torque(&speeds.times(&response), &needed, &self.weights(&stuck, capacity));
         let acceleration = difference(&free, &response.times(&stuck_torque));
-        let torques = difference(&self.node_torques, &nodes.times(&stuck_torque));
+        let torques = difference(&node_torques, &nodes.times(&stuck_torque));
         let residual = difference(&torques, &self.inertia.times(n).times(&acceleration));
         Some(Mode {
-            derivative: self.with_twists(&acceleration),
+            derivative: self.with_other_states(&acceleration),
             gear_torque: self.gear_torques(&force_rows, &residual)?,
             stuck_torque,
             stuck,
@@ -83,15 +179,65 @@ impl<T: Real> Network<T> {
 
     fn efficiency(&self, key: ModeKey, constraint: usize) -> Option<T> {
         let i = self.losses.iter().position(|loss| loss.constraint == constraint)?;
-        let loss = &self.losses[i];
-        let backward = key.backward >> i & 1 == 1;
-        Some(match loss.law {
-            LossLaw::Dissipative if backward => loss.eta.recip(),
-            LossLaw::Paper | LossLaw::Dissipative => loss.eta,
-        })
+        if key.held >> i & 1 == 1 {
+            return None;
+        }
+        Some(self.losses[i].loss.factor(1.0, key.backward >> i & 1 == 1).0)
     }
 
-    fn with_twists(&self, acceleration: &Matrix<T>) -> Matrix<T> {
+    /// Node torques with the drag of rolling gears, which acts on their driven side.
+    fn with_drag(&self, key: ModeKey) -> Matrix<T> {
+        let mut torques = self.node_torques.clone();
+        for (i, gear) in self.losses.iter().enumerate() {
+            if key.held >> i & 1 == 1 {
+                continue;
+            }
+            let sign = if key.reverse >> i & 1 == 1 { -1.0 } else { 1.0 };
+            let (_, drag) = gear.loss.factor(sign, key.backward >> i & 1 == 1);
+            for &(node, coefficient) in &self.mechanism.constraints[gear.constraint].row[1..] {
+                torques[(node, self.one())] += coefficient * drag;
+            }
+        }
+        torques
+    }
+
+    /// Speeds kept at zero or prescribed, over the independent speeds and over the nodes.
+    fn held_speeds(&self, stuck: &[Row]) -> (Matrix<T>, Matrix<T>) {
+        let count = stuck.len() + self.prescribed.len();
+        let mut speeds = Matrix::zeros(count, self.speeds());
+        let mut nodes = Matrix::zeros(self.mechanism.nodes.len(), count);
+        for (i, &row) in stuck.iter().enumerate() {
+            speeds.row_mut(i).copy_from_slice(self.slip_of(row));
+            match row {
+                Row::Friction(j) => {
+                    for &(node, direction) in &self.frictions[j].nodes {
+                        nodes[(node, i)] += direction;
+                    }
+                }
+                Row::Gear(g) => nodes[(self.losses[g].loss.driving, i)] += 1.0,
+            }
+        }
+        for (i, (speed, _)) in self.prescribed.iter().enumerate() {
+            speeds.row_mut(stuck.len() + i).copy_from_slice(speed);
+            nodes[(self.mechanism.prescribed[i].node, stuck.len() + i)] += 1.0;
+        }
+        (speeds, nodes)
+    }
+
+    /// What each held speed's torque can be, for the split of redundant locks; prescribed speeds,
+    /// which come last, and one-way clutches carry what the others cannot.
+    fn weights(&self, stuck: &[Row], capacity: &[T]) -> Vec<T> {
+        let unbounded = capacity.iter().fold(1.0, |m, c| c.re().max(m)) * 1e3;
+        let weight = |&row: &Row| match row {
+            Row::Friction(j) if !self.frictions[j].one_way => capacity[j] + 1e-9,
+            Row::Friction(_) => T::of(unbounded),
+            Row::Gear(_) => T::of(1.0),
+        };
+        let prescribed = std::iter::repeat_n(T::of(unbounded), self.prescribed.len());
+        stuck.iter().map(weight).chain(prescribed).collect()
+    }
+
+    fn with_other_states(&self, acceleration: &Matrix<T>) -> Matrix<T> {
         let mut derivative = Matrix::zeros(self.states(), self.basis());
         for i in 0..self.speeds() {
             derivative.row_mut(i).copy_from_slice(acceleration.row(i));
@@ -99,6 +245,11 @@ impl<T: Real> Network<T> {
         for i in 0..self.twist_rates.rows {
             let rate = self.twist_rates.row(i);
             derivative.row_mut(self.speeds() + i)[..rate.len()].copy_from_slice(rate);
+        }
+        for (i, lag) in self.lags.iter().enumerate() {
+            let state = self.first_lag() + i;
+            derivative[(state, state)] -= lag.time.recip();
+            derivative[(state, lag.target)] += lag.time.recip();
         }
         derivative
     }
@@ -114,27 +265,21 @@ impl<T: Real> Network<T> {
     }
 }
 
-/// Solve `W τ = b` for the torques that hold the slips at zero. For redundant locks the torques are
-/// those of least `Σ (τ_j / cap_j)²`.
-fn holding_torque<T: Real>(
-    w: &Matrix<T>,
-    b: &Matrix<T>,
-    stuck: &[usize],
-    capacity: &[T],
-) -> (Matrix<T>, bool) {
+/// Solve `W τ = b` for the torques that hold the speeds. For redundant locks the torques are those of
+/// least `Σ (τ_j / weight_j)²`.
+fn holding_torque<T: Real>(w: &Matrix<T>, b: &Matrix<T>, weights: &[T]) -> (Matrix<T>, bool) {
     if independent_rows(w).len() == w.rows {
         return (solve(w, b).expect("independent rows"), false);
     }
-    let scale = |i: usize| capacity[stuck[i]] + f64::MIN_POSITIVE.sqrt();
     let mut scaled = w.clone();
     for r in 0..w.rows {
         for c in 0..w.cols {
-            scaled[(r, c)] *= scale(c);
+            scaled[(r, c)] *= weights[c];
         }
     }
     let mut torque = least_norm(&scaled, b);
     for i in 0..torque.rows {
-        torque.row_mut(i).iter_mut().for_each(|t| *t *= scale(i));
+        torque.row_mut(i).iter_mut().for_each(|t| *t *= weights[i]);
     }
     (torque, true)
 }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 //! Where the energy of a run went.
 
-use crate::model::mechanism::{Account, ForceLaw};
-use crate::network::Network;
+use crate::model::mechanism::{Account, ForceLaw, Spring, SpringLaw};
 use crate::network::channel::form;
-use crate::number::{Real, Series, evaluate};
+use crate::network::{GearState, Network};
+use crate::number::Real;
 use crate::solve::{Integrator, Step};
 
-/// Work over a run, J: `source = stored + friction + gear_loss + shaft + load + error`.
+/// Work over a run, J: `source = stored + friction + gear_loss + shaft + load + converter + error`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergyAudit {
     /// Work of the sources.
@@ -22,6 +22,8 @@ pub struct EnergyAudit {
     pub shaft: f64,
     /// Work against loads.
     pub load: f64,
+    /// Heat of torque converters.
+    pub converter: f64,
     /// Energy that gears created, as a positive number; part of `gear_loss`.
     pub created: f64,
     /// What is missing in the balance.
@@ -50,59 +52,64 @@ impl Auditor {
 
     /// Add the work of one step.
     pub fn add<T: Real>(&mut self, run: &Integrator<'_, T>, step: &Step<T>) {
-        let network = run.network;
-        let gear_torques: Vec<Series<T>> = (0..network.losses.len())
-            .map(|i| run.expansion.form(network, run.mode.gear_torque.row(i)))
-            .collect();
-        let mut x = run.x.clone();
         for (node, weight) in GAUSS {
-            let h = step.length * node;
-            let width = weight * step.length.re();
-            run.expansion.state_at(h, &mut x);
-            self.add_forces(run, &x, h, width);
-            for channel in &run.expansion.channels[..network.frictions.len()] {
-                let torque = evaluate(&channel.torque, run.expansion.order, h);
-                let slip = evaluate(&channel.speed, run.expansion.order, h);
-                self.audit.friction += (torque * slip).re() * width;
-            }
-            for (spring, i) in network.mechanism.springs.iter().zip(0..) {
-                let rate = form(network.twist_rates.row(i), &x);
-                self.audit.shaft += (spring.damping * rate * rate).re() * width;
-            }
-            for (i, loss) in network.losses.iter().enumerate() {
-                let torque = evaluate(&gear_torques[i], run.expansion.order, h);
-                let power = (torque * form(&loss.speed, &x)).re();
-                let eta = loss.eta.re();
-                let backward = network.is_directional(i) && power < 0.0;
-                let lost = power * (1.0 - if backward { eta.recip() } else { eta }) * width;
-                self.audit.gear_loss += lost;
-                self.audit.created += (-lost).max(0.0);
-            }
+            let basis = run.expansion.basis_at(run.network, step.length * node);
+            self.add_powers(run, &basis, weight * step.length.re());
         }
     }
 
-    fn add_forces<T: Real>(&mut self, run: &Integrator<'_, T>, x: &[T], h: T, width: f64) {
+    fn add_powers<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
         let network = run.network;
         let n = &network.coordinates.speeds;
-        let mut channel = network.frictions.len();
+        let audit = &mut self.audit;
+        for (j, row) in network.frictions.iter().enumerate() {
+            let torque = basis[network.first_channel() + j];
+            audit.friction += (torque * form(&row.slip, basis)).re() * width;
+        }
         for force in &network.mechanism.forces {
-            let torque = match force.law {
-                ForceLaw::Input(i) => {
-                    let [value, rate] = run.expansion.inputs[i];
-                    value + rate * h
-                }
-                ForceLaw::Constant(torque) => torque,
-                ForceLaw::Quadratic(_) | ForceLaw::Map { .. } => {
-                    channel += 1;
-                    let series = &run.expansion.channels[channel - 1].torque;
-                    evaluate(series, run.expansion.order, h)
+            if let ForceLaw::Constant(torque) = force.law {
+                audit.load -= (torque * form(n.row(force.node), basis)).re() * width;
+            }
+        }
+        for drive in &network.drives {
+            let speed = drive.nodes.iter().fold(T::zero_(), |sum, &(node, direction)| {
+                sum + direction * form(n.row(node), basis)
+            });
+            let work = (basis[drive.basis] * speed).re() * width;
+            match drive.account {
+                Some(Account::Source) => audit.source += work,
+                Some(Account::Load) => audit.load -= work,
+                Some(Account::Converter) => audit.converter -= work,
+                None => audit.shaft -= work,
+            }
+        }
+        for (i, spring) in network.mechanism.springs.iter().enumerate() {
+            let rate = form(network.twist_rates.row(i), basis);
+            let twist = basis[network.speeds() + i];
+            audit.shaft += match spring.law {
+                SpringLaw::Linear { damping, .. } => (damping * rate * rate).re() * width,
+                SpringLaw::Backlash { .. } => -(elastic_torque(spring, twist) * rate).re() * width,
+            };
+        }
+        for (i, (speed, _)) in network.prescribed.iter().enumerate() {
+            let reaction = form(run.mode.stuck_torque.row(run.mode.stuck.len() + i), basis);
+            audit.source -= (reaction * form(speed, basis)).re() * width;
+        }
+        self.add_gear_losses(run, basis, width);
+    }
+
+    fn add_gear_losses<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
+        for (i, gear) in run.network.losses.iter().enumerate() {
+            let torque = form(run.mode.gear_torque.row(i), basis);
+            let speed = form(&gear.speed, basis);
+            let lost = match run.gears[i] {
+                GearState::Held => 0.0,
+                GearState::Rolling { sign, backward } => {
+                    (gear.loss.loss_torque(torque, sign, backward) * speed).re() * width
                 }
             };
-            let work = (torque * form(n.row(force.node), x)).re() * width;
-            match force.account {
-                Account::Source => self.audit.source += work,
-                Account::Load => self.audit.load -= work,
-            }
+            self.audit.gear_loss += lost;
+            self.audit.created += (-lost).max(0.0);
         }
     }
 
@@ -110,8 +117,20 @@ impl Auditor {
     pub fn close<T: Real>(mut self, network: &Network<T>, x: &[T]) -> EnergyAudit {
         let a = &mut self.audit;
         a.stored = stored_energy(network, x) - self.start;
-        a.error = a.source - a.stored - a.friction - a.gear_loss - a.shaft - a.load;
+        a.error = a.source - a.stored - a.friction - a.gear_loss - a.shaft - a.load - a.converter;
         self.audit
+    }
+}
+
+/// Spring torque without damping.
+fn elastic_torque<T: Real>(spring: &Spring<T>, twist: T) -> T {
+    match spring.law {
+        SpringLaw::Linear { stiffness, .. } => stiffness * twist,
+        SpringLaw::Backlash { stiffness, half_gap, .. } => {
+            let side = if twist.re() < 0.0 { -1.0 } else { 1.0 };
+            let depth = twist * side - half_gap;
+            if depth.re() > 0.0 { stiffness * depth * side } else { T::zero_() }
+        }
     }
 }
 
@@ -121,7 +140,13 @@ fn stored_energy<T: Real>(network: &Network<T>, x: &[T]) -> f64 {
         energy += 0.5 * (x[i] * form(network.mass.row(i), x)).re();
     }
     for (spring, twist) in network.mechanism.springs.iter().zip(&x[network.speeds()..]) {
-        energy += 0.5 * (spring.stiffness * *twist * *twist).re();
+        let torque = elastic_torque(spring, *twist).re();
+        let stiffness = match spring.law {
+            SpringLaw::Linear { stiffness, .. } | SpringLaw::Backlash { stiffness, .. } => {
+                stiffness
+            }
+        };
+        energy += if torque == 0.0 { 0.0 } else { 0.5 * torque * torque / stiffness.re() };
     }
     energy
 }

@@ -7,7 +7,7 @@ use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};
 use crate::network::Network;
 use crate::number::Real;
-use crate::solve::Settings;
+use crate::solve::{Settings, Signal};
 
 /// Start of a dual-clutch run.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ pub type DualClutchRun<T> = Trajectory<T>;
 /// Simulate the dual-clutch driveline (paper eqs. 2-9).
 pub fn simulate_dual_clutch<T: Real>(
     model: &DualClutch<T>,
-    signals: &[(&str, &[f64], &[T])],
+    signals: &[(&str, Signal<'_, T>)],
     start: &DualClutchStart<T>,
     grid: &[f64],
     options: (Settings, bool),

@@ -6,7 +6,7 @@ use super::start::{Start, StartError};
 use super::trajectory::{Output, Recorder, Trajectory};
 use crate::network::{CompileError, Network};
 use crate::number::Real;
-use crate::solve::{InputError, Inputs, Integrator, Settings, Status};
+use crate::solve::{InputError, Inputs, Integrator, Settings, Signal, Status};
 use thiserror::Error;
 
 /// Why a scenario cannot be run at all.
@@ -29,11 +29,11 @@ pub enum SimulateError {
     },
 }
 
-/// Simulate over `grid` [s] and record `outputs` on it. Signals are `(input name, times, values)`.
+/// Simulate over `grid` [s] and record `outputs` on it. Signals go by the names of the inputs.
 /// A run that fails on the way ends with its status and NaN from there on.
 pub fn run<T: Real>(
     network: &Network<T>,
-    signals: &[(&str, &[f64], &[T])],
+    signals: &[(&str, Signal<'_, T>)],
     start: &Start<T>,
     grid: &[f64],
     outputs: &[Output],
@@ -50,6 +50,9 @@ pub fn run<T: Real>(
             found.copied().ok_or_else(|| InputError::Missing { name: name.clone() })
         })
         .collect::<Result<Vec<_>, _>>()?;
+    for prescribed in &network.mechanism.prescribed {
+        refuse_jump(ordered[prescribed.input])?;
+    }
     let inputs = Inputs::join(&ordered, span)?;
     let (x, locked) = start.state(network)?;
     let mut recorder = Recorder::new(network, outputs, grid)?;
@@ -77,7 +80,9 @@ pub fn run<T: Real>(
     };
     let status = integrate().err().unwrap_or(Status::Completed);
     let columns = recorder.finish();
-    let elements = network.frictions.iter().map(|row| row.element.clone()).collect();
+    let frictions = network.frictions.iter().map(|row| row.element.clone());
+    let elements =
+        frictions.chain(network.losses.iter().map(|gear| gear.element.clone())).collect();
     let time = grid.to_vec();
     Ok(Trajectory { time, columns, elements, events, status, audit: balance })
 }
@@ -87,6 +92,15 @@ fn check_grid(grid: &[f64]) -> Result<(), SimulateError> {
     match (0..grid.len()).find(|&i| !ordered(i)) {
         Some(index) => Err(SimulateError::Grid { index }),
         None if grid.len() < 2 => Err(SimulateError::Grid { index: 0 }),
+        None => Ok(()),
+    }
+}
+
+/// A prescribed speed that jumps would take an infinite torque.
+fn refuse_jump<T: Real>((name, signal): (&str, Signal<'_, T>)) -> Result<(), InputError> {
+    let Signal::Samples(times, _) = signal else { return Ok(()) };
+    match times.windows(2).position(|w| w[0] == w[1]) {
+        Some(i) => Err(InputError::Jump { name: name.to_owned(), time: times[i] }),
         None => Ok(()),
     }
 }

@@ -3,16 +3,21 @@
 
 use super::audit::EnergyAudit;
 use super::start::{StartError, find};
-use crate::network::Network;
+use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
+use crate::network::{Network, Row};
 use crate::number::{Real, evaluate};
 use crate::solve::{Event, Integrator, RowState, Status, Step};
+use serde::{Deserialize, Serialize};
 
-/// A quantity to record.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A quantity to record, by the name of its node or element.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Output {
     /// Speed of a node, rad/s.
     Speed(String),
+    /// Angle that a node has turned since the start, rad.
+    Angle(String),
     /// Twist of a shaft, rad.
     Twist(String),
     /// Torque of a shaft on its driven end, N·m.
@@ -26,6 +31,8 @@ pub enum Output {
 /// An output with its index in the network.
 enum Column<T> {
     Speeds(Vec<T>),
+    /// Speed of the node and the angle at the start of the present step.
+    Angle(Vec<T>, T),
     Twist(usize),
     Shaft(usize),
     Friction(usize),
@@ -81,6 +88,11 @@ impl<'g, T: Real> Recorder<'g, T> {
             }
             self.next += 1;
         }
+        for (column, _) in &mut self.columns {
+            if let Column::Angle(row, angle) = column {
+                *angle += integral(run, row, step.length);
+            }
+        }
     }
 
     /// Columns at full length.
@@ -104,6 +116,10 @@ fn resolve<T: Real>(network: &Network<T>, output: &Output) -> Result<Column<T>, 
             let node = find("node", name, &nodes)?;
             Column::Speeds(network.over_speeds(&vec![(node, T::of(1.0))]))
         }
+        Output::Angle(name) => {
+            let node = find("node", name, &nodes)?;
+            Column::Angle(network.over_speeds(&vec![(node, T::of(1.0))]), T::zero_())
+        }
         Output::Twist(name) => Column::Twist(find("shaft", name, &springs)?),
         Output::ShaftTorque(name) => Column::Shaft(find("shaft", name, &springs)?),
         Output::Slip(name) => {
@@ -125,30 +141,49 @@ fn value<T: Real>(column: &Column<T>, run: &Integrator<'_, T>, h: T) -> T {
     match column {
         Column::Speeds(row) => linear(row),
         Column::Twist(i) => state(run.network.speeds() + i),
-        Column::Shaft(i) => {
-            let spring = &run.network.mechanism.springs[*i];
-            let twist = state(run.network.speeds() + i);
-            spring.stiffness * twist + spring.damping * linear(run.network.twist_rates.row(*i))
-        }
+        Column::Shaft(i) => shaft_torque(run, *i, h),
         Column::Friction(j) => match run.rows[*j] {
             RowState::Open => T::zero_(),
-            RowState::Slipping { .. } | RowState::Saturated { .. } => evaluate(
-                &run.expansion.channels[run.network.frictions[*j].channel].torque,
-                order,
-                h,
-            ),
-            RowState::Stuck => holding_torque(run, *j, h),
+            RowState::Slipping { .. } | RowState::Saturated { .. } => {
+                evaluate(&run.expansion.channels[*j].torque, order, h)
+            }
+            RowState::Stuck => {
+                let position = run.mode.stuck.iter().position(|&s| s == Row::Friction(*j));
+                let position = position.expect("a stuck element belongs to the mode");
+                form(run.mode.stuck_torque.row(position), &run.expansion.basis_at(run.network, h))
+            }
         },
+        Column::Angle(row, angle) => *angle + integral(run, row, h),
     }
 }
 
-fn holding_torque<T: Real>(run: &Integrator<'_, T>, j: usize, h: T) -> T {
-    let position = run.mode.stuck.iter().position(|&s| s == j);
-    let row = run.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode"));
-    let order = run.expansion.order;
-    let mut basis: Vec<T> = run.expansion.states.iter().map(|s| evaluate(s, order, h)).collect();
-    basis.extend(run.expansion.inputs.iter().map(|&[value, rate]| value + rate * h));
-    basis.push(T::of(1.0));
-    basis.extend(run.expansion.channels.iter().map(|c| evaluate(&c.torque, order, h)));
-    form(row, &basis)
+fn shaft_torque<T: Real>(run: &Integrator<'_, T>, i: usize, h: T) -> T {
+    let basis = run.expansion.basis_at(run.network, h);
+    match run.network.mechanism.springs[i].law {
+        SpringLaw::Linear { stiffness, damping } => {
+            let rate = form(run.network.twist_rates.row(i), &basis);
+            stiffness * basis[run.network.speeds() + i] + damping * rate
+        }
+        SpringLaw::Backlash { .. } => {
+            let springs = &run.network.mechanism.springs[..i];
+            let backlashes =
+                springs.iter().filter(|s| matches!(s.law, SpringLaw::Backlash { .. })).count();
+            basis[run.network.drives[backlashes].basis]
+        }
+    }
+}
+
+/// Angle turned within the first `h` seconds of the present step.
+fn integral<T: Real>(run: &Integrator<'_, T>, row: &[T], h: T) -> T {
+    let mut sum = T::zero_();
+    for (&c, series) in row.iter().zip(&run.expansion.states) {
+        if c.re() != 0.0 {
+            let mut value = T::zero_();
+            for k in (0..=run.expansion.order).rev() {
+                value = value * h + series[k] / (k + 1) as f64;
+            }
+            sum += c * value * h;
+        }
+    }
+    sum
 }

@@ -1,200 +1,247 @@
 // SPDX-License-Identifier: MIT
 //! Who stays stuck (THEORY section 1): the box-constrained programme over all friction elements at
-//! zero slip, together with the direction of power through lossy gears.
+//! zero slip, together with the states of lossy gears.
 
 use super::integrator::{Integrator, RowState};
 use super::status::Status;
-use crate::network::channel::{Cell, apply, form};
+use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows};
-use crate::network::{Mode, ModeKey};
+use crate::network::{Cell, GearState, Mode, ModeKey, Row};
 use crate::number::Real;
 use std::sync::Arc;
 
-/// A trial assignment: the state of every friction element and the direction of every lossy gear.
-type Assignment = (Vec<RowState>, u32);
+/// A trial: the state of every friction element and of every lossy gear.
+#[derive(Clone, PartialEq)]
+pub(super) struct Assignment {
+    /// Friction elements.
+    pub rows: Vec<RowState>,
+    /// Lossy gears.
+    pub gears: Vec<GearState>,
+}
 
 /// What counts as zero in a sum, relative to the size of its terms.
 const ROUND_OFF: f64 = 1e-10;
+/// Most trials before every assignment is tried in turn.
+const MAX_TRIALS: usize = 200;
+/// Most rows at zero speed for which every assignment is tried.
+const MAX_EXHAUSTIVE: usize = 8;
 
 /// What is wrong with an assignment.
-#[derive(Debug)]
 enum Fault {
-    /// A stuck element carries more than its static capacity; the torque's sign.
-    Overloaded(usize, f64),
-    /// A slipping element at zero slip accelerates against its friction torque.
-    Returning(usize),
-    /// Power through a lossy gear flows the other way.
+    /// A row at rest carries more than its bounds allow; the torque's sign.
+    Overloaded(Row, f64),
+    /// A row that moves off from zero speed accelerates back.
+    Returning(Row),
+    /// Power through a rolling gear flows the other way.
     Reversed(usize),
 }
 
 impl<T: Real> Integrator<'_, T> {
-    /// Decide anew the state of all friction elements at zero slip. `overloaded` names the one whose
-    /// holding torque has just reached its capacity, with the torque's sign.
-    pub(super) fn decide(&mut self, overloaded: Option<(usize, f64)>) -> Result<(), Status> {
-        let candidates = self.at_zero_slip();
-        let mut rows = self.rows.clone();
-        for &j in &candidates {
+    /// Decide anew the state of everything at zero speed. `overloaded` names what has just reached
+    /// its bound, with the torque's sign.
+    pub(super) fn decide(&mut self, overloaded: Option<(Row, f64)>) -> Result<(), Status> {
+        let candidates = self.at_zero_speed();
+        let mut trial = self.assignment();
+        for &row in &candidates {
             // An overload asks for more: what is at its capacity already stays there.
-            if overloaded.is_none() || !matches!(rows[j], RowState::Saturated { .. }) {
-                rows[j] = RowState::Stuck;
+            let saturated = matches!(row, Row::Friction(j)
+                if matches!(trial.rows[j], RowState::Saturated { .. }));
+            if overloaded.is_none() || !saturated {
+                trial.rest(row);
             }
         }
-        if let Some((j, sign)) = overloaded {
-            self.give_way(&mut rows, j, sign);
+        if let Some((row, sign)) = overloaded {
+            self.give_way(&mut trial, row, sign);
         }
         let mut visited: Vec<Assignment> = Vec::new();
         loop {
-            let key = self.key_of(&rows);
-            let mode = self.mode(key)?;
-            let basis = self.basis_at(&rows, &candidates);
-            let Some(fault) = self.fault(&rows, &candidates, (&mode, &basis)) else {
-                self.adopt(rows, &candidates, mode);
+            let mode = self.mode(self.key_of(&trial))?;
+            let basis = self.basis_now(&trial, &candidates);
+            let Some(fault) = self.fault(&trial, &candidates, (&mode, &basis)) else {
+                self.adopt(trial, &candidates, mode);
                 return Ok(());
             };
-            let assignment = (rows.clone(), self.backward);
-            if visited.contains(&assignment) || visited.len() > 200 {
+            if visited.contains(&trial) || visited.len() > MAX_TRIALS {
                 return self.decide_exhaustively(&candidates);
             }
-            visited.push(assignment);
+            visited.push(trial.clone());
             match fault {
-                Fault::Overloaded(j, sign) => self.give_way(&mut rows, j, sign),
-                Fault::Returning(j) => rows[j] = RowState::Stuck,
-                Fault::Reversed(i) => self.backward ^= 1 << i,
+                Fault::Overloaded(row, sign) => self.give_way(&mut trial, row, sign),
+                Fault::Returning(row) => trial.rest(row),
+                Fault::Reversed(i) => trial.reverse_power(i),
             }
         }
     }
 
     /// Try every assignment of the candidates in a fixed order; the first without fault holds.
-    fn decide_exhaustively(&mut self, candidates: &[usize]) -> Result<(), Status> {
-        let gears = self.network.losses.len() as u32;
-        let element = || {
-            candidates
-                .first()
-                .map_or_else(String::new, |&j| self.network.frictions[j].element.clone())
-        };
-        let undecidable = Status::Undecidable { time: self.t.re(), element: element() };
-        if candidates.len() > 7 || gears > 4 {
-            return Err(undecidable);
-        }
-        for trial in 0..3usize.pow(candidates.len() as u32) << gears {
-            self.backward = (trial & ((1 << gears) - 1)) as u32;
-            let mut rows = self.rows.clone();
-            let mut digits = trial >> gears;
-            for &j in candidates {
-                rows[j] = match digits % 3 {
-                    0 => RowState::Stuck,
-                    1 => RowState::Slipping { sign: 1.0 },
-                    _ => RowState::Slipping { sign: -1.0 },
-                };
+    fn decide_exhaustively(&mut self, candidates: &[Row]) -> Result<(), Status> {
+        let gears = self.gears.len();
+        let choices = 3usize.pow(candidates.len().min(MAX_EXHAUSTIVE) as u32) << gears.min(4);
+        let feasible = candidates.len() <= MAX_EXHAUSTIVE && gears <= 4;
+        'choices: for choice in 0..if feasible { choices } else { 0 } {
+            let mut trial = self.assignment();
+            let mut digits = choice >> gears;
+            for &row in candidates {
+                match digits % 3 {
+                    1 if self.blocks_forward(row) => continue 'choices,
+                    0 => trial.rest(row),
+                    1 => trial.move_off(row, 1.0),
+                    _ => trial.move_off(row, -1.0),
+                }
                 digits /= 3;
             }
-            let mode = self.mode(self.key_of(&rows))?;
-            let basis = self.basis_at(&rows, candidates);
-            if self.fault(&rows, candidates, (&mode, &basis)).is_none() {
-                self.adopt(rows, candidates, mode);
+            (0..gears).filter(|i| choice >> i & 1 == 1).for_each(|i| trial.reverse_power(i));
+            let Ok(mode) = self.mode(self.key_of(&trial)) else { continue };
+            let basis = self.basis_now(&trial, candidates);
+            if self.fault(&trial, candidates, (&mode, &basis)).is_none() {
+                self.adopt(trial, candidates, mode);
                 return Ok(());
             }
         }
-        Err(undecidable)
+        let element = candidates.first().map_or("a gear", |&row| self.network.element_of(row));
+        Err(Status::Undecidable { time: self.t.re(), element: element.to_owned() })
     }
 
-    fn at_zero_slip(&self) -> Vec<usize> {
-        let near = |j: usize| {
-            let row = &self.network.frictions[j];
-            let terms = row.slip.iter().zip(&self.x);
+    fn blocks_forward(&self, row: Row) -> bool {
+        matches!(row, Row::Friction(j) if self.network.frictions[j].one_way)
+    }
+
+    fn assignment(&self) -> Assignment {
+        Assignment { rows: self.rows.clone(), gears: self.gears.clone() }
+    }
+
+    fn at_zero_speed(&self) -> Vec<Row> {
+        let near = |row: Row| {
+            let slip = self.network.slip_of(row);
+            let terms = slip.iter().zip(&self.x);
             let scale = terms.map(|(c, v)| (c.re() * v.re()).abs()).fold(0.0, f64::max);
-            form(&row.slip, &self.x).re().abs() <= 1e-11 * scale.max(1.0)
+            form(slip, &self.x).re().abs() <= 1e-11 * scale.max(1.0)
         };
-        let pressed = |j: usize| self.rows[j] != RowState::Open;
-        (0..self.rows.len()).filter(|&j| pressed(j) && near(j)).collect()
+        let pressed = |j: &usize| self.rows[*j] != RowState::Open;
+        let directional = |i: &usize| self.network.losses[*i].loss.is_directional();
+        let frictions = (0..self.rows.len()).filter(pressed).map(Row::Friction);
+        let gears = (0..self.gears.len()).filter(directional).map(Row::Gear);
+        frictions.chain(gears).filter(|&row| near(row)).collect()
     }
 
-    pub(super) fn key_of(&self, rows: &[RowState]) -> ModeKey {
-        let mut key = ModeKey { stuck: 0, backward: self.backward };
-        for (j, &row) in rows.iter().enumerate() {
-            key = key.with_stuck(j, row == RowState::Stuck);
-        }
-        key
+    fn key_of(&self, trial: &Assignment) -> ModeKey {
+        let stuck = (0..trial.rows.len()).filter(|&j| trial.rows[j] == RowState::Stuck);
+        ModeKey::new(stuck, &trial.gears)
     }
 
-    /// The basis (x, u, 1, φ) at this instant.
-    fn basis_at(&self, rows: &[RowState], candidates: &[usize]) -> Vec<T> {
-        let network = self.network;
-        let mut basis = vec![T::zero_(); network.basis()];
-        basis[..self.x.len()].copy_from_slice(&self.x);
-        for (i, input) in self.expansion.inputs.iter().enumerate() {
-            basis[network.first_input() + i] = input[0];
-        }
-        basis[network.one()] = T::of(1.0);
-        for (j, row) in network.frictions.iter().enumerate() {
-            let slip = if candidates.contains(&j) { T::zero_() } else { form(&row.slip, &self.x) };
-            let normal = row.normal.line(&self.expansion.inputs)[0];
-            basis[network.first_channel() + row.channel] = match rows[j] {
+    /// The basis at this instant under a trial.
+    fn basis_now(&self, trial: &Assignment, candidates: &[Row]) -> Vec<T> {
+        let mut basis = self.basis_without_channels();
+        for (j, row) in self.network.frictions.iter().enumerate() {
+            let at_rest = candidates.contains(&Row::Friction(j));
+            let slip = if at_rest { T::zero_() } else { form(&row.slip, &self.x) };
+            let normal = self.normal(j);
+            basis.push(match trial.rows[j] {
                 RowState::Slipping { sign } => row.law.at(slip * sign) * normal * sign,
                 RowState::Saturated { sign } => row.law.at(T::zero_()) * row.peak * normal * sign,
                 RowState::Stuck | RowState::Open => T::zero_(),
-            };
+            });
         }
-        for i in network.frictions.len()..network.channels.len() {
-            basis[network.first_channel() + i] = self.channel_now(i);
-        }
+        let others = self.network.frictions.len()..self.network.channels.len();
+        basis.extend(others.map(|i| self.channel_now(i)));
         basis
     }
 
-    fn static_capacity(&self, j: usize) -> T {
-        let row = &self.network.frictions[j];
-        let normal = row.normal.line(&self.expansion.inputs)[0];
-        let capacity = row.law.at(T::zero_()) * row.peak * normal;
-        if capacity.re() > 0.0 { capacity } else { T::zero_() }
+    /// Normal load of an element now, cut at zero.
+    fn normal(&self, j: usize) -> T {
+        let normal = self.network.frictions[j].normal.term(&self.expansion.inputs, 0);
+        if self.pressed[j] && normal.re() > 0.0 { normal } else { T::zero_() }
     }
 
+    /// Static capacities of the friction elements.
     pub(super) fn capacities(&self) -> Vec<T> {
-        (0..self.rows.len()).map(|j| self.static_capacity(j)).collect()
+        let capacity = |(j, row): (usize, &crate::network::FrictionRow<T>)| {
+            row.law.at(T::zero_()) * row.peak * self.normal(j)
+        };
+        self.network.frictions.iter().enumerate().map(capacity).collect()
     }
 
     fn fault(
         &self,
-        rows: &[RowState],
-        candidates: &[usize],
+        trial: &Assignment,
+        candidates: &[Row],
         (mode, basis): (&Mode<T>, &[T]),
     ) -> Option<Fault> {
-        let mut worst: Option<(f64, Fault)> = None;
-        for (i, &j) in mode.stuck.iter().enumerate() {
-            let torque = apply(&mode.stuck_torque, i, basis).re();
-            let capacity = self.static_capacity(j).re();
-            let excess = (torque.abs() - capacity) / capacity.max(1e-9 * torque.abs()).max(1e-12);
-            if excess > 1e-12 && worst.as_ref().is_none_or(|w| excess > w.0) {
-                worst = Some((excess, Fault::Overloaded(j, torque.signum())));
-            }
-        }
-        if let Some((_, fault)) = worst {
-            return Some(fault);
-        }
-        for &j in candidates {
-            if let RowState::Slipping { sign } = rows[j] {
-                let (a, scale) = self.slip_acceleration(j, mode, basis);
-                if a * sign < -ROUND_OFF * scale {
-                    return Some(Fault::Returning(j));
-                }
-            }
-        }
-        for i in 0..self.network.losses.len() {
-            if self.network.is_directional(i) {
-                let (torque, scale) = sum_and_scale(mode.gear_torque.row(i), basis);
-                let power = torque * self.gear_speed_sign[i];
-                let backward = self.backward >> i & 1 == 1;
-                if torque.abs() > ROUND_OFF * scale && (power < 0.0) != backward {
-                    return Some(Fault::Reversed(i));
-                }
-            }
-        }
-        None
+        self.overload(mode, basis)
+            .or_else(|| {
+                let returning = |&&row: &&Row| {
+                    trial.direction(row).is_some_and(|sign| {
+                        let (a, scale) = self.acceleration(row, mode, basis);
+                        a * sign < -ROUND_OFF * scale
+                    })
+                };
+                candidates.iter().find(returning).map(|&row| Fault::Returning(row))
+            })
+            .or_else(|| {
+                let reversed = |&i: &usize| self.is_reversed(trial.gears[i], i, (mode, basis));
+                (0..trial.gears.len()).find(reversed).map(Fault::Reversed)
+            })
     }
 
-    /// Slip acceleration [rad/s²] and the size of the terms it is the sum of.
-    fn slip_acceleration(&self, j: usize, mode: &Mode<T>, basis: &[T]) -> (f64, f64) {
+    /// The row at rest that exceeds its bounds most, relative to their size.
+    fn overload(&self, mode: &Mode<T>, basis: &[T]) -> Option<Fault> {
+        let capacities = self.capacities();
+        let mut worst: Option<(f64, Fault)> = None;
+        for (i, &row) in mode.stuck.iter().enumerate() {
+            let torque = form(mode.stuck_torque.row(i), basis).re();
+            let (low, high) = match row {
+                Row::Friction(j) if self.network.frictions[j].one_way => {
+                    (-capacities[j].re(), f64::INFINITY)
+                }
+                Row::Friction(j) => (-capacities[j].re(), capacities[j].re()),
+                Row::Gear(g) => self.gear_bounds(g, form(mode.gear_torque.row(g), basis).re()),
+            };
+            let (excess, sign) =
+                if torque > high { (torque - high, 1.0) } else { (low - torque, -1.0) };
+            let size = if sign > 0.0 { high.abs() } else { low.abs() };
+            let relative = excess / size.max(1e-9 * torque.abs()).max(1e-12);
+            if relative > 1e-12 && worst.as_ref().is_none_or(|w| relative > w.0) {
+                worst = Some((relative, Fault::Overloaded(row, sign)));
+            }
+            let a = self.acceleration(row, mode, basis).0;
+            if worst.is_none() && a.abs() > self.forced_acceleration() {
+                worst = Some((0.0, Fault::Overloaded(row, a.signum())));
+            }
+        }
+        worst.map(|(_, fault)| fault)
+    }
+
+    /// What a row at rest may accelerate by round-off; more is forced on it by prescribed speeds.
+    fn forced_acceleration(&self) -> f64 {
+        let rate = |&(_, input): &(Vec<T>, usize)| self.expansion.inputs[input][1].re().abs();
+        self.network
+            .prescribed
+            .iter()
+            .map(rate)
+            .reduce(f64::max)
+            .map_or(f64::INFINITY, |largest| 1e-9 * (1.0 + largest))
+    }
+
+    fn gear_bounds(&self, g: usize, torque: f64) -> (f64, f64) {
+        let bounds = self.network.losses[g].loss.bounds();
+        let line = |(slope, drag): (T, T)| slope.re() * torque + drag.re();
+        let [u, v] = bounds.upper.map(line);
+        let [l, m] = bounds.lower.map(line);
+        (l.min(m), u.max(v))
+    }
+
+    fn is_reversed(&self, gear: GearState, i: usize, (mode, basis): (&Mode<T>, &[T])) -> bool {
+        let GearState::Rolling { sign, backward } = gear else { return false };
+        let loss = &self.network.losses[i].loss;
+        let (torque, scale) = sum_and_scale(mode.gear_torque.row(i), basis);
+        let excess = torque * sign - loss.threshold().re();
+        loss.is_directional() && excess.abs() > ROUND_OFF * scale && (excess < 0.0) != backward
+    }
+
+    /// Acceleration [rad/s²] of a row's speed and the size of the terms it is the sum of.
+    fn acceleration(&self, row: Row, mode: &Mode<T>, basis: &[T]) -> (f64, f64) {
         let (mut sum, mut scale) = (0.0, 0.0);
-        for (i, c) in self.network.frictions[j].slip.iter().enumerate() {
+        for (i, c) in self.network.slip_of(row).iter().enumerate() {
             let (part, size) = sum_and_scale(mode.derivative.row(i), basis);
             sum += c.re() * part;
             scale += c.re().abs() * size;
@@ -202,53 +249,97 @@ impl<T: Real> Integrator<'_, T> {
         (sum, scale)
     }
 
-    /// An overloaded element slips, unless others hold the same speed: then it stays at its
-    /// capacity and they carry the rest. Elements at their capacity slip with the last that held.
-    fn give_way(&self, rows: &mut [RowState], j: usize, sign: f64) {
-        rows[j] = RowState::Saturated { sign };
-        for i in 0..rows.len() {
-            if let RowState::Saturated { sign } = rows[i]
-                && !self.held_by_others(rows, i)
+    /// An overloaded row moves off, unless others hold the same speed: then a friction element
+    /// stays at its capacity and they carry the rest. Elements at their capacity slip with the last
+    /// that held.
+    fn give_way(&self, trial: &mut Assignment, row: Row, sign: f64) {
+        match row {
+            Row::Friction(j) => trial.rows[j] = RowState::Saturated { sign },
+            Row::Gear(_) => trial.move_off(row, sign),
+        }
+        for j in 0..trial.rows.len() {
+            if let RowState::Saturated { sign } = trial.rows[j]
+                && !self.held_by_others(trial, j)
             {
-                rows[i] = RowState::Slipping { sign };
+                trial.rows[j] = RowState::Slipping { sign };
             }
         }
     }
 
-    /// Whether the stuck elements alone keep element `j` from slipping.
-    fn held_by_others(&self, rows: &[RowState], j: usize) -> bool {
-        let mut stuck: Vec<usize> = self.key_of(rows).stuck_rows().collect();
-        let rank = |index: &[usize]| {
-            let mut slips = Matrix::zeros(index.len(), self.network.speeds());
-            for (i, &k) in index.iter().enumerate() {
-                slips.row_mut(i).copy_from_slice(&self.network.frictions[k].slip);
+    /// Whether what is at rest alone keeps element `j` from slipping.
+    fn held_by_others(&self, trial: &Assignment, j: usize) -> bool {
+        let mut stuck = self.key_of(trial).rows();
+        let rank = |rows: &[Row]| {
+            let mut speeds = Matrix::zeros(rows.len(), self.network.speeds());
+            for (i, &row) in rows.iter().enumerate() {
+                speeds.row_mut(i).copy_from_slice(self.network.slip_of(row));
             }
-            independent_rows(&slips).len()
+            independent_rows(&speeds).len()
         };
         let alone = rank(&stuck);
-        stuck.push(j);
+        stuck.push(Row::Friction(j));
         rank(&stuck) == alone
     }
 
-    /// Make an assignment the state of the run.
-    fn adopt(&mut self, rows: Vec<RowState>, candidates: &[usize], mode: Arc<Mode<T>>) {
+    /// Make a trial the state of the run.
+    fn adopt(&mut self, trial: Assignment, candidates: &[Row], mode: Arc<Mode<T>>) {
         self.released.iter_mut().for_each(|r| *r = false);
-        for &j in candidates {
-            self.released[j] = matches!(rows[j], RowState::Slipping { .. });
+        for &row in candidates {
+            let index = self.index_of(row);
+            self.released[index] = trial.direction(row).is_some();
         }
-        self.record_changes(&rows);
-        self.rows = rows;
+        self.record_changes(&trial);
+        self.rows = trial.rows;
+        self.gears = trial.gears;
         for (j, row) in self.network.frictions.iter().enumerate() {
-            self.cells[row.channel] = match self.rows[j] {
+            self.cells[j] = match self.rows[j] {
                 RowState::Open | RowState::Stuck => Cell::Off,
+                _ if !self.pressed[j] => Cell::Off,
                 RowState::Saturated { sign } => Cell::Saturated { sign },
                 RowState::Slipping { sign } => {
                     let slip = form(&row.slip, &self.x).re();
-                    self.network.channels[row.channel].cell_at(slip, sign, &self.expansion.inputs)
+                    let inputs = &self.expansion.inputs;
+                    self.network.channels[j].cell_at([slip, 0.0], sign, inputs)
                 }
             };
         }
         self.mode = mode;
+    }
+}
+
+impl Assignment {
+    fn rest(&mut self, row: Row) {
+        match row {
+            Row::Friction(j) => self.rows[j] = RowState::Stuck,
+            Row::Gear(i) => self.gears[i] = GearState::Held,
+        }
+    }
+
+    fn move_off(&mut self, row: Row, sign: f64) {
+        match row {
+            Row::Friction(j) => self.rows[j] = RowState::Slipping { sign },
+            Row::Gear(i) => self.gears[i] = GearState::Rolling { sign, backward: false },
+        }
+    }
+
+    fn reverse_power(&mut self, i: usize) {
+        if let GearState::Rolling { backward, .. } = &mut self.gears[i] {
+            *backward = !*backward;
+        }
+    }
+
+    /// Direction in which a row moves, none at rest or without capacity.
+    pub(super) fn direction(&self, row: Row) -> Option<f64> {
+        match row {
+            Row::Friction(j) => match self.rows[j] {
+                RowState::Slipping { sign } => Some(sign),
+                _ => None,
+            },
+            Row::Gear(i) => match self.gears[i] {
+                GearState::Rolling { sign, .. } => Some(sign),
+                GearState::Held => None,
+            },
+        }
     }
 }
 

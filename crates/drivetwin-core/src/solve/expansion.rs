@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! Taylor expansion in time of the whole state in one mode.
 
-use crate::network::channel::{Cell, ChannelSeries};
-use crate::network::{Mode, Network};
-use crate::number::{Real, Series, TERMS, evaluate};
+use crate::network::channel::ChannelSeries;
+use crate::network::{Cell, Mode, Network};
+use crate::number::{Real, Series, TERMS, evaluate, slope};
 
 /// Coefficients of states and channels over one step, and the working space to compute them.
 #[derive(Clone, Debug)]
@@ -12,8 +12,8 @@ pub struct Expansion<T> {
     pub states: Vec<Series<T>>,
     /// Channels.
     pub channels: Vec<ChannelSeries<T>>,
-    /// Value and rate of every input at the start.
-    pub inputs: Vec<[T; 2]>,
+    /// Inputs.
+    pub inputs: Vec<Series<T>>,
     /// Highest coefficient that is filled in.
     pub order: usize,
 }
@@ -33,9 +33,21 @@ impl<T: Real> Expansion<T> {
         Self {
             states: vec![[T::zero_(); TERMS]; network.states()],
             channels: vec![ChannelSeries::default(); network.channels.len()],
-            inputs: vec![[T::zero_(); 2]; network.mechanism.inputs.len()],
+            inputs: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             order: 0,
         }
+    }
+
+    /// The basis (x, u, prescribed accelerations, 1, φ) at `h` [s] after the start.
+    pub fn basis_at(&self, network: &Network<T>, h: T) -> Vec<T> {
+        let value = |series: &Series<T>| evaluate(series, self.order, h);
+        let mut basis: Vec<T> = self.states.iter().map(value).collect();
+        basis.extend(self.inputs.iter().map(|input| evaluate(input, TERMS - 1, h)));
+        let rate = |&(_, input): &(Vec<T>, usize)| slope(&self.inputs[input], TERMS - 1, h);
+        basis.extend(network.prescribed.iter().map(rate));
+        basis.push(T::of(1.0));
+        basis.extend(self.channels.iter().map(|channel| value(&channel.torque)));
+        basis
     }
 
     /// Expand from state `x`; returns the step `<= h` [s] over which the truncation error stays within
@@ -107,11 +119,13 @@ impl<T: Real> Expansion<T> {
     fn channel_terms(&mut self, network: &Network<T>, cells: &[Cell], k: usize) {
         for ((channel, &cell), series) in network.channels.iter().zip(cells).zip(&mut self.channels)
         {
-            let mut speed = T::zero_();
-            for (&c, state) in channel.speed.iter().zip(&self.states) {
-                speed += c * state[k];
+            for (row, argument) in channel.arguments.iter().zip(&mut series.arguments) {
+                let mut value = T::zero_();
+                for (&c, state) in row.iter().zip(&self.states) {
+                    value += c * state[k];
+                }
+                argument[k] = value;
             }
-            series.speed[k] = speed;
             channel.term(cell, &self.inputs, series, k);
         }
     }
@@ -128,9 +142,12 @@ impl<T: Real> Expansion<T> {
         for (&c, state) in row.iter().zip(&self.states) {
             sum += c * state[k];
         }
-        if k < 2 {
-            for (&c, input) in row[network.first_input()..].iter().zip(&self.inputs) {
-                sum += c * input[k];
+        for (&c, input) in row[network.first_input()..].iter().zip(&self.inputs) {
+            sum += c * input[k];
+        }
+        if k + 1 < TERMS {
+            for (&c, (_, input)) in row[network.first_rate()..].iter().zip(&network.prescribed) {
+                sum += c * self.inputs[*input][k + 1] * (k + 1) as f64;
             }
         }
         if k == 0 {
@@ -143,9 +160,10 @@ impl<T: Real> Expansion<T> {
     }
 
     /// Largest coefficient `k` relative to the scale of its state: speeds to 1 rad/s, twists to
-    /// 1 mrad at least.
+    /// 1 mrad, lagging torques to 1 N·m at least.
     fn relative_size(&self, network: &Network<T>, k: usize) -> f64 {
-        let floor = |i: usize| if i < network.speeds() { 1.0 } else { 1e-3 };
+        let twists = network.speeds()..network.first_lag();
+        let floor = |i: usize| if twists.contains(&i) { 1e-3 } else { 1.0 };
         let size = |(i, s): (usize, &Series<T>)| s[k].re().abs() / s[0].re().abs().max(floor(i));
         self.states.iter().enumerate().map(size).fold(0.0, f64::max)
     }

@@ -4,25 +4,20 @@
 use super::expansion::Expansion;
 use super::first_fall::first_fall;
 use super::integrator::RowState;
-use crate::network::channel::Cell;
-use crate::network::{Mode, Network};
+use crate::network::{Cell, GearState, Mode, Network, Row};
 use crate::number::{Real, Series, TERMS, evaluate, slope};
 
 /// What happens when a guard falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cause {
-    /// The slip of a friction element reaches zero.
-    SlipZero(usize),
-    /// The pressure of an open element exceeds its fill pressure.
-    Fill(usize),
-    /// The normal load of an element is gone.
-    Vent(usize),
-    /// The holding torque of a stuck element exceeds its static capacity.
-    Overload(usize),
-    /// The torque through a lossy gear changes its sign.
+    /// The slip of a friction element, or the speed of a lossy gear, reaches zero.
+    AtRest(Row),
+    /// The normal load of an element sets in or is gone.
+    Pressed(usize),
+    /// The torque of a row at rest leaves its bounds; its sign.
+    Overload(Row, f64),
+    /// Power through a rolling gear changes its direction.
     PowerReversal(usize),
-    /// The speed of a lossy gear changes its sign.
-    SpeedReversal(usize),
     /// A channel enters another cell.
     Border(usize, Cell),
 }
@@ -35,14 +30,14 @@ pub struct Watch<'a, T> {
     pub mode: &'a Mode<T>,
     /// State of every friction element.
     pub rows: &'a [RowState],
-    /// Whether an element slips from exact zero at the start of the step.
+    /// Whether an element has a normal load.
+    pub pressed: &'a [bool],
+    /// Whether an element or gear moves off from exact zero at the start of the step.
     pub released: &'a [bool],
     /// Active cell of every channel.
     pub cells: &'a [Cell],
-    /// Sign of the driving side's speed of each lossy gear.
-    pub gear_speed_sign: &'a [f64],
-    /// Bit i: power flows backwards through lossy gear i.
-    pub backward: u32,
+    /// State of every lossy gear.
+    pub gears: &'a [GearState],
 }
 
 /// The earliest fall within `h` [s], refined so that the time carries derivatives.
@@ -60,8 +55,12 @@ pub fn earliest<T: Real>(
             best = Some((t, series, cause));
         }
     };
-    friction_guards(watch, expansion, &mut consider);
-    gear_guards(watch, expansion, &mut consider);
+    for j in 0..watch.rows.len() {
+        friction_guards(watch, expansion, j, &mut consider);
+    }
+    for i in 0..watch.gears.len() {
+        gear_guards(watch, expansion, i, &mut consider);
+    }
     for (i, channel) in watch.network.channels.iter().enumerate() {
         let series = &expansion.channels[i];
         for (border, next) in channel.borders(watch.cells[i], &expansion.inputs, series) {
@@ -74,30 +73,27 @@ pub fn earliest<T: Real>(
 fn friction_guards<T: Real>(
     watch: &Watch<'_, T>,
     expansion: &Expansion<T>,
+    j: usize,
     consider: &mut impl FnMut(Series<T>, Cause),
 ) {
-    for (j, row) in watch.network.frictions.iter().enumerate() {
-        let normal = line(row.normal.line(&expansion.inputs), T::of(1.0));
-        match watch.rows[j] {
-            RowState::Open => {
-                consider(line(row.normal.line(&expansion.inputs), T::of(-1.0)), Cause::Fill(j));
-            }
-            RowState::Slipping { sign } => {
-                let slip = &expansion.channels[row.channel].speed;
-                consider(departing(slip, sign, watch.released[j]), Cause::SlipZero(j));
-                consider(normal, Cause::Vent(j));
-            }
-            RowState::Saturated { .. } => consider(normal, Cause::Vent(j)),
-            RowState::Stuck => {
-                let position = watch.mode.stuck.iter().position(|&s| s == j);
-                let position = position.expect("a stuck element belongs to the mode");
-                let row_of_torque = watch.mode.stuck_torque.row(position);
-                let torque = expansion.form(watch.network, row_of_torque);
-                let capacity = row.law.at(T::zero_()) * row.peak;
-                let cap = line(row.normal.line(&expansion.inputs), capacity);
-                consider(combined(&cap, &torque, -1.0), Cause::Overload(j));
-                consider(combined(&cap, &torque, 1.0), Cause::Overload(j));
-                consider(normal, Cause::Vent(j));
+    let row = &watch.network.frictions[j];
+    let normal = row.normal.series(&expansion.inputs);
+    let pressed = watch.pressed[j];
+    consider(if pressed { normal } else { scaled(&normal, T::of(-1.0)) }, Cause::Pressed(j));
+    match watch.rows[j] {
+        RowState::Open | RowState::Saturated { .. } => {}
+        RowState::Slipping { sign } => {
+            let slip = &expansion.channels[j].arguments[0];
+            let cause = Cause::AtRest(Row::Friction(j));
+            consider(departing(slip, sign, watch.released[j]), cause);
+        }
+        RowState::Stuck => {
+            let torque = holding_torque(watch, expansion, Row::Friction(j));
+            let capacity = row.law.at(T::zero_()) * row.peak;
+            let cap = scaled(&normal, if pressed { capacity } else { T::zero_() });
+            consider(combined(&cap, &torque, 1.0), Cause::Overload(Row::Friction(j), -1.0));
+            if !row.one_way {
+                consider(combined(&cap, &torque, -1.0), Cause::Overload(Row::Friction(j), 1.0));
             }
         }
     }
@@ -106,26 +102,57 @@ fn friction_guards<T: Real>(
 fn gear_guards<T: Real>(
     watch: &Watch<'_, T>,
     expansion: &Expansion<T>,
+    i: usize,
     consider: &mut impl FnMut(Series<T>, Cause),
 ) {
-    for (i, loss) in watch.network.losses.iter().enumerate() {
-        if !watch.network.is_directional(i) {
-            continue;
+    let gear = &watch.network.losses[i];
+    if !gear.loss.is_directional() {
+        return;
+    }
+    let torque = expansion.form(watch.network, watch.mode.gear_torque.row(i));
+    match watch.gears[i] {
+        GearState::Rolling { sign, backward } => {
+            let mut power = scaled(&torque, T::of(sign));
+            power[0] -= gear.loss.threshold();
+            let power = if backward { scaled(&power, T::of(-1.0)) } else { power };
+            consider(power, Cause::PowerReversal(i));
+            let released = watch.released[watch.rows.len() + i];
+            let speed = expansion.speed_form(&gear.speed);
+            consider(departing(&speed, sign, released), Cause::AtRest(Row::Gear(i)));
         }
-        let speed_sign = watch.gear_speed_sign[i];
-        let power_sign = if watch.backward >> i & 1 == 1 { -speed_sign } else { speed_sign };
-        let torque = expansion.form(watch.network, watch.mode.gear_torque.row(i));
-        consider(torque.map(|c| c * power_sign), Cause::PowerReversal(i));
-        let speed = expansion.speed_form(&loss.speed);
-        consider(speed.map(|c| c * speed_sign), Cause::SpeedReversal(i));
+        GearState::Held => {
+            let loss = holding_torque(watch, expansion, Row::Gear(i));
+            let bounds = gear.loss.bounds();
+            let line = |(slope, drag): (T, T)| {
+                let mut line = scaled(&torque, slope);
+                line[0] += drag;
+                line
+            };
+            let upper = larger(bounds.upper.map(line));
+            let lower = scaled(&larger(bounds.lower.map(line).map(negative)), T::of(-1.0));
+            consider(combined(&upper, &loss, -1.0), Cause::Overload(Row::Gear(i), 1.0));
+            consider(combined(&loss, &lower, -1.0), Cause::Overload(Row::Gear(i), -1.0));
+        }
     }
 }
 
-/// Slip in its direction. An element released at this instant starts from exact zero, and where its
-/// static and kinetic capacities agree also from zero acceleration: what is left of these is
-/// round-off and would look like an immediate return.
+/// The line that is the larger one now; where the other takes over the mode is decided anew.
+fn larger<T: Real>([a, b]: [Series<T>; 2]) -> Series<T> {
+    let ahead = a[0].re() > b[0].re() || (a[0].re() == b[0].re() && a[1].re() >= b[1].re());
+    if ahead { a } else { b }
+}
+
+fn holding_torque<T: Real>(watch: &Watch<'_, T>, expansion: &Expansion<T>, row: Row) -> Series<T> {
+    let position = watch.mode.stuck.iter().position(|&s| s == row);
+    let position = position.expect("what is at rest belongs to the mode");
+    expansion.form(watch.network, watch.mode.stuck_torque.row(position))
+}
+
+/// Slip in its direction. What is released at this instant starts from exact zero, and where static
+/// and kinetic capacities agree also from zero acceleration: what is left of these is round-off
+/// and would look like an immediate return.
 fn departing<T: Real>(slip: &Series<T>, sign: f64, released: bool) -> Series<T> {
-    let mut guard = slip.map(|c| c * sign);
+    let mut guard = scaled(slip, T::of(sign));
     if released {
         guard[0] = T::zero_();
         if guard[1].re().abs() <= 1e-9 * guard[2].re().abs().max(1.0) {
@@ -135,17 +162,18 @@ fn departing<T: Real>(slip: &Series<T>, sign: f64, released: bool) -> Series<T> 
     guard
 }
 
-fn line<T: Real>([value, rate]: [T; 2], factor: T) -> Series<T> {
-    let mut series = [T::zero_(); TERMS];
-    series[0] = value * factor;
-    series[1] = rate * factor;
-    series
+fn negative<T: Real>(series: Series<T>) -> Series<T> {
+    scaled(&series, T::of(-1.0))
+}
+
+fn scaled<T: Real>(series: &Series<T>, factor: T) -> Series<T> {
+    series.map(|c| c * factor)
 }
 
 fn combined<T: Real>(a: &Series<T>, b: &Series<T>, sign: f64) -> Series<T> {
-    let mut out = *a;
-    for (o, &c) in out.iter_mut().zip(b) {
-        *o += c * sign;
+    let mut out = [T::zero_(); TERMS];
+    for (o, (&a, &b)) in out.iter_mut().zip(a.iter().zip(b)) {
+        *o = a + b * sign;
     }
     out
 }

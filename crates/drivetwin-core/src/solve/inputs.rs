@@ -1,16 +1,38 @@
 // SPDX-License-Identifier: MIT
 //! Inputs over time, linear between samples.
 
-use crate::number::Real;
+use crate::number::{Real, Series};
 use thiserror::Error;
 
-/// Inputs on a common set of knots; a time that stands twice is a jump.
+/// How one input varies.
+#[derive(Clone, Copy, Debug)]
+pub enum Signal<'a, T> {
+    /// Linear between samples; a time that stands twice is a jump.
+    Samples(&'a [f64], &'a [T]),
+    /// `offset + amplitude · sin(2π frequency t + phase)`.
+    Sine {
+        /// Mean.
+        offset: T,
+        /// Amplitude.
+        amplitude: T,
+        /// Frequency, Hz.
+        frequency: f64,
+        /// Phase at t = 0, rad.
+        phase: f64,
+    },
+}
+
+/// Inputs on a common set of knots; a knot that stands twice is a jump.
 #[derive(Clone, Debug)]
 pub struct Inputs<T> {
     knots: Vec<f64>,
+    /// Values at the knots, knots × inputs; unused for sines.
     values: Vec<T>,
-    count: usize,
+    sines: Vec<Option<Sine<T>>>,
 }
+
+/// Offset, amplitude, angular frequency [rad/s], phase [rad].
+type Sine<T> = (T, T, f64, f64);
 
 /// Why signals cannot serve as inputs.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -49,6 +71,14 @@ pub enum InputError {
         /// First offending sample.
         index: usize,
     },
+    /// A prescribed speed jumps.
+    #[error("input {name:?} prescribes a speed and must not jump (at {time} s)")]
+    Jump {
+        /// Name of the input.
+        name: String,
+        /// When.
+        time: f64,
+    },
     /// The run asks for times outside the signals.
     #[error("input {name:?} spans {from} s to {to} s, the run needs {start} s to {end} s")]
     Span {
@@ -66,28 +96,40 @@ pub enum InputError {
 }
 
 impl<T: Real> Inputs<T> {
-    /// Join signals `(name, times, values)`, in the order the network numbers its inputs, over the
-    /// span `(start, end)` [s].
+    /// Join named signals, in the order the network numbers its inputs, over the span
+    /// `(start, end)` [s].
     pub fn join(
-        signals: &[(&str, &[f64], &[T])],
+        signals: &[(&str, Signal<'_, T>)],
         (start, end): (f64, f64),
     ) -> Result<Self, InputError> {
         let mut knots = vec![start, end];
-        for &(name, times, values) in signals {
-            check(name, times, values, (start, end))?;
-            knots.extend(times.iter().filter(|&&t| t > start && t < end));
-        }
-        knots.sort_by(f64::total_cmp);
-        let knots = merge_knots(&knots, signals);
-        let count = signals.len();
-        let mut values = Vec::with_capacity(knots.len() * count);
-        for (i, &t) in knots.iter().enumerate() {
-            let after_jump = i > 0 && knots[i - 1] == t;
-            for &(_, times, samples) in signals {
-                values.push(interpolate(times, samples, t, after_jump || i == 0));
+        let mut sampled: Vec<&[f64]> = Vec::new();
+        let mut sines = Vec::new();
+        for &(name, signal) in signals {
+            match signal {
+                Signal::Samples(times, values) => {
+                    check(name, times, values, (start, end))?;
+                    knots.extend(times.iter().filter(|&&t| t > start && t < end));
+                    sampled.push(times);
+                    sines.push(None);
+                }
+                Signal::Sine { offset, amplitude, frequency, phase } => {
+                    let omega = 2.0 * std::f64::consts::PI * frequency;
+                    sines.push(Some((offset, amplitude, omega, phase)));
+                }
             }
         }
-        Ok(Self { knots, values, count })
+        knots.sort_by(f64::total_cmp);
+        let knots = merge_knots(&knots, &sampled);
+        let mut values = Vec::with_capacity(knots.len() * signals.len());
+        for (i, &t) in knots.iter().enumerate() {
+            let after_jump = i == 0 || knots[i - 1] == t;
+            values.extend(signals.iter().map(|(_, signal)| match signal {
+                Signal::Samples(times, samples) => interpolate(times, samples, t, after_jump),
+                Signal::Sine { offset, .. } => *offset,
+            }));
+        }
+        Ok(Self { knots, values, sines })
     }
 
     /// Number of segments between knots.
@@ -100,17 +142,41 @@ impl<T: Real> Inputs<T> {
         (self.knots[i], self.knots[i + 1])
     }
 
-    /// Value and rate of every input at `t` within segment `i`.
-    pub fn at(&self, i: usize, t: T, out: &mut Vec<[T; 2]>) {
+    /// Taylor coefficients of every input at `t` within segment `i`.
+    pub fn expand(&self, i: usize, t: T, out: &mut [Series<T>]) {
         let (from, to) = self.span(i);
         let width = to - from;
-        let row = |k: usize| &self.values[k * self.count..(k + 1) * self.count];
-        out.clear();
-        out.extend(row(i).iter().zip(row(i + 1)).map(|(&a, &b)| {
+        let row = |k: usize| &self.values[k * self.sines.len()..(k + 1) * self.sines.len()];
+        for (j, series) in out.iter_mut().enumerate() {
+            if let Some(sine) = &self.sines[j] {
+                *series = sine_series(sine, t);
+                continue;
+            }
+            let (a, b) = (row(i)[j], row(i + 1)[j]);
             let rate = if width > 0.0 { (b - a) / width } else { T::zero_() };
-            [a + rate * (t - from), rate]
-        }));
+            series[0] = a + rate * (t - from);
+            series[1] = rate;
+        }
     }
+}
+
+/// Taylor coefficients of a sine about `t`.
+fn sine_series<T: Real>(&(offset, amplitude, omega, phase): &Sine<T>, t: T) -> Series<T> {
+    let angle = t * omega + phase;
+    let (sin, cos) = (angle.sin(), angle.cos());
+    let mut factor = amplitude;
+    std::array::from_fn(|k| {
+        if k > 0 {
+            factor *= omega / k as f64;
+        }
+        match k % 4 {
+            0 if k == 0 => offset + factor * sin,
+            0 => factor * sin,
+            1 => factor * cos,
+            2 => -factor * sin,
+            _ => -factor * cos,
+        }
+    })
 }
 
 fn check<T: Real>(
@@ -143,9 +209,9 @@ fn check<T: Real>(
 }
 
 /// Distinct times; times closer than round-off count as one; inner jumps stand twice.
-fn merge_knots<T>(sorted: &[f64], signals: &[(&str, &[f64], &[T])]) -> Vec<f64> {
+fn merge_knots(sorted: &[f64], sampled: &[&[f64]]) -> Vec<f64> {
     let jump = |t: f64| {
-        signals.iter().any(|(_, times, _)| {
+        sampled.iter().any(|times| {
             let i = times.partition_point(|&x| x < t);
             i + 1 < times.len() && times[i] == t && times[i + 1] == t
         })

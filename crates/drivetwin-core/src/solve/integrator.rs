@@ -5,8 +5,7 @@ use super::expansion::{Accuracy, Expansion};
 use super::guard::{Cause, Watch, earliest};
 use super::inputs::Inputs;
 use super::status::Status;
-use crate::network::channel::{Cell, form};
-use crate::network::{Mode, ModeKey, Network};
+use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
 use crate::number::Real;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -50,7 +49,7 @@ pub enum EventKind {
 pub struct Event<T> {
     /// When, s; carries derivatives.
     pub time: T,
-    /// Index of the friction element.
+    /// Index of the friction element, or after these of the lossy gear.
     pub element: usize,
     /// What.
     pub kind: EventKind,
@@ -106,8 +105,9 @@ pub struct Integrator<'a, T> {
     pub(super) t: T,
     pub(super) cells: Vec<Cell>,
     pub(super) released: Vec<bool>,
-    pub(super) backward: u32,
-    pub(super) gear_speed_sign: Vec<f64>,
+    pub(super) pressed: Vec<bool>,
+    /// States of lossy gears during the last step.
+    pub gears: Vec<GearState>,
     pub(super) inputs: &'a Inputs<T>,
     settings: Settings,
     modes: HashMap<ModeKey, Arc<Mode<T>>>,
@@ -139,9 +139,9 @@ impl<'a, T: Real> Integrator<'a, T> {
             events: Vec::new(),
             t: T::of(t),
             cells: vec![Cell::Off; network.channels.len()],
-            released: vec![false; frictions],
-            backward: 0,
-            gear_speed_sign: vec![1.0; network.losses.len()],
+            released: vec![false; frictions + network.losses.len()],
+            pressed: vec![false; frictions],
+            gears: vec![GearState::Rolling { sign: 1.0, backward: false }; network.losses.len()],
             network,
             inputs,
             settings,
@@ -151,11 +151,8 @@ impl<'a, T: Real> Integrator<'a, T> {
             stalled: 0,
             window: (0, t),
         };
-        run.bring_to_rest(locked);
-        for (i, loss) in network.losses.iter().enumerate() {
-            run.gear_speed_sign[i] = if form(&loss.speed, &run.x).re() < 0.0 { -1.0 } else { 1.0 };
-        }
-        run.refresh()?;
+        let locked: Vec<Row> = locked.iter().map(|&j| Row::Friction(j)).collect();
+        run.take_up(&locked)?;
         run.events.clear();
         Ok(run)
     }
@@ -216,8 +213,8 @@ impl<'a, T: Real> Integrator<'a, T> {
             rows: &self.rows,
             released: &self.released,
             cells: &self.cells,
-            gear_speed_sign: &self.gear_speed_sign,
-            backward: self.backward,
+            pressed: &self.pressed,
+            gears: &self.gears,
         }
     }
 
@@ -233,7 +230,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             let (from, to) = self.inputs.span(self.segment);
             jumped |= from == to;
         }
-        self.inputs.at(self.segment, self.t, &mut self.expansion.inputs);
+        self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
         if jumped {
             self.refresh()?;
         } else if entered {
@@ -265,17 +262,21 @@ impl<'a, T: Real> Integrator<'a, T> {
     }
 
     fn culprit(&self, cause: Cause) -> String {
-        match cause {
-            Cause::SlipZero(j) | Cause::Fill(j) | Cause::Vent(j) | Cause::Overload(j) => {
-                self.network.frictions[j].element.clone()
-            }
-            Cause::PowerReversal(i) | Cause::SpeedReversal(i) => {
-                self.network.losses[i].element.clone()
-            }
-            Cause::Border(channel, _) => match self.network.frictions.get(channel) {
-                Some(row) => row.element.clone(),
-                None => format!("map {}", channel - self.network.frictions.len()),
-            },
+        let row = match cause {
+            Cause::AtRest(row) | Cause::Overload(row, _) => row,
+            Cause::Pressed(j) => Row::Friction(j),
+            Cause::PowerReversal(i) => Row::Gear(i),
+            Cause::Border(channel, _) if channel < self.rows.len() => Row::Friction(channel),
+            Cause::Border(channel, _) => return format!("torque law {channel}"),
+        };
+        self.network.element_of(row).to_owned()
+    }
+
+    /// Position of a row in lists that hold friction elements first, then lossy gears.
+    pub(super) fn index_of(&self, row: Row) -> usize {
+        match row {
+            Row::Friction(j) => j,
+            Row::Gear(i) => self.rows.len() + i,
         }
     }
 }

@@ -15,6 +15,6 @@ mod status;
 mod transition;
 
 pub use expansion::Expansion;
-pub use inputs::{InputError, Inputs};
+pub use inputs::{InputError, Inputs, Signal};
 pub use integrator::{Event, EventKind, Integrator, RowState, Settings, Step};
 pub use status::Status;

@@ -1,36 +1,37 @@
 // SPDX-License-Identifier: MIT
 //! Changes of mode at events and at jumps of the inputs.
 
+use super::decide::Assignment;
 use super::guard::Cause;
 use super::integrator::{Event, EventKind, Integrator, RowState, sign_of};
 use super::status::Status;
 use crate::network::channel::{ChannelSeries, form};
 use crate::network::linalg::{Matrix, least_norm, solve};
+use crate::network::{GearState, Row};
 use crate::number::Real;
 
 impl<T: Real> Integrator<'_, T> {
     /// Carry out what the last event caused.
     pub(super) fn change_mode(&mut self) -> Result<(), Status> {
         let Some(cause) = self.pending.take() else { return Ok(()) };
-        self.inputs.at(self.segment, self.t, &mut self.expansion.inputs);
+        self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
         match cause {
-            Cause::SlipZero(j) => {
-                self.bring_to_rest(&[j]);
+            Cause::AtRest(row) => {
+                self.bring_to_rest(&[row]);
                 self.decide(None)
             }
-            Cause::Fill(j) => self.fill(j),
-            Cause::Vent(j) => self.vent(j),
-            Cause::Overload(j) => {
+            Cause::Pressed(j) => {
+                self.press(j, !self.pressed[j]);
+                self.decide(None)
+            }
+            Cause::Overload(row, sign) => {
                 self.bring_to_rest(&[]);
-                let sign = self.holding_sign(j);
-                self.decide(Some((j, sign)))
+                self.decide(Some((row, sign)))
             }
             Cause::PowerReversal(i) => {
-                self.backward ^= 1 << i;
-                self.decide(None)
-            }
-            Cause::SpeedReversal(i) => {
-                self.gear_speed_sign[i] = -self.gear_speed_sign[i];
+                if let GearState::Rolling { backward, .. } = &mut self.gears[i] {
+                    *backward = !*backward;
+                }
                 self.decide(None)
             }
             Cause::Border(channel, cell) => {
@@ -40,26 +41,32 @@ impl<T: Real> Integrator<'_, T> {
         }
     }
 
-    /// Take up everything anew at this instant, as after a jump of an input.
-    pub(super) fn refresh(&mut self) -> Result<(), Status> {
-        self.inputs.at(self.segment, self.t, &mut self.expansion.inputs);
-        let mut rows = self.rows.clone();
-        for (j, row) in self.network.frictions.iter().enumerate() {
-            let [normal, rate] = row.normal.line(&self.expansion.inputs).map(|n| n.re());
-            let pressed = normal > 0.0 || (normal == 0.0 && rate > 0.0);
-            let slip = form(&row.slip, &self.x).re();
-            rows[j] = match (pressed, rows[j]) {
-                (false, _) => RowState::Open,
-                (true, RowState::Open) => RowState::Slipping { sign: sign_of(slip) },
-                (true, state) => state,
-            };
+    /// Start of a run: prescribed speeds, elements at rest, directions of gears, cells.
+    pub(super) fn take_up(&mut self, locked: &[Row]) -> Result<(), Status> {
+        self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
+        self.bring_to_rest(locked);
+        for (gear, loss) in self.gears.iter_mut().zip(&self.network.losses) {
+            let sign = sign_of(form(&loss.speed, &self.x).re());
+            *gear = GearState::Rolling { sign, backward: false };
         }
-        self.record_changes(&rows);
-        self.rows = rows;
-        for i in self.network.frictions.len()..self.network.channels.len() {
-            let channel = &self.network.channels[i];
-            let speed = form(&channel.speed, &self.x).re();
-            self.cells[i] = channel.cell_at(speed, sign_of(speed), &self.expansion.inputs);
+        for i in self.rows.len()..self.network.channels.len() {
+            self.cells[i] = self.cell_now(i);
+        }
+        self.refresh()
+    }
+
+    /// Take up everything that follows the inputs anew at this instant, as after a jump.
+    pub(super) fn refresh(&mut self) -> Result<(), Status> {
+        for j in 0..self.rows.len() {
+            let normal = &self.network.frictions[j].normal;
+            let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
+            let pressed = now > 0.0 || (now == 0.0 && rate > 0.0);
+            self.press(j, pressed);
+        }
+        for i in self.rows.len()..self.network.channels.len() {
+            if self.network.channels[i].follows_inputs() {
+                self.cells[i] = self.cell_now(i);
+            }
         }
         self.decide(None)
     }
@@ -74,70 +81,91 @@ impl<T: Real> Integrator<'_, T> {
         Ok(())
     }
 
-    fn fill(&mut self, j: usize) -> Result<(), Status> {
-        let slip = form(&self.network.frictions[j].slip, &self.x).re();
-        let mut rows = self.rows.clone();
-        rows[j] = RowState::Slipping { sign: sign_of(slip) };
-        self.record_changes(&rows);
-        self.rows = rows;
-        self.decide(None)
-    }
-
-    fn vent(&mut self, j: usize) -> Result<(), Status> {
-        let mut rows = self.rows.clone();
-        rows[j] = RowState::Open;
-        self.record_changes(&rows);
-        self.rows = rows;
-        self.decide(None)
-    }
-
-    /// Remove the round-off slip of everything stuck and of `more`, changing the momentum least.
-    pub(super) fn bring_to_rest(&mut self, more: &[usize]) {
-        let at_rest = |j: &usize| {
-            more.contains(j)
-                || matches!(self.rows[*j], RowState::Stuck | RowState::Saturated { .. })
+    /// Give an element a normal load or take it away.
+    fn press(&mut self, j: usize, pressed: bool) {
+        let row = &self.network.frictions[j];
+        self.pressed[j] = pressed;
+        let slip = form(&row.slip, &self.x).re();
+        let state = match (pressed, self.rows[j]) {
+            (_, RowState::Open) if row.one_way => RowState::Slipping { sign: -1.0 },
+            (false, state) if row.one_way => state,
+            (false, _) => RowState::Open,
+            (true, RowState::Open) => RowState::Slipping { sign: sign_of(slip) },
+            (true, state) => state,
         };
-        let rows: Vec<usize> = (0..self.rows.len()).filter(at_rest).collect();
-        if rows.is_empty() {
+        let mut after = Assignment { rows: self.rows.clone(), gears: self.gears.clone() };
+        after.rows[j] = state;
+        self.record_changes(&after);
+        self.rows = after.rows;
+    }
+
+    /// Set prescribed speeds and remove the round-off speed of everything at rest and of `more`,
+    /// changing the momentum least.
+    pub(super) fn bring_to_rest(&mut self, more: &[Row]) {
+        let network = self.network;
+        let resting =
+            |j: usize| matches!(self.rows[j], RowState::Stuck | RowState::Saturated { .. });
+        let frictions = (0..self.rows.len()).filter(|&j| resting(j)).map(Row::Friction);
+        let held = |i: &usize| self.gears[*i] == GearState::Held;
+        let gears = (0..self.gears.len()).filter(held).map(Row::Gear);
+        let mut rows: Vec<Row> = frictions.chain(gears).collect();
+        rows.extend(more.iter().filter(|row| !rows.contains(row)).copied().collect::<Vec<_>>());
+        let count = rows.len() + network.prescribed.len();
+        if count == 0 {
             return;
         }
-        let mut g = Matrix::zeros(rows.len(), self.network.speeds());
-        let mut slip = Matrix::zeros(rows.len(), 1);
-        for (i, &j) in rows.iter().enumerate() {
-            g.row_mut(i).copy_from_slice(&self.network.frictions[j].slip);
-            slip[(i, 0)] = form(g.row(i), &self.x);
+        let mut g = Matrix::zeros(count, network.speeds());
+        let mut excess = Matrix::zeros(count, 1);
+        for (i, &row) in rows.iter().enumerate() {
+            g.row_mut(i).copy_from_slice(network.slip_of(row));
+            excess[(i, 0)] = form(g.row(i), &self.x);
         }
-        let response = solve(&self.network.mass, &g.transposed()).expect("the mass is regular");
-        let change = response.times(&least_norm(&g.times(&response), &slip));
-        for i in 0..self.network.speeds() {
+        for (i, (speed, input)) in (rows.len()..).zip(&network.prescribed) {
+            g.row_mut(i).copy_from_slice(speed);
+            excess[(i, 0)] = form(speed, &self.x) - self.expansion.inputs[*input][0];
+        }
+        let response = solve(&network.mass, &g.transposed()).expect("the mass is regular");
+        let change = response.times(&least_norm(&g.times(&response), &excess));
+        for i in 0..network.speeds() {
             self.x[i] -= change[(i, 0)];
         }
     }
 
-    /// Sign of the torque that a stuck element holds now.
-    fn holding_sign(&self, j: usize) -> f64 {
-        let position = self.mode.stuck.iter().position(|&s| s == j);
-        let row = self.mode.stuck_torque.row(position.expect("the element is stuck"));
+    /// State and inputs of the basis at this instant, without the channels.
+    pub(super) fn basis_without_channels(&self) -> Vec<T> {
+        let inputs = &self.expansion.inputs;
         let mut basis = self.x.clone();
-        basis.extend(self.expansion.inputs.iter().map(|input| input[0]));
+        basis.extend(inputs.iter().map(|input| input[0]));
+        basis.extend(self.network.prescribed.iter().map(|&(_, input)| inputs[input][1]));
         basis.push(T::of(1.0));
-        basis.extend((0..self.cells.len()).map(|i| self.channel_now(i)));
-        sign_of(form(row, &basis).re())
+        basis
     }
 
     /// Torque of a channel at this instant, in its present cell.
     pub(super) fn channel_now(&self, i: usize) -> T {
         let channel = &self.network.channels[i];
         let mut series = ChannelSeries::default();
-        series.speed[0] = form(&channel.speed, &self.x);
+        for (argument, row) in series.arguments.iter_mut().zip(&channel.arguments) {
+            argument[0] = form(row, &self.x);
+        }
         channel.term(self.cells[i], &self.expansion.inputs, &mut series, 0);
         series.torque[0]
     }
 
-    /// Note every difference between the friction modes and `rows` as an event.
-    pub(super) fn record_changes(&mut self, rows: &[RowState]) {
+    fn cell_now(&self, i: usize) -> crate::network::Cell {
+        let channel = &self.network.channels[i];
+        let mut arguments = [0.0; 2];
+        for (argument, row) in arguments.iter_mut().zip(&channel.arguments) {
+            *argument = form(row, &self.x).re();
+        }
+        channel.cell_at(arguments, sign_of(arguments[0]), &self.expansion.inputs)
+    }
+
+    /// Note every difference between the present modes and `after` as an event.
+    pub(super) fn record_changes(&mut self, after: &Assignment) {
         use RowState::{Open, Saturated, Slipping, Stuck};
-        for (element, (&before, &after)) in self.rows.iter().zip(rows).enumerate() {
+        let mut events = Vec::new();
+        for (element, (&before, &after)) in self.rows.iter().zip(&after.rows).enumerate() {
             let kind = match (before, after) {
                 (Open, Open) => continue,
                 (_, Open) => EventKind::Vent,
@@ -147,7 +175,22 @@ impl<T: Real> Integrator<'_, T> {
                 (Slipping { sign: a }, Slipping { sign: b }) if a != b => EventKind::Reverse,
                 _ => continue,
             };
-            self.events.push(Event { time: self.t, element, kind });
+            events.push((element, kind));
         }
+        for (i, (&before, &after)) in self.gears.iter().zip(&after.gears).enumerate() {
+            let kind = match (before, after) {
+                (GearState::Rolling { .. }, GearState::Held) => EventKind::Lock,
+                (GearState::Held, GearState::Rolling { .. }) => EventKind::BreakAway,
+                (GearState::Rolling { sign: a, .. }, GearState::Rolling { sign: b, .. })
+                    if a != b =>
+                {
+                    EventKind::Reverse
+                }
+                _ => continue,
+            };
+            events.push((self.rows.len() + i, kind));
+        }
+        let time = self.t;
+        self.events.extend(events.into_iter().map(|(element, kind)| Event { time, element, kind }));
     }
 }

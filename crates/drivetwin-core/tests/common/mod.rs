@@ -12,7 +12,7 @@ use drivetwin_core::model::{Driveline, FrictionLaw, Stribeck};
 use drivetwin_core::network::Network;
 use drivetwin_core::number::Real;
 use drivetwin_core::simulate::{DualClutchStart, Output, Start, Trajectory, run};
-use drivetwin_core::solve::Settings;
+use drivetwin_core::solve::{Settings, Signal as Input};
 use std::marker::PhantomData;
 
 /// A signal: input name, times, values.
@@ -81,8 +81,8 @@ pub fn simulate(
     grid: &[f64],
     outputs: &[Output],
 ) -> Trajectory<f64> {
-    let signals: Vec<(&str, &[f64], &[f64])> =
-        signals.iter().map(|(n, t, v)| (*n, t.as_slice(), v.as_slice())).collect();
+    let signals: Vec<(&str, Input<'_, f64>)> =
+        signals.iter().map(|(n, t, v)| (*n, Input::Samples(t, v))).collect();
     run(network, &signals, start, grid, outputs, (Settings::default(), true)).expect("sound inputs")
 }
 

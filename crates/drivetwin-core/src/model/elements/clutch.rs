@@ -54,6 +54,7 @@ impl<T: Real> Clutch<T> {
             law: self.friction.clone(),
             normal,
             peak: self.peak,
+            one_way: false,
         });
     }
 }

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 //! An engine by its steady-state map over throttle and speed (paper eq. 2).
 
-use crate::model::error::ModelError;
+use crate::model::error::{ModelError, require};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::model::torque_map::TorqueMap;
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
-use std::marker::PhantomData;
 
 /// Torque on one node from a map over a throttle input and the node's speed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,20 +19,23 @@ pub struct EngineMap<T> {
     pub throttle: String,
     /// Torque over throttle and speed.
     pub map: TorqueMap,
-    /// The map is data, not a number with derivatives.
-    #[serde(skip)]
-    pub number: PhantomData<T>,
+    /// Time constant with which the torque follows the map, s; at once if absent.
+    #[serde(default = "Option::default")]
+    pub lag: Option<T>,
 }
 
 impl<T: Real> EngineMap<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
+        if let Some(lag) = self.lag {
+            require(&self.name, "lag", lag.re(), |v| v > 0.0, "> 0 s")?;
+        }
         self.map.check(&self.name)
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
-        let law = ForceLaw::Map { input: m.input(&self.throttle), map: self.map.clone() };
         let node = m.node(&self.node);
-        let account = Account::Source;
-        m.forces.push(Force { element: self.name.clone(), node, law, account });
+        let law = ForceLaw::Map { input: m.input(&self.throttle), node, map: self.map.clone() };
+        let (element, account) = (self.name.clone(), Account::Source);
+        m.forces.push(Force { element, node, law, lag: self.lag, account });
     }
 }

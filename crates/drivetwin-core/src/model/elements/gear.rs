@@ -12,8 +12,48 @@ use serde::{Deserialize, Serialize};
 pub struct GearLoss<T> {
     /// Law by name.
     pub law: LossLaw,
-    /// Efficiency. Must be > 0; at most 1.5, so that fits may stray.
+    /// Efficiency with power from `a` to `b`. Must be > 0; at most 1.5, so that fits may stray.
     pub eta: T,
+    /// Efficiency with power from `b` to `a`; as `eta` if absent. A low value makes the gear
+    /// self-locking.
+    #[serde(default = "Option::default")]
+    pub eta_backward: Option<T>,
+    /// Drag torque at `a` with power from `a` to `b`, N·m; none if absent. Must be >= 0.
+    #[serde(default = "Option::default")]
+    pub drag: Option<T>,
+    /// Drag torque at `a` with power from `b` to `a`, N·m; as `drag` if absent. Must be >= 0.
+    #[serde(default = "Option::default")]
+    pub drag_backward: Option<T>,
+}
+
+impl<T: Real> GearLoss<T> {
+    /// A loss by its efficiency alone.
+    pub fn by_efficiency(law: LossLaw, eta: T) -> Self {
+        Self { law, eta, eta_backward: None, drag: None, drag_backward: None }
+    }
+
+    fn check(&self, element: &str) -> Result<(), ModelError> {
+        let efficient = |v: f64| v > 0.0 && v <= 1.5;
+        require(element, "eta", self.eta.re(), efficient, "in (0, 1.5]")?;
+        let backward = self.eta_backward.unwrap_or(self.eta);
+        require(element, "eta_backward", backward.re(), efficient, "in (0, 1.5]")?;
+        for drag in [self.drag, self.drag_backward].into_iter().flatten() {
+            require(element, "drag", drag.re(), |v| v >= 0.0, ">= 0 N m")?;
+        }
+        Ok(())
+    }
+
+    fn state(&self, driving: usize) -> Loss<T> {
+        let drag = self.drag.unwrap_or(T::zero_());
+        Loss {
+            law: self.law,
+            eta: self.eta,
+            eta_backward: self.eta_backward.unwrap_or(self.eta),
+            drag,
+            drag_backward: self.drag_backward.unwrap_or(drag),
+            driving,
+        }
+    }
 }
 
 /// `ω_a = ratio · ω_b`; the torque T_g that enters at `a` leaves at `b` as `ratio · φ(T_g)`.
@@ -37,18 +77,13 @@ impl<T: Real> Gear<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         require(&self.name, "ratio", self.ratio.re(), |v| v != 0.0, "not 0")?;
-        match &self.loss {
-            Some(loss) => {
-                require(&self.name, "eta", loss.eta.re(), |v| v > 0.0 && v <= 1.5, "in (0, 1.5]")
-            }
-            None => Ok(()),
-        }
+        self.loss.as_ref().map_or(Ok(()), |loss| loss.check(&self.name))
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let row = m.row(&[(&self.a, T::of(1.0)), (&self.b, -self.ratio)]);
         let driving = m.node(&self.a);
-        let loss = self.loss.as_ref().map(|l| Loss { law: l.law, eta: l.eta, driving });
+        let loss = self.loss.as_ref().map(|loss| loss.state(driving));
         m.constraints.push(Constraint { element: self.name.clone(), row, loss });
     }
 }

@@ -1,23 +1,33 @@
 // SPDX-License-Identifier: MIT
 //! The closed set of elements, one file each: fields, checks, and the law in a few lines.
 
+mod backlash;
+mod bearing;
 mod clutch;
 mod engine_map;
 mod gear;
 mod inertia;
+mod one_way_clutch;
 mod planetary;
+mod prescribed_speed;
 mod road_load;
 mod spring_damper;
 mod torque;
+mod torque_converter;
 
+pub use backlash::Backlash;
+pub use bearing::Bearing;
 pub use clutch::Clutch;
 pub use engine_map::EngineMap;
 pub use gear::{Gear, GearLoss};
 pub use inertia::Inertia;
+pub use one_way_clutch::{OneWayClutch, ParallelClutch};
 pub use planetary::Planetary;
+pub use prescribed_speed::PrescribedSpeed;
 pub use road_load::RoadLoad;
 pub use spring_damper::SpringDamper;
 pub use torque::Torque;
+pub use torque_converter::TorqueConverter;
 
 use super::error::ModelError;
 use super::mechanism::Mechanism;
@@ -52,4 +62,18 @@ macro_rules! elements {
     };
 }
 
-elements!(Inertia, Gear, Planetary, Clutch, SpringDamper, RoadLoad, Torque, EngineMap);
+elements!(
+    Inertia,
+    Gear,
+    Planetary,
+    Clutch,
+    OneWayClutch,
+    Bearing,
+    SpringDamper,
+    Backlash,
+    TorqueConverter,
+    RoadLoad,
+    Torque,
+    EngineMap,
+    PrescribedSpeed,
+);

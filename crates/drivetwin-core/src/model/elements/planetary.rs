@@ -2,7 +2,7 @@
 //! A planetary gear set.
 
 use crate::model::error::{ModelError, require};
-use crate::model::mechanism::{Constraint, Mechanism};
+use crate::model::mechanism::{Constraint, Inertia, Mechanism};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
 
@@ -21,17 +21,30 @@ pub struct Planetary<T> {
     pub carrier: String,
     /// Ring over sun teeth. Must not be 0 or -1.
     pub z: T,
+    /// Spin inertia of all planets together about their own axes, kg·m²; none if absent. For single
+    /// pinions (z > 1). Their orbiting mass belongs to the carrier. Must be >= 0.
+    #[serde(default = "Option::default")]
+    pub planet_inertia: Option<T>,
 }
 
 impl<T: Real> Planetary<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
-        require(&self.name, "z", self.z.re(), |z| z != 0.0 && z != -1.0, "neither 0 nor -1")
+        require(&self.name, "z", self.z.re(), |z| z != 0.0 && z != -1.0, "neither 0 nor -1")?;
+        let Some(spin) = self.planet_inertia else { return Ok(()) };
+        require(&self.name, "planet_inertia", spin.re(), |v| v >= 0.0, ">= 0 kg m^2")?;
+        require(&self.name, "z", self.z.re(), |z| z > 1.0, "> 1 for a set with planet inertia")
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let one = T::of(1.0);
         let row =
             m.row(&[(&self.sun, one), (&self.ring, self.z), (&self.carrier, -(self.z + 1.0))]);
+        if let Some(inertia) = self.planet_inertia {
+            // ω_planet = ω_carrier - (ω_sun - ω_carrier) N_sun / N_planet, N_planet = (N_ring - N_sun)/2
+            let pinion = (self.z - 1.0).recip() * 2.0;
+            let spin = m.row(&[(&self.carrier, pinion + 1.0), (&self.sun, -pinion)]);
+            m.inertias.push(Inertia { row: spin, inertia });
+        }
         m.constraints.push(Constraint { element: self.name.clone(), row, loss: None });
     }
 }

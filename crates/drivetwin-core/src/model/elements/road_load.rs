@@ -33,11 +33,12 @@ impl<T: Real> RoadLoad<T> {
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let node = m.node(&self.node);
         let mut force = |law| {
-            m.forces.push(Force { element: self.name.clone(), node, law, account: Account::Load });
+            let (element, account) = (self.name.clone(), Account::Load);
+            m.forces.push(Force { element, node, law, lag: None, account });
         };
         force(ForceLaw::Constant(-self.constant));
         if self.aero.re() != 0.0 {
-            force(ForceLaw::Quadratic(-self.aero));
+            force(ForceLaw::Quadratic { coefficient: -self.aero, node });
         }
         if self.rolling.re() != 0.0 {
             m.frictions.push(Friction {
@@ -46,6 +47,7 @@ impl<T: Real> RoadLoad<T> {
                 law: FrictionLaw::constant(T::of(1.0)),
                 normal: Normal::Constant(self.rolling),
                 peak: T::of(1.0),
+                one_way: false,
             });
         }
     }

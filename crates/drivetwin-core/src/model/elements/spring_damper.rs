@@ -2,7 +2,7 @@
 //! A compliant shaft (paper eq. 8).
 
 use crate::model::error::{ModelError, require, require_apart};
-use crate::model::mechanism::{Mechanism, Spring};
+use crate::model::mechanism::{Mechanism, Spring, SpringLaw};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
 
@@ -31,11 +31,7 @@ impl<T: Real> SpringDamper<T> {
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let row = m.row(&[(&self.a, T::of(1.0)), (&self.b, T::of(-1.0))]);
-        m.springs.push(Spring {
-            element: self.name.clone(),
-            row,
-            stiffness: self.stiffness,
-            damping: self.damping,
-        });
+        let law = SpringLaw::Linear { stiffness: self.stiffness, damping: self.damping };
+        m.springs.push(Spring { element: self.name.clone(), row, law });
     }
 }

@@ -32,7 +32,7 @@ impl<T: Real> Torque<T> {
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let law = ForceLaw::Input(m.input(&self.input));
         let node = m.node(&self.node);
-        let account = Account::Source;
-        m.forces.push(Force { element: self.name.clone(), node, law, account });
+        let (element, account) = (self.name.clone(), Account::Source);
+        m.forces.push(Force { element, node, law, lag: None, account });
     }
 }

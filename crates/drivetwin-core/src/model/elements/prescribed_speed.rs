@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+//! A node that is driven at a given speed whatever torque that takes.
+
+use crate::model::error::ModelError;
+use crate::model::mechanism::{Mechanism, Prescribed};
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+
+/// `ω_node` equals an input. A friction element that would have to hold against it slips.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PrescribedSpeed<T> {
+    /// Unique name.
+    pub name: String,
+    /// The node.
+    pub node: String,
+    /// Name of the speed input, rad/s; it must not jump.
+    pub input: String,
+    /// The element has no number of its own.
+    #[serde(skip)]
+    pub number: PhantomData<T>,
+}
+
+impl<T: Real> PrescribedSpeed<T> {
+    #[expect(clippy::unnecessary_wraps, reason = "all elements share one form")]
+    #[expect(clippy::unused_self, reason = "all elements share one form")]
+    pub(crate) fn check(&self) -> Result<(), ModelError> {
+        Ok(())
+    }
+
+    pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
+        let (node, input) = (m.node(&self.node), m.input(&self.input));
+        m.prescribed.push(Prescribed { element: self.name.clone(), node, input });
+    }
+}

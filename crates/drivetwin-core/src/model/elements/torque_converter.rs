@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+//! A hydrodynamic torque converter by its steady-state map.
+
+use crate::model::converter_map::ConverterMap;
+use crate::model::error::{ModelError, require_apart};
+use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
+use crate::number::Real;
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+
+/// Couples pump and turbine, in drive and in overrun; the lock-up clutch is a clutch beside it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TorqueConverter<T> {
+    /// Unique name.
+    pub name: String,
+    /// Node of the pump (impeller).
+    pub pump: String,
+    /// Node of the turbine.
+    pub turbine: String,
+    /// Steady-state map.
+    pub map: ConverterMap,
+    /// The map is data, not a number with derivatives.
+    #[serde(skip)]
+    pub number: PhantomData<T>,
+}
+
+impl<T: Real> TorqueConverter<T> {
+    pub(crate) fn check(&self) -> Result<(), ModelError> {
+        require_apart(&self.name, &self.pump, &self.turbine)?;
+        self.map.check(&self.name)
+    }
+
+    pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
+        let (pump, turbine) = (m.node(&self.pump), m.node(&self.turbine));
+        for (node, at_turbine) in [(pump, false), (turbine, true)] {
+            let map = self.map.clone();
+            let law = ForceLaw::Converter { pump, turbine, map, at_turbine };
+            let (element, account) = (self.name.clone(), Account::Converter);
+            m.forces.push(Force { element, node, law, lag: None, account });
+        }
+    }
+}

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: MIT
+//! The analytic branch of a channel, where it ends, and what lies beyond.
+
+use super::channel::{Channel, ChannelSeries, Law};
+use crate::model::FrictionLaw;
+use crate::model::torque_map::span_index;
+use crate::number::{Real, Series};
+
+/// How a backlash is in contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contact {
+    /// No torque.
+    Free,
+    /// Spring and damper.
+    Spring,
+    /// The damping torque is limited to the spring torque.
+    Limited,
+    /// Beyond the gap, but parting so fast that the damper would pull: no torque.
+    Parting,
+}
+
+/// The branch that is active.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Cell {
+    /// No torque.
+    #[default]
+    Off,
+    /// Friction at rest relative to the other side, loaded to its static capacity.
+    Saturated {
+        /// Sign of the torque.
+        sign: f64,
+    },
+    /// Moving in one direction, on piece `piece` of a table.
+    Moving {
+        /// Sign of the speed.
+        sign: f64,
+        /// Piece of the table, 0 without one.
+        piece: usize,
+    },
+    /// Spans of throttle and speed of a torque map.
+    Map {
+        /// Throttle span.
+        throttle: usize,
+        /// Speed span.
+        speed: usize,
+    },
+    /// Span of the speed ratio of a converter.
+    Converter {
+        /// Cell of its map.
+        index: usize,
+    },
+    /// Backlash.
+    Backlash {
+        /// Side of the contact, ±1, or the last one left.
+        side: f64,
+        /// Kind of contact.
+        contact: Contact,
+    },
+}
+
+/// A border of a cell: the series must stay positive; beyond lies the cell.
+pub type Border<T> = (Series<T>, Cell);
+
+impl<T: Real> Channel<T> {
+    /// The cell that holds at the given arguments; `sign` is the direction of a friction element.
+    pub fn cell_at(&self, arguments: [f64; 2], sign: f64, inputs: &[Series<T>]) -> Cell {
+        let [s, r] = arguments;
+        match &self.law {
+            Law::Friction { mu: FrictionLaw::Table(table), .. } => {
+                Cell::Moving { sign, piece: table.cell((s * sign).max(0.0)) }
+            }
+            Law::Friction { .. } | Law::Quadratic(_) => Cell::Moving { sign, piece: 0 },
+            Law::Map { input, map } => Cell::Map {
+                throttle: span_index(&map.throttle, inputs[*input][0].re()),
+                speed: span_index(&map.speed, s),
+            },
+            Law::Converter { map, .. } => {
+                let ratio = if s == 0.0 && r == 0.0 { 0.0 } else { r / s };
+                Cell::Converter { index: map.cell_index(ratio) }
+            }
+            Law::Backlash { stiffness, damping, half_gap } => {
+                let side = if s < 0.0 { -1.0 } else { 1.0 };
+                let spring = stiffness.re() * (s.abs() - half_gap.re());
+                let damper = damping.re() * r * side;
+                let contact = if spring <= 0.0 {
+                    Contact::Free
+                } else if spring + damper <= 0.0 {
+                    Contact::Parting
+                } else if damper <= spring {
+                    Contact::Spring
+                } else {
+                    Contact::Limited
+                };
+                Cell::Backlash { side, contact }
+            }
+        }
+    }
+
+    /// Borders of the active cell.
+    pub fn borders(
+        &self,
+        cell: Cell,
+        inputs: &[Series<T>],
+        c: &ChannelSeries<T>,
+    ) -> Vec<Border<T>> {
+        let [s, r] = &c.arguments;
+        match (&self.law, cell) {
+            (Law::Friction { mu: FrictionLaw::Table(table), .. }, Cell::Moving { sign, piece }) => {
+                let (_, (from, to)) = table.piece(piece);
+                let next =
+                    |step: isize| Cell::Moving { sign, piece: piece.wrapping_add_signed(step) };
+                let from = if piece == 0 { f64::NEG_INFINITY } else { from };
+                between(&scaled(s, sign), (from, to)).map(|(b, step)| (b, next(step))).collect()
+            }
+            (Law::Quadratic(_), Cell::Moving { sign, piece }) => {
+                vec![(scaled(s, sign), Cell::Moving { sign: -sign, piece })]
+            }
+            (Law::Map { input, map }, Cell::Map { throttle, speed }) => {
+                let cell = map.cell(throttle, speed);
+                let across = between(&inputs[*input], cell.throttle).map(|(border, step)| {
+                    let throttle = throttle.wrapping_add_signed(step);
+                    (border, Cell::Map { throttle, speed })
+                });
+                let along = between(s, cell.speed).map(|(border, step)| {
+                    let speed = speed.wrapping_add_signed(step);
+                    (border, Cell::Map { throttle, speed })
+                });
+                across.chain(along).collect()
+            }
+            (Law::Converter { map, .. }, Cell::Converter { index }) => {
+                let (from, to) = map.cell(index).span;
+                let ends = [(from, 1.0, -1), (to, -1.0, 1)];
+                let border = |(end, sign, step): (f64, f64, isize)| {
+                    let index = index.wrapping_add_signed(step);
+                    (weighted(r, T::of(sign), s, T::of(-sign * end)), Cell::Converter { index })
+                };
+                ends.into_iter().filter(|e| e.0.is_finite()).map(border).collect()
+            }
+            (Law::Backlash { stiffness, damping, half_gap }, Cell::Backlash { side, contact }) => {
+                let mut depth = scaled(s, side);
+                depth[0] -= *half_gap;
+                let spring = depth.map(|c| c * *stiffness);
+                let damper = r.map(|c| c * *damping * side);
+                backlash_borders((&spring, &damper), contact, side, (s, *half_gap))
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// Where a backlash changes its kind of contact.
+fn backlash_borders<T: Real>(
+    (spring, damper): (&Series<T>, &Series<T>),
+    contact: Contact,
+    side: f64,
+    (twist, half_gap): (&Series<T>, T),
+) -> Vec<Border<T>> {
+    let one = T::of(1.0);
+    let to = |contact: Contact| Cell::Backlash { side, contact };
+    let push = weighted(spring, one, damper, one);
+    let margin = weighted(spring, one, damper, -one);
+    match contact {
+        Contact::Spring => vec![
+            (push, to(Contact::Parting)),
+            (margin, to(Contact::Limited)),
+            (*spring, to(Contact::Free)),
+        ],
+        Contact::Limited => {
+            vec![(*spring, to(Contact::Free)), (scaled(&margin, -1.0), to(Contact::Spring))]
+        }
+        Contact::Parting => {
+            vec![(*spring, to(Contact::Free)), (scaled(&push, -1.0), to(Contact::Spring))]
+        }
+        Contact::Free => [1.0, -1.0]
+            .map(|side| {
+                let mut clearance = scaled(twist, -side);
+                clearance[0] += half_gap;
+                (clearance, Cell::Backlash { side, contact: Contact::Limited })
+            })
+            .to_vec(),
+    }
+}
+
+fn scaled<T: Real>(series: &Series<T>, factor: f64) -> Series<T> {
+    series.map(|c| c * factor)
+}
+
+fn weighted<T: Real>(a: &Series<T>, wa: T, b: &Series<T>, wb: T) -> Series<T> {
+    std::array::from_fn(|k| a[k] * wa + b[k] * wb)
+}
+
+/// Distances to the ends of a span that exist, each with the step to the neighbouring cell.
+fn between<T: Real>(
+    series: &Series<T>,
+    span: (f64, f64),
+) -> impl Iterator<Item = (Series<T>, isize)> {
+    let mut above = *series;
+    above[0] -= span.0;
+    let mut below = scaled(series, -1.0);
+    below[0] += span.1;
+    let finite = [(span.0, (above, -1)), (span.1, (below, 1))];
+    finite.into_iter().filter(|(end, _)| end.is_finite()).map(|(_, border)| border)
+}
