@@ -64,23 +64,25 @@ impl<T: Real> Expansion<T> {
             series[0] = value;
         }
         let last = accuracy.order.unwrap_or(TERMS - 1);
-        let (mut power, mut before) = (1.0, f64::INFINITY);
+        // Two successive terms, because every other one of an even or odd motion is zero.
+        let mut power = 1.0;
+        let (mut before, mut size) = (f64::INFINITY, f64::INFINITY);
         for k in 0..last {
             self.channel_terms(network, cells, k);
             self.next_term(network, mode, k);
             power *= h;
-            let size = self.relative_size(network, k + 1) * power;
+            before = size;
+            size = self.relative_size(network, k + 1) * power;
             if accuracy.order.is_none() && k >= 2 && size.max(before) <= accuracy.tolerance {
                 self.finish(network, cells, k + 1);
                 return h;
             }
-            before = size;
         }
         self.finish(network, cells, last);
         if accuracy.order.is_some() {
             return h;
         }
-        let excess = before / accuracy.tolerance;
+        let excess = before.max(size) / accuracy.tolerance;
         h * (0.8 * excess.powf(-1.0 / last as f64)).min(1.0)
     }
 

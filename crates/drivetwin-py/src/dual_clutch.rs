@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+//! Simulation of the dual-clutch driveline; see `drivetwin.driveline.simulate`.
+
+use crate::plain::{Audit, Event, as_tuple, events_of};
+use drivetwin_core::model::DualClutch;
+use drivetwin_core::simulate::{DualClutchStart, simulate_dual_clutch};
+use drivetwin_core::solve::{Settings, Signal};
+use numpy::{PyArray2, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Name, times [s] and values of an input.
+type Samples<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+/// Speeds of engine, output and wheel [rad/s], twist [rad], names of locked elements.
+type Start = (f64, f64, f64, f64, Vec<String>);
+/// Tolerance, longest step [s], fixed order, whether to audit the energy.
+type Options = (f64, f64, Option<usize>, bool);
+/// Columns (n_columns, n_time), events, status, audit.
+type Run<'py> = (Bound<'py, PyArray2<f64>>, Vec<Event>, String, Option<Audit>);
+
+/// Simulate a dual-clutch driveline given as JSON.
+#[pyfunction]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    model: &str,
+    signals: Vec<Samples<'py>>,
+    start: Start,
+    grid: PyReadonlyArray1<'py, f64>,
+    options: Options,
+) -> PyResult<Run<'py>> {
+    let model: DualClutch<f64> =
+        serde_json::from_str(model).map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let grid = grid.as_slice()?;
+    let signals = signals
+        .iter()
+        .map(|(name, times, values)| {
+            Ok((name.as_str(), Signal::Samples(times.as_slice()?, values.as_slice()?)))
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    let (engine_speed, output_speed, wheel_speed, twist, locked) = start;
+    let start = DualClutchStart { engine_speed, output_speed, wheel_speed, twist, locked };
+    let (tolerance, max_step, order, audit) = options;
+    let settings = Settings { tolerance, max_step, order };
+    let run = py
+        .detach(|| simulate_dual_clutch(&model, &signals, &start, grid, (settings, audit)))
+        .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let columns = PyArray2::from_vec2(py, &run.columns)?;
+    let events = events_of(&run);
+    Ok((columns, events, run.status.to_string(), run.audit.map(as_tuple)))
+}

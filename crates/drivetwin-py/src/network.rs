@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+//! Simulation of any network of elements; see `drivetwin.network.simulate`.
+
+use crate::plain::{Audit, Event, as_tuple, events_of};
+use drivetwin_core::model::Driveline;
+use drivetwin_core::network::Network;
+use drivetwin_core::simulate::{Output, Start, run};
+use drivetwin_core::solve::{Settings, Signal};
+use numpy::{PyArray2, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Input name, times [s] and values.
+type Samples<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+/// Input name, offset, amplitude, frequency [Hz], phase [rad].
+type Sine = (String, f64, f64, f64, f64);
+/// Speeds [rad/s] by node, twists [rad] by shaft, names of elements at rest.
+type StartState = (Vec<(String, f64)>, Vec<(String, f64)>, Vec<String>);
+/// Tolerance, longest step [s], fixed order, whether to audit the energy.
+type Options = (f64, f64, Option<usize>, bool);
+/// Columns (n_outputs, n_time), events, status, audit.
+type Run<'py> = (Bound<'py, PyArray2<f64>>, Vec<Event>, String, Option<Audit>);
+
+/// Simulate a driveline given as JSON; outputs are a JSON list such as `[{"speed": "engine"}]`.
+#[pyfunction]
+#[pyo3(signature = (driveline, outputs, signals, start, grid, options))]
+pub fn simulate_network<'py>(
+    py: Python<'py>,
+    driveline: &str,
+    outputs: &str,
+    signals: (Vec<Samples<'py>>, Vec<Sine>),
+    start: StartState,
+    grid: PyReadonlyArray1<'py, f64>,
+    options: Options,
+) -> PyResult<Run<'py>> {
+    let refuse = |e: serde_json::Error| PyValueError::new_err(e.to_string());
+    let driveline: Driveline<f64> = serde_json::from_str(driveline).map_err(refuse)?;
+    let outputs: Vec<Output> = serde_json::from_str(outputs).map_err(refuse)?;
+    let grid = grid.as_slice()?;
+    let (samples, sines) = signals;
+    let mut inputs = samples
+        .iter()
+        .map(|(name, times, values)| {
+            Ok((name.as_str(), Signal::Samples(times.as_slice()?, values.as_slice()?)))
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    inputs.extend(sines.iter().map(|&(ref name, offset, amplitude, frequency, phase)| {
+        (name.as_str(), Signal::Sine { offset, amplitude, frequency, phase })
+    }));
+    let (speeds, twists, locked) = start;
+    let start = Start { speeds, twists, locked };
+    let (tolerance, max_step, order, audit) = options;
+    let settings = Settings { tolerance, max_step, order };
+    let trajectory = py
+        .detach(|| {
+            let network = Network::compile(&driveline)?;
+            run(&network, &inputs, &start, grid, &outputs, (settings, audit))
+        })
+        .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let columns = PyArray2::from_vec2(py, &trajectory.columns)?;
+    let events = events_of(&trajectory);
+    Ok((columns, events, trajectory.status.to_string(), trajectory.audit.map(as_tuple)))
+}

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""Any driveline as a network of elements: described as data, simulated by the core.
+
+An element is a mapping with `type`, `name` and the fields of its kind, SI throughout; the kinds
+and their laws are listed in docs/reference/elements.md. Nodes are the names used at the flanges;
+`ground` does not turn.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from drivetwin import _native
+from drivetwin.driveline import Accuracy, EnergyAudit, Event, FloatArray, Signal
+from drivetwin.errors import InputError
+
+Element = Mapping[str, Any]
+OutputKind = Literal["speed", "angle", "twist", "shaft_torque", "slip", "friction_torque"]
+Output = tuple[OutputKind, str]
+"""What to record and of which node or element."""
+
+
+@dataclass(frozen=True)
+class Sine:
+    """An input `offset + amplitude·sin(2π·frequency·t + phase)`; frequency in Hz, phase in rad."""
+
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Start:
+    """Speeds of nodes [rad/s], twists of shafts [rad] (0 where absent), elements without slip."""
+
+    speeds: Mapping[str, float]
+    twists: Mapping[str, float] = field(default_factory=dict)
+    locked: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class NetworkRun:
+    """Result: `columns[kind, name]` (n,) on `time`; NaN after a failure, see `status`."""
+
+    time: FloatArray
+    columns: Mapping[Output, FloatArray]
+    events: tuple[Event, ...]
+    status: str
+    audit: EnergyAudit | None
+
+
+def simulate(
+    elements: Sequence[Element],
+    inputs: Mapping[str, Signal | Sine],
+    start: Start,
+    time: FloatArray,
+    outputs: Sequence[Output],
+    *,
+    audit: bool = False,
+    accuracy: Accuracy | None = None,
+) -> NetworkRun:
+    """Simulate a network from `time[0]` and record `outputs` on `time` (n,) [s], increasing.
+
+    Sampled inputs are linear between samples; a time that stands twice is a jump.
+    Raises InputError where the description is inconsistent, naming the element; a run that fails
+    on the way returns its status.
+    """
+    accuracy = accuracy or Accuracy()
+    samples = [
+        (name, _array(signal.time), _array(signal.values))
+        for name, signal in inputs.items()
+        if isinstance(signal, Signal)
+    ]
+    sines = [
+        (name, sine.offset, sine.amplitude, sine.frequency, sine.phase)
+        for name, sine in inputs.items()
+        if isinstance(sine, Sine)
+    ]
+    try:
+        columns, events, status, energy = _native.simulate_network(
+            json.dumps({"elements": list(elements)}),
+            json.dumps([{kind: name} for kind, name in outputs]),
+            (samples, sines),
+            (list(start.speeds.items()), list(start.twists.items()), list(start.locked)),
+            _array(time),
+            (accuracy.tolerance, accuracy.max_step, accuracy.order, audit),
+        )
+    except ValueError as error:
+        raise InputError(str(error), "correct the elements, their inputs or the start") from error
+    return NetworkRun(
+        time,
+        dict(zip(outputs, columns, strict=True)),
+        tuple(Event(*event) for event in events),
+        status,
+        EnergyAudit(*energy) if energy is not None else None,
+    )
+
+
+def _array(values: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(values, dtype=np.float64)
