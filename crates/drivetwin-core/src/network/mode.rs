@@ -170,7 +170,7 @@ impl<T: Real> Network<T> {
         let residual = difference(&torques, &self.inertia.times(n).times(&acceleration));
         Some(Mode {
             derivative: self.with_other_states(&acceleration),
-            gear_torque: self.gear_torques(&force_rows, &residual)?,
+            gear_torque: self.gear_torques(&force_rows, &residual, (&stuck, &stuck_torque))?,
             stuck_torque,
             stuck,
             redundant,
@@ -254,14 +254,28 @@ impl<T: Real> Network<T> {
         derivative
     }
 
-    /// Multipliers of the lossy constraints from the balance of the dependent nodes,
-    /// `D_depᵀ λ = (f - I ω')_dep`.
-    fn gear_torques(&self, force_rows: &Matrix<T>, residual: &Matrix<T>) -> Option<Matrix<T>> {
+    /// Torques entering the lossy gears: the multipliers of their constraints from the balance of
+    /// the dependent nodes, `D_depᵀ λ = (f - I ω')_dep`, and at rest the loss torque on top.
+    fn gear_torques(
+        &self,
+        force_rows: &Matrix<T>,
+        residual: &Matrix<T>,
+        (stuck, stuck_torque): (&[Row], &Matrix<T>),
+    ) -> Option<Matrix<T>> {
         let dependent = &self.coordinates.dependent;
         let balance = force_rows.transposed().select_rows(dependent);
         let multipliers = solve(&balance, &residual.select_rows(dependent)).ok()?;
         let lossy: Vec<usize> = self.losses.iter().map(|loss| loss.constraint).collect();
-        Some(multipliers.select_rows(&lossy))
+        let mut entering = multipliers.select_rows(&lossy);
+        for (position, &row) in stuck.iter().enumerate() {
+            if let Row::Gear(i) = row {
+                for (total, &loss) in entering.row_mut(i).iter_mut().zip(stuck_torque.row(position))
+                {
+                    *total += loss;
+                }
+            }
+        }
+        Some(entering)
     }
 }
 

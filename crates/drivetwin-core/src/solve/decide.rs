@@ -21,6 +21,8 @@ pub(super) struct Assignment {
 
 /// What counts as zero in a sum, relative to the size of its terms.
 const ROUND_OFF: f64 = 1e-10;
+/// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
+const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
 /// Most trials before every assignment is tried in turn.
 const MAX_TRIALS: usize = 200;
 /// Most rows at zero speed for which every assignment is tried.
@@ -172,7 +174,7 @@ impl<T: Real> Integrator<'_, T> {
                 let returning = |&&row: &&Row| {
                     trial.direction(row).is_some_and(|sign| {
                         let (a, scale) = self.acceleration(row, mode, basis);
-                        a * sign < -ROUND_OFF * scale
+                        a * sign < -(ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION)
                     })
                 };
                 candidates.iter().find(returning).map(|&row| Fault::Returning(row))

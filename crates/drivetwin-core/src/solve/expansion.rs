@@ -72,7 +72,7 @@ impl<T: Real> Expansion<T> {
             self.next_term(network, mode, k);
             power *= h;
             before = size;
-            size = self.relative_size(network, k + 1) * power;
+            size = self.relative_size(network, k + 1).max(self.input_size(k + 1)) * power;
             if accuracy.order.is_none() && k >= 2 && size.max(before) <= accuracy.tolerance {
                 self.finish(network, cells, k + 1);
                 return h;
@@ -159,6 +159,15 @@ impl<T: Real> Expansion<T> {
             sum += c * channel.torque[k];
         }
         sum
+    }
+
+    /// Largest coefficient `k` of an input that is not linear, relative to its size now: guards depend
+    /// on inputs even where the states rest.
+    fn input_size(&self, k: usize) -> f64 {
+        let curved =
+            self.inputs.iter().filter(|input| input[2].re() != 0.0 || input[3].re() != 0.0);
+        let scale = |input: &Series<T>| input[0].re().abs() + input[1].re().abs();
+        curved.map(|input| input[k].re().abs() / scale(input)).fold(0.0, f64::max)
     }
 
     /// Largest coefficient `k` relative to the scale of its state: speeds to 1 rad/s, twists to
