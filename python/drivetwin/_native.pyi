@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The compiled core. Private: use `drivetwin.driveline` and `drivetwin.network`."""
+"""The compiled core. Private: use `drivetwin.driveline`, `drivetwin.network` and `drivetwin.gearbox`."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["simulate", "simulate_network"]
+__all__ = ["gear_statics", "reduce_shift", "simulate", "simulate_network"]
 
 _Array = NDArray[np.float64]
 _Options = tuple[float, float, int | None, bool]
@@ -16,6 +16,8 @@ _Run = tuple[
     str,
     tuple[float, float, float, float, float, float, float, float, float] | None,
 ]
+
+_Ratios = tuple[str, float, float, float]
 
 def simulate(
     model: str,
@@ -34,3 +36,13 @@ def simulate_network(
     grid: _Array,
     options: _Options,
 ) -> _Run: ...
+def gear_statics(
+    driveline: str, engaged: Sequence[str], input: str, output: str
+) -> tuple[list[tuple[str, float | None]], list[tuple[str, str, float]], tuple[float, float]]: ...
+def reduce_shift(
+    driveline: str,
+    from_elements: Sequence[str],
+    to_elements: Sequence[str],
+    dogs: Sequence[str],
+    ends: tuple[str, str],
+) -> tuple[_Ratios, _Ratios, list[str], list[tuple[str, float, float, float]]]: ...

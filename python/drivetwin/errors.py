@@ -77,7 +77,11 @@ class MappingError(InputError):
 
 
 class CardError(InputError):
-    """The vehicle card has unknown keys, wrong types or impossible values."""
+    """A vehicle or gearbox card has unknown keys, wrong types or impossible values."""
+
+
+class ReductionError(InputError):
+    """A shift of a gearbox has no dual-clutch form, or none that can be simulated."""
 
 
 class ResultFileError(InputError):

@@ -25,8 +25,8 @@ _MAY_NOT_USE = {
 """Folders of the core and what they must not know; the integrator knows no elements either."""
 
 PYTHON_LAYERS = (
-    frozenset({"errors", "parameters", "driveline", "tomlfile", "_native"}),
-    frozenset({"logs", "vehicle", "held"}),
+    frozenset({"errors", "parameters", "driveline", "network", "tomlfile", "_native"}),
+    frozenset({"logs", "vehicle", "held", "gearbox"}),
     frozenset({"shifts", "dyno"}),
     frozenset({"identify"}),
     frozenset({"twin", "results", "start_state", "validate"}),

@@ -4,6 +4,7 @@
 //! Private to the package; the Python modules of the same names are its face.
 
 mod dual_clutch;
+mod gearbox;
 mod network;
 mod plain;
 
@@ -14,5 +15,7 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(dual_clutch::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(network::simulate_network, module)?)?;
+    module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;
+    module.add_function(wrap_pyfunction!(gearbox::reduce_shift, module)?)?;
     Ok(())
 }

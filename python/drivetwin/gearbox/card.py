@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""Gearbox cards: from a TOML file or a built-in name to a Gearbox in SI."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from drivetwin.errors import CardError
+from drivetwin.gearbox.check import gearbox_faults
+from drivetwin.gearbox.schema import GearboxFile
+from drivetwin.gearbox.spec import Gearbox
+from drivetwin.tomlfile import did_you_mean, raise_faults, read_toml
+
+_CARDS = Path(__file__).parent / "cards"
+
+
+def builtin_gearboxes() -> tuple[str, ...]:
+    """Names of the built-in cards, in alphabetical order."""
+    return tuple(sorted(path.stem for path in _CARDS.glob("*.toml")))
+
+
+def load_gearbox(card: Path | str) -> Gearbox:
+    """Read a gearbox card: a path, or the name of a built-in one.
+
+    Raises CardError that lists all faults by key path, or the built-in names where the card is
+    neither.
+    """
+    path = _find(card)
+    document = read_toml(path, CardError)
+    raise_faults(
+        gearbox_faults(document),
+        CardError,
+        str(card),
+        "correct these keys of the gearbox card; docs/reference/gearbox-card.md describes them",
+    )
+    return _gearbox(GearboxFile.model_validate(document))
+
+
+def gearbox_schema() -> dict[str, Any]:
+    """Return the JSON Schema of the gearbox card, for editors."""
+    return GearboxFile.model_json_schema()
+
+
+def _find(card: Path | str) -> Path:
+    builtin = _CARDS / f"{card}.toml"
+    if str(card) in builtin_gearboxes():
+        return builtin
+    path = Path(card)
+    if path.suffix or path.exists():
+        return path
+    raise CardError(
+        f"no built-in gearbox {str(card)!r}{did_you_mean(str(card), builtin_gearboxes())}",
+        f"give a path to a card, or one of {', '.join(builtin_gearboxes())}",
+    )
+
+
+def _gearbox(file: GearboxFile) -> Gearbox:
+    return Gearbox(
+        name=file.name,
+        input=file.input,
+        output=file.output,
+        sets=tuple(table.spec(name) for name, table in file.sets.items()),
+        pairs=tuple(table.spec(name) for name, table in file.pairs.items()),
+        elements={name: e.spec(name, file.friction) for name, e in file.elements.items()},
+        gears=tuple(gear.spec() for gear in file.gears),
+        inertias=dict(file.inertia_kgm2),
+        source=file.source,
+        drive=None if file.drive is None else file.drive.spec(),
+    )

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Faults of a gearbox card that lie between its tables: names that nothing else knows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from drivetwin.gearbox.schema import GearboxFile
+from drivetwin.gearbox.spec import GROUND
+from drivetwin.tomlfile import Fault, did_you_mean, schema_faults
+
+
+def gearbox_faults(document: Mapping[str, Any]) -> list[Fault]:
+    """Return all faults of a card file: those of the schema, or else those between tables."""
+    faults = schema_faults(document, GearboxFile)
+    if faults:
+        return faults
+    file = GearboxFile.model_validate(document)
+    return [*_names(file), *_members(file), *_gears(file)]
+
+
+def _names(file: GearboxFile) -> Iterator[Fault]:
+    """Sets, pairs and elements share one name space: torques are reported by these names."""
+    seen: dict[str, str] = {}
+    for table, names in (("sets", file.sets), ("pairs", file.pairs), ("elements", file.elements)):
+        for name in names:
+            if name in seen:
+                yield Fault(f"{table}.{name}", f"the name is already that of {seen[name]}.{name}")
+            seen[name] = table
+
+
+def _members(file: GearboxFile) -> Iterator[Fault]:
+    """Every member of an end, an element or an inertia must belong to a set or a gear pair."""
+    geared = {m for each in file.sets.values() for m in (each.sun, each.ring, each.carrier)}
+    geared |= {m for pair in file.pairs.values() for m in (pair.a, pair.b)}
+    joined = {m for element in file.elements.values() for m in element.members}
+    known = geared | joined
+    for key, member in (("input", file.input), ("output", file.output)):
+        if member not in known:
+            yield Fault(key, f"no set, pair or element has a member {member!r}"
+                        f"{did_you_mean(member, known)}")  # fmt: skip
+    for member in file.inertia_kgm2:
+        if member not in known:
+            text = f"no set, pair or element has this member{did_you_mean(member, known)}"
+            yield Fault(f"inertia_kgm2.{member}", text)
+    for name, element in file.elements.items():
+        if element.members[0] == element.members[-1] and len(element.members) == 2:
+            yield Fault(f"elements.{name}.members", "both sides are the same member")
+        for member in element.members:
+            if member not in geared | {file.input, file.output, GROUND} and (
+                sum(member in other.members for other in file.elements.values()) < 2
+            ):
+                text = f"{member!r} belongs to nothing else{did_you_mean(member, geared)}"
+                yield Fault(f"elements.{name}.members", text)
+
+
+def _gears(file: GearboxFile) -> Iterator[Fault]:
+    """Gears have different names and engage elements of the card."""
+    seen: set[str] = set()
+    for index, gear in enumerate(file.gears):
+        if gear.name in seen:
+            yield Fault(f"gears[{index}].name", f"gear {gear.name!r} is given twice")
+        seen.add(gear.name)
+        for name in gear.elements:
+            if name not in file.elements:
+                text = f"no [elements.{name}]{did_you_mean(name, file.elements)}"
+                yield Fault(f"gears[{index}].elements", text)

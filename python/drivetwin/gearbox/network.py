@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""A gearbox as elements of the core's network, as plain data for its JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from dataclasses import asdict
+from typing import Any
+
+from drivetwin.driveline import FrictionTable
+from drivetwin.gearbox.spec import Capacity, ElementKind, Gearbox, ShiftMember
+
+_NO_CAPACITY = Capacity(gain=0.0, P0=0.0, peak=1.0, friction=FrictionTable((0.0,), (0.0,)))
+
+Element = dict[str, Any]
+
+
+def network_elements(
+    gearbox: Gearbox, engaged_dogs: Collection[str] | None = None
+) -> tuple[Element, ...]:
+    """Return the gearbox as elements of the core, its members as nodes.
+
+    Every friction element has a pressure input [Pa] of its own name. Dogs that are in
+    `engaged_dogs` become rigid and the others are left out; without it, all stay as elements
+    without capacity, for the study of gears.
+    """
+    return (
+        *_gearing(gearbox),
+        *(
+            _inertia(member, inertia)
+            for member, inertia in gearbox.inertias.items()
+            if inertia > 0.0
+        ),
+        *(
+            _rigid(element) if element.name in engaged_dogs else _friction(element)
+            for element in gearbox.elements.values()
+            if engaged_dogs is not None and element.kind is ElementKind.DOG
+            if element.name in engaged_dogs
+        ),
+        *(
+            _friction(element)
+            for element in gearbox.elements.values()
+            if engaged_dogs is None or element.kind is not ElementKind.DOG
+        ),
+    )
+
+
+def as_json(gearbox: Gearbox) -> str:
+    """Return the gearbox as the driveline that the core reads, dogs as friction elements."""
+    return json.dumps({"elements": network_elements(gearbox)})
+
+
+def _gearing(gearbox: Gearbox) -> list[Element]:
+    sets = [
+        {
+            "type": "planetary",
+            "name": each.name,
+            "sun": each.sun,
+            "ring": each.ring,
+            "carrier": each.carrier,
+            "z": each.z,
+            **({"planet_inertia": each.planet_inertia} if each.planet_inertia > 0.0 else {}),
+        }
+        for each in gearbox.sets
+    ]
+    pairs = [
+        {"type": "gear", "name": pair.name, "a": pair.a, "b": pair.b, "ratio": pair.ratio}
+        for pair in gearbox.pairs
+    ]
+    return [*sets, *pairs]
+
+
+def _inertia(member: str, inertia: float) -> Element:
+    return {"type": "inertia", "name": f"J {member}", "node": member, "inertia": inertia}
+
+
+def _rigid(element: ShiftMember) -> Element:
+    return {"type": "gear", "name": element.name, "a": element.a, "b": element.b, "ratio": 1.0}
+
+
+def _friction(element: ShiftMember) -> Element:
+    capacity = element.capacity or _NO_CAPACITY
+    return {
+        "type": "clutch",
+        "name": element.name,
+        "a": element.a,
+        "b": element.b,
+        "friction": asdict(capacity.friction),
+        "gain": capacity.gain,
+        "p0": capacity.P0,
+        "peak": capacity.peak,
+        "pressure": element.name,
+        "drum_inertia": 0.0,
+    }

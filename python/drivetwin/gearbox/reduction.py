@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""A shift of a gearbox as a dual clutch: ratios, mass matrix, condition (1) (THEORY section 2)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from drivetwin import _native
+from drivetwin.driveline import DualClutch
+from drivetwin.errors import ReductionError
+from drivetwin.gearbox.drive import Drive
+from drivetwin.gearbox.dual import dual_clutch
+from drivetwin.gearbox.network import as_json
+from drivetwin.gearbox.spec import Gearbox
+
+_NO_COUPLING = 1e-9
+"""|M12| over √(M11·M22) up to which it is round-off."""
+
+
+@dataclass(frozen=True)
+class ElementRatios:
+    """slip = ω_in/i_c - i_out·ω_out (eq. 15) with i_c > 0.
+
+    `sense` is 1 where that is the element's own slip ω_a - ω_b, -1 where it is the negative.
+    """
+
+    element: str
+    i_c: float
+    i_out: float
+    sense: float
+
+    @property
+    def ratio(self) -> float:
+        """ω_in/ω_out with this element locked."""
+        return self.i_c * self.i_out
+
+
+@dataclass(frozen=True)
+class MemberInertia:
+    """A member of `inertia` [kg m^2] that runs at ω = a·ω_in - b·ω_out."""
+
+    member: str
+    inertia: float
+    a: float
+    b: float
+
+    @property
+    def coupling(self) -> float:
+        """Contribution -I·a·b to M12 [kg m^2]."""
+        return -self.inertia * self.a * self.b
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """The dual-clutch form of one shift; inertias [kg m^2] of the gearbox alone.
+
+    `common` stays engaged throughout; `members` are all inertias that move.
+    """
+
+    gearbox: Gearbox
+    from_gear: str
+    to_gear: str
+    off_going: ElementRatios
+    on_coming: ElementRatios
+    common: tuple[str, ...]
+    members: tuple[MemberInertia, ...]
+
+    @property
+    def M11(self) -> float:
+        """Inertia at the input, kg m^2."""
+        return sum(each.inertia * each.a**2 for each in self.members)
+
+    @property
+    def M12(self) -> float:
+        """Coupling of input and output, kg m^2."""
+        return sum(each.coupling for each in self.members)
+
+    @property
+    def M22(self) -> float:
+        """Inertia at the output, kg m^2."""
+        return sum(each.inertia * each.b**2 for each in self.members)
+
+    @property
+    def coupling_ratio(self) -> float:
+        """|M12|/√(M11·M22); 0 where nothing couples."""
+        scale = math.sqrt(self.M11 * self.M22)
+        return abs(self.M12) / scale if scale > 0.0 else 0.0
+
+    @property
+    def violations(self) -> tuple[MemberInertia, ...]:
+        """Members that run with both shafts, by the size of their coupling."""
+        floor = _NO_COUPLING * math.sqrt(self.M11 * self.M22)
+        coupled = [each for each in self.members if abs(each.coupling) > floor]
+        return tuple(sorted(coupled, key=lambda each: -abs(each.coupling)))
+
+    @property
+    def exact(self) -> bool:
+        """Whether the dual-clutch form is exact: M12 vanishes."""
+        return self.coupling_ratio <= _NO_COUPLING
+
+    def condition(self) -> str:
+        """Condition (1) of the paper in words, for this shift."""
+        if not self.violations:
+            return (
+                "Condition (1) holds: no member that turns with both shafts has an inertia, so the "
+                "dual-clutch form is exact."
+            )
+        names = ", ".join(f"{each.member} ({each.coupling:+.4g} kg m²)" for each in self.violations)
+        if self.exact:
+            return (
+                "The dual-clutch form is exact although members turn with both shafts: their "
+                f"couplings cancel: {names}."
+            )
+        return (
+            "Condition (1) is violated: these members turn with both shafts and couple input and "
+            f"output: {names}. Together M12 = {self.M12:.4g} kg m², "
+            f"{100 * self.coupling_ratio:.3g} % of √(M11·M22)."
+        )
+
+    def dual_clutch(self, drive: Drive | None = None, *, keep_coupling: bool = True) -> DualClutch:
+        """Return the dual-clutch driveline of this shift in the given drive (the card's, if None).
+
+        With `keep_coupling`, M12 is carried by drum inertias of the two elements, as -I·a·b, I·a²,
+        I·b² of a member that runs with the slip; without, it is left out and the diagonal kept.
+        Raises ReductionError where an element states no capacity, or no drum can carry M12.
+        """
+        return dual_clutch(self, drive or self.gearbox.require_drive(), keep_coupling=keep_coupling)
+
+
+def reduce(gearbox: Gearbox, from_gear: str, to_gear: str) -> Reduction:
+    """Reduce the shift between two gears of a gearbox to the dual-clutch form.
+
+    Raises ReductionError, with the reason, where the shift is not one element off and one on, or
+    where more or fewer than the two speeds of input and output remain in its middle.
+    """
+    old, new = gearbox.gear(from_gear), gearbox.gear(to_gear)
+    try:
+        off_going, on_coming, common, members = _native.reduce_shift(
+            as_json(gearbox),
+            list(old.elements),
+            list(new.elements),
+            list(gearbox.dogs),
+            (gearbox.input, gearbox.output),
+        )
+    except ValueError as error:
+        raise ReductionError(
+            f"shift {from_gear}-{to_gear} of {gearbox.name} has no dual-clutch form: {error}",
+            "choose a shift that releases one element and applies one, such as between "
+            "neighbouring gears, or simulate the whole gearbox",
+        ) from error
+    return Reduction(
+        gearbox=gearbox,
+        from_gear=from_gear,
+        to_gear=to_gear,
+        off_going=ElementRatios(*off_going),
+        on_coming=ElementRatios(*on_coming),
+        common=tuple(common),
+        members=tuple(
+            MemberInertia(_label(gearbox, name), inertia, a, b) for name, inertia, a, b in members
+        ),
+    )
+
+
+def _label(gearbox: Gearbox, name: str) -> str:
+    """Name the spin of planets, which the core gives as `carrier + sun`, after their set."""
+    for each in gearbox.sets:
+        if name == f"{each.carrier} + {each.sun}":
+            return f"planets of {each.name}"
+    return name

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""A gearbox as its card describes it, in SI: sets, gear pairs, inertias, shift elements, gears."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from drivetwin.driveline import FrictionTable, Stribeck
+from drivetwin.errors import CardError, InputError
+from drivetwin.gearbox.drive import Drive
+from drivetwin.tomlfile import did_you_mean
+
+GROUND = "ground"
+"""The member that does not turn: the housing."""
+
+
+class ElementKind(StrEnum):
+    """What a shift element is.
+
+    `DOG` stands for dog clutches and synchronisers: engaged without slip, never under load.
+    """
+
+    CLUTCH = "clutch"
+    BRAKE = "brake"
+    DOG = "dog"
+
+
+@dataclass(frozen=True)
+class PlanetarySet:
+    """ω_sun + z·ω_ring = (1 + z)·ω_carrier, z = ring over sun teeth, negative for dual pinions.
+
+    `planet_inertia` [kg m^2]: spin of all planets together about their own axes; 0 if not given.
+    """
+
+    name: str
+    sun: str
+    ring: str
+    carrier: str
+    z: float
+    planet_inertia: float = 0.0
+
+
+@dataclass(frozen=True)
+class GearPair:
+    """ω_a = ratio·ω_b; negative where the wheels mesh externally."""
+
+    name: str
+    a: str
+    b: str
+    ratio: float
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """What an element transmits: μ·gain·(P - P0), static `peak` times that (THEORY section 1).
+
+    `gain` = N·D·A·r [m^3], `P0` [Pa].
+    """
+
+    gain: float
+    P0: float
+    peak: float
+    friction: Stribeck | FrictionTable
+
+
+@dataclass(frozen=True)
+class ShiftMember:
+    """A shift element between members `a` and `b` (`ground` for a brake).
+
+    `capacity` is None where the card states no geometry, as for dogs.
+    """
+
+    name: str
+    kind: ElementKind
+    a: str
+    b: str
+    capacity: Capacity | None = None
+
+
+@dataclass(frozen=True)
+class GearEntry:
+    """One gear: the elements engaged in it and its published ratio, final drive included.
+
+    `tolerance` is the absolute rounding error of the published ratio.
+    """
+
+    name: str
+    elements: tuple[str, ...]
+    published: float
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class Gearbox:
+    """A gearbox between the members `input` and `output`.
+
+    Members rigidly connected carry one name. `inertias` [kg m^2] by member; `source` names where
+    the numbers come from; `drive` is the engine and vehicle that shifts are studied in.
+    """
+
+    name: str
+    input: str
+    output: str
+    sets: tuple[PlanetarySet, ...]
+    pairs: tuple[GearPair, ...]
+    elements: Mapping[str, ShiftMember]
+    gears: tuple[GearEntry, ...]
+    inertias: Mapping[str, float] = field(default_factory=dict)
+    source: str = ""
+    drive: Drive | None = None
+
+    def require_drive(self) -> Drive:
+        """Return the drive; raises CardError where the card has none."""
+        if self.drive is None:
+            raise CardError(
+                f"the card of {self.name} has no [drive]",
+                "add the table [drive]: engine, output shaft, vehicle and pace of the shift",
+            )
+        return self.drive
+
+    def gear(self, name: str) -> GearEntry:
+        """Return the gear of this name; raises InputError with the names there are."""
+        for gear in self.gears:
+            if gear.name == name:
+                return gear
+        names = [gear.name for gear in self.gears]
+        raise InputError(
+            f"{self.name} has no gear {name!r}{did_you_mean(name, names)}",
+            f"choose one of {', '.join(names)}",
+        )
+
+    @property
+    def dogs(self) -> tuple[str, ...]:
+        """Names of the dog clutches."""
+        return tuple(e.name for e in self.elements.values() if e.kind is ElementKind.DOG)
