@@ -3,14 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 
 from drivetwin.errors import MappingError, MissingChannelError
 from drivetwin.logs.mapping import ChannelSpec, guess, plain, resolve
+from drivetwin.logs.raw import Column
 from drivetwin.logs.roles import NEEDED
 
 ELEMENTS = {"B2": "brake", "B3": "brake"}
 ENGLISH = ["EngTrq", "PrsBrk2", "PrsBrk3", "TrqOut", "SpdIn", "SpdOut", "SpdWhl"]
+
+
+def columns(names: Sequence[str]) -> list[Column]:
+    return [Column(name) for name in names]
 
 
 @pytest.mark.parametrize(
@@ -29,13 +36,13 @@ ENGLISH = ["EngTrq", "PrsBrk2", "PrsBrk3", "TrqOut", "SpdIn", "SpdOut", "SpdWhl"
 )
 def test_names_in_use_are_recognised(role: str, names: str) -> None:
     for name in names.split():
-        assert guess([name], ELEMENTS) == {role: [name]}
+        assert guess(columns([name]), ELEMENTS) == {role: columns([name])}
 
 
 def test_a_clutch_and_a_brake_of_one_number_are_told_apart_by_kind() -> None:
     elements = {"B2": "brake", "K2": "clutch"}
-    found = guess(["PrsBrk2", "pKup2", "p_Temp"], elements)
-    assert found == {"pressure.B2": ["PrsBrk2"], "pressure.K2": ["pKup2"]}
+    found = guess(columns(["PrsBrk2", "pKup2", "p_Temp"]), elements)
+    assert found == {"pressure.B2": columns(["PrsBrk2"]), "pressure.K2": columns(["pKup2"])}
 
 
 def test_plain_names() -> None:
@@ -45,7 +52,7 @@ def test_plain_names() -> None:
 
 def test_resolve_orders_roles_and_prefers_what_is_stated() -> None:
     stated = {"output_torque": ChannelSpec("Sensor7", unit="Nm", sign=-1)}
-    mapped = resolve([*ENGLISH, "Sensor7"], stated, ELEMENTS, NEEDED, "log.csv")
+    mapped = resolve(columns([*ENGLISH, "Sensor7"]), stated, ELEMENTS, NEEDED, "log.csv")
     assert list(mapped.channels) == [
         "engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed",
         "pressure.B2", "pressure.B3",
@@ -56,17 +63,61 @@ def test_resolve_orders_roles_and_prefers_what_is_stated() -> None:
 
 
 def test_a_stated_column_is_not_guessed_for_another_role() -> None:
-    stated = {"engine_speed": ChannelSpec("SpdIn")}
+    stated = {"wheel_speed": ChannelSpec("SpdIn")}
     with pytest.raises(MissingChannelError, match="'input_speed'"):
-        resolve(ENGLISH, stated, ELEMENTS, NEEDED, "log.csv")
+        resolve(columns(ENGLISH), stated, ELEMENTS, NEEDED, "log.csv")
+
+
+def test_the_engine_speed_stands_in_for_the_input_speed() -> None:
+    stated = {"engine_speed": ChannelSpec("SpdIn")}
+    mapped = resolve(columns(ENGLISH), stated, ELEMENTS, NEEDED, "log.csv")
+    assert "input_speed" not in mapped.channels
+    assert mapped.channels["engine_speed"].source == "SpdIn"
+
+
+def test_what_nobody_needs_may_be_missing() -> None:
+    mapped = resolve(columns(["SpdIn", "SpdOut"]), {}, ELEMENTS, ("input_speed",), "log.csv")
+    assert list(mapped.channels) == ["input_speed", "output_speed"]
+    assert mapped.warnings == ("no pressure of B2, B3: nothing that needs it can be told",)
+
+
+def test_a_pressure_can_be_needed() -> None:
+    with pytest.raises(MissingChannelError, match=r"'pressure\.B2' among SpdIn"):
+        resolve(columns(["SpdIn"]), {}, ELEMENTS, ("pressure.B2",), "log.csv")
+
+
+def test_columns_of_one_name_are_told_apart_by_group() -> None:
+    both = [*columns(ENGLISH), Column("n", group="10ms"), Column("n", group="100ms")]
+    stated = {"engine_speed": ChannelSpec("n", group="100ms")}
+    mapped = resolve(both, stated, ELEMENTS, NEEDED, "log.mf4")
+    assert mapped.channels["engine_speed"].group == "100ms"
+    with pytest.raises(MappingError, match="the file has 'n' in '10ms', '100ms'") as caught:
+        resolve(both, {"engine_speed": ChannelSpec("n")}, ELEMENTS, NEEDED, "log.mf4")
+    assert 'channels.engine_speed.group = "10ms"' in caught.value.remedy
+    with pytest.raises(MappingError, match="'n' in '1s' for 'gear'; the file has it in '10ms'"):
+        resolve(both, {"gear": ChannelSpec("n", group="1s")}, ELEMENTS, NEEDED, "log.mf4")
+
+
+def test_two_groups_with_one_recognised_name_are_ambiguous_with_both_named() -> None:
+    names = [name for name in ENGLISH if name != "SpdIn"]
+    both = [*columns(names), Column("SpdIn", group="10ms"), Column("SpdIn", group="100ms")]
+    with pytest.raises(MappingError, match=r"SpdIn \(10ms\), SpdIn \(100ms\)"):
+        resolve(both, {}, ELEMENTS, NEEDED, "log.mf4")
+
+
+def test_a_column_without_numbers_is_no_rival() -> None:
+    names = [name for name in ENGLISH if name != "SpdIn"]
+    both = [*columns(names), Column("SpdIn", group="a", empty=True), Column("SpdIn", group="b")]
+    mapped = resolve(both, {}, ELEMENTS, NEEDED, "log.mf4")
+    assert mapped.channels["input_speed"] == ChannelSpec("SpdIn", group="b")
 
 
 def test_missing_roles_are_all_named_with_columns_and_remedy() -> None:
-    names = [name for name in ENGLISH if name not in ("TrqOut", "PrsBrk3")]
+    names = [name for name in ENGLISH if name not in ("TrqOut", "SpdIn")]
     with pytest.raises(MissingChannelError) as caught:
-        resolve(names, {}, ELEMENTS, NEEDED, "log.csv")
+        resolve(columns(names), {}, ELEMENTS, NEEDED, "log.csv")
     assert str(caught.value) == (
-        "log.csv: no column for 'output_torque' nor 'pressure.B3' among EngTrq, PrsBrk2, SpdIn, "
+        "log.csv: no column for 'output_torque' nor 'input_speed' among EngTrq, PrsBrk2, PrsBrk3, "
         "SpdOut, SpdWhl\n"
         "  -> name its column in a channel mapping (--channels): channels.output_torque = "
         '{ source = "..." }; `drivetwin inspect` lists the columns'
@@ -75,20 +126,20 @@ def test_missing_roles_are_all_named_with_columns_and_remedy() -> None:
 
 def test_a_third_element_may_lack_its_pressure() -> None:
     elements = {**ELEMENTS, "K2": "clutch"}
-    mapped = resolve(ENGLISH, {}, elements, NEEDED, "log.csv")
+    mapped = resolve(columns(ENGLISH), {}, elements, NEEDED, "log.csv")
     assert "pressure.K2" not in mapped.channels
-    assert mapped.warnings == ("no column for 'pressure.K2': its shifts cannot be told",)
+    assert mapped.warnings == ("no pressure of K2: nothing that needs it can be told",)
 
 
 def test_several_candidates_for_a_needed_role_are_an_error() -> None:
     with pytest.raises(MappingError) as caught:
-        resolve([*ENGLISH, "Motormoment"], {}, ELEMENTS, NEEDED, "log.csv")
+        resolve(columns([*ENGLISH, "Motormoment"]), {}, ELEMENTS, NEEDED, "log.csv")
     assert caught.value.what == "'engine_torque' may be any of the columns EngTrq, Motormoment"
     assert "channels.engine_torque = { source" in caught.value.remedy
 
 
 def test_several_candidates_for_another_role_are_a_warning() -> None:
-    mapped = resolve([*ENGLISH, "Gang", "gear"], {}, ELEMENTS, NEEDED, "log.csv")
+    mapped = resolve(columns([*ENGLISH, "Gang", "gear"]), {}, ELEMENTS, NEEDED, "log.csv")
     assert "gear" not in mapped.channels
     assert mapped.warnings == (
         "'gear' may be any of the columns Gang, gear; none is used, name one in a channel mapping",
@@ -97,24 +148,28 @@ def test_several_candidates_for_another_role_are_a_warning() -> None:
 
 def test_a_repeated_column_name_is_ambiguous() -> None:
     with pytest.raises(MappingError, match="EngTrq, EngTrq") as caught:
-        resolve([*ENGLISH, "EngTrq"], {}, ELEMENTS, NEEDED, "log.csv")
+        resolve(columns([*ENGLISH, "EngTrq"]), {}, ELEMENTS, NEEDED, "log.csv")
     assert caught.value.remedy == "rename the repeated column in the file"
     stated = {"engine_torque": ChannelSpec("EngTrq")}
     with pytest.raises(MappingError, match="the file has 2 columns 'EngTrq'"):
-        resolve([*ENGLISH, "EngTrq"], stated, ELEMENTS, NEEDED, "log.csv")
+        resolve(columns([*ENGLISH, "EngTrq"]), stated, ELEMENTS, NEEDED, "log.csv")
 
 
 def test_one_column_for_two_elements_is_ambiguous() -> None:
     names = [name for name in ENGLISH if not name.startswith("Prs")]
     with pytest.raises(MappingError, match=r"column 'p2' may be pressure\.B2 or pressure\.K2"):
-        resolve([*names, "p2"], {}, {"B2": "brake", "K2": "clutch"}, NEEDED, "log.csv")
+        resolve(columns([*names, "p2"]), {}, {"B2": "brake", "K2": "clutch"}, NEEDED, "log.csv")
 
 
 def test_a_stated_column_must_exist() -> None:
     with pytest.raises(MappingError, match=r"'Trq_Out' for 'output_torque'.* mean 'TrqOut'"):
-        resolve(ENGLISH, {"output_torque": ChannelSpec("Trq_Out")}, ELEMENTS, NEEDED, "log.csv")
+        resolve(
+            columns(ENGLISH), {"output_torque": ChannelSpec("Trq_Out")}, ELEMENTS, NEEDED, "log.csv"
+        )
 
 
 def test_a_stated_element_must_be_on_the_card() -> None:
     with pytest.raises(MappingError, match="'B4', which is no element"):
-        resolve(ENGLISH, {"pressure.B4": ChannelSpec("PrsBrk2")}, ELEMENTS, NEEDED, "log.csv")
+        resolve(
+            columns(ENGLISH), {"pressure.B4": ChannelSpec("PrsBrk2")}, ELEMENTS, NEEDED, "log.csv"
+        )

@@ -30,7 +30,7 @@ def test_a_written_mapping_reads_back(tmp_path: Path) -> None:
 def test_the_time_column_can_be_mapped(tmp_path: Path) -> None:
     path = tmp_path / "map.toml"
     path.write_text('[time]\nsource = "clk"\nunit = "ms"\n', encoding="utf-8")
-    assert read_mapping(path).time == TimeColumn("clk", "ms")
+    assert read_mapping(path).options.time == TimeColumn("clk", "ms")
 
 
 def test_every_role_has_its_table() -> None:

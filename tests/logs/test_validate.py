@@ -58,16 +58,48 @@ def test_single_samples_without_number_are_left_out_and_told() -> None:
     )
 
 
-def test_a_run_without_numbers_is_damage_with_its_span() -> None:
+def test_runs_without_numbers_are_left_out_and_told_with_their_spans() -> None:
     values = ramp(100.0, 150.0)
     values[20:30] = np.nan
     values[60:66] = np.inf
-    with pytest.raises(DamagedChannelError) as caught:
-        check_channel(channel("input_speed", values), "log.csv")
-    assert caught.value.what == (
-        "10 samples in a row hold no number, from 0.2 s to 0.29 s; 2 such runs"
+    checked = check_channel(channel("input_speed", values), "log.csv")
+    assert checked.channel.values.size == 84
+    assert checked.warnings == (
+        "channel 'X': no number from 0.2 s to 0.29 s, from 0.6 s to 0.65 s",
     )
-    assert str(caught.value).startswith("log.csv, channel 'X', t = 0.2 s: ")
+
+
+def test_a_channel_that_lost_most_samples_is_refused() -> None:
+    values = ramp(100.0, 150.0)
+    values[20:80] = np.nan
+    with pytest.raises(DamagedChannelError, match="only 40 of 100 samples hold a sound number"):
+        check_channel(channel("input_speed", values), "log.csv")
+
+
+def test_a_counter_that_starts_again_is_named() -> None:
+    time = np.where(TIME < 0.5, TIME, TIME - 0.5)
+    with pytest.raises(TimeError, match=r"lies 0\.49 s before") as caught:
+        check_channel(channel("input_speed", ramp(100, 150), time=time), "log.csv")
+    assert "a time counter that starts again after 0.49 s" in caught.value.remedy
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e12, "ps"), (1 / 60.0, None)])
+def test_stamps_in_another_unit_than_seconds(factor: float, unit: str | None) -> None:
+    fine = channel("input_speed", ramp(100, 150), time=TIME * factor)
+    if unit is None:
+        check_channel(fine, "log.csv")
+        return
+    with pytest.raises(TimeError, match="apart, no log of a shift does that") as caught:
+        check_channel(fine, "log.csv")
+    assert f'time = {{ unit = "{unit}" }}' in caught.value.remedy
+
+
+def test_a_speed_that_overflows_is_refused() -> None:
+    values = ramp(100.0, 150.0)
+    values[50:] -= 102.4
+    with pytest.raises(DamagedChannelError, match=r"jumps from .* \(1 such jumps\)") as caught:
+        check_channel(channel("input_speed", values), "log.csv")
+    assert caught.value.where.time == 0.5
 
 
 def test_too_few_samples() -> None:

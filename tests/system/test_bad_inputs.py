@@ -88,7 +88,7 @@ class Case:
 
 CASES = {
     "missing channel": Case(
-        "MissingChannelError", "output_torque.*--channels", _edit(_without("TrqOut"))
+        "MissingChannelError", "input_speed.*--channels", _edit(_without("SpdIn"))
     ),
     "missing pressure": Case(
         "MissingChannelError", r"pressure\.B3.*--channels", _edit(_without("PrsBrk3"))
@@ -102,7 +102,7 @@ CASES = {
     "NaN run": Case(
         "DamagedChannelError",
         "SpdOut.*->",
-        _edit(_column("SpdOut", lambda n, text: "NaN" if 300 < n < 360 else text)),
+        _edit(_column("SpdOut", lambda n, text: "NaN" if n > 300 else text)),
     ),
     "constant channel": Case(
         "DamagedChannelError", "TrqOut.*constant", _edit(_column("TrqOut", lambda *_: "2400"))

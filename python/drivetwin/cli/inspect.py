@@ -50,13 +50,14 @@ def inspect(
 
 def _table(columns: list[dict[str, Any]], source: str) -> Table:
     table = table_of(
-        f"Columns of {source}", "column", "unit", "Hz", "min", "max", "gaps", "role",
+        f"Columns of {source}", "column", "group", "unit", "Hz", "min", "max", "gaps", "role",
         right=("Hz", "min", "max", "gaps"),
     )  # fmt: skip
     for column in columns:
         low, high = column["range"] or (None, None)
         table.add_row(
             column["name"],
+            column["group"],
             column["unit"] or "none",
             _cell(column["rate"]),
             _cell(low),

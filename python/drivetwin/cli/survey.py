@@ -8,19 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from drivetwin.logs.held import find_raster
-from drivetwin.logs.mapping import ChannelSpec, Mapped, guess
+from drivetwin.logs.mapping import ChannelSpec, Mapped, guess, spec_of
 from drivetwin.logs.profile import read_mapping
-from drivetwin.logs.raw import RawChannel
-from drivetwin.logs.read import read_raw
-from drivetwin.logs.roles import NEEDED, PRESSURE, quantity_of
-from drivetwin.logs.shiftlog import Channel
+from drivetwin.logs.raw import Column as LogColumn
+from drivetwin.logs.roles import NEEDED, PRESSURE
+from drivetwin.logs.summary import ColumnSummary, summarise
 from drivetwin.vehicle.card import VehicleCard, load_card
-
-_GAP = 2.5
-"""A gap is a time step of more than this many median steps."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +24,7 @@ class Column:
     """
 
     name: str
+    group: str
     unit: str | None
     rate: float | None
     range: tuple[float, float] | None
@@ -69,63 +63,51 @@ def survey(log: Path, vehicle: Path | None, channels: Path | None) -> Survey:
     """
     card = None if vehicle is None else load_card(vehicle)
     stated = Mapped({}) if channels is None else read_mapping(channels)
-    raw = read_raw(log, stated.time)
+    summary = summarise(log, stated.options)
+    columns = [one.column for one in summary.columns]
     specs = {**({} if card is None else card.channels), **stated.channels}
-    names = [channel.name for channel in raw.channels]
     kinds = {} if card is None else {name: spec.kind for name, spec in card.elements.items()}
-    candidates = {role: [spec.source] for role, spec in specs.items()}
-    taken = {spec.source for spec in specs.values()}
-    guesses = guess([name for name in names if name not in taken], kinds)
-    candidates = {**guesses, **candidates}
-    mapping = {
-        role: specs.get(role, ChannelSpec(columns[0]))
-        for role, columns in candidates.items()
-        if len(columns) == 1
+    free = [one for one in columns if not any(spec.picks(one) for spec in specs.values())]
+    candidates = {
+        **guess(free, kinds),
+        **{role: [one for one in columns if spec.picks(one)] for role, spec in specs.items()},
     }
-    notes = [*raw.warnings, *(f"{name}: {why}" for name, why in raw.unreadable.items())]
+    mapping = {
+        role: specs.get(role) or spec_of(found[0], columns)
+        for role, found in candidates.items()
+        if len(found) == 1
+    }
+    faults = [f"{one.column}: {one.fault}" for one in summary.columns if one.fault]
     return Survey(
         source=str(log),
-        columns=tuple(_column(channel, candidates) for channel in raw.channels),
+        columns=tuple(_column(one, candidates) for one in summary.columns if not one.fault),
         mapping=mapping,
-        notes=(*notes, *_notes(candidates, card)),
+        notes=(*summary.warnings, *faults, *_notes(candidates, card)),
     )
 
 
-def _column(channel: RawChannel, candidates: Mapping[str, Sequence[str]]) -> Column:
-    roles = tuple(role for role, names in candidates.items() if channel.name in names)
-    finite = channel.values[np.isfinite(channel.values)]
-    steps = np.diff(channel.time)
-    step = float(np.median(steps)) if steps.size else 0.0
-    gaps = int(np.count_nonzero(steps > _GAP * step)) + channel.values.size - finite.size
+def _column(summary: ColumnSummary, candidates: Mapping[str, Sequence[LogColumn]]) -> Column:
+    column = summary.column
     return Column(
-        name=channel.name,
-        unit=channel.unit,
-        rate=_rate(channel, roles) if step > 0.0 else None,
-        range=(float(finite.min()), float(finite.max())) if finite.size else None,
-        gaps=gaps,
-        roles=roles,
+        name=column.name,
+        group=column.group,
+        unit=column.unit,
+        rate=summary.rate,
+        range=summary.range,
+        gaps=summary.gaps,
+        roles=tuple(role for role, found in candidates.items() if column in found),
     )
 
 
-def _rate(channel: RawChannel, roles: Sequence[str]) -> float:
-    """Updates per second; of a held signal those of its sender, not the logger's."""
-    step = float(np.median(np.diff(channel.time)))
-    if not roles:
-        return 1.0 / step
-    sent = Channel(roles[0], quantity_of(roles[0]), channel.time, channel.values, channel.name, "")
-    raster = find_raster(sent)
-    return 1.0 / (step if raster is None else raster.period)
-
-
-def _notes(candidates: Mapping[str, Sequence[str]], card: VehicleCard | None) -> list[str]:
+def _notes(candidates: Mapping[str, Sequence[LogColumn]], card: VehicleCard | None) -> list[str]:
     """Roles that no column, or more than one, could play."""
     notes = [
-        f"{role} may be any of {', '.join(names)}: name one in a channel mapping"
-        for role, names in candidates.items()
-        if len(names) > 1
+        f"{role} may be any of {', '.join(map(str, found))}: name one in a channel mapping"
+        for role, found in candidates.items()
+        if len(found) > 1
     ]
     wanted = [*NEEDED, *(PRESSURE + element for element in (card.elements if card else ()))]
-    missing = [role for role in wanted if role not in candidates]
+    missing = [role for role in wanted if not candidates.get(role)]
     if missing:
         notes.append(f"no column for {', '.join(missing)}: name it in a channel mapping")
     if card is None:

@@ -20,6 +20,9 @@ FINAL_DRIVE_TOLERANCE = 0.2
 GEAR_MARGIN = 3.0
 """Factor around the card's gears, for logs that also hold other gears; rpm/(rad/s) is 9.5."""
 
+OPPOSED = -0.5
+"""Normalised product of two torques below which one has the wrong sign."""
+
 
 def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
     """Raise TimeError where no time belongs to all channels: then a time base is wrong."""
@@ -69,3 +72,22 @@ def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str)
                 "or correct the card",
                 Where(file=file),
             )
+
+
+def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
+    """Raise PlausibilityError where engine and output torque act against each other throughout."""
+    if "engine_torque" not in channels or "output_torque" not in channels:
+        return
+    engine, output = channels["engine_torque"], channels["output_torque"]
+    driven = output.at(engine.time)
+    known = np.isfinite(driven)
+    product = engine.values[known] * driven[known]
+    size = float(np.sqrt(np.sum(engine.values[known] ** 2) * np.sum(driven[known] ** 2)))
+    if size > 0.0 and float(product.sum()) < OPPOSED * size:
+        raise PlausibilityError(
+            f"{engine.source_name!r} and {output.source_name!r} have opposite signs for most of "
+            "the log; both count positive when the engine drives the vehicle",
+            f"set the sign in the channel mapping: channels.output_torque = "
+            f'{{ source = "{output.source_name}", sign = -1 }}, or that of the engine torque',
+            Where(file=file),
+        )

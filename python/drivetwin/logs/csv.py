@@ -2,8 +2,9 @@
 """Reader of CSV and TSV logs.
 
 Delimiter `,` `;` or tab; decimal point or comma; units in a row under the names or in the names as
-`EngTrq [Nm]`; comment lines (# % //); byte order mark; quoted fields. An empty cell is no sample of
-its column, so each column keeps its own time base.
+`EngTrq [Nm]`; comment lines (# % //), the last of which may hold the names; byte order mark; quoted
+fields; time as a number or as a clock, with the date beside it. An empty cell is no sample of its
+column, so each column keeps its own time base.
 """
 
 from __future__ import annotations
@@ -15,22 +16,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivetwin.errors import (
-    FileFormatError,
-    MappingError,
-    MissingChannelError,
-    TimeError,
-    Where,
-)
+from drivetwin.errors import FileFormatError, TimeError, Where
 from drivetwin.logs.cells import Numbers, decimal_sign, is_number, to_numbers
+from drivetwin.logs.clock import clock_seconds, is_clock
+from drivetwin.logs.names import name_and_unit, time_index
 from drivetwin.logs.raw import RawChannel, RawLog, TimeColumn
 from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.units import is_unit, time_factor
-from drivetwin.tomlfile import did_you_mean
 
-_TIME_NAMES = frozenset(
-    ("t", "time", "times", "timestamp", "timestamps", "zeit", "zeitstempel", "messzeit")
-)
+_DATE_NAMES = frozenset(("date", "datum"))
 _COMMENT_MARKS = ("#", "%", "//")
 _EXPORT = "export the log as text: one row of names, one of units, then one row for each sample"
 _NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
@@ -67,27 +61,31 @@ def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
     body = table.rows[header.height :]
     if not body:
         raise FileFormatError("the file holds names but no samples", _EXPORT, Where(file=file))
+    lines = table.lines[header.height :]
     decimal = decimal_sign(body, file)
-    columns = [
-        to_numbers(cells, table.lines[header.height :], decimal)
-        for cells in zip(*body, strict=True)
-    ]
-    unit = time.unit if time.unit is not None else header.units[header.time]
+    cells = list(zip(*body, strict=True))
+    columns = [to_numbers(column, lines, decimal) for column in cells]
     where = Where(file=file, channel=header.names[header.time])
-    stamps = _stamps(columns[header.time], table.lines[header.height :], where)
-    seconds = stamps * time_factor(unit, where)
-    return _channels(header, columns, seconds, table.warnings)
+    days = next((i for i, name in enumerate(header.names) if name.casefold() in _DATE_NAMES), None)
+    if is_clock(cells[header.time][0]):
+        dates = None if days is None else cells[days]
+        seconds = _clock(cells[header.time], dates, lines, where)
+    else:
+        unit = time.unit if time.unit is not None else header.units[header.time]
+        seconds = _stamps(columns[header.time], lines, where) * time_factor(unit, where)
+    channels, unreadable = _channels(header, columns, seconds, without={header.time, days})
+    return RawLog(tuple(channels), unreadable, table.warnings, file)
 
 
 def _channels(
-    header: _Header, columns: Sequence[Numbers], seconds: FloatArray, warnings: tuple[str, ...]
-) -> RawLog:
+    header: _Header, columns: Sequence[Numbers], seconds: FloatArray, without: set[int | None]
+) -> tuple[list[RawChannel], dict[str, str]]:
     channels: list[RawChannel] = []
     unreadable: dict[str, str] = {}
     for index, (name, unit, column) in enumerate(
         zip(header.names, header.units, columns, strict=True)
     ):
-        if index == header.time or (not name and not column.present.any()):
+        if index in without or (not name and not column.present.any()):
             continue
         if column.fault is not None:
             unreadable[name] = column.fault
@@ -96,7 +94,7 @@ def _channels(
         else:
             present = column.present
             channels.append(RawChannel(name, unit, seconds[present], column.values[present]))
-    return RawLog(tuple(channels), unreadable, warnings)
+    return channels, unreadable
 
 
 def _decode(data: bytes, file: str) -> str:
@@ -129,9 +127,10 @@ def _table(text: str, file: str) -> _Table:
     ]
     if not kept:
         raise FileFormatError("the file holds only comments", _EXPORT, Where(file=file))
-    numbers, content = zip(*kept, strict=True)
     if delimiter is None:
-        delimiter = _delimiter(content, file)
+        delimiter = _delimiter([line for _, line in kept], file)
+    kept = _names_in_comments(lines[: kept[0][0] - 1], delimiter, kept[0][1]) + kept
+    numbers = [number for number, _ in kept]
     rows = []
     for number, line in kept:
         try:
@@ -140,6 +139,29 @@ def _table(text: str, file: str) -> _Table:
             what = f"line {number}: a quoted field does not end where it should ({fault})"
             raise FileFormatError(what, _EXPORT, Where(file=file)) from None
     return _even(rows, numbers, file)
+
+
+def _names_in_comments(lines: Sequence[str], delimiter: str, first: str) -> list[tuple[int, str]]:
+    """The comment lines with names, and perhaps units below, of a table that starts with numbers.
+
+    They split into as many fields as the `first` line; units are told by their spelling.
+    """
+    with contextlib.suppress(csv.Error):
+        fields = [cell.strip() for cell in _fields(first, delimiter)]
+        if not all(is_number(cell) or is_number(cell, ",") or is_clock(cell) for cell in fields):
+            return []
+        found: list[tuple[int, str]] = []
+        for number, line in enumerate(lines, start=1):
+            text = re.sub(r"^\s*(#|%|//)+\s*", "", line)
+            cells = _fields(text, delimiter)
+            if len(cells) == len(fields) and not any(is_number(cell) for cell in cells):
+                found.append((number, text))
+        if found and all(
+            is_unit(cell) or not cell.strip() for cell in _fields(found[-1][1], delimiter)
+        ):
+            return found[-2:]
+        return found[-1:]
+    return []
 
 
 def _fields(line: str, delimiter: str) -> list[str]:
@@ -195,54 +217,28 @@ def _header(table: _Table, time: TimeColumn, file: str) -> _Header:
             _EXPORT,
             Where(file=file),
         )
-    split = [_name_and_unit(cell) for cell in cells]
+    split = [name_and_unit(cell) for cell in cells]
     names = [name for name, _ in split]
     units = [unit for _, unit in split]
-    index = _time_index(names, time, file)
+    index = time_index(names, time, file)
     if len(table.rows) < 2:
         return _Header(names, units, index, height=1)
     second = [cell.strip() for cell in table.rows[1]]
-    if is_number(second[index]) or is_number(second[index], ","):
+    if is_number(second[index]) or is_number(second[index], ",") or is_clock(second[index]):
         return _Header(names, units, index, height=1)
     units = [below or beside for below, beside in zip(second, units, strict=True)]
     return _Header(names, units, index, height=2)
 
 
-def _name_and_unit(cell: str) -> tuple[str, str | None]:
-    """`EngTrq [Nm]` -> name and unit; round brackets count where they hold a unit.
-
-    `x[1]` without a blank is an index, part of the name.
-    """
-    if match := re.fullmatch(r"(.+?)(\s*)\[([^\[\]]*)\]", cell):
-        name, blank, inside = match.groups()
-        if blank or not inside.isdigit():
-            return name, inside.strip() or None
-    if (match := re.fullmatch(r"(.+?)\s*\(([^()]*)\)", cell)) and is_unit(match[2]):
-        return match[1], match[2].strip()
-    return cell, None
-
-
-def _time_index(names: Sequence[str], time: TimeColumn, file: str) -> int:
-    if time.source is not None:
-        found = [index for index, name in enumerate(names) if name == time.source]
-    else:
-        found = [
-            index
-            for index, name in enumerate(names)
-            if re.sub(r"[^a-z]", "", name.casefold()) in _TIME_NAMES
-        ]
-    if len(found) == 1:
-        return found[0]
-    where = Where(file=file)
-    remedy = 'name the time column in a channel mapping: time = { source = "...", unit = "s" }'
-    if found:
-        listed = ", ".join(names[index] for index in found)
-        raise MappingError(f"several time columns: {listed}", remedy, where)
-    if time.source is not None:
-        what = f"no column {time.source!r} for time{did_you_mean(time.source, names)}"
-    else:
-        what = f"no time column among {', '.join(names)}"
-    raise MissingChannelError(what, remedy, where)
+def _clock(
+    cells: Sequence[str], dates: Sequence[str] | None, lines: Sequence[int], where: Where
+) -> FloatArray:
+    """Seconds (n,) since the first row of a column that shows a clock."""
+    seconds, count = clock_seconds(cells, dates)
+    if count < seconds.size:
+        what = f"no time stamp: line {lines[count]}: {cells[count].strip()[:40]!r} is no clock time"
+        raise TimeError(what, "export time as seconds since the start of the recording", where)
+    return seconds
 
 
 def _stamps(column: Numbers, lines: Sequence[int], where: Where) -> FloatArray:

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from drivetwin.errors import MappingError, MissingChannelError, Where
-from drivetwin.logs.raw import TimeColumn
-from drivetwin.logs.roles import PRESSURE, ROLES
+from drivetwin.logs.raw import Column, ReadOptions
+from drivetwin.logs.roles import MEASURED, PRESSURE, ROLES, STAND_INS
 from drivetwin.tomlfile import did_you_mean
 
 
@@ -18,7 +18,7 @@ class ChannelSpec:
     """How a role is read: value = sign·(scale·column + offset) in `unit`, then in SI.
 
     `unit` asserts the unit against the file (None: as the file says). `time_shift` [s] is added to
-    the time stamps.
+    the time stamps. `group` chooses among columns of one name (None: the name is unique).
     """
 
     source: str
@@ -27,21 +27,29 @@ class ChannelSpec:
     scale: float = 1.0
     offset: float = 0.0
     time_shift: float = 0.0
+    group: str | None = None
+
+    def picks(self, column: Column) -> bool:
+        """Tell whether this is the column meant."""
+        return column.name == self.source and self.group in (None, column.group)
 
 
 @dataclass(frozen=True)
 class Mapped:
-    """Channel specs by role, the time column, and what was left out on purpose."""
+    """Channel specs by role, how to read the file, and what was left out on purpose."""
 
     channels: Mapping[str, ChannelSpec]
-    time: TimeColumn = field(default_factory=TimeColumn)
+    options: ReadOptions = field(default_factory=ReadOptions)
     warnings: tuple[str, ...] = field(default=())
 
 
 _ENGINE = "mot|motor|eng|engine|verbrennungsmotor|vm"
 _TORQUE = "m|md|mom|moment|t|tq|trq|torque|drehmoment"
 _SPEED = "n|w|om|omega|spd|speed|drehzahl|drz|rpm"
-_INPUT = "in|inp|input|ein|eing|eingang|eingangs|getrein|gearboxin|turb|turbine|trnsinp|transinput"
+_INPUT = (
+    "inputshaft|in|inp|input|ein|eing|eingang|eingangs|getrein|gearboxin|turb|turbine|trnsinp|"
+    "transinput"
+)
 _OUTPUT = "out|outp|output|ab|abtr|abtrieb|abtriebs|aus|ausgang|ausgangs|outshaft|outputshaft"
 _GEARBOX = "(getr|getriebe|gbx|gearbox|trans|transmission|at)?"
 _WHEEL = "whl|wheel|wheels|rad|raeder|rd"
@@ -53,15 +61,17 @@ def _either_order(thing: str, measure: str) -> str:
 
 
 _NAMES: dict[str, str] = {
-    "engine_torque": f"{_either_order(_ENGINE, _TORQUE)}|te|me",
+    "engine_torque": f"{_either_order(_ENGINE, _TORQUE)}|te|me|engnettorque",
     "output_torque": f"{_either_order(_OUTPUT, _TORQUE)}|to",
     "input_speed": _either_order(_INPUT, _SPEED),
     "engine_speed": f"{_either_order(_ENGINE, _SPEED)}|we|ne",
     "output_speed": _either_order(_OUTPUT, _SPEED),
     "wheel_speed": f"{_either_order(_WHEEL, _SPEED)}|ww",
-    "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|throttlepos|pedalpos|pwg)(pos|stellung)?"
+    "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|pwg)((pos1?)|stellung)?" + _STATE,
+    "gear": "(trans)?(current|act|ist)?(gear|gang)" + _STATE,
+    "shift_in_process": "(trans|getr)?(shift|schaltung)(inprocess|active|flag|aktiv)" + _STATE,
+    "lockup_engaged": "(trans)?(torqueconverter|tc|wandler)?(lockup|luc|wk)(engaged|closed|zu)?"
     + _STATE,
-    "gear": "(current|act|ist)?(gear|gang)" + _STATE,
 }
 """Names of each role, in the form of `plain`: without case, separators, umlauts."""
 
@@ -80,18 +90,25 @@ def plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", text)
 
 
-def guess(names: Sequence[str], elements: Mapping[str, str]) -> dict[str, list[str]]:
-    """Return the candidate columns of each role; `elements` gives the kind of each by name."""
+def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, list[Column]]:
+    """Return the candidate columns of each role; `elements` gives the kind of each by name.
+
+    A column without any number is a candidate only where no other is.
+    """
     found = {
-        role: [name for name in names if re.fullmatch(pattern, plain(name))]
+        role: [column for column in columns if re.fullmatch(pattern, plain(column.name))]
         for role, pattern in _NAMES.items()
     }
     for element, kind in elements.items():
-        found[PRESSURE + element] = _pressure_candidates(names, element, kind)
-    return {role: candidates for role, candidates in found.items() if candidates}
+        found[PRESSURE + element] = _pressure_candidates(columns, element, kind)
+    return {role: _with_numbers(candidates) for role, candidates in found.items() if candidates}
 
 
-def _pressure_candidates(names: Sequence[str], element: str, kind: str) -> list[str]:
+def _with_numbers(candidates: list[Column]) -> list[Column]:
+    return [column for column in candidates if not column.empty] or candidates
+
+
+def _pressure_candidates(columns: Sequence[Column], element: str, kind: str) -> list[Column]:
     """Columns for an element: its full name or kind and number first, its bare number last."""
     label = plain(element)
     digits = re.sub(r"\D", "", label)
@@ -103,57 +120,77 @@ def _pressure_candidates(names: Sequence[str], element: str, kind: str) -> list[
         )
         forms.append(f"({_PRESSURE_WORD})0*{digits}{_STATE}")
     for form in forms:
-        if candidates := [name for name in names if re.fullmatch(form, plain(name))]:
-            return candidates
+        if found := [column for column in columns if re.fullmatch(form, plain(column.name))]:
+            return found
     return []
 
 
 def resolve(
-    names: Sequence[str],
+    columns: Sequence[Column],
     stated: Mapping[str, ChannelSpec],
     elements: Mapping[str, str],
     needed: Iterable[str],
     file: str,
 ) -> Mapped:
-    """Decide the column of every role from the `names` of a file.
+    """Decide the column of every role from the `columns` of a file.
 
     What is `stated` holds; the rest is guessed. Raises MappingError where a stated column does not
-    exist or a needed role has several candidates, MissingChannelError where a needed role has none.
+    exist or a role has several candidates (a warning for throttle, gear and flags that nobody
+    needs), MissingChannelError where a needed role and its stand-in have none.
     """
-    needed = tuple(needed)
+    needed = frozenset(needed)
     _refuse_unknown_elements(stated, elements, file)
-    channels = {role: _existing(role, spec, names, file) for role, spec in stated.items()}
-    taken = {spec.source for spec in stated.values()}
-    guessed = guess([name for name in names if name not in taken], elements)
+    channels = {role: _existing(role, spec, columns, file) for role, spec in stated.items()}
+    free = [one for one in columns if not any(spec.picks(one) for spec in stated.values())]
     warnings: list[str] = []
-    for role, candidates in _unclaimed(guessed, channels).items():
-        if len(candidates) == 1:
-            channels[role] = ChannelSpec(candidates[0])
+    for role, candidates in guess(free, elements).items():
+        if role in channels:
             continue
-        what = f"{role!r} may be any of the columns {', '.join(candidates)}"
-        if role in needed or role.startswith(PRESSURE):
+        if len(candidates) == 1:
+            channels[role] = spec_of(candidates[0], columns)
+            continue
+        what = f"{role!r} may be any of the columns {', '.join(map(str, candidates))}"
+        if role in needed or role in MEASURED or role.startswith(PRESSURE):
             repeated = len(set(candidates)) < len(candidates)
             remedy = "rename the repeated column in the file" if repeated else _remedy(role)
             raise MappingError(what, remedy, Where(file=file))
         warnings.append(f"{what}; none is used, name one in a channel mapping")
     _refuse_shared(channels, stated, file)
-    pressures = [PRESSURE + element for element in elements]
-    absent = [role for role in needed if role not in channels]
-    without = [role for role in pressures if role not in channels]
-    if len(pressures) - len(without) < 2:  # off-going and on-coming element
-        absent += without
-    else:
-        warnings += [f"no column for {role!r}: its shifts cannot be told" for role in without]
+    _refuse_absent(needed, channels, columns, file)
+    order = [*ROLES, *(PRESSURE + element for element in elements)]
+    without = [element for element in elements if PRESSURE + element not in channels]
+    if without:
+        warnings.append(f"no pressure of {', '.join(without)}: nothing that needs it can be told")
+    return Mapped(
+        {role: channels[role] for role in order if role in channels}, warnings=tuple(warnings)
+    )
+
+
+def spec_of(column: Column, columns: Sequence[Column]) -> ChannelSpec:
+    """Return the spec that picks a column: with its group where the name alone would not."""
+    alike = sum(other.name == column.name for other in columns)
+    return ChannelSpec(column.name, group=column.group if alike > 1 else None)
+
+
+def _refuse_absent(
+    needed: Iterable[str],
+    channels: Mapping[str, ChannelSpec],
+    columns: Sequence[Column],
+    file: str,
+) -> None:
+    order = [*ROLES, *sorted(role for role in needed if role not in ROLES)]
+    absent = [
+        role
+        for role in order
+        if role in needed and role not in channels and STAND_INS.get(role) not in channels
+    ]
     if absent:
         raise MissingChannelError(
-            f"no column for {' nor '.join(map(repr, absent))} among {', '.join(names)}",
+            f"no column for {' nor '.join(map(repr, absent))} among "
+            f"{', '.join(dict.fromkeys(column.name for column in columns))}",
             _remedy(absent[0]),
             Where(file=file),
         )
-    return Mapped(
-        {role: channels[role] for role in (*ROLES, *pressures) if role in channels},
-        warnings=tuple(warnings),
-    )
 
 
 def _refuse_unknown_elements(
@@ -170,34 +207,43 @@ def _refuse_unknown_elements(
             )
 
 
-def _unclaimed(
-    guessed: Mapping[str, list[str]], channels: Mapping[str, ChannelSpec]
-) -> dict[str, list[str]]:
-    return {role: names for role, names in guessed.items() if role not in channels}
-
-
-def _existing(role: str, spec: ChannelSpec, names: Sequence[str], file: str) -> ChannelSpec:
-    count = names.count(spec.source)
-    if count == 1:
+def _existing(role: str, spec: ChannelSpec, columns: Sequence[Column], file: str) -> ChannelSpec:
+    found = _with_numbers([column for column in columns if spec.picks(column)])
+    if len(found) == 1:
         return spec
+    where = Where(file=file)
+    if found:
+        groups = list(dict.fromkeys(column.group for column in found))
+        if len(groups) == len(found):
+            what = f"the file has {spec.source!r} in {', '.join(map(repr, groups))}"
+            remedy = f'choose one in the channel mapping: channels.{role}.group = "{groups[0]}"'
+            raise MappingError(what, remedy, where)
+        what = f"the file has {len(found)} columns {spec.source!r}"
+        raise MappingError(what, "rename the repeated column in the file", where)
+    groups = [column.group for column in columns if column.name == spec.source]
+    if groups:
+        what = (
+            f"the mapping names {spec.source!r} in {spec.group!r} for {role!r}; the file has it in "
+            f"{', '.join(map(repr, groups))}"
+        )
+        raise MappingError(what, "correct `group`", where)
+    names = [column.name for column in columns]
     what = (
         f"the mapping names column {spec.source!r} for {role!r}, which the file does not have"
         f"{did_you_mean(spec.source, names)}"
-        if count == 0
-        else f"the file has {count} columns {spec.source!r}"
     )
-    raise MappingError(what, "correct `source`, or rename the column in the file", Where(file=file))
+    raise MappingError(what, "correct `source`, or rename the column in the file", where)
 
 
 def _refuse_shared(
     channels: Mapping[str, ChannelSpec], stated: Mapping[str, ChannelSpec], file: str
 ) -> None:
     """A guessed column must not serve two roles, as with two elements of one number."""
-    roles_of: dict[str, list[str]] = {}
+    roles_of: dict[tuple[str, str | None], list[str]] = {}
     for role, spec in channels.items():
         if role not in stated:
-            roles_of.setdefault(spec.source, []).append(role)
-    for source, roles in roles_of.items():
+            roles_of.setdefault((spec.source, spec.group), []).append(role)
+    for (source, _), roles in roles_of.items():
         if len(roles) > 1:
             raise MappingError(
                 f"column {source!r} may be {' or '.join(roles)}",

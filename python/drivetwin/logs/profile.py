@@ -12,7 +12,7 @@ from pydantic import Field
 
 from drivetwin.errors import MappingError
 from drivetwin.logs.mapping import ChannelSpec, Mapped
-from drivetwin.logs.raw import TimeColumn
+from drivetwin.logs.raw import BusOptions, ReadOptions, TimeColumn
 from drivetwin.logs.roles import PRESSURE, ROLES
 from drivetwin.tomlfile import StrictModel, raise_faults, read_toml, schema_faults
 
@@ -30,6 +30,8 @@ class ByRole(StrictModel, Generic[Entry]):
     wheel_speed: Entry | None = None
     throttle: Entry | None = None
     gear: Entry | None = None
+    shift_in_process: Entry | None = None
+    lockup_engaged: Entry | None = None
     pressure: dict[str, Entry] = Field(default_factory=dict)
 
     def items(self) -> Iterator[tuple[str, Entry]]:
@@ -46,6 +48,7 @@ class ChannelTable(StrictModel):
     """`[channels.<role>]`: see ChannelSpec for the meaning of each key."""
 
     source: str = Field(min_length=1)
+    group: str | None = None
     unit: str | None = None
     sign: Literal[1, -1] = 1
     scale: float = Field(default=1.0, gt=0)
@@ -55,7 +58,13 @@ class ChannelTable(StrictModel):
     def spec(self) -> ChannelSpec:
         """Return the table as the mapping uses it."""
         return ChannelSpec(
-            self.source, self.unit, self.sign, self.scale, self.offset, self.time_shift_s
+            source=self.source,
+            unit=self.unit,
+            sign=self.sign,
+            scale=self.scale,
+            offset=self.offset,
+            time_shift=self.time_shift_s,
+            group=self.group,
         )
 
 
@@ -66,10 +75,18 @@ class TimeTable(StrictModel):
     unit: str | None = None
 
 
+class BusTable(StrictModel):
+    """`[bus]`: DBC files of a bus log (paths from the mapping file) and its reference torque."""
+
+    dbc: list[str] = Field(default_factory=list)
+    reference_torque_Nm: float | None = Field(default=None, gt=0)
+
+
 class MappingFile(StrictModel):
     """A channel mapping file."""
 
     time: TimeTable = TimeTable()
+    bus: BusTable = BusTable()
     channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
 
 
@@ -84,7 +101,10 @@ def read_mapping(path: Path) -> Mapped:
     )
     file = MappingFile.model_validate(document)
     channels = {role: table.spec() for role, table in file.channels.items()}
-    return Mapped(channels, TimeColumn(file.time.source, file.time.unit))
+    bus = BusOptions(
+        tuple(path.parent / name for name in file.bus.dbc), file.bus.reference_torque_Nm
+    )
+    return Mapped(channels, ReadOptions(TimeColumn(file.time.source, file.time.unit), bus))
 
 
 def write_mapping(path: Path, channels: Mapping[str, ChannelSpec]) -> None:
@@ -109,6 +129,8 @@ def write_mapping(path: Path, channels: Mapping[str, ChannelSpec]) -> None:
 def _table(spec: ChannelSpec) -> tomlkit.items.Table:
     table = tomlkit.table()
     table.add("source", spec.source)
+    if spec.group is not None:
+        table.add("group", spec.group)
     if spec.unit is not None:
         table.add("unit", spec.unit)
     table.add("sign", spec.sign)

@@ -1,12 +1,41 @@
 # SPDX-License-Identifier: MIT
-"""What every reader delivers: named columns in the file's own units, each on its own time base."""
+"""What every reader delivers: named columns in the file's own units, each on its own time base.
+
+A reader opens a file as a `Recording`: it lists columns at once and loads one when asked, so that
+memory is bounded by what is selected. Text files are in memory anyway: `RawLog`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
 
-from drivetwin.logs.shiftlog import FloatArray
+import numpy as np
+
+from drivetwin.errors import DamagedChannelError, Where
+from drivetwin.logs.shiftlog import FloatArray, gap_limit
+
+Window = tuple[float, float]
+"""First and last time [s] wanted of a recording."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a file by name, unit as written (None: none) and group.
+
+    The group is what tells equal names apart: raster of a measurement file, message and sender on a
+    bus; blank where the format has none. `empty`: it is there but holds no number.
+    """
+
+    name: str
+    unit: str | None = None
+    group: str = ""
+    empty: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.group})" if self.group else self.name
 
 
 @dataclass(frozen=True)
@@ -14,21 +43,97 @@ class RawChannel:
     """One column as recorded: `time` (n,) [s], `values` (n,) in `unit`; None: file names no unit.
 
     Values may hold NaN where the file says so; a sample that the file does not have is absent.
+    `notes` tell what the reader left out and why.
     """
 
     name: str
     unit: str | None
     time: FloatArray
     values: FloatArray
+    group: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def step(self) -> float | None:
+        """Median sample interval [s]; None below two samples."""
+        return float(np.median(np.diff(self.time))) if self.time.size > 1 else None
+
+    @property
+    def rate(self) -> float | None:
+        """Samples per second; None where it cannot be told."""
+        step = self.step
+        return 1.0 / step if step is not None and step > 0.0 else None
+
+    @property
+    def range(self) -> tuple[float, float] | None:
+        """Least and greatest number in the file's unit; None if there is no number."""
+        finite = self.values[np.isfinite(self.values)]
+        return (float(finite.min()), float(finite.max())) if finite.size else None
+
+    @property
+    def gaps(self) -> tuple[Window, ...]:
+        """Spans of time [s] without a number, from the sample before to the sample after."""
+        stamps = self.time[np.isfinite(self.values) & np.isfinite(self.time)]
+        wide = np.flatnonzero(np.diff(stamps) > gap_limit(self.time))
+        return tuple((float(stamps[index]), float(stamps[index + 1])) for index in wide)
+
+    @property
+    def pauses(self) -> int:
+        """Number of interruptions in time, whether or not numbers stand beside them."""
+        return int(np.count_nonzero(np.diff(self.time) > gap_limit(self.time)))
+
+    def within(self, window: Window | None) -> RawChannel:
+        """Return the samples in a window of time, both ends included; all without a window."""
+        if window is None:
+            return self
+        inside = (self.time >= window[0]) & (self.time <= window[1])
+        return RawChannel(
+            self.name, self.unit, self.time[inside], self.values[inside], self.group, self.notes
+        )
+
+
+class Recording(Protocol):
+    """An open file. `columns` are all it has, readable or not; `warnings` concern the whole."""
+
+    @property
+    def columns(self) -> Sequence[Column]: ...
+
+    @property
+    def warnings(self) -> tuple[str, ...]: ...
+
+    def load(self, index: int, window: Window | None = None) -> RawChannel:
+        """Read the column at `index` of `columns`.
+
+        Raises DamagedChannelError where it holds no numbers.
+        """
+        ...
 
 
 @dataclass(frozen=True)
 class RawLog:
-    """All columns of one file. `unreadable` tells by name why a column holds no numbers."""
+    """All columns of one file in memory. `unreadable` tells by name why one holds no numbers."""
 
     channels: tuple[RawChannel, ...]
     unreadable: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    source: str = ""
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Readable columns first, in file order."""
+        readable = (Column(one.name, one.unit, one.group) for one in self.channels)
+        return (*readable, *(Column(name, empty=True) for name in self.unreadable))
+
+    def load(self, index: int, window: Window | None = None) -> RawChannel:
+        """Return the column at `index` of `columns`; raises DamagedChannelError without numbers."""
+        if index < len(self.channels):
+            return self.channels[index].within(window)
+        name = self.columns[index].name
+        raise DamagedChannelError(
+            self.unreadable[name],
+            "repair or empty the cell, or map another column",
+            Where(file=self.source, channel=name),
+        )
 
     def named(self, name: str) -> tuple[RawChannel, ...]:
         """Return the channels of this exact name: none, one, or several if the file repeats it."""
@@ -41,3 +146,23 @@ class TimeColumn:
 
     source: str | None = None
     unit: str | None = None
+
+
+@dataclass(frozen=True)
+class BusOptions:
+    """How a bus log is decoded, where the user states it.
+
+    `databases` are DBC files (none: the built-in J1939 messages); `reference_torque` [N·m] is what
+    percent torque refers to, against the one that the bus tells.
+    """
+
+    databases: tuple[Path, ...] = ()
+    reference_torque: float | None = None
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What the user states about the file as a whole."""
+
+    time: TimeColumn = field(default_factory=TimeColumn)
+    bus: BusOptions = field(default_factory=BusOptions)

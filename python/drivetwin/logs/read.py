@@ -8,104 +8,90 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin.errors import DamagedChannelError, FileFormatError, Where
-from drivetwin.logs.agreement import check_common_span, check_gearing
-from drivetwin.logs.csv import read_csv
+from drivetwin.errors import DamagedChannelError, Where
+from drivetwin.logs.agreement import check_common_span, check_gearing, check_torque_signs
+from drivetwin.logs.align import clock_warnings
+from drivetwin.logs.formats import open_recording
 from drivetwin.logs.held import find_raster
 from drivetwin.logs.mapping import ChannelSpec, Mapped, resolve
 from drivetwin.logs.profile import read_mapping
-from drivetwin.logs.raw import RawLog, TimeColumn
-from drivetwin.logs.roles import NEEDED, quantity_of
+from drivetwin.logs.raw import RawChannel, RawLog, ReadOptions, Recording, Window
+from drivetwin.logs.roles import FOR_SHIFTS, quantity_of
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.logs.units import channel_unit, lookup
 from drivetwin.logs.validate import check_channel
 from drivetwin.vehicle.card import VehicleCard
-
-_FORMATS = {
-    b"MDF     ": "an MDF measurement file",
-    b"UnFinMF ": "an unfinished MDF measurement file",
-    b"MATLAB 5.0": "a MATLAB file",
-    b"MATLAB 7.3": "a MATLAB 7.3 file",
-    b"\x89HDF": "an HDF5 file",
-    b"PAR1": "a Parquet file",
-    b"LOGG": "a Vector BLF bus log",
-    b"PK\x03\x04": "a zip archive or Excel workbook",
-    b"\x1f\x8b": "a gzip archive",
-}
-"""First bytes of formats that are told by name instead of `binary`."""
 
 
 def read_log(
     path: Path,
     card: VehicleCard,
     mapping: Path | None = None,
-    needed: Iterable[str] = NEEDED,
+    needed: Iterable[str] = FOR_SHIFTS,
+    window: Window | None = None,
 ) -> ShiftLog:
     """Read a shift log: every mapped channel on its own time base, SI inside.
 
     Columns come from the `mapping` file, else from the card's [channels], else by name. `needed`
-    are the roles that must exist; two pressures of the card's elements must exist as well.
+    are the roles that must exist (or their stand-in: engine for input speed, wheel for output
+    speed); what else there is comes along. Only mapped columns are read, in a `window` (first and
+    last time of the file [s], before any time_shift) only the samples inside.
 
-    Raises FileFormatError, MissingChannelError, MappingError, UnitError, TimeError,
+    What is damaged is left out and listed in `warnings`; nothing is replaced. Raises
+    FileFormatError, MissingExtraError, MissingChannelError, MappingError, UnitError, TimeError,
     DamagedChannelError, PlausibilityError; each says what to do.
     """
-    data = _bytes(path)
     stated = read_mapping(mapping) if mapping is not None else Mapped({})
-    raw = _read_raw(data, str(path), stated.time)
     kinds = {name: element.kind for name, element in card.elements.items()}
-    mapped = resolve(
-        [*(channel.name for channel in raw.channels), *raw.unreadable],
-        {**card.channels, **stated.channels},
-        kinds,
-        needed,
-        str(path),
-    )
     channels: dict[str, Channel] = {}
-    warnings = [*raw.warnings, *mapped.warnings]
-    for role, spec in mapped.channels.items():
-        checked = check_channel(_channel(role, spec, raw, str(path)), str(path))
-        held = find_raster(checked.channel) is not None
-        channels[role] = replace(checked.channel, held=held)
-        warnings += [*checked.warnings, *_asserted(spec, raw)]
+    with open_recording(path, stated.options) as recording:
+        specs = {**card.channels, **stated.channels}
+        mapped = resolve(recording.columns, specs, kinds, needed, str(path))
+        warnings = [*recording.warnings, *mapped.warnings]
+        for role, spec in mapped.channels.items():
+            raw = _load(recording, spec, window)
+            warnings += [f"channel {raw.name!r}: {note}" for note in raw.notes]
+            warnings += _asserted(spec, raw)
+            checked = check_channel(_channel(role, spec, raw, str(path)), str(path))
+            held = find_raster(checked.channel) is not None
+            channels[role] = replace(checked.channel, held=held)
+            warnings += checked.warnings
     check_common_span(channels, str(path))
     check_gearing(channels, card, str(path))
-    return ShiftLog(channels, str(path), hashlib.sha256(data).hexdigest(), tuple(warnings))
+    check_torque_signs(channels, str(path))
+    warnings += clock_warnings(channels, card)
+    return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
 
 
-def read_raw(path: Path, time: TimeColumn | None = None) -> RawLog:
+def read_raw(path: Path, options: ReadOptions | None = None) -> RawLog:
     """Read all columns of a file as recorded, without mapping, unit or check."""
-    return _read_raw(_bytes(path), str(path), time or TimeColumn())
+    channels: list[RawChannel] = []
+    unreadable: dict[str, str] = {}
+    with open_recording(path, options) as recording:
+        for index, column in enumerate(recording.columns):
+            try:
+                channels.append(recording.load(index))
+            except DamagedChannelError as fault:
+                unreadable[str(column)] = fault.what
+        return RawLog(tuple(channels), unreadable, recording.warnings, str(path))
 
 
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as fault:
-        what = f"cannot read the file: {fault.strerror}"
-        raise FileFormatError(what, "check the path", Where(file=str(path))) from None
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _read_raw(data: bytes, file: str, time: TimeColumn) -> RawLog:
-    for magic, name in _FORMATS.items():
-        if data.startswith(magic):
-            raise FileFormatError(
-                f"this is {name}, for which there is no reader",
-                "export the channels as CSV with a row of units",
-                Where(file=file),
-            )
-    return read_csv(data, file, time)
+def _load(recording: Recording, spec: ChannelSpec, window: Window | None) -> RawChannel:
+    """The column of a spec; `resolve` saw to it that it is the only one, or one with numbers."""
+    picked = [index for index, column in enumerate(recording.columns) if spec.picks(column)]
+    index = min(picked, key=lambda one: recording.columns[one].empty)
+    return recording.load(index, window)
 
 
-def _channel(role: str, spec: ChannelSpec, raw: RawLog, file: str) -> Channel:
-    where = Where(file=file, channel=spec.source)
-    if spec.source in raw.unreadable:
-        raise DamagedChannelError(
-            raw.unreadable[spec.source], "repair or empty the cell, or map another column", where
-        )
-    source = raw.named(spec.source)[0]
+def _channel(role: str, spec: ChannelSpec, source: RawChannel, file: str) -> Channel:
     quantity = quantity_of(role)
     unit_text = spec.unit if spec.unit is not None else source.unit
-    unit = channel_unit(unit_text, quantity, where)
+    unit = channel_unit(unit_text, quantity, Where(file=file, channel=spec.source))
     return Channel(
         role=role,
         quantity=quantity,
@@ -116,9 +102,8 @@ def _channel(role: str, spec: ChannelSpec, raw: RawLog, file: str) -> Channel:
     )
 
 
-def _asserted(spec: ChannelSpec, raw: RawLog) -> list[str]:
+def _asserted(spec: ChannelSpec, raw: RawChannel) -> list[str]:
     """A warning where the mapping asserts another unit than the file states."""
-    stated = raw.named(spec.source)[0].unit
-    if spec.unit is None or stated is None or lookup(stated) == lookup(spec.unit):
+    if spec.unit is None or raw.unit is None or lookup(raw.unit) == lookup(spec.unit):
         return []
-    return [f"channel {spec.source!r}: read in {spec.unit!r} as mapped, the file says {stated!r}"]
+    return [f"channel {spec.source!r}: read in {spec.unit!r} as mapped, the file says {raw.unit!r}"]

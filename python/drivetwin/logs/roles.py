@@ -14,6 +14,8 @@ ROLES: dict[str, Quantity] = {
     "wheel_speed": Quantity.SPEED,
     "throttle": Quantity.FRACTION,
     "gear": Quantity.STATE,
+    "shift_in_process": Quantity.STATE,
+    "lockup_engaged": Quantity.STATE,
 }
 """Roles that exist once; beside them stands one `pressure.<element>` for each shift element."""
 
@@ -22,6 +24,15 @@ PRESSURE = "pressure."
 
 NEEDED = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
 """Roles without which a log cannot be identified in absolute terms (pressures come on top)."""
+
+FOR_SHIFTS = ("input_speed", "output_speed")
+"""Roles without which no shift can be found."""
+
+STAND_INS = {"input_speed": "engine_speed", "output_speed": "wheel_speed"}
+"""Roles that another may replace, for finding shifts."""
+
+MEASURED = frozenset(role for role in ROLES if ROLES[role] in (Quantity.TORQUE, Quantity.SPEED))
+"""Roles for which two candidate columns are an error even where the role is not needed."""
 
 
 def quantity_of(role: str) -> Quantity:

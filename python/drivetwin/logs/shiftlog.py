@@ -14,6 +14,16 @@ from drivetwin.errors import MissingChannelError, Where
 
 FloatArray = NDArray[np.float64]
 
+GAP_STEPS = 5.0
+"""A pause of more than this many median steps is a gap: nothing is interpolated across it."""
+
+
+def gap_limit(time: FloatArray) -> float:
+    """Return the longest pause [s] between samples at `time` (n,) that is not a gap."""
+    if time.size < 2:
+        return np.inf
+    return GAP_STEPS * float(np.median(np.diff(time)))
+
 
 class Quantity(StrEnum):
     """What a channel measures; decides its SI unit and how it may be interpolated."""
@@ -50,14 +60,29 @@ class Channel:
         return float(np.median(np.diff(self.time)))
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Values at `time` (m,): linear between samples (held for states), NaN outside the span."""
+        """Values at `time` (m,): linear between samples, held for states.
+
+        NaN outside the span, and for all but states inside a gap (more than GAP_STEPS median steps
+        without a sample); a state that is sent on change only is known between its messages.
+        """
+        before = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)
+        unknown = (time < self.time[0]) | (time > self.time[-1])
         if self.quantity is Quantity.STATE:
-            index = np.searchsorted(self.time, time, side="right") - 1
-            values = self.values[np.clip(index, 0, None)]
+            values = self.values[before]
         else:
             values = np.interp(time, self.time, self.values)
-        outside = (time < self.time[0]) | (time > self.time[-1])
-        return np.where(outside, np.nan, values)
+            after = np.clip(before + 1, None, self.time.size - 1)
+            pause = self.time[after] - self.time[before]
+            unknown |= (pause > gap_limit(self.time)) & (time > self.time[before])
+        return np.where(unknown, np.nan, values)
+
+    @property
+    def gaps(self) -> tuple[tuple[float, float], ...]:
+        """Spans [s] in which `at` knows nothing, from the sample before to the one after."""
+        if self.quantity is Quantity.STATE:
+            return ()
+        wide = np.flatnonzero(np.diff(self.time) > gap_limit(self.time))
+        return tuple((float(self.time[i]), float(self.time[i + 1])) for i in wide)
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,30 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
+from drivetwin.logs.damage import Damage, clipped, missing, spikes, stuck
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.logs.units import usual_units
 
 MIN_SAMPLES = 10
 """Fewer samples cannot show a shift."""
 
-MAX_GAP_SAMPLES = 3
-"""So many samples in a row may lack a number; a longer run is damage."""
+MIN_SOUND = 0.5
+"""Share of the samples that must hold a sound number."""
+
+MAX_WRAPS = 3
+"""So few steps back suggest a counter that wrapped, more suggest disorder."""
+
+SHORTEST_STEP, LONGEST_STEP = 1e-6, 0.9
+"""Sample intervals [s] between which a channel can show a shift."""
+
+TYPICAL_STEP = (1e-4, 0.2)
+"""Sample interval [s] that a proposed unit of time must lead to."""
+
+MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
+"""Speed change [rad/s] and rate [rad/s2] that no shaft of a driveline shows between samples."""
 
 BAR = 1e5
 
@@ -52,65 +66,136 @@ class Checked:
 
 
 def check_channel(channel: Channel, file: str) -> Checked:
-    """Return the channel fit for use.
+    """Return the channel fit for use: damaged samples are left out, never replaced, and listed.
 
-    Raises TimeError, DamagedChannelError, PlausibilityError. Single samples without a number are
-    left out, never replaced, and listed as a warning.
+    Raises TimeError, DamagedChannelError, PlausibilityError where nothing sound would remain or the
+    whole channel is in doubt.
     """
     where = Where(file=file, channel=channel.source_name)
-    _check_time(channel.time, where)
-    finite = np.isfinite(channel.values)
-    warnings: tuple[str, ...] = ()
-    if not finite.all():
-        _check_runs(channel, where)
-        first = channel.time[int(finite.argmin())]
-        count = int((~finite).sum())
-        warnings = (
-            f"channel {channel.source_name!r}: {count} samples without a number left out, the "
-            f"first at {first:.6g} s",
-        )
-        channel = replace(channel, time=channel.time[finite], values=channel.values[finite])
-    if channel.time.size < MIN_SAMPLES:
-        raise DamagedChannelError(
-            f"only {channel.time.size} samples", "the file may be cut: export the log again", where
-        )
+    warnings: list[str] = []
+    _check_order(channel.time, where)
+    _check_count(channel, channel.time.size, where)
+    _check_rate(channel, where)
+    total = channel.time.size
+    found = missing(channel.time, channel.values)
+    channel = _without(channel, found, warnings)
+    _check_count(channel, total, where)
     _check_variation(channel, where)
+    for look in (_spikes, _stuck, _clipped):
+        channel = _without(channel, look(channel), warnings)
+        _check_count(channel, total, where)
     _check_magnitude(channel, where)
     _check_sign(channel, where)
-    return Checked(channel, warnings)
+    _check_jumps(channel, where)
+    return Checked(channel, tuple(warnings))
 
 
-def _check_time(time: FloatArray, where: Where) -> None:
+def _spikes(channel: Channel) -> Damage | None:
+    return spikes(channel.time, channel.values, channel.quantity)
+
+
+def _stuck(channel: Channel) -> Damage | None:
+    return stuck(channel.time, channel.values) if channel.role in _MUST_VARY else None
+
+
+def _clipped(channel: Channel) -> Damage | None:
+    return clipped(channel.time, channel.values) if channel.role in _MUST_VARY else None
+
+
+def _without(channel: Channel, damage: Damage | None, warnings: list[str]) -> Channel:
+    """Leave the damaged samples out and say so."""
+    if damage is None:
+        return channel
+    warnings.append(f"channel {channel.source_name!r}: {damage.text}")
+    keep = ~damage.mask
+    return replace(channel, time=channel.time[keep], values=channel.values[keep])
+
+
+def _check_order(time: FloatArray, where: Where) -> None:
+    """Refuse stamps that are missing, repeated or run backward: which of them is wrong is open."""
     if not np.isfinite(time).all():
         index = int(np.isfinite(time).argmin())
         raise TimeError(f"sample {index} has no time stamp", "remove or repair it", where)
     backward = np.flatnonzero(np.diff(time) <= 0)
-    if backward.size:
-        index = int(backward[0]) + 1
-        step = float(time[index] - time[index - 1])
-        how = "repeats the stamp before it" if step == 0 else f"lies {-step:.6g} s before the last"
-        raise TimeError(
-            f"time does not increase: sample {index} {how} ({backward.size} such samples)",
-            "remove the repeated or misplaced samples, or map the right time column: "
-            'time = { source = "...", unit = "s" }',
-            Where(file=where.file, channel=where.channel, time=float(time[index])),
+    if not backward.size:
+        return
+    index = int(backward[0]) + 1
+    step = float(time[index] - time[index - 1])
+    how = "repeats the stamp before it" if step == 0 else f"lies {-step:.6g} s before the last"
+    raise TimeError(
+        f"time does not increase: sample {index} {how} ({backward.size} such samples)",
+        _time_remedy(time, backward),
+        Where(file=where.file, channel=where.channel, time=float(time[index])),
+    )
+
+
+def _time_remedy(time: FloatArray, backward: NDArray[np.intp]) -> str:
+    """What to do about stamps that run backward; a counter that starts again goes on from there."""
+    later = np.minimum(backward + MIN_SAMPLES, time.size - 1)
+    if backward.size <= MAX_WRAPS and np.all(time[later] < time[backward]):
+        index = int(backward[0])
+        wrapped = float(time[index] - time[index + 1])
+        return (
+            f"a time counter that starts again after {wrapped:.6g} s, or two recordings in one "
+            "file: export with a running clock, or cut the file there"
         )
+    return (
+        "remove the repeated or misplaced samples, or map the right time column: "
+        'time = { source = "...", unit = "s" }'
+    )
 
 
-def _check_runs(channel: Channel, where: Where) -> None:
-    missing = np.concatenate(([False], ~np.isfinite(channel.values), [False]))
-    edges = np.flatnonzero(np.diff(missing.astype(np.int8)))
-    starts, ends = edges[::2], edges[1::2]
-    long_runs = np.flatnonzero(ends - starts > MAX_GAP_SAMPLES)
-    if long_runs.size:
-        start, end = int(starts[long_runs[0]]), int(ends[long_runs[0]])
-        more = f"; {long_runs.size} such runs" if long_runs.size > 1 else ""
+def _check_count(channel: Channel, total: int, where: Where) -> None:
+    """Refuse what has too few samples, or lost more than half of them."""
+    size = channel.time.size
+    if total < MIN_SAMPLES:
+        what = f"only {total} samples"
+    elif size < max(MIN_SAMPLES, MIN_SOUND * total):
+        what = f"only {size} of {total} samples hold a sound number"
+    else:
+        return
+    raise DamagedChannelError(
+        what, "the file may be cut, or the sensor failed: export the log again", where
+    )
+
+
+def _check_rate(channel: Channel, where: Where) -> None:
+    """Refuse stamps in another unit than s: too far apart, or too close, for any shift log."""
+    step = channel.step
+    if channel.quantity is Quantity.STATE or SHORTEST_STEP <= step <= LONGEST_STEP:
+        return
+    fitting = [
+        unit
+        for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("ps", 1e-12), ("min", 60.0))
+        if TYPICAL_STEP[0] <= factor * step <= TYPICAL_STEP[1]
+    ]
+    remedy = (
+        f'the stamps would fit "{fitting[0]}": assert it in the channel mapping, '
+        f'time = {{ unit = "{fitting[0]}" }}'
+        if fitting
+        else "check the time base of this channel"
+    )
+    raise TimeError(f"samples lie {step:.4g} s apart, no log of a shift does that", remedy, where)
+
+
+def _check_jumps(channel: Channel, where: Where) -> None:
+    """Refuse a speed that jumps from one sample to the next: its number has overflown."""
+    if channel.quantity is not Quantity.SPEED:
+        return
+    pause, change = np.diff(channel.time), np.abs(np.diff(channel.values))
+    close = pause <= 2.5 * channel.step
+    jumps = np.flatnonzero(close & (change > MAX_JUMP) & (change > MAX_ACCELERATION * pause))
+    if jumps.size:
+        index = int(jumps[0]) + 1
+        before, after = (
+            _show(float(channel.values[index - 1]), channel.quantity),
+            _show(float(channel.values[index]), channel.quantity),
+        )
         raise DamagedChannelError(
-            f"{end - start} samples in a row hold no number, from {channel.time[start]:.6g} s to "
-            f"{channel.time[end - 1]:.6g} s{more}",
-            "cut the log to a span without the gap, or leave the cells empty if the channel was "
-            "not sampled there",
-            Where(where.file, where.channel, float(channel.time[start])),
+            f"jumps from {before} to {after} between two samples ({jumps.size} such jumps)",
+            "the number may overflow or the sensor drop out: cut the log to a sound span, or map "
+            "another channel",
+            Where(where.file, where.channel, float(channel.time[index])),
         )
 
 

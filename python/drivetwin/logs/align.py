@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: MIT
+"""Delay and clock drift between speed channels, where physics ties them together.
+
+In a gear ω_in = i·ω_out at every instant, so what differs in time with the acceleration is a delay.
+It is told, with the mapping line that cures it, and never applied unasked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from drivetwin.logs.shiftlog import Channel, FloatArray
+from drivetwin.vehicle.spec import VehicleCard
+
+_GRID = 0.01
+"""Raster [s] on which the speeds are compared."""
+
+_SMOOTH = 0.1
+"""Averaging [s] before comparison; noise would otherwise hide in the acceleration and bias it."""
+
+_IN_GEAR = 0.01
+"""Relative distance from a ratio within which its gear is held."""
+
+_LEAST_TIME = 1.0
+"""So much time in gear [s] is needed for a statement."""
+
+_SIGNIFICANT = 5.0
+"""Standard deviations from which a delay is told ..."""
+
+_LEAST_DELAY = 5e-3
+"""... if it also exceeds this [s] and half the coarser sample interval."""
+
+
+@dataclass(frozen=True)
+class Delay:
+    """How much later [s] one channel's stamps are than another's, in the middle of the log.
+
+    `drift` [s/s] is how the delay grows; the `sigma`s are one standard deviation; `span` [s] of the
+    data in gear.
+    """
+
+    value: float
+    sigma: float
+    drift: float
+    drift_sigma: float
+    span: float
+
+
+def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> Delay | None:
+    """Return how late `slower` is against `faster` where their ratio is one of `ratios`.
+
+    Least squares of ω_f - i·ω_s = δ_g·ω_s + i·(τ + d·t)·dω_s/dt over all samples in gear g: the
+    ratio may be off by δ_g, so only changes of acceleration tell the delay. None where there is too
+    little time in gear or no such change.
+    """
+    start = max(faster.time[0], slower.time[0])
+    end = min(faster.time[-1], slower.time[-1])
+    if end - start < _LEAST_TIME:
+        return None
+    time = np.arange(start, end, _GRID)
+    width = round(_SMOOTH / _GRID)
+    fast, slow = (uniform_filter1d(one.at(time), width, mode="nearest") for one in (faster, slower))
+    rate = np.gradient(slow, _GRID)
+    gear = _gears(fast, slow, ratios, width)
+    known = (gear >= 0) & np.isfinite(rate) & np.isfinite(fast)
+    if np.count_nonzero(known) * _GRID < _LEAST_TIME:
+        return None
+    ratio = np.asarray(ratios)[gear[known]]
+    t = time[known] - time[known].mean()
+    used = np.unique(gear[known])
+    columns = [np.where(gear[known] == one, slow[known], 0.0) for one in used]
+    design = np.column_stack([*columns, ratio * rate[known], ratio * rate[known] * t])
+    return _fit(design, fast[known] - ratio * slow[known], t)
+
+
+def _gears(
+    fast: FloatArray, slow: FloatArray, ratios: Sequence[float], width: int
+) -> np.typing.NDArray[np.intp]:
+    """Index of the gear held at each sample, -1 for none; clear of the edges of each stretch."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        quotient = fast / slow
+    gear = np.full(fast.size, -1, np.intp)
+    for index, ratio in enumerate(ratios):
+        held = np.abs(quotient - ratio) < _IN_GEAR * ratio
+        gear[uniform_filter1d(held.astype(np.float64), 4 * width, mode="constant") > 0.999] = index
+    return gear
+
+
+def _fit(design: FloatArray, error: FloatArray, time: FloatArray) -> Delay | None:
+    scale = np.linalg.norm(design, axis=0)
+    if not np.all(scale > 0.0):
+        return None
+    solution, _, rank, _ = np.linalg.lstsq(design / scale, error, rcond=1e-8)
+    if rank < design.shape[1]:
+        return None
+    residual = error - design / scale @ solution
+    independent = max(1.0, time.size * _GRID / _SMOOTH - design.shape[1])
+    variance = float(residual @ residual) / time.size * (time.size / independent)
+    covariance = variance * np.linalg.inv((design / scale).T @ (design / scale))
+    value, sigma = solution / scale, np.sqrt(np.diag(covariance)) / scale
+    return Delay(
+        float(value[-2]), float(sigma[-2]), float(value[-1]), float(sigma[-1]), float(np.ptp(time))
+    )
+
+
+def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
+    """Tell delays and drifts of speed channels against each other that are beyond doubt."""
+    pairs = (
+        ("input_speed", "output_speed", [gear.ratio for gear in card.gears]),
+        ("engine_speed", "input_speed", [card.i_in]),
+    )
+    return [
+        text
+        for faster, slower, ratios in pairs
+        if faster in channels and slower in channels
+        for text in _told(channels[faster], channels[slower], ratios)
+    ]
+
+
+def _told(faster: Channel, slower: Channel, ratios: Sequence[float]) -> list[str]:
+    delay = speed_delay(faster, slower, ratios)
+    if delay is None:
+        return []
+    least = max(_LEAST_DELAY, 0.5 * faster.step, 0.5 * slower.step)
+    texts = []
+    if abs(delay.value) > max(least, _SIGNIFICANT * delay.sigma):
+        late, early = (slower, faster) if delay.value > 0.0 else (faster, slower)
+        texts.append(
+            f"channel {late.source_name!r} is {1e3 * abs(delay.value):.1f} ms late against "
+            f"{early.source_name!r} (± {1e3 * delay.sigma:.1f} ms): to correct it set "
+            f"channels.{late.role}.time_shift_s = {-abs(delay.value):.4f} in the channel mapping"
+        )
+    if abs(delay.drift) * delay.span > max(least, _SIGNIFICANT * delay.drift_sigma * delay.span):
+        texts.append(
+            f"the clocks of {faster.source_name!r} and {slower.source_name!r} drift apart by "
+            f"{1e6 * abs(delay.drift):.0f} µs/s: export both on one clock"
+        )
+    return texts

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""The frames of a bus log as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.logs.shiftlog import FloatArray
+
+PAYLOAD = 8
+"""Data bytes of a classical frame; longer ones (CAN FD) are counted and left out."""
+
+_ABSOLUTE = 1e8
+"""Stamps above this [s] count from 1970 and are made relative to the first frame."""
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Data frames in file order.
+
+    `time` (n,) [s]; `identifier` (n,) with 11 or 29 bits as `extended` (n,) says; `data` (n, 8)
+    padded with 0xFF; `length` (n,) of valid bytes; `bus` (n,) an index into `buses`.
+    """
+
+    time: FloatArray
+    identifier: NDArray[np.uint32]
+    extended: NDArray[np.bool_]
+    data: NDArray[np.uint8]
+    length: NDArray[np.uint8]
+    bus: NDArray[np.intp]
+    buses: tuple[str, ...]
+    warnings: tuple[str, ...] = field(default=())
+
+
+def frame_table(
+    stamps: Sequence[float],
+    identifiers: Sequence[int],
+    extended: Sequence[bool],
+    payloads: Sequence[bytes],
+    buses: Sequence[str],
+    warnings: tuple[str, ...] = (),
+) -> Frames:
+    """Build the table from one entry for each frame; payloads have at most 8 bytes."""
+    time = np.array(stamps, np.float64)
+    if time.size and time[0] > _ABSOLUTE:
+        time = time - time[0]
+    names = tuple(dict.fromkeys(buses))
+    index = {name: place for place, name in enumerate(names)}
+    padded = b"".join(payload.ljust(PAYLOAD, b"\xff") for payload in payloads)
+    return Frames(
+        time=time,
+        identifier=np.array(identifiers, np.uint32),
+        extended=np.array(extended, np.bool_),
+        data=np.frombuffer(padded, np.uint8).reshape(-1, PAYLOAD),
+        length=np.array([len(payload) for payload in payloads], np.uint8),
+        bus=np.array([index[name] for name in buses], np.intp),
+        buses=names,
+        warnings=warnings,
+    )

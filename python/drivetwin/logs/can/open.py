@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""Opening a bus log of any form with its databases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from drivetwin.logs.can.candump import is_candump, read_candump
+from drivetwin.logs.can.database import Message, read_database
+from drivetwin.logs.can.frames import Frames
+from drivetwin.logs.can.recording import BusRecording
+from drivetwin.logs.can.vector import is_asc, read_asc, read_blf
+from drivetwin.logs.raw import ReadOptions, Recording
+
+
+def is_bus_text(head: bytes) -> bool:
+    """Tell whether the first bytes of a file are a bus log in text form."""
+    return is_candump(head) or is_asc(head)
+
+
+@contextmanager
+def open_bus_text(path: Path, options: ReadOptions) -> Iterator[Recording]:
+    """Open a candump or ASC log; raises FileFormatError, MissingExtraError, MissingChannelError."""
+    data = path.read_bytes()
+    frames = read_candump(data, str(path)) if is_candump(data[:8192]) else read_asc(path)
+    yield _recording(frames, options, path)
+
+
+@contextmanager
+def open_blf(path: Path, options: ReadOptions) -> Iterator[Recording]:
+    """Open a BLF log; raises FileFormatError, MissingExtraError, MissingChannelError."""
+    yield _recording(read_blf(path), options, path)
+
+
+def _recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
+    return BusRecording(frames, _messages(options.bus.databases), options.bus, path)
+
+
+def _messages(databases: tuple[Path, ...]) -> tuple[Message, ...]:
+    """Messages of the stated databases, else the built-in ones of J1939."""
+    if databases:
+        return read_database(databases)
+    with as_file(files("drivetwin.logs.j1939") / "driveline.dbc") as path:
+        return read_database((path,))

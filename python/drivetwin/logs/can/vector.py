@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""Reader of Vector bus logs, ASC (text) and BLF (binary), by python-can."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from drivetwin.errors import FileFormatError, Where
+from drivetwin.logs.can.frames import PAYLOAD, Frames, frame_table
+from drivetwin.logs.extras import foreign_parser, require
+
+_ASC = re.compile(
+    rb"^(?:date [A-Z][a-z]{2} |base\s+(?:hex|dec)\b|Begin Triggerblock"
+    rb"|[ \t]*\d+\.\d+[ \t]+(?:CANFD[ \t]+)?\d+[ \t]+[0-9A-Fa-f]+x?[ \t]+(?:Rx|Tx)\b)",
+    re.MULTILINE | re.IGNORECASE,
+)
+_RELATIVE = re.compile(rb"^base\s+\w+\s+timestamps\s+relative", re.MULTILINE | re.IGNORECASE)
+
+
+def is_asc(head: bytes) -> bool:
+    """Tell whether the first bytes of a file are an ASC log."""
+    return _ASC.search(head) is not None
+
+
+def read_asc(path: Path) -> Frames:
+    """Read the data frames of an ASC file.
+
+    Raises MissingExtraError without python-can; FileFormatError for a damaged file, one without
+    frames, and one whose stamps count from the event before, of which some may be missing.
+    """
+    kind = "an ASC bus log"
+    with path.open("rb") as file:
+        if _RELATIVE.search(file.read(4096)):
+            raise FileFormatError(
+                "its time stamps count from event to event", "export with absolute time stamps",
+                Where(file=str(path)),
+            )  # fmt: skip
+    can = require("can", "can", kind, path)
+    with path.open(encoding="utf-8", errors="replace") as file, foreign_parser(kind, path):
+        return _read(can.ASCReader(file, relative_timestamp=True), kind, path)
+
+
+def read_blf(path: Path) -> Frames:
+    """Read the data frames of a BLF file; raises MissingExtraError, FileFormatError."""
+    kind = "a BLF bus log"
+    can = require("can", "can", kind, path)
+    with path.open("rb") as file, foreign_parser(kind, path):
+        return _read(can.BLFReader(file), kind, path)
+
+
+def _read(reader: Any, kind: str, path: Path) -> Frames:
+    """The table of data frames; what breaks off is read up to there."""
+    frames: list[tuple[float, int, bool, bytes, str]] = []
+    left_out = 0
+    warnings: list[str] = []
+    try:
+        with foreign_parser(kind, path):
+            left_out = _collect(reader, frames)
+    except FileFormatError as fault:
+        if not frames:
+            raise
+        warnings.append(f"{fault.what}; {len(frames)} frames were read before")
+    if not frames:
+        raise FileFormatError("no frame in the file", "record it again", Where(file=str(path)))
+    if left_out:
+        warnings.append(f"{left_out} remote, error or FD frames left out")
+    stamps, identifiers, extended, payloads, buses = zip(*frames, strict=True)
+    return frame_table(stamps, identifiers, extended, payloads, buses, tuple(warnings))
+
+
+def _collect(reader: Iterable[Any], frames: list[tuple[float, int, bool, bytes, str]]) -> int:
+    """Append the data frames; return how many others there were."""
+    left_out = 0
+    for message in reader:
+        data = bytes(message.data)
+        if message.is_remote_frame or message.is_error_frame or len(data) > PAYLOAD:
+            left_out += 1
+            continue
+        frames.append(
+            (message.timestamp, message.arbitration_id, message.is_extended_id, data,
+             f"channel {message.channel}")
+        )  # fmt: skip
+    return left_out

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""Damaged samples of one channel: found, left out, told. Nothing is put in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from drivetwin.logs.shiftlog import FloatArray, Quantity
+
+Mask = NDArray[np.bool_]
+
+_LISTED = 3
+"""So many places are named; more are counted."""
+
+_SPIKE_WIDTH = 3
+"""Longest spike in samples."""
+
+_SPIKE_CONTRAST = 5.0
+"""A spike stands out by so many times the largest step of its surroundings ..."""
+
+_SURROUNDINGS = 12
+"""... which are so many samples on both sides."""
+
+_SPIKE_SHARE = 0.05
+"""Least height of a spike as a share of the channel's range without its extremes."""
+
+_SPIKE_TIME = 5e-3
+"""Longest spike [s] of a torque or pressure, which may truly change that fast; speeds may not."""
+
+_STUCK_TIME = 0.25
+"""Shortest time [s] of one repeated number that may be a stuck signal."""
+
+_STUCK_SAMPLES = 10
+_STUCK_RELEASE = 8.0
+"""A stuck signal jumps at its end by so many usual steps."""
+
+_CLIPPED_SAMPLES = 3
+_CLIPPED_RUNS = 3
+"""A limit is reached in so many runs of so many equal samples."""
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Samples (n,) that are no measurement, and the words for them."""
+
+    mask: Mask
+    text: str
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """Return first index and end (one past the last) of each stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def missing(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Samples without a number."""
+    mask = ~np.isfinite(values)
+    if not mask.any():
+        return None
+    found = runs(mask)
+    if all(end - start <= _CLIPPED_SAMPLES for start, end in found):
+        first = float(time[found[0][0]])
+        return Damage(
+            mask,
+            f"{int(mask.sum())} samples without a number left out, the first at {first:.6g} s",
+        )
+    return Damage(mask, f"no number {_spans(time, found)}")
+
+
+def spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
+    """Up to three samples that leave the signal and return to it, far beyond its usual steps."""
+    mask = np.zeros(values.size, np.bool_)
+    if quantity is Quantity.STATE or values.size < 4 * _SURROUNDINGS:
+        return None
+    steps = np.abs(np.diff(values))
+    least = max(
+        _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
+        _SPIKE_CONTRAST * float(np.median(steps[steps > 0.0])) if steps.any() else np.inf,
+    )
+    interval = float(np.median(np.diff(time)))
+    for width in range(1, _SPIKE_WIDTH + 1):
+        if quantity is not Quantity.SPEED and width * interval > _SPIKE_TIME:
+            break
+        for start in _spike_starts(values, steps, width, least):
+            mask[start : start + width] = True
+    if not mask.any():
+        return None
+    return Damage(mask, f"{len(runs(mask))} spikes left out, {_spans(time, runs(mask))}")
+
+
+def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: float) -> list[int]:
+    """First samples of spikes of one width: both neighbours agree, the rest around is calm."""
+    before, after = values[: -width - 1], values[width + 1 :]
+    base, apart = 0.5 * (before + after), np.abs(after - before)
+    inside = np.lib.stride_tricks.sliding_window_view(values[1:-1], width) - base[:, None]
+    height = np.abs(inside).min(axis=1)
+    height[np.abs(np.sign(inside).sum(axis=1)) < width] = 0.0
+    # Largest step in the windows that end before and start after the spike.
+    left = maximum_filter1d(steps, _SURROUNDINGS, origin=(_SURROUNDINGS - 1) // 2, mode="nearest")
+    right = maximum_filter1d(steps, _SURROUNDINGS, origin=-(_SURROUNDINGS // 2), mode="nearest")
+    count = height.size
+    lefts = np.concatenate(([0.0], left))[:count]  # steps up to the sample before
+    rights = np.concatenate((right[width + 1 :], [0.0]))[:count]
+    around = np.maximum(np.maximum(lefts, rights), apart)
+    found = (height > least) & (height > _SPIKE_CONTRAST * around)
+    return (np.flatnonzero(found) + 1).tolist()
+
+
+def stuck(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Stretches in which a varying signal repeats one number, then jumps; standstill is none."""
+    same = np.diff(values) == 0.0
+    moving = np.abs(np.diff(values))
+    usual = float(np.median(moving[~same])) if (~same).any() else np.inf
+    lengths = [end - start + 1 for start, end in runs(same)]
+    alone = values.size - sum(lengths)
+    fine = alone > 0.9 * values.size  # a signal whose numbers hardly ever repeat
+    mask = np.zeros(values.size, np.bool_)
+    for start, end in runs(same):
+        if end - start < _STUCK_SAMPLES or time[end] - time[start] < _STUCK_TIME:
+            continue
+        if values[start] == 0.0:
+            continue
+        jump = moving[end] if end < moving.size else 0.0
+        if fine or jump > _STUCK_RELEASE * usual:
+            mask[start + 1 : end + 1] = True
+    if not mask.any():
+        return None
+    return Damage(mask, f"stuck at one number {_spans(time, runs(mask))}, left out")
+
+
+def clipped(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Samples at the largest or smallest number, where a fine signal rests there repeatedly."""
+    same = runs(np.diff(values) == 0.0)
+    for limit in (float(values.max()), float(values.min())):
+        at_limit = values == limit
+        rests = [run for run in runs(at_limit) if run[1] - run[0] >= _CLIPPED_SAMPLES]
+        elsewhere = sum(
+            end - start + 1 >= _CLIPPED_SAMPLES for start, end in same if values[start] != limit
+        )
+        if limit != 0.0 and len(rests) >= _CLIPPED_RUNS and elsewhere == 0:
+            mask = np.zeros(values.size, np.bool_)
+            for start, end in rests:
+                mask[start:end] = True
+            return Damage(mask, f"saturated at one number {_spans(time, rests)}, left out")
+    return None
+
+
+def _spans(time: FloatArray, found: Sequence[tuple[int, int]]) -> str:
+    """`from 0.2 s to 0.29 s` of the first stretches, and how many more."""
+    parts = [
+        f"at {time[start]:.6g} s"
+        if end - start == 1
+        else f"from {time[start]:.6g} s to {time[end - 1]:.6g} s"
+        for start, end in found[:_LISTED]
+    ]
+    more = f" and {len(found) - _LISTED} more times" if len(found) > _LISTED else ""
+    return ", ".join(parts) + more

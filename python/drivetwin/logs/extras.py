@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""Optional libraries that read foreign formats: found, or named with their install command."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from drivetwin.errors import DrivetwinError, FileFormatError, MissingExtraError, Where
+
+
+def require(module: str, extra: str, kind: str, path: Path) -> Any:
+    """Import a library of an extra; MissingExtraError names the install command."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return import_module(module)
+    except ImportError as fault:
+        raise MissingExtraError(
+            f"{kind} needs the library {module.split('.')[0]} ({fault})",
+            f'pip install "drivetwin[{extra}]"',
+            Where(file=str(path)),
+        ) from None
+
+
+@contextmanager
+def foreign_parser(kind: str, path: Path) -> Iterator[None]:
+    """Turn whatever a foreign parser raises on damaged bytes into FileFormatError.
+
+    Such parsers check little: a flipped bit shows as any exception at all. Their warnings would
+    not reach the user's report; what matters is told by the reader.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except DrivetwinError:
+        raise
+    except (Exception, MemoryError) as fault:
+        text = " ".join(str(fault).split())[:120] or "no more is known"
+        raise FileFormatError(
+            f"{kind} cannot be read, it may be cut or damaged ({type(fault).__name__}: {text})",
+            "record or export the log again",
+            Where(file=str(path)),
+        ) from None

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: MIT
+"""Reader of MDF 3 and 4 measurement files, by asammdf.
+
+Each channel keeps the time base of its group; nothing is resampled, and only what is asked for is
+read. asammdf's own resampling and one-table export hold or invent values, so they are not used.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError, Where
+from drivetwin.logs.extras import foreign_parser, require
+from drivetwin.logs.mdf_blocks import check_blocks
+from drivetwin.logs.raw import Column, RawChannel, ReadOptions, Recording, Window
+from drivetwin.logs.shiftlog import FloatArray
+from drivetwin.logs.units import time_factor
+
+_KIND = "an MDF file"
+_MOST_INFLATION = 1100
+"""Deflate packs zeros about 1030 to 1; a group that claims more than this is damaged."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    group: int
+    index: int
+
+
+@contextmanager
+def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
+    """Open an MDF file.
+
+    Raises MissingExtraError without asammdf, FileFormatError for a damaged file.
+    """
+    asammdf = require("asammdf", "mdf", _KIND, path)
+    check_blocks(path)
+    with foreign_parser(_KIND, path):
+        mdf = asammdf.MDF(path, process_bus_logging=False, use_display_names=False)
+    try:
+        with foreign_parser(_KIND, path):
+            recording = MdfRecording(mdf, path, options)
+        yield recording
+    finally:
+        mdf.close()
+
+
+class MdfRecording:
+    """Channels of an open MDF file; the group is the recorder's name for it, else its number."""
+
+    def __init__(self, mdf: Any, path: Path, options: ReadOptions) -> None:
+        self._mdf = mdf
+        self._path = path
+        unit = options.time.unit
+        self._factor = 1.0 if unit is None else time_factor(unit, Where(file=str(path)))
+        self.warnings: tuple[str, ...] = ()
+        names = _group_names(mdf.groups)
+        places: list[_Place] = []
+        columns: list[Column] = []
+        timeless: list[str] = []
+        for number, group in enumerate(mdf.groups):
+            if number not in mdf.masters_db:
+                timeless.append(names[number])
+                continue
+            self._check_size(group, names[number])
+            for index, channel in enumerate(group.channels):
+                if index == mdf.masters_db[number]:
+                    continue
+                unit_text = mdf.get_channel_unit(group=number, index=index)
+                places.append(_Place(number, index))
+                columns.append(Column(channel.name, unit_text.strip() or None, names[number]))
+        self._places = tuple(places)
+        self.columns: Sequence[Column] = tuple(columns)
+        if timeless:
+            self.warnings = (f"groups without a time channel left out: {', '.join(timeless)}",)
+        if not columns:
+            raise MissingChannelError(
+                "the file has no channel with a time base",
+                "record or export the log again",
+                Where(file=str(path)),
+            )
+
+    def load(self, index: int, window: Window | None = None) -> RawChannel:
+        """Read one channel, in a window only the records inside; see `Recording`."""
+        place, column = self._places[index], self.columns[index]
+        with foreign_parser(_KIND, self._path):
+            time = self._time(place.group)
+            first, count = 0, time.size
+            if window is not None:
+                first, last = np.searchsorted(time, window)
+                last += int(last < time.size and time[last] == window[1])
+                count = int(last - first)
+                time = time[first:last]
+            values, invalid = self._samples(place, int(first), count)
+        where = Where(file=str(self._path), channel=str(column))
+        if values.dtype.kind not in "iufb" or values.ndim != 1:
+            raise DamagedChannelError(
+                "it holds text or arrays, one number for each sample is needed",
+                "map another channel",
+                where,
+            )
+        if values.size != time.size:
+            raise FileFormatError(
+                f"{values.size} values for {time.size} time stamps", "record the log again", where
+            )
+        numbers = values.astype(np.float64)
+        notes: tuple[str, ...] = ()
+        if invalid is not None and invalid.any():
+            notes = (f"{int(invalid.sum())} samples that the recorder marks invalid left out",)
+            time, numbers = time[~invalid], numbers[~invalid]
+        return RawChannel(column.name, column.unit, time, numbers, column.group, notes)
+
+    def _time(self, group: int) -> FloatArray:
+        master: FloatArray = np.asarray(self._mdf.get_master(group), dtype=np.float64)
+        return master * self._factor
+
+    def _samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any]:
+        """Values with the conversion of the file, of text tables the numbers before it."""
+        wanted = {
+            "group": place.group,
+            "index": place.index,
+            "record_offset": first,
+            "record_count": count,
+            "ignore_invalidation_bits": False,
+        }
+        signal = self._mdf.get(raw=False, **wanted)
+        if signal.samples.dtype.kind in "SUO":
+            signal = self._mdf.get(raw=True, **wanted)
+        bits = signal.invalidation_bits
+        return signal.samples, None if bits is None else np.asarray(bits, dtype=np.bool_)
+
+    def _check_size(self, group: Any, name: str) -> None:
+        """Refuse a group that claims more records than the file can hold, before it is loaded."""
+        block = group.channel_group
+        records = int(block.cycles_nr)
+        width = max(1, int(block.samples_byte_nr))
+        size = self._path.stat().st_size
+        if records * width > _MOST_INFLATION * size + 1_000_000 or records < 0:
+            raise FileFormatError(
+                f"group {name!r} claims {records} records in a file of {size} bytes",
+                "the file is cut or damaged: record or export the log again",
+                Where(file=str(self._path)),
+            )
+
+
+def _group_names(groups: Sequence[Any]) -> list[str]:
+    """Name of each group: of its acquisition, else its comment; with its number where repeated."""
+    names = [_group_name(group.channel_group) for group in groups]
+    count = Counter(names)
+    return [
+        name if name and count[name] == 1 else f"{name} #{number}".strip()
+        for number, name in enumerate(names)
+    ]
+
+
+def _group_name(block: Any) -> str:
+    name = str(getattr(block, "acq_name", "") or "").strip()
+    comment = str(block.comment or "").strip()
+    return name or ("" if comment.startswith("<") else comment.partition("\n")[0])

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""What each column of a file holds, one column in memory at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from drivetwin.errors import DamagedChannelError
+from drivetwin.logs.formats import open_recording
+from drivetwin.logs.held import find_raster
+from drivetwin.logs.raw import Column, RawChannel, ReadOptions, Window
+from drivetwin.logs.shiftlog import Channel, Quantity
+
+
+@dataclass(frozen=True)
+class ColumnSummary:
+    """A column as recorded: `rate` [Hz] of its updates, `range` in the file's unit.
+
+    `span` is first and last time [s]; `gaps` counts samples without a number and interruptions.
+    `fault` tells why a column holds no numbers.
+    """
+
+    column: Column
+    samples: int = 0
+    rate: float | None = None
+    range: tuple[float, float] | None = None
+    span: Window | None = None
+    gaps: int = 0
+    fault: str | None = None
+
+
+@dataclass(frozen=True)
+class Summary:
+    """All columns of a file in file order, and what its reader has to say."""
+
+    columns: tuple[ColumnSummary, ...]
+    warnings: tuple[str, ...]
+
+
+def summarise(path: Path, options: ReadOptions | None = None) -> Summary:
+    """Look at every column of a file; raises the errors of its reader."""
+    found: list[ColumnSummary] = []
+    with open_recording(path, options) as recording:
+        for index, column in enumerate(recording.columns):
+            try:
+                found.append(_summary(column, recording.load(index)))
+            except DamagedChannelError as fault:
+                found.append(ColumnSummary(column, fault=fault.what))
+        return Summary(tuple(found), recording.warnings)
+
+
+def _summary(column: Column, channel: RawChannel) -> ColumnSummary:
+    without = int(np.count_nonzero(~np.isfinite(channel.values)))
+    return ColumnSummary(
+        column=column,
+        samples=channel.time.size,
+        rate=_update_rate(channel),
+        range=channel.range,
+        span=(float(channel.time[0]), float(channel.time[-1])) if channel.time.size else None,
+        gaps=without + channel.pauses,
+    )
+
+
+def _update_rate(channel: RawChannel) -> float | None:
+    """Updates per second; of a held signal those of its sender, not the logger's."""
+    step = channel.step
+    if step is None or step <= 0.0:
+        return None
+    sent = Channel("", Quantity.FRACTION, channel.time, channel.values, channel.name, "")
+    raster = find_raster(sent) if np.all(np.diff(channel.time) > 0.0) else None
+    return 1.0 / (step if raster is None else raster.period)
