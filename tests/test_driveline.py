@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from drivetwin.driveline import (
     Signal,
     State,
     Stribeck,
+    sensitivities,
     simulate,
 )
 from drivetwin.errors import InputError
@@ -192,3 +194,72 @@ def test_the_same_run_twice_is_bit_identical() -> None:
     time = np.linspace(0.0, 1.0, 101)
     first, second = (simulate(paper_model(), torque, pressures, start, time) for _ in range(2))
     assert np.array_equal(first.shaft_torque, second.shaft_torque)
+
+
+def upshift() -> tuple[Signal, dict[str, Signal], State, Any]:
+    """A 2-3 upshift at 1 kHz with ripple on the on-coming pressure."""
+    time = np.linspace(0.0, 1.2, 1201)
+    torque = np.interp(time, [0, 0.45, 0.5, 0.8, 0.9], [1545, 1545, 1100, 1100, 1545])
+    off = np.interp(time, [0, 0.3, 0.36, 0.45], [14e5, 14e5, 5e5, 0.0])
+    on = np.interp(time, [0, 0.2, 0.3, 0.45, 0.9, 1.1], [0, 0, 1.5e5, 5.5e5, 6.5e5, 14e5])
+    on += np.where((time > 0.5) & (time < 0.9), 2e4 * np.sin(2 * np.pi * 22 * time), 0.0)
+    start = held_second_gear()[2]
+    pressures = {"B2": Signal(time, off), "B3": Signal(time, on)}
+    return Signal(time, torque, 0.0), pressures, start, np.linspace(0.01, 1.15, 571)
+
+
+PARAMETERS: dict[str, tuple[Callable[[DualClutch, float], DualClutch], float]] = {
+    "eta": (lambda m, d: replace(m, eta=m.eta + d), 1e-6),
+    "k_o": (lambda m, d: replace(m, k_o=m.k_o + d), 0.1),
+    "load.constant": (lambda m, d: replace(m, load=RoadLoad(m.load.constant + d)), 1e-2),
+    "B3.mu_c": (
+        lambda m, d: replace(
+            m,
+            elements=(
+                m.elements[0],
+                replace(m.elements[1], friction=Stribeck(0.110 + d, 0.135, 15.0, 1e-4)),
+            ),
+        ),
+        1e-7,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_derivatives_agree_with_central_differences_through_all_events(name: str) -> None:
+    torque, pressures, start, time = upshift()
+    model = paper_model()
+    change, step = PARAMETERS[name]
+    found = sensitivities(model, torque, pressures, start, time, [name])
+    up, down = (simulate(change(model, d), torque, pressures, start, time) for d in (step, -step))
+    exact = found.derivatives[name].shaft_torque
+    difference = (up.shaft_torque - down.shaft_torque) / (2 * step)
+    scale = np.abs(difference).max()
+    assert np.abs(exact - difference).max() < 2e-6 * scale
+    event_difference = (up.events[-1].time - down.events[-1].time) / (2 * step)
+    assert found.event_times[name][-1] == pytest.approx(event_difference, rel=2e-6)
+
+
+def test_the_derivative_by_a_delay_agrees_with_differences() -> None:
+    torque, pressures, start, time = upshift()
+    found = sensitivities(
+        paper_model(), torque, pressures, start, time, ["delay.engine torque", "delay.B3"]
+    )
+    step = 1e-6
+    for which in ("engine torque", "B3"):
+        runs = []
+        for sign in (1, -1):
+            shifted = replace(torque, delay=sign * step * (which == "engine torque"))
+            moved = pressures | {
+                "B3": replace(pressures["B3"], delay=sign * step * (which == "B3"))
+            }
+            runs.append(simulate(paper_model(), shifted, moved, start, time))
+        difference = (runs[0].shaft_torque - runs[1].shaft_torque) / (2 * step)
+        exact = found.derivatives[f"delay.{which}"].shaft_torque
+        assert np.abs(exact - difference).max() < 1e-3 * np.abs(difference).max()
+
+
+def test_an_unknown_parameter_of_a_derivative_is_refused() -> None:
+    torque, pressures, start, time = upshift()
+    with pytest.raises(InputError, match=r"parameter \"B3\.nu\" is unknown"):
+        sensitivities(paper_model(), torque, pressures, start, time, ["B3.nu"])

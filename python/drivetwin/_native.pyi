@@ -26,6 +26,13 @@ def simulate(
     grid: _Array,
     options: _Options,
 ) -> _Run: ...
+def sensitivities(
+    model: str,
+    signals: Sequence[tuple[str, _Array, _Array, float]],
+    start: tuple[float, float, float, float, Sequence[str]],
+    grid: _Array,
+    options: tuple[float, Sequence[str]],
+) -> tuple[_Array, list[tuple[float, str, str]], str, NDArray[np.float64], _Array]: ...
 def simulate_network(
     driveline: str,
     outputs: str,

@@ -7,7 +7,7 @@ The physics itself stands in the Rust core; these classes only describe and carr
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
@@ -114,10 +114,14 @@ class State:
 
 @dataclass(frozen=True)
 class Signal:
-    """An input, linear between its samples; `time` (n,) [s], `values` (n,) SI."""
+    """An input, linear between its samples; `time` (n,) [s], `values` (n,) SI.
+
+    The input at time t is the sample of time t - `delay` [s].
+    """
 
     time: FloatArray
     values: FloatArray
+    delay: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -183,6 +187,19 @@ class Trajectory:
     audit: EnergyAudit | None = field(default=None)
 
 
+@dataclass(frozen=True)
+class Sensitivities:
+    """A run with its derivatives.
+
+    `derivatives[parameter]` holds the derivative of every trajectory column per unit of the
+    parameter; `event_times[parameter]` (n_events,) those of the times of `run.events` [s].
+    """
+
+    run: Trajectory
+    derivatives: Mapping[str, Trajectory]
+    event_times: Mapping[str, FloatArray]
+
+
 def simulate(
     model: DualClutch,
     engine_torque: Signal,
@@ -205,21 +222,67 @@ def simulate(
     try:
         columns, events, status, energy = _native.simulate(
             _as_json(model),
-            [(name, _array(s.time), _array(s.values)) for name, s in signals.items()],
-            (
-                start.engine_speed,
-                start.output_speed,
-                start.wheel_speed,
-                start.twist,
-                list(start.locked),
-            ),
+            [(name, _array(s.time + s.delay), _array(s.values)) for name, s in signals.items()],
+            _start(start),
             _array(time),
             options,
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the time grid") from error
-    names = [element.name for element in model.elements]
+    audited = EnergyAudit(*energy) if energy is not None else None
+    return _trajectory(model, time, columns, (events, status, audited))
+
+
+def sensitivities(
+    model: DualClutch,
+    engine_torque: Signal,
+    pressures: Mapping[str, Signal],
+    start: State,
+    time: FloatArray,
+    parameters: Sequence[str],
+) -> Sensitivities:
+    """Run the model and differentiate the run by `parameters`, exactly, through all events.
+
+    Names are fields of the model (`eta`, `J1`, `k_o`, `load.constant`), of a shift element
+    (`B3.P0`, `B3.mu_c`, `B3.mu.4` for a point of a table), of the start (`start.twist`), and delays
+    of inputs (`delay.engine torque`, `delay.B3`). Event times are differentiated implicitly; where
+    an event grazes no derivative exists.
+    Raises InputError for an unknown name or an inconsistent description.
+    """
+    signals = {"engine torque": engine_torque, **pressures}
+    delayed = [(n, _array(s.time), _array(s.values), s.delay) for n, s in signals.items()]
+    options = (Accuracy().tolerance, list(parameters))
+    try:
+        columns, events, status, derivatives, event_derivatives = _native.sensitivities(
+            _as_json(model), delayed, _start(start), _array(time), options
+        )
+    except ValueError as error:
+        raise InputError(str(error), "correct the model, its inputs or the names") from error
+    run = _trajectory(model, time, columns, (events, status, None))
+    return Sensitivities(
+        run,
+        {
+            name: _trajectory(model, time, derivatives[i], ([], status, None))
+            for i, name in enumerate(parameters)
+        },
+        {name: event_derivatives[i] for i, name in enumerate(parameters)},
+    )
+
+
+def _start(start: State) -> tuple[float, float, float, float, list[str]]:
+    speeds = (start.engine_speed, start.output_speed, start.wheel_speed)
+    return (*speeds, start.twist, list(start.locked))
+
+
+def _trajectory(
+    model: DualClutch,
+    time: FloatArray,
+    columns: FloatArray,
+    outcome: tuple[list[tuple[float, str, str]], str, EnergyAudit | None],
+) -> Trajectory:
+    events, status, audit = outcome
     engine, output, wheel, twist, shaft = columns[:5]
+    names = [element.name for element in model.elements]
     return Trajectory(
         time,
         engine,
@@ -231,7 +294,7 @@ def simulate(
         slip=dict(zip(names, columns[6::2], strict=True)),
         events=tuple(Event(*event) for event in events),
         status=status,
-        audit=EnergyAudit(*energy) if energy is not None else None,
+        audit=audit,
     )
 
 

@@ -3,9 +3,9 @@
 
 use crate::plain::{Audit, Event, as_tuple, events_of};
 use drivetwin_core::model::DualClutch;
-use drivetwin_core::simulate::{DualClutchStart, simulate_dual_clutch};
+use drivetwin_core::simulate::{DualClutchStart, dual_clutch_sensitivities, simulate_dual_clutch};
 use drivetwin_core::solve::{Settings, Signal};
-use numpy::{PyArray2, PyReadonlyArray1};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -34,7 +34,7 @@ pub fn simulate<'py>(
     let signals = signals
         .iter()
         .map(|(name, times, values)| {
-            Ok((name.as_str(), Signal::Samples(times.as_slice()?, values.as_slice()?)))
+            Ok((name.as_str(), Signal::samples(times.as_slice()?, values.as_slice()?)))
         })
         .collect::<PyResult<Vec<_>>>()?;
     let (engine_speed, output_speed, wheel_speed, twist, locked) = start;
@@ -47,4 +47,52 @@ pub fn simulate<'py>(
     let columns = PyArray2::from_vec2(py, &run.columns)?;
     let events = events_of(&run);
     Ok((columns, events, run.status.to_string(), run.audit.map(as_tuple)))
+}
+
+/// Columns (n_columns, n_time), events, status, derivatives (n_parameters, n_columns, n_time), and
+/// of event times (n_parameters, n_events).
+type Sensitive<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Vec<Event>,
+    String,
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray2<f64>>,
+);
+/// Name, times [s], values and delay [s] of an input.
+type Delayed<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, f64);
+
+/// Simulate and differentiate by the named parameters.
+#[pyfunction]
+pub fn sensitivities<'py>(
+    py: Python<'py>,
+    model: &str,
+    signals: Vec<Delayed<'py>>,
+    start: Start,
+    grid: PyReadonlyArray1<'py, f64>,
+    options: (f64, Vec<String>),
+) -> PyResult<Sensitive<'py>> {
+    let model: DualClutch<f64> =
+        serde_json::from_str(model).map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let grid = grid.as_slice()?;
+    let signals = signals
+        .iter()
+        .map(|(name, times, values, delay)| {
+            Ok((name.as_str(), times.as_slice()?, values.as_slice()?, *delay))
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    let (engine_speed, output_speed, wheel_speed, twist, locked) = start;
+    let start = DualClutchStart { engine_speed, output_speed, wheel_speed, twist, locked };
+    let (tolerance, parameters) = options;
+    let names: Vec<&str> = parameters.iter().map(String::as_str).collect();
+    let settings = Settings { tolerance, ..Settings::default() };
+    let found = py
+        .detach(|| dual_clutch_sensitivities(&model, &signals, &start, grid, (settings, &names)))
+        .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    Ok((
+        PyArray2::from_vec2(py, &found.run.columns)?,
+        events_of(&found.run),
+        found.run.status.to_string(),
+        PyArray3::from_vec3(py, &found.columns)?,
+        PyArray2::from_vec2(py, &found.events)?,
+    ))
 }

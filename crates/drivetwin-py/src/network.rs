@@ -41,7 +41,7 @@ pub fn simulate_network<'py>(
     let mut inputs = samples
         .iter()
         .map(|(name, times, values)| {
-            Ok((name.as_str(), Signal::Samples(times.as_slice()?, values.as_slice()?)))
+            Ok((name.as_str(), Signal::samples(times.as_slice()?, values.as_slice()?)))
         })
         .collect::<PyResult<Vec<_>>>()?;
     inputs.extend(sines.iter().map(|&(ref name, offset, amplitude, frequency, phase)| {

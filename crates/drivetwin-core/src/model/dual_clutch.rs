@@ -157,3 +157,90 @@ fn inertia<T: Real>(name: &str, node: &str, inertia: T) -> Element<T> {
 fn gear<T: Real>(name: &str, a: &str, b: &str, ratio: T) -> Gear<T> {
     Gear { name: name.into(), a: a.into(), b: b.into(), ratio, loss: None }
 }
+
+impl<T> DualClutch<T> {
+    /// A number of the model by its name: a field (`eta`), `load.constant`, or a field of a shift
+    /// element by the element's name (`B2.P0`, `B2.mu_c`, `B2.mu.3` for a point of a table).
+    pub fn parameter_mut(&mut self, name: &str) -> Option<&mut T> {
+        Some(match name {
+            "J1" => &mut self.J1,
+            "J2e" => &mut self.J2e,
+            "eta" => &mut self.eta,
+            "i_in" => &mut self.i_in,
+            "J_out" => &mut self.J_out,
+            "i_f" => &mut self.i_f,
+            "J_v" => &mut self.J_v,
+            "k_o" => &mut self.k_o,
+            "c_o" => &mut self.c_o,
+            "load.constant" => &mut self.load.constant,
+            "load.rolling" => &mut self.load.rolling,
+            "load.aero" => &mut self.load.aero,
+            _ => {
+                let (element, field) = name.split_once('.')?;
+                return self.elements.iter_mut().find(|e| e.name == element)?.field_mut(field);
+            }
+        })
+    }
+
+    fn map<U>(&self, f: &impl Fn(&T) -> U) -> DualClutch<U> {
+        DualClutch {
+            J1: f(&self.J1),
+            J2e: f(&self.J2e),
+            eta: f(&self.eta),
+            loss_law: self.loss_law,
+            i_in: f(&self.i_in),
+            J_out: f(&self.J_out),
+            i_f: f(&self.i_f),
+            J_v: f(&self.J_v),
+            k_o: f(&self.k_o),
+            c_o: f(&self.c_o),
+            load: Load {
+                constant: f(&self.load.constant),
+                rolling: f(&self.load.rolling),
+                aero: f(&self.load.aero),
+            },
+            elements: self.elements.iter().map(|element| element.map(f)).collect(),
+        }
+    }
+}
+
+impl DualClutch<f64> {
+    /// The same driveline over another number type.
+    pub fn lifted<T: Real>(&self) -> DualClutch<T> {
+        self.map(&|&value| T::of(value))
+    }
+}
+
+impl<T> ShiftElement<T> {
+    fn field_mut(&mut self, name: &str) -> Option<&mut T> {
+        match (name, &mut self.friction) {
+            ("i_c", _) => Some(&mut self.i_c),
+            ("i_out", _) => Some(&mut self.i_out),
+            ("gain", _) => Some(&mut self.gain),
+            ("P0", _) => Some(&mut self.p0),
+            ("peak", _) => Some(&mut self.peak),
+            ("drum_inertia", _) => Some(&mut self.drum_inertia),
+            ("mu_c", FrictionLaw::Stribeck(law)) => Some(&mut law.mu_c),
+            ("mu_s", FrictionLaw::Stribeck(law)) => Some(&mut law.mu_s),
+            ("v_s", FrictionLaw::Stribeck(law)) => Some(&mut law.v_s),
+            ("mu_v", FrictionLaw::Stribeck(law)) => Some(&mut law.mu_v),
+            (point, FrictionLaw::Table(table)) => {
+                table.mu.get_mut(point.strip_prefix("mu.")?.parse::<usize>().ok()?)
+            }
+            _ => None,
+        }
+    }
+
+    fn map<U>(&self, f: &impl Fn(&T) -> U) -> ShiftElement<U> {
+        ShiftElement {
+            name: self.name.clone(),
+            i_c: f(&self.i_c),
+            i_out: f(&self.i_out),
+            gain: f(&self.gain),
+            p0: f(&self.p0),
+            friction: self.friction.map(f),
+            peak: f(&self.peak),
+            drum_inertia: f(&self.drum_inertia),
+        }
+    }
+}

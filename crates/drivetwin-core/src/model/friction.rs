@@ -42,6 +42,25 @@ pub enum FrictionLaw<T> {
     Table(FrictionTable<T>),
 }
 
+impl<T> FrictionLaw<T> {
+    /// The same law over another number type.
+    pub(crate) fn map<U>(&self, f: &impl Fn(&T) -> U) -> FrictionLaw<U> {
+        match self {
+            Self::Stribeck(law) => FrictionLaw::Stribeck(Stribeck {
+                mu_c: f(&law.mu_c),
+                mu_s: f(&law.mu_s),
+                v_s: f(&law.v_s),
+                mu_v: f(&law.mu_v),
+            }),
+            Self::Table(table) => FrictionLaw::Table(FrictionTable {
+                slip: table.slip.clone(),
+                mu: table.mu.iter().map(f).collect(),
+                extend: table.extend,
+            }),
+        }
+    }
+}
+
 impl<T: Real> FrictionLaw<T> {
     /// μ independent of slip.
     pub fn constant(mu: T) -> Self {

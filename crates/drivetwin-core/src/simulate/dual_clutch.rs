@@ -59,3 +59,29 @@ pub fn simulate_dual_clutch<T: Real>(
     }
     run(&network, signals, &start, grid, &outputs, options)
 }
+
+impl DualClutchStart<f64> {
+    /// The same start over another number type.
+    pub fn lifted<T: Real>(&self) -> DualClutchStart<T> {
+        DualClutchStart {
+            engine_speed: T::of(self.engine_speed),
+            output_speed: T::of(self.output_speed),
+            wheel_speed: T::of(self.wheel_speed),
+            twist: T::of(self.twist),
+            locked: self.locked.clone(),
+        }
+    }
+}
+
+impl<T> DualClutchStart<T> {
+    /// A number of the start by its name.
+    pub fn field_mut(&mut self, name: &str) -> Option<&mut T> {
+        Some(match name {
+            "engine_speed" => &mut self.engine_speed,
+            "output_speed" => &mut self.output_speed,
+            "wheel_speed" => &mut self.wheel_speed,
+            "twist" => &mut self.twist,
+            _ => return None,
+        })
+    }
+}

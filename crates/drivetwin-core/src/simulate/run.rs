@@ -98,7 +98,7 @@ fn check_grid(grid: &[f64]) -> Result<(), SimulateError> {
 
 /// A prescribed speed that jumps would take an infinite torque.
 fn refuse_jump<T: Real>((name, signal): (&str, Signal<'_, T>)) -> Result<(), InputError> {
-    let Signal::Samples(times, _) = signal else { return Ok(()) };
+    let Signal::Samples { times, .. } = signal else { return Ok(()) };
     match times.windows(2).position(|w| w[0] == w[1]) {
         Some(i) => Err(InputError::Jump { name: name.to_owned(), time: times[i] }),
         None => Ok(()),

@@ -8,7 +8,15 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug)]
 pub enum Signal<'a, T> {
     /// Linear between samples; a time that stands twice is a jump.
-    Samples(&'a [f64], &'a [T]),
+    Samples {
+        /// Times, s.
+        times: &'a [f64],
+        /// Values, SI.
+        values: &'a [T],
+        /// The input at time t is the sample of time t - delay, s. Derivatives with respect to it are
+        /// exact for signals without jumps.
+        delay: T,
+    },
     /// `offset + amplitude · sin(2π frequency t + phase)`.
     Sine {
         /// Mean.
@@ -22,12 +30,19 @@ pub enum Signal<'a, T> {
     },
 }
 
+impl<'a, T: Real> Signal<'a, T> {
+    /// Samples without delay.
+    pub fn samples(times: &'a [f64], values: &'a [T]) -> Self {
+        Self::Samples { times, values, delay: T::zero_() }
+    }
+}
+
 /// Inputs on a common set of knots; a knot that stands twice is a jump.
 #[derive(Clone, Debug)]
 pub struct Inputs<T> {
     knots: Vec<f64>,
-    /// Values at the knots, knots × inputs; unused for sines.
-    values: Vec<T>,
+    /// Value at the start of a segment and rate within it, segments × inputs; unused for sines.
+    lines: Vec<[T; 2]>,
     sines: Vec<Option<Sine<T>>>,
 }
 
@@ -103,14 +118,18 @@ impl<T: Real> Inputs<T> {
         (start, end): (f64, f64),
     ) -> Result<Self, InputError> {
         let mut knots = vec![start, end];
-        let mut sampled: Vec<&[f64]> = Vec::new();
+        let mut jumps = Vec::new();
         let mut sines = Vec::new();
         for &(name, signal) in signals {
             match signal {
-                Signal::Samples(times, values) => {
-                    check(name, times, values, (start, end))?;
-                    knots.extend(times.iter().filter(|&&t| t > start && t < end));
-                    sampled.push(times);
+                Signal::Samples { times, values, delay } => {
+                    let delay = delay.re();
+                    check(name, times, values, (start - delay, end - delay))?;
+                    let inside =
+                        times.iter().map(|t| t + delay).filter(|t| (start..end).contains(t));
+                    knots.extend(inside);
+                    let twice = times.windows(2).filter(|w| w[0] == w[1]);
+                    jumps.extend(twice.map(|w| w[0] + delay));
                     sines.push(None);
                 }
                 Signal::Sine { offset, amplitude, frequency, phase } => {
@@ -120,16 +139,17 @@ impl<T: Real> Inputs<T> {
             }
         }
         knots.sort_by(f64::total_cmp);
-        let knots = merge_knots(&knots, &sampled);
-        let mut values = Vec::with_capacity(knots.len() * signals.len());
-        for (i, &t) in knots.iter().enumerate() {
-            let after_jump = i == 0 || knots[i - 1] == t;
-            values.extend(signals.iter().map(|(_, signal)| match signal {
-                Signal::Samples(times, samples) => interpolate(times, samples, t, after_jump),
-                Signal::Sine { offset, .. } => *offset,
+        let knots = merge_knots(&knots, &jumps);
+        let mut lines = Vec::with_capacity((knots.len() - 1) * signals.len());
+        for span in knots.windows(2) {
+            lines.extend(signals.iter().map(|(_, signal)| match signal {
+                Signal::Samples { times, values, delay } => {
+                    line(times, values, *delay, (span[0], span[1]))
+                }
+                Signal::Sine { offset, .. } => [*offset, T::zero_()],
             }));
         }
-        Ok(Self { knots, values, sines })
+        Ok(Self { knots, lines, sines })
     }
 
     /// Number of segments between knots.
@@ -144,18 +164,16 @@ impl<T: Real> Inputs<T> {
 
     /// Taylor coefficients of every input at `t` within segment `i`.
     pub fn expand(&self, i: usize, t: T, out: &mut [Series<T>]) {
-        let (from, to) = self.span(i);
-        let width = to - from;
-        let row = |k: usize| &self.values[k * self.sines.len()..(k + 1) * self.sines.len()];
-        for (j, series) in out.iter_mut().enumerate() {
-            if let Some(sine) = &self.sines[j] {
-                *series = sine_series(sine, t);
-                continue;
+        let elapsed = t - self.knots[i];
+        let lines = &self.lines[i * self.sines.len()..];
+        for ((series, sine), &[start, rate]) in out.iter_mut().zip(&self.sines).zip(lines) {
+            match sine {
+                Some(sine) => *series = sine_series(sine, t),
+                None => {
+                    series[0] = start + rate * elapsed;
+                    series[1] = rate;
+                }
             }
-            let (a, b) = (row(i)[j], row(i + 1)[j]);
-            let rate = if width > 0.0 { (b - a) / width } else { T::zero_() };
-            series[0] = a + rate * (t - from);
-            series[1] = rate;
         }
     }
 }
@@ -209,19 +227,14 @@ fn check<T: Real>(
 }
 
 /// Distinct times; times closer than round-off count as one; inner jumps stand twice.
-fn merge_knots(sorted: &[f64], sampled: &[&[f64]]) -> Vec<f64> {
-    let jump = |t: f64| {
-        sampled.iter().any(|times| {
-            let i = times.partition_point(|&x| x < t);
-            i + 1 < times.len() && times[i] == t && times[i + 1] == t
-        })
-    };
+fn merge_knots(sorted: &[f64], jumps: &[f64]) -> Vec<f64> {
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
     let (start, end) = (sorted[0], sorted[sorted.len() - 1]);
     let mut knots: Vec<f64> = Vec::with_capacity(sorted.len());
     for &t in sorted {
-        if knots.last().is_none_or(|&last| t - last > 1e-12 * (1.0 + t.abs())) {
+        if knots.last().is_none_or(|&last| !near(last, t)) {
             knots.push(t);
-            if t > start && t < end && jump(t) {
+            if t > start && !near(t, end) && jumps.iter().any(|&jump| near(jump, t)) {
                 knots.push(t);
             }
         }
@@ -229,20 +242,14 @@ fn merge_knots(sorted: &[f64], sampled: &[&[f64]]) -> Vec<f64> {
     knots
 }
 
-fn interpolate<T: Real>(times: &[f64], values: &[T], t: f64, after_jump: bool) -> T {
-    let last = times.len() - 1;
-    let next = if after_jump {
-        times.partition_point(|&x| x <= t)
-    } else {
-        times.partition_point(|&x| x < t)
-    };
-    if next == 0 {
-        return values[0];
+/// Value at the start of a segment and rate within it. The samples' interval is found by the
+/// middle of the segment, so that round-off of the knots cannot pick a neighbour.
+fn line<T: Real>(times: &[f64], values: &[T], delay: T, (from, to): (f64, f64)) -> [T; 2] {
+    let middle = 0.5 * (from + to) - delay.re();
+    let next = times.partition_point(|&t| t <= middle);
+    if next == 0 || next == times.len() {
+        return [values[next.saturating_sub(1)], T::zero_()];
     }
-    if next > last {
-        return values[last];
-    }
-    let (a, b) = (times[next - 1], times[next]);
-    let share = ((t - a) / (b - a)).clamp(0.0, 1.0);
-    values[next - 1] + (values[next] - values[next - 1]) * share
+    let rate = (values[next] - values[next - 1]) / (times[next] - times[next - 1]);
+    [values[next - 1] + rate * (-delay + (from - times[next - 1])), rate]
 }

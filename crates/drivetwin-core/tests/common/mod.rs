@@ -82,7 +82,7 @@ pub fn simulate(
     outputs: &[Output],
 ) -> Trajectory<f64> {
     let signals: Vec<(&str, Input<'_, f64>)> =
-        signals.iter().map(|(n, t, v)| (*n, Input::Samples(t, v))).collect();
+        signals.iter().map(|(n, t, v)| (*n, Input::samples(t, v))).collect();
     run(network, &signals, start, grid, outputs, (Settings::default(), true)).expect("sound inputs")
 }
 

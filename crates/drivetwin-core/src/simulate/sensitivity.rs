@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+//! Exact forward derivatives of a dual-clutch run, through lock and break-away events.
+
+use super::dual_clutch::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
+use super::run::SimulateError;
+use crate::model::dual_clutch::DualClutch;
+use crate::number::Real;
+use crate::solve::{Settings, Signal};
+use num_dual::{Derivative, DualSVec64};
+use thiserror::Error;
+
+/// Parameters that one pass differentiates for.
+const LANES: usize = 8;
+
+type Dual = DualSVec64<LANES>;
+
+/// Why sensitivities cannot be computed.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum SensitivityError {
+    /// A name that is no parameter.
+    #[error(
+        "parameter {name:?} is unknown; known are the fields of the model (eta, J1, load.constant,          B2.P0, B2.mu_c, ...), start.engine_speed, start.output_speed, start.wheel_speed,          start.twist and delay.<input>"
+    )]
+    Unknown {
+        /// The name.
+        name: String,
+    },
+    /// The scenario cannot be run.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+}
+
+/// Sampled input: name, times [s], values, delay [s].
+pub type Sampled<'a> = (&'a str, &'a [f64], &'a [f64], f64);
+
+/// A run with the derivatives of its columns and event times.
+#[derive(Clone, Debug)]
+pub struct Sensitivities {
+    /// Values.
+    pub run: DualClutchRun<f64>,
+    /// Derivative of every column by every parameter: parameters × columns × time.
+    pub columns: Vec<Vec<Vec<f64>>>,
+    /// Derivative of every event time by every parameter: parameters × events.
+    pub events: Vec<Vec<f64>>,
+}
+
+/// Simulate and differentiate by the named parameters. Derivatives are undefined where an event
+/// grazes; event times differentiate implicitly.
+pub fn dual_clutch_sensitivities(
+    model: &DualClutch<f64>,
+    signals: &[Sampled<'_>],
+    start: &DualClutchStart<f64>,
+    grid: &[f64],
+    (settings, parameters): (Settings, &[&str]),
+) -> Result<Sensitivities, SensitivityError> {
+    let plain: Vec<_> = signals
+        .iter()
+        .map(|&(name, times, values, delay)| (name, Signal::Samples { times, values, delay }))
+        .collect();
+    let run = simulate_dual_clutch(model, &plain, start, grid, (settings, false))?;
+    let (mut columns, mut events) = (Vec::new(), Vec::new());
+    for group in parameters.chunks(LANES) {
+        let dual = differentiated(model, signals, start, grid, (settings, group))?;
+        for lane in 0..group.len() {
+            let column = |c: &Vec<Dual>| c.iter().map(|value| part(value, lane)).collect();
+            columns.push(dual.columns.iter().map(column).collect());
+            events.push(dual.events.iter().map(|e| part(&e.time, lane)).collect());
+        }
+    }
+    Ok(Sensitivities { run, columns, events })
+}
+
+/// Derivative of one lane; absent parts are zero.
+fn part(value: &Dual, lane: usize) -> f64 {
+    value.eps.0.as_ref().map_or(0.0, |parts| parts[lane])
+}
+
+fn differentiated(
+    model: &DualClutch<f64>,
+    signals: &[Sampled<'_>],
+    start: &DualClutchStart<f64>,
+    grid: &[f64],
+    (settings, parameters): (Settings, &[&str]),
+) -> Result<DualClutchRun<Dual>, SensitivityError> {
+    let mut model = model.lifted::<Dual>();
+    let mut start = start.lifted::<Dual>();
+    let lifted: Vec<Vec<Dual>> =
+        signals.iter().map(|s| s.2.iter().map(|&v| Dual::of(v)).collect()).collect();
+    let mut delays: Vec<Dual> = signals.iter().map(|s| Dual::of(s.3)).collect();
+    for (lane, &name) in parameters.iter().enumerate() {
+        let place = match name.split_once('.') {
+            Some(("start", field)) => start.field_mut(field),
+            Some(("delay", input)) => {
+                signals.iter().position(|s| s.0 == input).map(|i| &mut delays[i])
+            }
+            _ => model.parameter_mut(name),
+        };
+        let place = place.ok_or_else(|| SensitivityError::Unknown { name: name.to_owned() })?;
+        place.eps = Derivative::derivative_generic(nalgebra::Const::<LANES>, nalgebra::U1, lane);
+    }
+    let inputs: Vec<_> = signals
+        .iter()
+        .zip(lifted.iter().zip(&delays))
+        .map(|(s, (values, &delay))| (s.0, Signal::Samples { times: s.1, values, delay }))
+        .collect();
+    Ok(simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?)
+}
