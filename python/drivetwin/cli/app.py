@@ -10,9 +10,11 @@ from typing import Annotated
 import typer
 
 from drivetwin.cli.demo import demo
+from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
 from drivetwin.cli.inspect import inspect
 from drivetwin.cli.output import show_error
+from drivetwin.cli.reduce import reduce
 from drivetwin.cli.report import report
 from drivetwin.cli.shifts import shifts
 from drivetwin.cli.simulate import simulate
@@ -25,7 +27,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for command in (demo, synth, inspect, shifts, identify, simulate, report):
+for command in (demo, synth, inspect, shifts, identify, simulate, report, gearbox, reduce):
     app.command()(command)
 
 

@@ -4,17 +4,27 @@
 from __future__ import annotations
 
 from drivetwin.gearbox.card import builtin_gearboxes, gearbox_schema, load_gearbox
+from drivetwin.gearbox.compare import Comparison, compare
+from drivetwin.gearbox.drive import Drive
+from drivetwin.gearbox.estimate import CouplingError, estimate
 from drivetwin.gearbox.gears import GearStatics, gear_statics
+from drivetwin.gearbox.network import network_elements
 from drivetwin.gearbox.reduction import Reduction, reduce
 from drivetwin.gearbox.spec import Gearbox
 
 __all__ = [
+    "Comparison",
+    "CouplingError",
+    "Drive",
     "GearStatics",
     "Gearbox",
     "Reduction",
     "builtin_gearboxes",
+    "compare",
+    "estimate",
     "gear_statics",
     "gearbox_schema",
     "load_gearbox",
+    "network_elements",
     "reduce",
 ]

@@ -17,14 +17,16 @@ def dual_clutch(reduction: Reduction, drive: Drive, *, keep_coupling: bool) -> D
     """Return the dual-clutch driveline; see `Reduction.dual_clutch`."""
     pair = (reduction.off_going, reduction.on_coming)
     drums = _drums(reduction, drive) if keep_coupling else (0.0, 0.0)
-    own = [(drum / each.i_c**2, drum * each.i_out**2) for drum, each in zip(drums, pair, strict=True)]
+    own = [
+        (drum / each.i_c**2, drum * each.i_out**2) for drum, each in zip(drums, pair, strict=True)
+    ]
     return DualClutch(
-        J1=drive.engine_inertia + reduction.M11 - sum(at_input for at_input, _ in own),
+        J1=drive.engine_inertia + reduction.M11 - drums_in,
         J2e=0.0,
         eta=1.0,
         loss_law="dissipative",
         i_in=1.0,
-        J_out=reduction.M22 - sum(at_output for _, at_output in own),
+        J_out=reduction.M22 - drums_out,
         i_f=drive.i_f,
         J_v=drive.vehicle_inertia,
         k_o=drive.k_o,
@@ -38,12 +40,7 @@ def dual_clutch(reduction: Reduction, drive: Drive, *, keep_coupling: bool) -> D
 
 
 def _element(reduction: Reduction, ratios: ElementRatios, drum: float) -> ShiftElement:
-    capacity = reduction.gearbox.elements[ratios.element].capacity
-    if capacity is None:
-        raise ReductionError(
-            f"element {ratios.element} of {reduction.gearbox.name} states no capacity",
-            f"give surfaces, area_m2 and radius_m, and a friction law, in [elements.{ratios.element}]",
-        )
+    capacity = reduction.gearbox.capacity(ratios.element)
     return ShiftElement(
         name=ratios.element,
         i_c=ratios.i_c,

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import asdict
 from typing import Any
 
@@ -32,17 +32,7 @@ def network_elements(
             for member, inertia in gearbox.inertias.items()
             if inertia > 0.0
         ),
-        *(
-            _rigid(element) if element.name in engaged_dogs else _friction(element)
-            for element in gearbox.elements.values()
-            if engaged_dogs is not None and element.kind is ElementKind.DOG
-            if element.name in engaged_dogs
-        ),
-        *(
-            _friction(element)
-            for element in gearbox.elements.values()
-            if engaged_dogs is None or element.kind is not ElementKind.DOG
-        ),
+        *_shift_elements(gearbox, engaged_dogs),
     )
 
 
@@ -69,6 +59,14 @@ def _gearing(gearbox: Gearbox) -> list[Element]:
         for pair in gearbox.pairs
     ]
     return [*sets, *pairs]
+
+
+def _shift_elements(gearbox: Gearbox, engaged_dogs: Collection[str] | None) -> Iterator[Element]:
+    for element in gearbox.elements.values():
+        if engaged_dogs is None or element.kind is not ElementKind.DOG:
+            yield _friction(element)
+        elif element.name in engaged_dogs:
+            yield _rigid(element)
 
 
 def _inertia(member: str, inertia: float) -> Element:

@@ -178,7 +178,7 @@ class GearTable(StrictModel):
 
 
 class DriveTable(StrictModel):
-    """`[drive]`: engine, output shaft and vehicle around the gearbox, and the pace of its shifts."""
+    """`[drive]`: engine, output shaft, vehicle around the gearbox; the pace of its shifts."""
 
     engine_inertia_kgm2: float = Field(gt=0)
     engine_torque_Nm: float = Field(gt=0)
@@ -223,5 +223,3 @@ class GearboxFile(StrictModel):
     inertia_kgm2: dict[str, Annotated[float, Field(ge=0)]] = Field(default_factory=dict)
     friction: FrictionEntry | None = None
     drive: DriveTable | None = None
-
-

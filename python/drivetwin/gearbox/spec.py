@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+
 from drivetwin.driveline import FrictionTable, Stribeck
-from drivetwin.errors import CardError, InputError
+from drivetwin.errors import CardError, InputError, ReductionError
 from drivetwin.gearbox.drive import Drive
 from drivetwin.tomlfile import did_you_mean
 
@@ -63,6 +65,10 @@ class Capacity:
     P0: float
     peak: float
     friction: Stribeck | FrictionTable
+
+    def mean_mu(self, slip: float) -> float:
+        """Mean μ over the slips from zero to `slip` [rad/s]; μ(0) for 0."""
+        return float(np.mean(self.friction.at(np.linspace(0.0, slip, 201))))
 
 
 @dataclass(frozen=True)
@@ -130,6 +136,16 @@ class Gearbox:
             f"{self.name} has no gear {name!r}{did_you_mean(name, names)}",
             f"choose one of {', '.join(names)}",
         )
+
+    def capacity(self, element: str) -> Capacity:
+        """Return what an element transmits; raises ReductionError where the card does not say."""
+        capacity = self.elements[element].capacity
+        if capacity is None:
+            raise ReductionError(
+                f"element {element} of {self.name} states no capacity",
+                f"give surfaces, area_m2, radius_m and a friction law in [elements.{element}]",
+            )
+        return capacity
 
     @property
     def dogs(self) -> tuple[str, ...]:

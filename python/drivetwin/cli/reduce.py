@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin reduce CARD --shift 2-3`: a shift of a gearbox as a dual clutch."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from drivetwin.cli.output import JsonFlag, print_json, say, show, table_of
+from drivetwin.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from drivetwin.gearbox import CouplingError, Reduction
+
+GearboxCard = Annotated[
+    str, typer.Argument(metavar="CARD", help="Gearbox card (TOML), or the name of a built-in one.")
+]
+
+
+def reduce(
+    card: GearboxCard,
+    shift: Annotated[
+        str, typer.Option("--shift", metavar="OLD-NEW", help="The two gears, such as 2-3.")
+    ],
+    as_json: JsonFlag = False,
+) -> None:
+    """Reduce a shift to the dual-clutch form and tell how exact that is.
+
+    Ratios of both elements, mass matrix, condition (1) with the members that violate it, the error
+    of leaving their coupling out: estimated first, then simulated.
+    """
+    from drivetwin.gearbox import load_gearbox
+    from drivetwin.gearbox import reduce as reduce_shift
+
+    old, dash, new = shift.rpartition("-")
+    if not dash or not old or not new:
+        raise InputError(f"{shift!r} is no shift", "write two gears with a hyphen, such as 2-3")
+    reduction = reduce_shift(load_gearbox(card), old, new)
+    errors = _errors(reduction)
+    if as_json:
+        print_json(_document(reduction, errors))
+        return
+    show(_elements(reduction))
+    say("slip = ω_in/i_c - i_out·ω_out (eq. 15)")
+    say("")
+    show(_matrix(reduction))
+    say(reduction.condition())
+    say("")
+    if errors.reason is not None:
+        say(f"No error of leaving M12 out is told: {errors.reason}")
+    else:
+        show(_error_table(errors))
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """Estimate and simulation of the error without M12, or the reason why there is none."""
+
+    estimate: CouplingError | None = None
+    simulated: CouplingError | None = None
+    reason: str | None = None
+
+
+def _errors(reduction: Reduction) -> _Errors:
+    from drivetwin.gearbox import compare, estimate
+
+    try:
+        return _Errors(estimate(reduction), compare(reduction).error)
+    except InputError as error:
+        return _Errors(reason=error.what)
+
+
+def _elements(reduction: Reduction) -> Table:
+    title = f"{reduction.gearbox.name}, shift {reduction.from_gear}-{reduction.to_gear}"
+    numbers = ("i_c", "i_out", "i_c·i_out")
+    table = table_of(title, "element", "", *numbers, "own slip", right=numbers)
+    for role, each in (("off-going", reduction.off_going), ("on-coming", reduction.on_coming)):
+        row = [f"{value:.4f}" for value in (each.i_c, each.i_out, each.ratio)]
+        table.add_row(each.element, role, *row, "slip" if each.sense > 0 else "-slip")
+    for name in reduction.common:
+        table.add_row(name, "engaged throughout", "", "", "", "")
+    return table
+
+
+def _matrix(reduction: Reduction) -> Table:
+    title = "Mass matrix of the gearbox over (ω_in, ω_out), kg m²"
+    table = table_of(title, "", "ω_in", "ω_out", right=("ω_in", "ω_out"))
+    table.add_row("ω_in", f"{reduction.M11:.4g}", f"{reduction.M12:.4g}")
+    table.add_row("ω_out", f"{reduction.M12:.4g}", f"{reduction.M22:.4g}")
+    return table
+
+
+def _error_table(errors: _Errors) -> Table:
+    title = "Largest error over the reference shift of the card without M12"
+    columns = ("estimated before", "simulated")
+    table = table_of(title, "signal", *columns, "", right=columns)
+    for label, field, unit in (
+        ("shaft torque", "shaft_torque", "N·m"),
+        ("input speed", "input_speed", "rad/s"),
+        ("output speed", "output_speed", "rad/s"),
+    ):
+        values = [getattr(each, field) for each in (errors.estimate, errors.simulated)]
+        table.add_row(label, *(f"{value:.3g}" for value in values), unit)
+    return table
+
+
+def _document(reduction: Reduction, errors: _Errors) -> dict[str, Any]:
+    def error(of: CouplingError | None) -> dict[str, float] | None:
+        return None if of is None else asdict(of)
+
+    return {
+        "gearbox": reduction.gearbox.name,
+        "from": reduction.from_gear,
+        "to": reduction.to_gear,
+        "off_going": asdict(reduction.off_going),
+        "on_coming": asdict(reduction.on_coming),
+        "common": list(reduction.common),
+        "mass": [[reduction.M11, reduction.M12], [reduction.M12, reduction.M22]],
+        "coupling_ratio": reduction.coupling_ratio,
+        "exact": reduction.exact,
+        "condition": reduction.condition(),
+        "members": [asdict(each) | {"coupling": each.coupling} for each in reduction.members],
+        "violations": [each.member for each in reduction.violations],
+        "error_estimate": error(errors.estimate),
+        "error_simulated": error(errors.simulated),
+        "no_error_because": errors.reason,
+    }

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""The error seen: whole gearbox and dual-clutch form simulated over the same reference shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.driveline import FloatArray, RoadLoad, Signal, State
+from drivetwin.driveline import simulate as simulate_dual_clutch
+from drivetwin.errors import SimulationError
+from drivetwin.gearbox.drive import Drive
+from drivetwin.gearbox.estimate import CouplingError
+from drivetwin.gearbox.gears import gear_statics
+from drivetwin.gearbox.maneuver import Maneuver, plan, signals, time_grid
+from drivetwin.gearbox.network import Element, network_elements
+from drivetwin.gearbox.reduction import Reduction
+from drivetwin.network import Start
+from drivetwin.network import simulate as simulate_network
+
+AXLE, WHEEL, SHAFT = "axle beyond the shaft", "wheel of the vehicle", "shaft to the axle"
+ENGINE_TORQUE = "engine torque"
+_COMPLETED = "completed"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Traces (n,) over `time` [s] of the whole gearbox and of the dual-clutch form without M12.
+
+    Shaft torques [N m], speeds of input and output [rad/s].
+    """
+
+    time: FloatArray
+    full_shaft_torque: FloatArray
+    full_input_speed: FloatArray
+    full_output_speed: FloatArray
+    form_shaft_torque: FloatArray
+    form_input_speed: FloatArray
+    form_output_speed: FloatArray
+
+    @property
+    def error(self) -> CouplingError:
+        """Largest differences."""
+        return CouplingError(
+            shaft_torque=_largest(self.full_shaft_torque - self.form_shaft_torque),
+            input_speed=_largest(self.full_input_speed - self.form_input_speed),
+            output_speed=_largest(self.full_output_speed - self.form_output_speed),
+        )
+
+
+def compare(
+    reduction: Reduction, drive: Drive | None = None, *, keep_coupling: bool = False
+) -> Comparison:
+    """Simulate the reference shift with the whole gearbox and with its dual-clutch form.
+
+    With `keep_coupling` the form carries M12, and both agree to the integrator's accuracy.
+    Raises ReductionError where no reference shift can be planned, SimulationError where a run does
+    not complete.
+    """
+    drive = drive or reduction.gearbox.require_drive()
+    maneuver = plan(reduction, drive)
+    time = time_grid(maneuver)
+    full = _whole_gearbox(reduction, maneuver, time)
+    form = _dual_clutch(reduction, maneuver, time, keep_coupling=keep_coupling)
+    return Comparison(time, *full, *form)
+
+
+def _largest(difference: FloatArray) -> float:
+    return float(np.max(np.abs(difference)))
+
+
+Traces = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def _start(reduction: Reduction, maneuver: Maneuver, coupling: float) -> tuple[float, float, float]:
+    """Speeds of output and wheel and twist of the shaft in steady acceleration in the old gear.
+
+    The speeds are the same with and without `coupling` [kg m^2] and lead to those planned for the
+    release.
+    """
+    drive, i, new = maneuver.drive, maneuver.old_ratio, reduction.on_coming
+    inertia = (drive.engine_inertia + reduction.M11) * i**2 + reduction.M22
+    gained = maneuver.gain_before_release(inertia, i / new.i_c - new.i_out)
+    output = maneuver.output_speed - gained
+    total = inertia + 2.0 * coupling * i + maneuver.vehicle
+    acceleration = (i * maneuver.engine_torque - maneuver.load) / total
+    twist = (maneuver.load + maneuver.vehicle * acceleration) / drive.k_o
+    return output, output / drive.i_f, twist
+
+
+def _whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: FloatArray) -> Traces:
+    gearbox = reduction.gearbox
+    torque, pressures = signals(reduction, maneuver)
+    dogs = [name for name in reduction.common if name in gearbox.dogs]
+    elements = [*network_elements(gearbox, dogs), *_surroundings(reduction, maneuver)]
+    names = {e["name"] for e in elements if e["type"] == "clutch"}
+    zero = Signal(torque.time, np.zeros_like(torque.time))
+    inputs = {ENGINE_TORQUE: torque} | {name: pressures.get(name, zero) for name in names}
+    output, wheel, twist = _start(reduction, maneuver, reduction.M12)
+    friction = [name for name in reduction.common if name in names]
+    in_gear = gear_statics(gearbox, reduction.from_gear).speeds
+    speed_in = maneuver.old_ratio * output
+    speeds = {member: speed_in * each for member, each in in_gear.items() if each is not None}
+    start = Start(
+        speeds=speeds | {WHEEL: wheel},
+        twists={SHAFT: twist},
+        locked=(reduction.off_going.element, *friction),
+    )
+    run = simulate_network(
+        elements,
+        inputs,
+        start,
+        time,
+        [("shaft_torque", SHAFT), ("speed", gearbox.input), ("speed", gearbox.output)],
+    )
+    _require_completed(run.status, "the whole gearbox")
+    shaft_torque, input_speed, output_speed = run.columns.values()
+    return shaft_torque, input_speed, output_speed
+
+
+def _surroundings(reduction: Reduction, maneuver: Maneuver) -> list[Element]:
+    """Engine, shaft, final drive, vehicle and load around the gearbox."""
+    drive, engine, output = maneuver.drive, reduction.gearbox.input, reduction.gearbox.output
+    load = maneuver.load * drive.i_f
+
+    def element(kind: str, name: str, **fields: str | float) -> Element:
+        return {"type": kind, "name": name, **fields}
+
+    return [
+        element("inertia", "inertia of the engine", node=engine, inertia=drive.engine_inertia),
+        element("torque", "torque of the engine", node=engine, input=ENGINE_TORQUE),
+        element("spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o),
+        element("gear", "drive to the wheel", a=AXLE, b=WHEEL, ratio=drive.i_f),
+        element("inertia", "inertia of the vehicle", node=WHEEL, inertia=drive.vehicle_inertia),
+        element("road_load", "load", node=WHEEL, constant=load, rolling=0.0, aero=0.0),
+    ]
+
+
+def _dual_clutch(
+    reduction: Reduction, maneuver: Maneuver, time: FloatArray, *, keep_coupling: bool
+) -> Traces:
+    model = reduction.dual_clutch(maneuver.drive, keep_coupling=keep_coupling)
+    model = replace(model, load=RoadLoad(constant=maneuver.load * maneuver.drive.i_f))
+    torque, pressures = signals(reduction, maneuver)
+    coupling = reduction.M12 if keep_coupling else 0.0
+    output, wheel, twist = _start(reduction, maneuver, coupling)
+    run = simulate_dual_clutch(
+        model,
+        torque,
+        {each.name: pressures[each.name] for each in model.elements},
+        State(maneuver.old_ratio * output, output, wheel, twist, (reduction.off_going.element,)),
+        time,
+    )
+    _require_completed(run.status, "the dual-clutch form")
+    return run.shaft_torque, run.engine_speed, run.output_speed
+
+
+def _require_completed(status: str, what: str) -> None:
+    if status != _COMPLETED:
+        raise SimulationError(
+            f"the simulation of {what} ended: {status}",
+            "look at the drive and the capacities in the card",
+        )

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""A reference shift: the torques and speeds of a clean up-shift under power or coasting down-shift.
+
+The off-going element gives its torque up to the on-coming one, then the on-coming torque, constant
+but for the slope of μ, brings the input to the new gear within the inertia phase, and holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.driveline import FloatArray, Signal
+from drivetwin.errors import ReductionError
+from drivetwin.gearbox.drive import Drive
+from drivetwin.gearbox.reduction import Reduction
+from drivetwin.gearbox.spec import Capacity
+
+LEAD_IN = 0.1
+"""Time in the old gear before the torque phase, s."""
+AFTER = 0.6
+"""Time in the new gear that is looked at, s: several periods of the output shaft."""
+RAMP = 0.05
+"""Time in which the on-coming torque rises from the handed-over to the synchronising one, s."""
+HOLDING = 3.0
+"""Capacity of an element that is to hold, over the torque of the gear."""
+FILL = 0.02
+"""Time in which a pressure falls to or rises from zero, s."""
+
+
+@dataclass(frozen=True)
+class Maneuver:
+    """The operating point of a reference shift; torques [N m], speeds [rad/s], times [s].
+
+    The inertia phase begins at `release` with the `output_speed` and ends at `lock`; `swing_in`,
+    `swing_out` are the speed changes of input and output within it. `handover` and
+    `synchronising` are the on-coming torque at its begin and, in the mean, within it; `on_coming`
+    is the capacity of the on-coming element. `load` is the load at the output.
+    """
+
+    drive: Drive
+    engine_torque: float
+    load: float
+    old_ratio: float
+    new_ratio: float
+    output_speed: float
+    swing_in: float
+    swing_out: float
+    handover: float
+    synchronising: float
+    on_coming: Capacity
+    on_coming_i_c: float
+    release: float
+    lock: float
+
+    @property
+    def slip(self) -> float:
+        """Slip of the on-coming element at the release, rad/s, without its sign."""
+        per_speed = self.new_ratio / self.old_ratio - 1.0
+        return abs(per_speed * self.output_speed * self.old_ratio / self.on_coming_i_c)
+
+    def torque_below(self, slip: float) -> float:
+        """Mean on-coming torque over the last `slip` [rad/s] before lock-up, N m."""
+        return self.synchronising * self.on_coming.mean_mu(slip) / self.on_coming.mean_mu(self.slip)
+
+    @property
+    def vehicle(self) -> float:
+        """Vehicle inertia at the output, kg m^2 (J5)."""
+        return self.drive.vehicle_inertia / self.drive.i_f**2
+
+    def gain_before_release(self, inertia: float, grip: float) -> float:
+        """Speed that the output gains before the release [rad/s].
+
+        `inertia` before the shaft, at the output [kg m^2]; `grip` is the slip of the on-coming
+        element per output speed in the old gear.
+        """
+        pull = self.old_ratio * self.engine_torque - self.load
+        taken = 0.5 * grip * self.handover * self.drive.torque_phase
+        return (pull * self.release - taken) / (inertia + self.vehicle)
+
+
+def plan(reduction: Reduction, drive: Drive) -> Maneuver:
+    """Plan the reference shift.
+
+    Raises ReductionError where it cannot be: an element without capacity, or gears of opposite
+    sense.
+    """
+    old, new = reduction.off_going, reduction.on_coming
+    step = new.ratio / old.ratio
+    if step <= 0.0 or abs(step - 1.0) < 1e-6:
+        raise ReductionError(
+            f"no reference shift leads from ratio {old.ratio:.4g} to {new.ratio:.4g}",
+            "choose two gears of the same sense and of different ratios",
+        )
+    upshift = step < 1.0
+    torque = drive.engine_torque if upshift else drive.overrun_torque
+    inertia = drive.engine_inertia + reduction.M11
+    vehicle = reduction.M22 + drive.vehicle_inertia / drive.i_f**2
+    load = drive.load / drive.i_f if upshift else 0.0
+    phase, pace = drive.inertia_phase, drive.inertia_phase - 0.5 * RAMP
+    # The swing that ends at synchronism with an output that the on-coming torque speeds up.
+    alone = (step - 1.0) * drive.engine_speed
+    drawn = new.ratio * (new.ratio * torque - load) / vehicle * phase
+    swing = (alone + drawn) / (1.0 + new.ratio**2 * inertia / vehicle * phase / pace)
+    synchronising = new.i_c * (torque - inertia * swing / pace)
+    return Maneuver(
+        drive=drive,
+        engine_torque=torque,
+        load=load,
+        old_ratio=old.ratio,
+        new_ratio=new.ratio,
+        output_speed=drive.engine_speed / old.ratio,
+        swing_in=swing,
+        swing_out=(new.i_out * synchronising - load) / vehicle * phase,
+        handover=new.i_c * torque,
+        synchronising=synchronising,
+        on_coming=reduction.gearbox.capacity(new.element),
+        on_coming_i_c=new.i_c,
+        release=LEAD_IN + drive.torque_phase,
+        lock=LEAD_IN + drive.torque_phase + phase,
+    )
+
+
+def signals(reduction: Reduction, maneuver: Maneuver) -> tuple[Signal, Mapping[str, Signal]]:
+    """Engine torque and pressures [Pa] by element, common elements included, over the shift."""
+    end = maneuver.lock + AFTER
+    hold = maneuver.lock + 0.5 * AFTER
+    on_coming = maneuver.on_coming
+    largest = max(abs(maneuver.engine_torque), abs(maneuver.synchronising))
+
+    def pressure(capacity: Capacity, torque: float, mu: float) -> float:
+        return capacity.P0 + abs(torque) / (mu * capacity.gain)
+
+    def holding(capacity: Capacity, share: float) -> float:
+        return pressure(capacity, HOLDING * largest * share, capacity.mean_mu(0.0))
+
+    mu = on_coming.mean_mu(maneuver.slip)
+    begin = float(on_coming.friction.at(np.full(1, maneuver.slip))[0])
+    off_going = reduction.gearbox.capacity(reduction.off_going.element)
+    rising = [
+        (0.0, 0.0),
+        (LEAD_IN - FILL, 0.0),
+        (LEAD_IN, on_coming.P0),
+        (maneuver.release, pressure(on_coming, maneuver.handover, begin)),
+        (maneuver.release + RAMP, pressure(on_coming, maneuver.synchronising, mu)),
+        (hold, pressure(on_coming, maneuver.synchronising, mu)),
+        (hold + FILL, holding(on_coming, reduction.on_coming.ratio)),
+        (end, holding(on_coming, reduction.on_coming.ratio)),
+    ]
+    full = holding(off_going, abs(reduction.off_going.ratio))
+    falling = [(0.0, full), (maneuver.release - FILL, full), (maneuver.release, 0.0), (end, 0.0)]
+    lines = {reduction.on_coming.element: rising, reduction.off_going.element: falling}
+    for name in reduction.common:
+        capacity = reduction.gearbox.elements[name].capacity
+        if capacity is not None:
+            always = holding(capacity, 10.0)
+            lines[name] = [(0.0, always), (end, always)]
+    torque = Signal(np.array([0.0, end]), np.full(2, maneuver.engine_torque))
+    return torque, {name: _line(points) for name, points in lines.items()}
+
+
+def time_grid(maneuver: Maneuver) -> FloatArray:
+    """Times of the whole shift at 2 kHz, above every frequency of the driveline."""
+    end = maneuver.lock + AFTER
+    return np.linspace(0.0, end, round(2000.0 * end) + 1)
+
+
+def _line(points: list[tuple[float, float]]) -> Signal:
+    time, values = zip(*points, strict=True)
+    return Signal(np.array(time), np.array(values))
