@@ -11,6 +11,7 @@ import pytest
 
 from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.errors import InputError, MissingParameterError, ResultFileError
+from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.twin import Twin
 from tests.report.sample import SHIFT, STRIBECK, card, identification
 
@@ -82,6 +83,20 @@ def test_covariance_is_total(twin: Twin) -> None:
     stds = [twin.parameters[name].std_total for name in twin.covariance_ids]
     assert np.sqrt(np.diag(twin.covariance)) == pytest.approx(stds)
     assert twin.covariance[0, 1] == pytest.approx(0.6 * (stds[0] or 0.0) * (stds[1] or 0.0))
+
+
+def test_the_card_it_carries_reads_a_log_as_the_vehicles_own(twin: Twin, tmp_path: Path) -> None:
+    spec = ChannelSpec("TQ_OUT", unit="N*m", sign=-1, group="fast")
+    replace(twin, channels={"output_torque": spec}).save(tmp_path / "twin.toml")
+    carried, given = Twin.load(tmp_path / "twin.toml").card(), card()
+    for gear in given.gears:
+        assert carried.ratio(gear.name) == pytest.approx(given.ratio(gear.name))
+        assert carried.element_of(gear.name) == given.element_of(gear.name)
+    for name in given.elements:
+        assert carried.clutch_ratios(name) == pytest.approx(given.clutch_ratios(name))
+        assert carried.elements[name].kind == given.elements[name].kind
+    assert carried.J_vehicle_range == given.J_vehicle_range
+    assert carried.channels == {"output_torque": spec}
 
 
 def test_round_trip(twin: Twin, tmp_path: Path) -> None:

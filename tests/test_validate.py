@@ -101,9 +101,11 @@ def twin(truth: dict[str, Any]) -> Twin:
             for gear, name in (("2", "B2"), ("3", "B3"))
         },
         elements={
-            name: TwinElement(c["i_c"], c["i_out"], c["gain_m3"], c["P0_Pa"], 1.0, 0.0)
+            name: TwinElement("brake", c["i_c"], c["i_out"], c["gain_m3"], c["P0_Pa"], 1.0, 0.0)
             for name, c in elements.items()
         },
+        J_prime_range=(1.0, 100.0),
+        J_vehicle_range=(1e3, 1e4),
         parameters={k: Estimate(k, v, 0.0, Verdict.IDENTIFIED, "given") for k, v in values.items()},
         friction={name: _curve(clutch) for name, clutch in elements.items()},
         validity={"slip": (0.0, 200.0), "speed": (0.0, 300.0)},

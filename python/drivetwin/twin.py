@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +20,9 @@ from drivetwin.driveline import (
 )
 from drivetwin.errors import InputError, MissingParameterError, Where
 from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, Identification, Method
+from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.shifts.shift import Shift
-
-if TYPE_CHECKING:
-    from drivetwin.vehicle.card import VehicleCard
+from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, Prior, VehicleCard
 
 
 @dataclass(frozen=True)
@@ -38,12 +37,18 @@ class TwinGear:
 class TwinElement:
     """Design data of one shift element: ratios of eq. 15, gain [m^3], P0 [Pa], drum [kg m^2]."""
 
+    kind: ElementKind
     i_c: float
     i_out: float
     gain: float
     P0: float
     peak: float
     drum_inertia: float
+
+    def spec(self, name: str) -> ElementSpec:
+        """The same as on a vehicle card, all of it taken as known."""
+        P0, drum = Prior(self.P0), Prior(self.drum_inertia)
+        return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,8 @@ class Twin:
 
     `parameters` by id (see parameters.py), also those that could not be told; `friction` by
     element; `covariance` (n, n) over `covariance_ids`, total; `validity` the ranges of slip,
-    pressure, torque and speed that the log covered; `inputs` file name -> SHA-256.
+    pressure, torque and speed that the log covered; `inputs` file name -> SHA-256. The design
+    ranges [kg m^2] and `channels` by role are those of the vehicle card.
     """
 
     name: str
@@ -62,6 +68,8 @@ class Twin:
     final_drive: float
     gears: Mapping[str, TwinGear]
     elements: Mapping[str, TwinElement]
+    J_prime_range: tuple[float, float]
+    J_vehicle_range: tuple[float, float]
     parameters: Mapping[str, Estimate]
     friction: Mapping[str, FrictionCurve]
     validity: Mapping[str, tuple[float, float]]
@@ -71,6 +79,7 @@ class Twin:
     version: str
     covariance_ids: tuple[str, ...] = ()
     covariance: FloatArray | None = None
+    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
 
     @classmethod
     def from_identification(cls, found: Identification, card: VehicleCard) -> Twin:
@@ -133,6 +142,23 @@ class Twin:
                     (shift.oncoming, shift.offgoing),
                 )
             ),
+        )
+
+    def card(self) -> VehicleCard:
+        """The vehicle card, as far as it takes to read another log and find its shifts."""
+        return VehicleCard(
+            name=self.name,
+            loss_law=self.loss_law,
+            i_in=self.i_in,
+            final_drive=self.final_drive,
+            gears=tuple(
+                Gear(name, gear.ratio / self.i_in, (gear.element,))
+                for name, gear in self.gears.items()
+            ),
+            elements={name: one.spec(name) for name, one in self.elements.items()},
+            J_prime_range=self.J_prime_range,
+            J_vehicle_range=self.J_vehicle_range,
+            channels=self.channels,
         )
 
     def gear(self, name: str) -> TwinGear:

@@ -71,11 +71,12 @@ def test_constant_engine_torque_is_said_in_words_not_hidden() -> None:
     assert "cannot tell η from J′" in found.estimates["J_prime_2"].reason
     assert found.estimates["te_delay"].verdict is Verdict.NOT_IDENTIFIABLE
     assert found.estimates["te_delay"].value is None
-    assert any("rests on the inertia phase" in text for text in found.warnings)
+    assert any("gear 2 alone determines η and J′ poorly" in text for text in found.warnings)
 
 
 def test_a_log_with_throttle_steps_tells_everything() -> None:
     found = identified("truck_a", Method.INTEGRAL)
+    assert list(found.inputs) == ["truck_a.csv"]
     told = {name for name, e in found.estimates.items() if e.verdict is Verdict.IDENTIFIED}
     assert {"eta", "J_prime_2", "J_prime_3", "J_vehicle", "Tv_over_if", "te_delay"} <= told
     assert {"k_o", "c_o", "f_d_3", "zeta_3", "P0.B3"} <= told
@@ -90,7 +91,20 @@ def test_the_papers_method_claims_no_interval_and_doubts_the_constant_torque() -
     assert found.estimates["eta"].value == 0.85
     assert found.estimates["eta"].std_noise is None
     assert found.estimates["eta"].verdict is Verdict.WEAK
-    assert found.estimates["J_prime_2"].verdict is Verdict.WEAK
+    assert not any(one.verdict is Verdict.IDENTIFIED for one in found.estimates.values())
+    assert found.estimates["J_vehicle"].value is None, "the least error lies at a negative inertia"
+
+
+@pytest.mark.parametrize("method", [Method.INTEGRAL, Method.PAPER])
+def test_design_values_do_not_pass_for_measured_ones(method: Method) -> None:
+    found = identified("paper_like", method)
+    for name, value in (("J_out", 0.9), ("P0.B2", 0.8e5), ("P0.B3", 0.8e5)):
+        estimate = found.estimates[name]
+        assert (estimate.verdict, estimate.method) == (Verdict.DESIGN, "card")
+        assert estimate.value == pytest.approx(value)
+        assert estimate.std_total == 0.0
+        assert "card" in estimate.reason
+
 
 
 def test_sensor_tolerances_widen_the_total_interval_only() -> None:

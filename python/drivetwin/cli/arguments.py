@@ -16,6 +16,10 @@ LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="Shift log (CSV wit
 VehicleFile = Annotated[
     Path, typer.Option("--vehicle", metavar="CARD", help="Vehicle card (TOML).")
 ]
+OptionalVehicleFile = Annotated[
+    Path | None,
+    typer.Option("--vehicle", metavar="CARD", help="Vehicle card, in place of the twin's own."),
+]
 ChannelsFile = Annotated[
     Path | None,
     typer.Option("--channels", metavar="MAP", help="Channel mapping file (TOML)."),

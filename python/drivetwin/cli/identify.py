@@ -84,14 +84,14 @@ def _print(outcome: Outcome, source: str) -> None:
         fit_table,
         friction_table,
         parameter_table,
-        reasons,
+        remarks,
         shift_table,
     )
 
     found = outcome.found
     show(shift_table(found.shifts, source))
     show(parameter_table(found.estimates, f"Parameters ({found.method} method)"))
-    for line in reasons(found.estimates):
+    for line in remarks(found.estimates):
         note(line)
     if found.friction:
         show(friction_table(found.friction))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,10 +51,22 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
             raise no_shift(recording, shifts.rejected)
     with step(f"identifying by the {method} method"):
         found = identify(recording, card, shifts, method)
+        found = replace(found, inputs={**found.inputs, **_digests(vehicle, channels)})
         twin = Twin.from_identification(found, card)
     with step("simulating the shifts"):
         found = validated(found, twin, recording)
     return Outcome(recording, card, found, twin)
+
+
+def _digests(*files: Path | None) -> dict[str, str]:
+    """File name -> SHA-256 of card and mapping."""
+    import hashlib
+
+    return {
+        file.name: hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in files
+        if file is not None
+    }
 
 
 def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:

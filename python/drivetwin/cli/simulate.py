@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load
+from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
 from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ _SI = {"output_torque": "N*m", "input_speed": "rad/s", "output_speed": "rad/s"}
 def simulate(
     twin: Annotated[Path, typer.Argument(metavar="TWIN", help="Identified model (twin.toml).")],
     log: LogFile,
-    vehicle: VehicleFile,
+    vehicle: OptionalVehicleFile = None,
     channels: ChannelsFile = None,
     output: Annotated[
         Path | None,
@@ -32,17 +32,21 @@ def simulate(
     """Simulate the shifts of a log with an identified model and compare.
 
     Measured engine torque and pressures drive the model; the log may be another than the twin's.
+    Ratios and shift elements are the twin's own, so no vehicle card is needed.
     """
     from drivetwin.cli.pipeline import no_shift
     from drivetwin.cli.tables import fit_table
+    from drivetwin.logs.read import read_log
     from drivetwin.results.atomic import write_text
     from drivetwin.shifts.find import find_shifts
     from drivetwin.twin import Twin
     from drivetwin.validate import validate
+    from drivetwin.vehicle.card import load_card
 
     model = Twin.load(twin)
     with step(f"simulating {log.name}"):
-        recording, card = load(log, vehicle, channels)
+        card = model.card() if vehicle is None else load_card(vehicle)
+        recording = read_log(log, card, channels)
         shifts = find_shifts(recording, card)
         if not shifts.shifts:
             raise no_shift(recording, shifts.rejected)
@@ -79,6 +83,7 @@ def traces_text(runs: Sequence[Validation]) -> str:
     lines = [",".join(names), ",".join(["s", *_SI.values()])]
     for run in runs:
         motion = run.trajectory
-        columns = (motion.time, motion.shaft_torque, motion.engine_speed, motion.output_speed)
+        input_speed = motion.engine_speed / run.model.i_in
+        columns = (motion.time, motion.shaft_torque, input_speed, motion.output_speed)
         lines += [",".join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)]
     return "\n".join(lines) + "\n"

@@ -44,23 +44,27 @@ def shift_table(shifts: Sequence[Shift], source: str) -> Table:
 
 
 def parameter_table(estimates: Mapping[str, Estimate], title: str) -> Table:
-    """Value, 95 % interval with sensor tolerances, unit and verdict of every parameter."""
+    """Value, 95 % interval with sensor tolerances, unit, verdict and the remark's number."""
     table = table_of(
         title, "parameter", "value", "95 %", "unit", "verdict", right=("value", "95 %")
     )
+    numbers = _numbers(estimates)
     for estimate in estimates.values():
         value, interval, unit = shown(estimate.value, estimate.ci95_total, estimate.unit)
-        table.add_row(estimate.id, value, interval, unit, estimate.verdict.value)
+        remark = f" ({numbers[estimate.reason]})" if estimate.reason else ""
+        table.add_row(estimate.id, value, interval, unit, estimate.verdict.value + remark)
     return table
 
 
-def reasons(estimates: Mapping[str, Estimate]) -> list[str]:
-    """What limits each verdict: one line for each reason given, with all parameters it is for."""
-    by_reason: dict[str, list[str]] = {}
-    for estimate in estimates.values():
-        if estimate.reason:
-            by_reason.setdefault(estimate.reason, []).append(estimate.id)
-    return [f"{', '.join(ids)}: {reason}" for reason, ids in by_reason.items()]
+def remarks(estimates: Mapping[str, Estimate]) -> list[str]:
+    """What stands behind each verdict: one numbered line for each reason given."""
+    return [f"({number}) {reason}" for reason, number in _numbers(estimates).items()]
+
+
+def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, int]:
+    """The different reasons, numbered from 1 in the order of the parameters."""
+    reasons = dict.fromkeys(one.reason for one in estimates.values() if one.reason)
+    return {reason: number for number, reason in enumerate(reasons, start=1)}
 
 
 def friction_table(friction: Mapping[str, FrictionCurve]) -> Table:

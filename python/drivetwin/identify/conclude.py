@@ -12,11 +12,13 @@ from drivetwin.identify.combine import combine
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.result import Estimate, FrictionCurve
 from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
-from drivetwin.identify.uncertainty import correlation, judge, refused
+from drivetwin.identify.uncertainty import correlation, designed, judge, refused
 
 METHOD = "integral"
 PRIOR_SHARE = 0.8
 """A posterior standard deviation above this share of the prior's says the prior decided."""
+KNOWN = "known from design, as the card says"
+ADDS_LITTLE = "design value of the card, to which the log adds little"
 CHI2_WARN = 1.6
 """Residual power over stated noise above which a warning is due."""
 
@@ -39,8 +41,9 @@ def _low_gear_note(signals: ShiftSignals, gear: str) -> str:
     if moving > 0.03 * level:
         return ""
     return (
-        f"the engine torque moves by {100 * moving / max(level, 1e-9):.1f} % only in gear {gear}, "
-        "which by itself cannot tell η from J′; the value rests on the inertia phase of the shift"
+        f"gear {gear} alone determines η and J′ poorly: the engine torque moves by "
+        f"{100 * moving / max(level, 1e-9):.1f} % only while it is held, which cannot tell η from "
+        "J′; the values rest on the inertia phase of the shift"
     )
 
 
@@ -61,15 +64,16 @@ def conclude(
     notes = _notes(signals)
     estimates = {}
     for name, value, noise in zip(ids, values, std, strict=True):
-        method, note = METHOD, notes.get(name, "")
         prior = J_out if name == "J_out" else _fill_prior(name, drivelines)
-        if prior is not None and prior.std == 0.0:
-            method, note, noise = "prior", "known from design, as the card says", 0.0
-        elif prior is not None and noise >= PRIOR_SHARE * prior.std:
-            method, note = "prior", "the log adds little to the design value of the card"
-        estimates[name] = judge(
-            name, float(value), float(noise), method, systematic.get(name), note
-        )
+        if prior is not None and noise >= PRIOR_SHARE * prior.std:
+            known = prior.std == 0.0
+            estimates[name] = designed(
+                name, float(value), 0.0 if known else float(noise), KNOWN if known else ADDS_LITTLE
+            )
+        else:
+            estimates[name] = judge(
+                name, float(value), float(noise), METHOD, systematic.get(name), notes.get(name, "")
+            )
     estimates |= _card_values(estimates, drivelines)
     estimates |= _refusals(shifts, signals, estimates)
     return Conclusions(
@@ -108,7 +112,7 @@ def _card_values(
             name = f"P0.{element.name}"
             if name not in known:
                 note = "design value of the card; the log does not show this element filling"
-                found[name] = judge(name, element.P0.value, element.P0.std, "prior", note=note)
+                found[name] = designed(name, element.P0.value, element.P0.std, note)
     return found
 
 

@@ -11,19 +11,21 @@ from drivetwin.identify.conclude import Conclusions
 from drivetwin.identify.literal import PaperShift
 from drivetwin.identify.result import Estimate, Verdict
 from drivetwin.identify.signals import Driveline, ShiftSignals
-from drivetwin.identify.uncertainty import experiment_for, judge, refused
+from drivetwin.identify.uncertainty import designed, experiment_for, refused
 from drivetwin.parameters import spec_of
 
 METHOD = "paper"
 _NO_INTERVAL = "the paper's procedure gives no interval"
+_TAKEN = "the paper's procedure takes the card's value"
 
 
 def paper_conclusions(
     shifts: Sequence[PaperShift], signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]
 ) -> Conclusions:
-    """Values of the first shift that tells them, with a verdict from the doubts it raised.
+    """Values of the first shift that tells them, with the doubts it raised.
 
-    Jo′ and P0 are the card's: the paper takes them as known.
+    Without an interval no value counts as identified. Jo′ and P0 are the card's: the paper takes
+    them as known.
     """
     estimates: dict[str, Estimate] = {}
     for shift, s in zip(shifts, signals, strict=True):
@@ -35,8 +37,7 @@ def paper_conclusions(
                 estimates[name] = refused(name, METHOD, doubt)
                 continue
             reason = f"{doubt}; {experiment_for(name)}" if doubt else _NO_INTERVAL
-            verdict = Verdict.WEAK if doubt else Verdict.IDENTIFIED
-            estimates[name] = Estimate(name, value, None, verdict, METHOD, reason=reason)
+            estimates[name] = Estimate(name, value, None, Verdict.WEAK, METHOD, reason=reason)
         gear = s.shift.end_gear
         for name in ("k_o", "c_o", f"f_d_{gear}", f"zeta_{gear}"):
             if name not in shift.values and name not in estimates:
@@ -44,10 +45,10 @@ def paper_conclusions(
     for driveline in drivelines:
         if driveline.J_out is not None:
             prior = driveline.J_out
-            estimates["J_out"] = judge("J_out", prior.value, prior.std, "prior")
+            estimates["J_out"] = designed("J_out", prior.value, prior.std, _TAKEN)
         for element in (driveline.offgoing, driveline.oncoming):
             name = f"P0.{element.name}"
-            estimates[name] = judge(name, element.P0.value, element.P0.std, "prior")
+            estimates[name] = designed(name, element.P0.value, element.P0.std, _TAKEN)
     friction = {s.friction.element: s.friction.curve for s in shifts if s.friction is not None}
     doubts = dict.fromkeys(text for shift in shifts for text in shift.doubts.values())
     warnings = (

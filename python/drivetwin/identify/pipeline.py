@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -82,7 +83,7 @@ def identify(
         method=method,
         loss_law=card.loss_law,
         validity=_validity(signals, found),
-        inputs={log.source: log.sha256},
+        inputs={Path(log.source).name: log.sha256},
         settings=_settings(card, method),
         evidence=evidence,
         warnings=(*log.warnings, *found.warnings),

@@ -20,11 +20,12 @@ _Z95 = 1.959963984540054
 
 
 class Verdict(StrEnum):
-    """What may be concluded about a parameter."""
+    """What may be concluded about a parameter; DESIGN: the value is the card's, not the log's."""
 
     IDENTIFIED = "identified"
     WEAK = "weak"
     NOT_IDENTIFIABLE = "not identifiable"
+    DESIGN = "design value"
 
 
 @dataclass(frozen=True)

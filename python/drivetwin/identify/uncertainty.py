@@ -77,6 +77,11 @@ def judge(
     return Estimate(parameter_id, value, std_noise, verdict, method, std_systematic, text)
 
 
+def designed(parameter_id: str, value: float, std: float, note: str) -> Estimate:
+    """A value that the vehicle card states and the log adds nothing to; `std` 0: known."""
+    return Estimate(parameter_id, value, std, Verdict.DESIGN, "card", reason=note)
+
+
 def refused(parameter_id: str, method: str, why: str) -> Estimate:
     """A parameter that the log cannot tell, with the reason and the experiment that would."""
     reason = f"{why}; {experiment_for(parameter_id)}"

@@ -10,6 +10,8 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from drivetwin.identify.result import Verdict
+
 MEASURED = "#1A7FC4"
 SIMULATED = "#D55E00"
 FITTED = "#D55E00"
@@ -18,7 +20,12 @@ ACCENT = "#CC79A7"
 SECOND = "#E69F00"
 MUTED = "#8a8f98"
 
-VERDICT_COLOURS = {"identified": "#009E73", "weak": "#E69F00", "not identifiable": "#8a8f98"}
+VERDICT_COLOURS = {
+    Verdict.IDENTIFIED: "#009E73",
+    Verdict.WEAK: "#E69F00",
+    Verdict.NOT_IDENTIFIABLE: MUTED,
+    Verdict.DESIGN: MUTED,
+}
 
 PHASE_FILL = {
     "before": "rgba(0,0,0,0)",

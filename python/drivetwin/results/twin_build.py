@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drivetwin.identify.result import Estimate, FloatArray, Identification, Verdict
+from drivetwin.identify.conclude import KNOWN
+from drivetwin.identify.result import FloatArray, Identification
+from drivetwin.identify.uncertainty import designed
+from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.results.records import FrictionRecord, ParameterRecord
 from drivetwin.results.result_file import plain
 from drivetwin.results.twin_file import (
     TWIN_SCHEMA,
+    ChannelRecord,
     CovarianceRecord,
     ElementRecord,
     GearRecord,
@@ -31,9 +35,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
     parameters = dict(found.estimates)
     assumptions = list(found.assumptions)
     if "J_out" not in parameters and card.J_out is not None:
-        parameters["J_out"] = Estimate(
-            "J_out", card.J_out.value, card.J_out.std, Verdict.IDENTIFIED, "prior"
-        )
+        parameters["J_out"] = designed("J_out", card.J_out.value, card.J_out.std, KNOWN)
         assumptions.append("Jo′ is the vehicle card's value")
     assumptions += _borrowed_friction(found)
     ids, covariance = _covariance(found)
@@ -49,6 +51,8 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
             for gear in card.gears
         },
         elements={name: _element(card, name) for name in card.elements},
+        J_prime_range=card.J_prime_range,
+        J_vehicle_range=card.J_vehicle_range,
         parameters=parameters,
         friction=found.friction,
         validity=found.validity,
@@ -58,13 +62,16 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
         version=program_version(),
         covariance_ids=ids,
         covariance=covariance,
+        channels=card.channels,
     )
 
 
 def _element(card: VehicleCard, name: str) -> TwinElement:
     spec = card.elements[name]
     i_c, i_out = card.clutch_ratios(name)
-    return TwinElement(i_c, i_out, spec.gain, spec.P0.value, spec.peak, spec.drum_inertia.value)
+    return TwinElement(
+        spec.kind, i_c, i_out, spec.gain, spec.P0.value, spec.peak, spec.drum_inertia.value
+    )
 
 
 def _borrowed_friction(found: Identification) -> list[str]:
@@ -107,7 +114,10 @@ def file_of(twin: Twin) -> TwinFile:
                 name: GearRecord(ratio=gear.ratio, element=gear.element)
                 for name, gear in twin.gears.items()
             },
+            J_prime_range_kgm2=twin.J_prime_range,
+            J_vehicle_range_kgm2=twin.J_vehicle_range,
             elements={name: _element_record(one) for name, one in twin.elements.items()},
+            channels={role: ChannelRecord(**vars(one)) for role, one in twin.channels.items()},
         ),
         parameters={name: ParameterRecord.of(one) for name, one in twin.parameters.items()},
         friction={name: FrictionRecord.of(curve) for name, curve in twin.friction.items()},
@@ -123,6 +133,7 @@ def file_of(twin: Twin) -> TwinFile:
 
 def _element_record(element: TwinElement) -> ElementRecord:
     return ElementRecord(
+        kind=element.kind,
         i_c=element.i_c,
         i_out=element.i_out,
         gain_m3=element.gain,
@@ -145,10 +156,18 @@ def twin_from_file(content: TwinFile) -> Twin:
         gears={name: TwinGear(one.ratio, one.element) for name, one in gearbox.gears.items()},
         elements={
             name: TwinElement(
-                one.i_c, one.i_out, one.gain_m3, one.P0_Pa, one.peak, one.drum_inertia_kgm2
+                kind=one.kind,
+                i_c=one.i_c,
+                i_out=one.i_out,
+                gain=one.gain_m3,
+                P0=one.P0_Pa,
+                peak=one.peak,
+                drum_inertia=one.drum_inertia_kgm2,
             )
             for name, one in gearbox.elements.items()
         },
+        J_prime_range=gearbox.J_prime_range_kgm2,
+        J_vehicle_range=gearbox.J_vehicle_range_kgm2,
         parameters={name: one.estimate(name) for name, one in content.parameters.items()},
         friction={name: one.curve() for name, one in content.friction.items()},
         validity=content.validity,
@@ -158,4 +177,5 @@ def twin_from_file(content: TwinFile) -> Twin:
         version=content.version,
         covariance_ids=() if covariance is None else tuple(covariance.ids),
         covariance=None if covariance is None else np.asarray(covariance.matrix),
+        channels={role: ChannelSpec(**one.model_dump()) for role, one in gearbox.channels.items()},
     )

@@ -21,6 +21,7 @@ from drivetwin.results.records import (
     SchemaName,
     check_schema,
 )
+from drivetwin.vehicle.spec import ElementKind
 
 TWIN_SCHEMA = "drivetwin/twin-1"
 _HEADER = (
@@ -39,6 +40,7 @@ class GearRecord(Record):
 class ElementRecord(Record):
     """Design data of one shift element (THEORY sections 1 and 2)."""
 
+    kind: ElementKind
     i_c: FiniteFloat
     i_out: FiniteFloat
     gain_m3: FiniteFloat = Field(gt=0)
@@ -47,13 +49,28 @@ class ElementRecord(Record):
     drum_inertia_kgm2: FiniteFloat = Field(ge=0)
 
 
+class ChannelRecord(Record):
+    """How a role is read from a log: sign*(scale*column + offset) in `unit`, shifted in time."""
+
+    source: str
+    unit: str | None = None
+    sign: int = 1
+    scale: FiniteFloat = 1.0
+    offset: FiniteFloat = 0.0
+    time_shift: FiniteFloat = 0.0
+    group: str | None = None
+
+
 class TransmissionRecord(Record):
     """What the vehicle card knew from design."""
 
     i_in: FiniteFloat = Field(gt=0)
     final_drive: FiniteFloat = Field(gt=0)
+    J_prime_range_kgm2: Interval
+    J_vehicle_range_kgm2: Interval
     gears: dict[str, GearRecord]
     elements: dict[str, ElementRecord]
+    channels: dict[str, ChannelRecord] = Field(default_factory=dict)
 
 
 class CovarianceRecord(Record):

@@ -13,7 +13,7 @@ from drivetwin.identify.result import Identification
 from drivetwin.logs.read import read_log
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.html import render_report
-from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, TableBlock
+from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, TableBlock, Tone
 from drivetwin.report.sections.evidence import evidence_sections
 from drivetwin.shifts.find import find_shifts
 from drivetwin.twin import Twin
@@ -52,13 +52,22 @@ def test_tables_are_those_of_the_paper(given: tuple[Identification, ShiftLog]) -
     assert all(sum(bool(row[3].text) for row in table.rows) == 1 for table in tables)
 
 
+def test_a_doubtful_grid_is_not_marked_as_good(given: tuple[Identification, ShiftLog]) -> None:
+    load = evidence_sections(given[0])[1]
+    (table,) = (block for block in load.blocks if isinstance(block, TableBlock))
+    (doubt,) = (block for block in load.blocks if isinstance(block, NotesBlock))
+    marks = [row[3] for row in table.rows if row[3].text]
+    assert [mark.tone for mark in marks] == [Tone.DOUBTFUL]
+    assert "outside its design range" in doubt.items[0]
+
+
 def test_a_refused_stage_says_why(given: tuple[Identification, ShiftLog]) -> None:
     found = given[0]
     (one,) = found.evidence["integral"]
     refused = replace(one, ring=None, refusals={"shaft": "no oscillation"})
     shaft = evidence_sections(replace(found, evidence={"integral": (refused,)}))[2]
     assert [block.items for block in shaft.blocks if isinstance(block, NotesBlock)] == [
-        ["no oscillation"]
+        ["Default method: no oscillation"]
     ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from drivetwin.identify.result import Verdict
 from drivetwin.report.figures.parameters import interval_figure
 from drivetwin.report.sections.blocks import Tone
 from drivetwin.report.sections.trust import fit_table, parameter_table, trust_section
@@ -28,6 +29,12 @@ def test_parameter_that_cannot_be_told_shows_no_number() -> None:
     assert [cell.text for cell in rows["te_delay"][1:4]] == ["–", "–", "–"]
 
 
+def test_the_reason_of_a_verdict_stands_in_its_row() -> None:
+    rows = {row[0].note.split(" · ")[1]: row for row in parameter_table(identification()).rows}
+    assert rows["c_o"][0].remark == "the oscillation is short"
+    assert rows["J_prime_2"][0].remark == ""
+
+
 def test_missing_sensor_tolerances_are_said() -> None:
     found = identification()
     plain = {key: replace(one, std_systematic=None) for key, one in found.estimates.items()}
@@ -49,16 +56,20 @@ def test_warnings_stand_above_the_table() -> None:
 
 def test_intervals_of_what_was_found_only() -> None:
     estimates = identification().estimates
-    estimates["J_out"] = replace(estimates["J_out"], std_noise=1e-7)
+    estimates["J_out"] = replace(estimates["J_out"], verdict=Verdict.DESIGN)
     total, noise = interval_figure(estimates).data
-    assert "te_delay" not in total.y
-    assert "J_out" not in total.y
+    assert "J′ (2)" in total.y
+    assert "τ_e" not in total.y
+    assert "Jo′" not in total.y
     assert all(n <= t for n, t in zip(noise.x, total.x, strict=True))
 
 
 def test_design_values_do_not_count_as_identified() -> None:
     found = identification()
-    estimates = {**found.estimates, "J_out": replace(found.estimates["J_out"], method="prior")}
+    estimates = {
+        **found.estimates,
+        "J_out": replace(found.estimates["J_out"], verdict=Verdict.DESIGN),
+    }
     intro = trust_section(replace(found, estimates=estimates)).intro
     assert "9 of 12 parameters are identified" in intro
     assert "1 taken from the vehicle card" in intro

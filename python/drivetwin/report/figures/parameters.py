@@ -7,27 +7,32 @@ from collections.abc import Mapping
 
 import plotly.graph_objects as go
 
-from drivetwin.identify.result import Estimate, FloatArray
+from drivetwin.identify.result import Estimate, FloatArray, Verdict
+from drivetwin.report.labels import parameter_label
 from drivetwin.report.style import MUTED, VERDICT_COLOURS, axis, layout
 
-_KNOWN = 1e-5
-"""Relative standard deviation below which a parameter was given, not found."""
+_TICKS = [scale * 10.0**power for power in range(-4, 4) for scale in (1.0, 2.0, 5.0)]
+"""Labelled values of the logarithmic axis [%]."""
 
 
 def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     """Half width of the 95 % interval relative to the value, total and noise alone, log axis.
 
-    Parameters that were not told, or are taken as known, are left out.
+    Parameters without an interval and design values are left out.
     """
-    shown = [one for one in estimates.values() if _relative(one.value, one.std_total) > _KNOWN]
+    shown = [
+        one
+        for one in estimates.values()
+        if one.verdict is not Verdict.DESIGN and _percent(one.value, one.std_total) is not None
+    ]
     figure = go.Figure()
-    names = [one.id for one in shown]
+    names = [parameter_label(one.id) for one in shown]
     figure.add_scatter(
         y=names,
         x=[_percent(one.value, one.std_total) for one in shown],
         mode="markers",
         name="total: noise and sensor tolerances",
-        marker={"color": [VERDICT_COLOURS[one.verdict.value] for one in shown], "size": 11},
+        marker={"color": [VERDICT_COLOURS[one.verdict] for one in shown], "size": 11},
         hovertemplate="%{y}: ±%{x:.2g} %<extra></extra>",
     )
     figure.add_scatter(
@@ -41,27 +46,29 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     figure.update_layout(
         layout(
             90 + 26 * len(shown),
-            xaxis=axis("half width of the 95 % interval [% of the value]", type="log"),
+            xaxis=axis(
+                "half width of the 95 % interval [% of the value]",
+                type="log",
+                tickvals=_TICKS,
+                ticktext=[f"{tick:g}" for tick in _TICKS],
+            ),
             yaxis=axis("", autorange="reversed"),
         )
     )
     return figure
 
 
-def _relative(value: float | None, std: float | None) -> float:
-    return abs(std / value) if value and std else 0.0
-
-
 def _percent(value: float | None, std: float | None) -> float | None:
-    return 196.0 * _relative(value, std) or None
+    return 196.0 * abs(std / value) if value and std else None
 
 
 def correlation_figure(ids: tuple[str, ...], correlation: FloatArray) -> go.Figure:
     """Correlation matrix (n, n) of the estimates; pairs near ±1 cannot be told apart well."""
+    names = [parameter_label(one) for one in ids]
     figure = go.Figure(
         go.Heatmap(
-            x=ids,
-            y=ids,
+            x=names,
+            y=names,
             z=correlation,
             zmin=-1,
             zmax=1,

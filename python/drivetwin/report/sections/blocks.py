@@ -29,6 +29,8 @@ class Cell:
     tone: Tone = Tone.PLAIN
     note: str = ""
     """Smaller text under the cell's own."""
+    remark: str = ""
+    """What limits the row, under the note."""
 
 
 @dataclass(frozen=True)

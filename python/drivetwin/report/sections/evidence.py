@@ -9,7 +9,6 @@ from typing import TypeVar
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.literal import PaperShift
 from drivetwin.identify.result import Identification
-from drivetwin.identify.ringdown import RingDown
 from drivetwin.identify.wlse import GridFit
 from drivetwin.report.figures.load import load_figure
 from drivetwin.report.figures.momentum import momentum_figure
@@ -41,6 +40,7 @@ LOAD_LABELS = WlseLabels(
     torque="T_o − T_v/i_f [Nm]",
     inertia="J3",
 )
+_LOAD_TEXT = "Default method, momentum form: one point per window."
 _Kind = TypeVar("_Kind")
 
 
@@ -56,7 +56,9 @@ def evidence_sections(found: Identification) -> list[Section]:
             "agree with one η and one J′.",
             [
                 *_momentum_blocks(integral),
-                *_grid_blocks((p.inertia for p in paper), INERTIA_LABELS),
+                *_grid_blocks(
+                    ((p.inertia, p.doubts.get("eta", "")) for p in paper), INERTIA_LABELS
+                ),
             ],
         ),
         Section(
@@ -65,7 +67,9 @@ def evidence_sections(found: Identification) -> list[Section]:
             "Eq. 11: T_o − T_v/i_f = (J3/i_f)·ω_w′.",
             [
                 *_load_blocks(found, integral),
-                *_grid_blocks((one.load for one in paper), LOAD_LABELS),
+                *_grid_blocks(
+                    ((p.load, p.doubts.get("J_vehicle", "")) for p in paper), LOAD_LABELS
+                ),
             ],
         ),
         Section(
@@ -74,7 +78,7 @@ def evidence_sections(found: Identification) -> list[Section]:
             "After lock-up the inertias on both sides of the output shaft swing against each "
             "other; frequency and decay give stiffness and damping (eqs. 12–14).",
             [
-                *_ring_blocks(one.ring for one in shifts),
+                *_ring_blocks(shifts),
                 *_refusals(shifts, "shaft"),
             ],
         ),
@@ -93,37 +97,43 @@ def _momentum_blocks(shifts: Iterable[IntegralShift]) -> list[Block]:
     return [
         FigureBlock(
             momentum_figure(one.momentum),
-            "Momentum form: each point is a window weighted by a smooth kernel, so no speed is "
-            "differentiated. Right: how the misfit rises as the engine torque is taken to be older "
-            "or younger than it is.",
+            "Default method, momentum form: each point is a window weighted by a smooth kernel, so "
+            "no speed is differentiated. Right: how the misfit rises as the engine torque is taken "
+            "to be older or younger than it is." + _without_age(one),
         )
         for one in shifts
     ]
+
+
+def _without_age(shift: IntegralShift) -> str:
+    why = shift.refusals.get("te_delay")
+    return f" Here {why}; the least misfit is noise, and no age is assumed." if why else ""
 
 
 def _load_blocks(found: Identification, shifts: Iterable[IntegralShift]) -> list[Block]:
     validations = _of_kind(found, Validation)
     final_drive = validations[0].model.i_f if validations else None
-    return [
-        FigureBlock(load_figure(one.load, final_drive), "Momentum form, one point per window.")
-        for one in shifts
-    ]
+    return [FigureBlock(load_figure(one.load, final_drive), _LOAD_TEXT) for one in shifts]
 
 
-def _grid_blocks(fits: Iterable[GridFit], labels: WlseLabels) -> list[Block]:
+def _grid_blocks(fits: Iterable[tuple[GridFit, str]], labels: WlseLabels) -> list[Block]:
+    """Figure and table of each grid search; a doubt about it stands between the two."""
     blocks: list[Block] = []
-    for fit in fits:
+    for fit, doubt in fits:
         text = (
             "The paper's weighted least squares (Fig. 6): samples whose own quotient lies in the "
             "plausible range weigh 1, others 0.01; the grid value of least RMS error is kept. "
             "Noise in the differenced speed biases it."
         )
-        blocks += [FigureBlock(wlse_figure(fit, labels), text), grid_table(fit, labels)]
+        blocks.append(FigureBlock(wlse_figure(fit, labels), text))
+        if doubt:
+            blocks.append(NotesBlock("Not to be relied on", [doubt], Tone.DOUBTFUL))
+        blocks.append(grid_table(fit, labels, Tone.DOUBTFUL if doubt else Tone.GOOD))
     return blocks
 
 
-def grid_table(fit: GridFit, labels: WlseLabels) -> TableBlock:
-    """The grid as in the paper's Table 1; the row of least error is marked."""
+def grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -> TableBlock:
+    """The grid as in the paper's Table 1; the row of least error is marked in `tone`."""
     head = (
         Cell(f"{labels.grid} [{labels.unit}]", number=True),
         Cell(f"{labels.inertia} [kg·m²]", number=True),
@@ -135,28 +145,32 @@ def grid_table(fit: GridFit, labels: WlseLabels) -> TableBlock:
             Cell(f"{row.value:g}", number=True),
             Cell(significant(row.inertia), number=True),
             Cell(significant(row.rmse), number=True),
-            Cell("least error" if row == fit.best else "", badge=True, tone=Tone.GOOD),
+            Cell("least error" if row == fit.best else "", badge=True, tone=tone),
         )
         for row in fit.rows
     ]
     return TableBlock("Grid search as in Table 1, RMS error at the output shaft.", head, rows)
 
 
-def _ring_blocks(rings: Iterable[RingDown | None]) -> list[Block]:
+def _ring_blocks(shifts: Iterable[IntegralShift | PaperShift]) -> list[Block]:
     blocks: list[Block] = []
-    for ring in rings:
-        if ring is None:
+    for one in shifts:
+        if one.ring is None:
             continue
         how = (
             "read from the extremes of the averaged curve"
-            if ring.extremes_time.size
+            if isinstance(one, PaperShift)
             else "from a decaying sine on a parabola, the engine torque's own motion included"
         )
-        text = f"{ring.f_d:.3f} Hz, damping ratio {ring.zeta:.4f}, {how}."
-        blocks.append(FigureBlock(ringdown_figure(ring), text))
+        text = f"{_by(one)}: {one.ring.f_d:.3f} Hz, damping ratio {one.ring.zeta:.4f}, {how}."
+        blocks.append(FigureBlock(ringdown_figure(one.ring), text))
     return blocks
 
 
+def _by(shift: IntegralShift | PaperShift) -> str:
+    return "The paper's method" if isinstance(shift, PaperShift) else "Default method"
+
+
 def _refusals(shifts: Iterable[IntegralShift | PaperShift], stage: str) -> list[Block]:
-    texts = [one.refusals[stage] for one in shifts if stage in one.refusals]
+    texts = [f"{_by(one)}: {one.refusals[stage]}" for one in shifts if stage in one.refusals]
     return [NotesBlock("Not possible here", texts, Tone.DOUBTFUL)] if texts else []

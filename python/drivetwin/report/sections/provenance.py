@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from drivetwin.identify.result import Identification, Verdict
 from drivetwin.report.figures.parameters import correlation_figure
+from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -16,7 +17,7 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     cells,
 )
-from drivetwin.report.sections.trust import TONES, parameter_label
+from drivetwin.report.sections.trust import TONES
 from drivetwin.report.units import BAR, NM, RAD_PER_S, RPM, Display, significant
 from drivetwin.results.result_file import plain
 from drivetwin.results.version import program_version
@@ -39,19 +40,18 @@ _INSEPARABLE = (
 def limits_section(found: Identification) -> Section:
     """What the log cannot tell, and which experiment would help."""
     blocks: list[Block] = []
-    remarked = [
-        one
-        for one in found.estimates.values()
-        if one.reason or one.verdict is not Verdict.IDENTIFIED
-    ]
+    remarked: dict[tuple[Verdict, str], list[str]] = {}
+    for one in found.estimates.values():
+        if one.reason:
+            remarked.setdefault((one.verdict, one.reason), []).append(parameter_label(one.id))
     if remarked:
         rows = [
             (
-                Cell(parameter_label(one), note=one.id),
-                Cell(one.verdict.value, badge=True, tone=TONES[one.verdict]),
-                Cell(one.reason),
+                Cell(", ".join(labels)),
+                Cell(verdict.value, badge=True, tone=TONES[verdict]),
+                Cell(reason),
             )
-            for one in remarked
+            for (verdict, reason), labels in remarked.items()
         ]
         blocks.append(
             TableBlock(

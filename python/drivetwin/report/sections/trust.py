@@ -9,6 +9,7 @@ from collections import Counter
 from drivetwin.identify.result import Estimate, Identification, SignalFit, Verdict
 from drivetwin.parameters import spec_of
 from drivetwin.report.figures.parameters import interval_figure
+from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -22,12 +23,11 @@ from drivetwin.report.sections.blocks import (
 )
 from drivetwin.report.units import NM, RPM, Display, display_of, significant, with_uncertainty
 
-PRIOR = "prior"
-"""Method of an estimate that is the vehicle card's design value."""
 TONES = {
     Verdict.IDENTIFIED: Tone.GOOD,
     Verdict.WEAK: Tone.DOUBTFUL,
     Verdict.NOT_IDENTIFIABLE: Tone.UNKNOWN,
+    Verdict.DESIGN: Tone.PLAIN,
 }
 SIGNALS: dict[str, tuple[str, Display]] = {
     "output_torque": ("output torque", NM),
@@ -62,16 +62,14 @@ def trust_section(found: Identification) -> Section:
 
 
 def _headline(found: Identification) -> str:
-    count = Counter(estimate.verdict for estimate in found.estimates.values())
-    told = len(_told(found))
-    given = count[Verdict.IDENTIFIED] - told
-    text = f"{told} of {len(found.estimates)} parameters are identified"
+    count = _verdicts(found)
+    text = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)} parameters are identified"
     if count[Verdict.WEAK]:
         text += f", {count[Verdict.WEAK]} only weakly"
     if count[Verdict.NOT_IDENTIFIABLE]:
         text += f", {count[Verdict.NOT_IDENTIFIABLE]} cannot be told from this log"
-    if given:
-        text += f", {given} taken from the vehicle card"
+    if count[Verdict.DESIGN]:
+        text += f", {count[Verdict.DESIGN]} taken from the vehicle card"
     text += "."
     fit = found.fit.get("output_torque", {}).get("all")
     if fit is not None and math.isfinite(fit.fit_percent):
@@ -82,13 +80,8 @@ def _headline(found: Identification) -> str:
     return text
 
 
-def _told(found: Identification) -> list[Estimate]:
-    """Estimates that the log told; a design value that it adds nothing to is none of them."""
-    return [
-        one
-        for one in found.estimates.values()
-        if one.verdict is Verdict.IDENTIFIED and one.method != PRIOR
-    ]
+def _verdicts(found: Identification) -> Counter[Verdict]:
+    return Counter(estimate.verdict for estimate in found.estimates.values())
 
 
 def _tiles(found: Identification) -> list[Tile]:
@@ -98,12 +91,12 @@ def _tiles(found: Identification) -> list[Tile]:
         if fit is not None:
             note = f"rmse {significant(fit.rmse * display.factor, 3)} {display.label}"
             tiles.append(Tile(f"fit of {label}", _percent(fit), _fit_tone(fit), note))
-    told = _told(found)
-    complete = all(one.verdict is Verdict.IDENTIFIED for one in found.estimates.values())
+    count = _verdicts(found)
+    complete = not count[Verdict.WEAK] and not count[Verdict.NOT_IDENTIFIABLE]
     tiles.append(
         Tile(
             "identified",
-            f"{len(told)} of {len(found.estimates)}",
+            f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)}",
             Tone.GOOD if complete else Tone.DOUBTFUL,
             "parameters",
         )
@@ -124,19 +117,12 @@ def parameter_table(found: Identification) -> TableBlock:
         Cell("verdict"),
         Cell("method"),
     )
-    caption = "Identified parameters."
+    caption = "Parameters."
     if not any(one.std_systematic for one in found.estimates.values()):
         caption += (
             " The vehicle card states no sensor tolerance, so both intervals are of noise alone."
         )
     return TableBlock(caption, head, [_parameter_row(one) for one in found.estimates.values()])
-
-
-def parameter_label(estimate: Estimate) -> str:
-    """Symbol with the gear or element it belongs to, e.g. `J′ (2)`."""
-    spec = spec_of(estimate.id)
-    suffix = estimate.id.removeprefix(spec.stem).lstrip("_.")
-    return f"{spec.symbol} ({suffix})" if suffix else spec.symbol
 
 
 def _parameter_row(estimate: Estimate) -> tuple[Cell, ...]:
@@ -145,7 +131,11 @@ def _parameter_row(estimate: Estimate) -> tuple[Cell, ...]:
     value, total = _shown(estimate, estimate.std_total, display)
     _, noise = _shown(estimate, estimate.std_noise, display)
     return (
-        Cell(parameter_label(estimate), note=f"{spec.meaning} · {estimate.id}"),
+        Cell(
+            parameter_label(estimate.id),
+            note=f"{spec.meaning} · {estimate.id}",
+            remark=estimate.reason,
+        ),
         Cell(value, number=True),
         Cell(total, number=True),
         Cell(noise, number=True),
