@@ -6,11 +6,12 @@ from __future__ import annotations
 from drivetwin.gearbox.card import builtin_gearboxes, gearbox_schema, load_gearbox
 from drivetwin.gearbox.compare import Comparison, compare
 from drivetwin.gearbox.drive import Drive
-from drivetwin.gearbox.estimate import CouplingError, estimate
+from drivetwin.gearbox.estimate import estimate
 from drivetwin.gearbox.gears import GearStatics, gear_statics
 from drivetwin.gearbox.network import network_elements
 from drivetwin.gearbox.reduction import Reduction, reduce
 from drivetwin.gearbox.spec import Gearbox
+from drivetwin.gearbox.traces import CouplingError
 
 __all__ = [
     "Comparison",

@@ -11,11 +11,11 @@ from drivetwin.driveline import FloatArray, RoadLoad, Signal, State
 from drivetwin.driveline import simulate as simulate_dual_clutch
 from drivetwin.errors import SimulationError
 from drivetwin.gearbox.drive import Drive
-from drivetwin.gearbox.estimate import CouplingError
 from drivetwin.gearbox.gears import gear_statics
 from drivetwin.gearbox.maneuver import Maneuver, plan, signals, time_grid
 from drivetwin.gearbox.network import Element, network_elements
 from drivetwin.gearbox.reduction import Reduction
+from drivetwin.gearbox.traces import CouplingError, Traces
 from drivetwin.network import Start
 from drivetwin.network import simulate as simulate_network
 
@@ -26,27 +26,16 @@ _COMPLETED = "completed"
 
 @dataclass(frozen=True)
 class Comparison:
-    """Traces (n,) over `time` [s] of the whole gearbox and of the dual-clutch form without M12.
-
-    Shaft torques [N m], speeds of input and output [rad/s].
-    """
+    """The whole gearbox and its dual-clutch form over `time` (n,) [s]."""
 
     time: FloatArray
-    full_shaft_torque: FloatArray
-    full_input_speed: FloatArray
-    full_output_speed: FloatArray
-    form_shaft_torque: FloatArray
-    form_input_speed: FloatArray
-    form_output_speed: FloatArray
+    full: Traces
+    form: Traces
 
     @property
     def error(self) -> CouplingError:
         """Largest differences."""
-        return CouplingError(
-            shaft_torque=_largest(self.full_shaft_torque - self.form_shaft_torque),
-            input_speed=_largest(self.full_input_speed - self.form_input_speed),
-            output_speed=_largest(self.full_output_speed - self.form_output_speed),
-        )
+        return self.full.largest_difference(self.form)
 
 
 def compare(
@@ -63,14 +52,7 @@ def compare(
     time = time_grid(maneuver)
     full = _whole_gearbox(reduction, maneuver, time)
     form = _dual_clutch(reduction, maneuver, time, keep_coupling=keep_coupling)
-    return Comparison(time, *full, *form)
-
-
-def _largest(difference: FloatArray) -> float:
-    return float(np.max(np.abs(difference)))
-
-
-Traces = tuple[FloatArray, FloatArray, FloatArray]
+    return Comparison(time, full, form)
 
 
 def _start(reduction: Reduction, maneuver: Maneuver, coupling: float) -> tuple[float, float, float]:
@@ -116,7 +98,7 @@ def _whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: FloatArray) -
     )
     _require_completed(run.status, "the whole gearbox")
     shaft_torque, input_speed, output_speed = run.columns.values()
-    return shaft_torque, input_speed, output_speed
+    return Traces(shaft_torque, input_speed, output_speed)
 
 
 def _surroundings(reduction: Reduction, maneuver: Maneuver) -> list[Element]:
@@ -153,7 +135,7 @@ def _dual_clutch(
         time,
     )
     _require_completed(run.status, "the dual-clutch form")
-    return run.shaft_torque, run.engine_speed, run.output_speed
+    return Traces(run.shaft_torque, run.engine_speed, run.output_speed)
 
 
 def _require_completed(status: str, what: str) -> None:

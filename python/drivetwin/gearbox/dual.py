@@ -17,9 +17,8 @@ def dual_clutch(reduction: Reduction, drive: Drive, *, keep_coupling: bool) -> D
     """Return the dual-clutch driveline; see `Reduction.dual_clutch`."""
     pair = (reduction.off_going, reduction.on_coming)
     drums = _drums(reduction, drive) if keep_coupling else (0.0, 0.0)
-    own = [
-        (drum / each.i_c**2, drum * each.i_out**2) for drum, each in zip(drums, pair, strict=True)
-    ]
+    drums_in = sum(drum / each.i_c**2 for drum, each in zip(drums, pair, strict=True))
+    drums_out = sum(drum * each.i_out**2 for drum, each in zip(drums, pair, strict=True))
     return DualClutch(
         J1=drive.engine_inertia + reduction.M11 - drums_in,
         J2e=0.0,

@@ -16,21 +16,10 @@ from drivetwin.driveline import FloatArray
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.maneuver import RAMP, Maneuver, plan, time_grid
 from drivetwin.gearbox.reduction import Reduction
+from drivetwin.gearbox.traces import CouplingError, Traces
 
 _GROWTH_STEPS = 4
 """Fixed-point steps for the slip left when the first model locks; the growth is moderate."""
-
-
-@dataclass(frozen=True)
-class CouplingError:
-    """Largest differences between full gearbox and dual-clutch form without M12 over a shift.
-
-    `shaft_torque` [N m], `input_speed` and `output_speed` [rad/s].
-    """
-
-    shaft_torque: float
-    input_speed: float
-    output_speed: float
 
 
 def estimate(reduction: Reduction, drive: Drive | None = None) -> CouplingError:
@@ -45,15 +34,12 @@ def estimate(reduction: Reduction, drive: Drive | None = None) -> CouplingError:
     alone = _inertia_phase(reduction, maneuver, 0.0)
     full = _motion(reduction, maneuver, coupled, time)
     form = _motion(reduction, maneuver, alone, time)
+    error = full.largest_difference(form)
     return CouplingError(
-        shaft_torque=_largest(full.shaft_torque - form.shaft_torque),
-        input_speed=max(_largest(full.input_speed - form.input_speed), abs(coupled.in_at_lock)),
-        output_speed=max(_largest(full.output_speed - form.output_speed), abs(coupled.out_at_lock)),
+        shaft_torque=error.shaft_torque,
+        input_speed=max(error.input_speed, abs(coupled.in_at_lock)),
+        output_speed=max(error.output_speed, abs(coupled.out_at_lock)),
     )
-
-
-def _largest(difference: FloatArray) -> float:
-    return float(np.max(np.abs(difference)))
 
 
 @dataclass(frozen=True)
@@ -123,18 +109,9 @@ def _head_start(reduction: Reduction, maneuver: Maneuver, M12: float) -> float:
     return coupled - maneuver.gain_before_release(inertia, grip)
 
 
-@dataclass(frozen=True)
-class _Motion:
-    """Shaft torque, input and output speed of one model over the inertia phase and gear h."""
-
-    shaft_torque: FloatArray
-    input_speed: FloatArray
-    output_speed: FloatArray
-
-
 def _motion(
     reduction: Reduction, maneuver: Maneuver, phase: _InertiaPhase, time: FloatArray
-) -> _Motion:
+) -> Traces:
     drive, i_h, J5 = maneuver.drive, maneuver.new_ratio, maneuver.vehicle
     done = np.clip((time - maneuver.release) / (phase.lock - maneuver.release), 0.0, 1.0)
     start_in = drive.engine_speed + maneuver.old_ratio * phase.ahead
@@ -154,7 +131,7 @@ def _motion(
     locked = time >= phase.lock
     relative = J5 / (J4 + J5) * (phase.torque - settled) * twist_rate
     output = start_out + swing_out * done + np.where(locked, acceleration * after + relative, 0.0)
-    return _Motion(
+    return Traces(
         shaft_torque=np.where(locked, settled + (phase.torque - settled) * decay, phase.torque),
         input_speed=np.where(locked, i_h * output, start_in + swing_in * done),
         output_speed=output,

@@ -99,12 +99,12 @@ def plan(reduction: Reduction, drive: Drive) -> Maneuver:
     inertia = drive.engine_inertia + reduction.M11
     vehicle = reduction.M22 + drive.vehicle_inertia / drive.i_f**2
     load = drive.load / drive.i_f if upshift else 0.0
-    phase, pace = drive.inertia_phase, drive.inertia_phase - 0.5 * RAMP
-    # The swing that ends at synchronism with an output that the on-coming torque speeds up.
+    phase = drive.inertia_phase
+    # Momentum: what the on-coming torque takes from the input reaches the output i_h times.
     alone = (step - 1.0) * drive.engine_speed
-    drawn = new.ratio * (new.ratio * torque - load) / vehicle * phase
-    swing = (alone + drawn) / (1.0 + new.ratio**2 * inertia / vehicle * phase / pace)
-    synchronising = new.i_c * (torque - inertia * swing / pace)
+    pulled = (new.ratio * torque - load) / vehicle * phase
+    swing = (alone + new.ratio * pulled) / (1.0 + new.ratio**2 * inertia / vehicle)
+    synchronising = new.i_c * (torque - inertia * swing / (phase - 0.5 * RAMP))
     return Maneuver(
         drive=drive,
         engine_torque=torque,
@@ -113,7 +113,7 @@ def plan(reduction: Reduction, drive: Drive) -> Maneuver:
         new_ratio=new.ratio,
         output_speed=drive.engine_speed / old.ratio,
         swing_in=swing,
-        swing_out=(new.i_out * synchronising - load) / vehicle * phase,
+        swing_out=pulled - new.ratio * inertia / vehicle * swing,
         handover=new.i_c * torque,
         synchronising=synchronising,
         on_coming=reduction.gearbox.capacity(new.element),

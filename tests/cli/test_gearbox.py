@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin gearbox`: built-in cards, gears, and one gear in full."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from drivetwin.cli import main
+
+
+def test_without_a_card_it_lists_the_built_in_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gearbox"]) == 0
+    assert "zf-8hp70" in capsys.readouterr().out.split()
+
+
+def test_a_card_lists_its_gears(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gearbox", "zf-8hp70", "--json"]) == 0
+    gears = json.loads(capsys.readouterr().out)["gears"]
+    assert [gear["gear"] for gear in gears] == [*"12345678R"]
+    assert gears[0]["ratio"] == pytest.approx(gears[0]["published"], abs=5e-5)
+
+
+def test_one_gear_is_shown_in_full(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gearbox", "dual-clutch-7", "--gear", "1"]) == 0
+    shown = capsys.readouterr().out
+    assert "idle" in shown
+    assert "final-lower" in shown
+    assert "Powers sum to zero" in shown
