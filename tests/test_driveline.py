@@ -183,6 +183,14 @@ def test_inputs_that_do_not_span_the_run_are_refused() -> None:
         simulate(paper_model(), torque, pressures, start, np.array([0.0, 1.0]))
 
 
+def test_an_input_sample_within_round_off_of_the_end_costs_no_output() -> None:
+    _, pressures, start = held_second_gear(2.0)
+    stamps = np.array([0.0, np.nextafter(1.0, 0.0), 2.0])
+    torque = Signal(stamps, np.array([1545.0, 1600.0, 1600.0]))
+    run = simulate(paper_model(), torque, pressures, start, np.linspace(0.0, 1.0, 11))
+    assert np.all(np.isfinite(run.shaft_torque))
+
+
 def test_a_missing_pressure_is_named() -> None:
     torque, pressures, start = held_second_gear()
     with pytest.raises(InputError, match='input "B3" has no signal'):

@@ -226,7 +226,8 @@ fn check<T: Real>(
     Ok(())
 }
 
-/// Distinct times; times closer than round-off count as one; inner jumps stand twice.
+/// Distinct times; times closer than round-off count as one, the end always as itself; inner jumps
+/// stand twice.
 fn merge_knots(sorted: &[f64], jumps: &[f64]) -> Vec<f64> {
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
     let (start, end) = (sorted[0], sorted[sorted.len() - 1]);
@@ -238,6 +239,9 @@ fn merge_knots(sorted: &[f64], jumps: &[f64]) -> Vec<f64> {
                 knots.push(t);
             }
         }
+    }
+    if let Some(last) = knots.last_mut() {
+        *last = end;
     }
     knots
 }
