@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Output error and maximum likelihood: the simulated driveline against the whole measurement."""

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""Covariance of the residuals, R + G·Q·Gᵀ, without ever forming it.
+
+A residual is sensor noise R plus what the noise Q of the inputs, sent through the simulation (G),
+does to its outputs. The driveline has four states, so G·Q·Gᵀ is that of a Markov process z driven
+by the input noise, and by Woodbury's identity
+
+    Σ⁻¹ = R⁻¹ - R⁻¹H·(P⁻¹ + Hᵀ R⁻¹ H)⁻¹·Hᵀ R⁻¹,   P⁻¹ = Lᵀ W L
+
+where L holds the transitions, W the inverse process noise and H what the sensors see of z. The
+matrix in brackets is banded, so its Cholesky factor costs as much as one run of the simulation
+(the information form of a fixed-interval smoother: Rauch, Tung and Striebel 1965).
+An input's noise acts on the driveline through its power per frequency only, since the driveline
+passes less than half the sampling rate: a sample's variance times the sampling time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.sparse import csr_array
+
+from drivetwin.driveline import DualClutch
+from drivetwin.identify.likelihood.record import Record
+from drivetwin.identify.likelihood.response import STATES, Response, observed
+from drivetwin.identify.signals import FloatArray
+
+QUIET = 3e-5
+"""Process noise per step given to every state, as a share of a sensor's noise: W stays finite and
+the random walk over a log stays below what the sensors show of the state."""
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Weighting of residuals (n,) by the inverse of their covariance.
+
+    `factor` is the banded Cholesky factor and `seen` the matrix H of the input noise; None where
+    the outputs' noise counts alone.
+    """
+
+    variance: FloatArray
+    seen: csr_array | None = None
+    factor: FloatArray | None = None
+
+    def weighted(self, columns: FloatArray) -> FloatArray:
+        """Σ⁻¹·columns, (n,) or (n, q)."""
+        variance = self.variance if columns.ndim == 1 else self.variance[:, None]
+        return (columns - self.driven(columns)) / variance
+
+    def driven(self, columns: FloatArray) -> FloatArray:
+        """The part of residual columns (n,) or (n, q) that input noise explains best."""
+        if self.seen is None or self.factor is None:
+            return np.zeros_like(columns)
+        variance = self.variance if columns.ndim == 1 else self.variance[:, None]
+        z = cho_solve_banded(
+            (self.factor, True), self.seen.T @ (columns / variance), check_finite=False
+        )
+        return np.asarray(self.seen @ z)
+
+
+def sensor_noise(record: Record) -> Whiteness:
+    """Weighting by the sensors' noise alone."""
+    return Whiteness(record.sigma**2)
+
+
+def with_input_noise(model: DualClutch, record: Record, response: Response) -> Whiteness:
+    """Weighting with the noise of engine torque and pressures in it."""
+    seen = _seen(model, record)
+    variance = record.sigma**2
+    inverse = np.linalg.inv(_process(model, record, response))
+    factor = cholesky_banded(
+        _information(inverse, response.transition, model, record),
+        overwrite_ab=True,
+        lower=True,
+        check_finite=False,
+    )
+    return Whiteness(variance, seen, factor)
+
+
+def _process(model: DualClutch, record: Record, response: Response) -> FloatArray:
+    """Process noise (N, 4, 4) that enters between a grid point and the one before; first: start."""
+    sigma = {out.name: out.sigma for out in record.outputs}
+    wheel = sigma.get("wheel_speed", sigma["output_speed"] / model.i_f)
+    quiet = QUIET * np.array(
+        [sigma["engine_speed"], sigma["output_speed"], wheel, sigma["output_torque"] / model.k_o]
+    )
+    noise = np.zeros((record.time.size, STATES, STATES)) + np.diag(quiet**2)
+    for name, drive in response.drive.items():
+        signal = record.engine_torque if name == "engine torque" else record.pressures[name]
+        between = float(np.median(np.diff(signal.time)))
+        power = record.input_sigma[name] ** 2 * between / response.step
+        noise[1:] += power[:, None, None] * drive[:, :, None] * drive[:, None, :]
+    return noise
+
+
+def _information(
+    inverse: FloatArray, transition: FloatArray, model: DualClutch, record: Record
+) -> FloatArray:
+    """P⁻¹ + Hᵀ R⁻¹ H in lower banded storage (8, 4N)."""
+    count = record.time.size
+    through = inverse[1:] @ transition
+    diagonal = inverse.copy()
+    diagonal[:-1] += transition.transpose(0, 2, 1) @ through
+    for out in record.outputs:
+        row = observed(model, out.name)
+        diagonal[out.place] += np.outer(row, row) / out.sigma**2
+    banded = np.zeros((2 * STATES, STATES * count))
+    for i in range(STATES):
+        for j in range(i + 1):
+            banded[i - j, j::STATES] = diagonal[:, i, j]
+        for j in range(STATES):
+            banded[STATES + i - j, j : STATES * (count - 1) : STATES] = -through[:, i, j]
+    return banded
+
+
+def _seen(model: DualClutch, record: Record) -> csr_array:
+    """What the sensors see of the state: (compared samples, 4N)."""
+    data, columns, count = [], [], 0
+    for out in record.outputs:
+        data.append(np.tile(observed(model, out.name), out.place.size))
+        columns.append((STATES * out.place[:, None] + np.arange(STATES)).ravel())
+        count += out.place.size
+    start = np.arange(count + 1) * STATES
+    shape = (count, STATES * record.time.size)
+    return csr_array((np.concatenate(data), np.concatenate(columns), start), shape=shape)

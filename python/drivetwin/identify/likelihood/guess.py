@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""Start values of the fit: from the linear method where it told them, else plausible ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from drivetwin.identify.friction import LOG_V, MU_C, MU_DROP, MU_V
+from drivetwin.identify.integral import IntegralShift
+from drivetwin.identify.likelihood.unknowns import LAW
+from drivetwin.identify.signals import Driveline
+
+TYPICAL_LAW = {"mu_c": 0.11, "mu_drop": 0.02, "mu_v": 1e-4, "ln_v_s": float(np.log(12.0))}
+"""Friction of a wet clutch facing where the log shows none."""
+TYPICAL_MODE = (2.0 * np.pi * 10.0, 0.06)
+"""Angular frequency [rad/s] and damping ratio of a driveline where no ring-down was clean."""
+
+
+def guess_of(
+    shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]
+) -> dict[str, float]:
+    """A value for every unknown of the driveline and every law, from the linear fits."""
+    first = shifts[0]
+    told = dict(zip(first.ids, first.values, strict=True))
+    for shift in shifts[1:]:
+        told |= {k: v for k, v in zip(shift.ids, shift.values, strict=True) if k not in told}
+    J_e = first.momentum.value("J_e")
+    found = {
+        "eta": told["eta"],
+        "J_e": J_e,
+        "J_out": told["J_out"],
+        "J_vehicle": told["J_vehicle"],
+        "Tv_over_if": told["Tv_over_if"],
+        "te_delay": first.momentum.value("te_delay"),
+    }
+    shaft = {key: told[key] for key in ("k_o", "c_o") if key in told}
+    found |= shaft or _typical_shaft(found, drivelines[0])
+    return {k: float(v) for k, v in found.items()} | _laws(shifts, drivelines)
+
+
+def _typical_shaft(found: Mapping[str, float], driveline: Driveline) -> dict[str, float]:
+    omega, zeta = TYPICAL_MODE
+    J4 = found["J_e"] * driveline.i_after**2 + found["J_out"]
+    J5 = found["J_vehicle"] / driveline.i_f**2
+    J = J4 * J5 / (J4 + J5)
+    return {"k_o": J * omega**2, "c_o": 2.0 * zeta * omega * J}
+
+
+def _laws(shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]) -> dict[str, float]:
+    """Law, P0 and drum of every element; one without a curve takes its partner's."""
+    found: dict[str, float] = {}
+    laws: dict[str, dict[str, float]] = {}
+    for shift, d in zip(shifts, drivelines, strict=True):
+        law = TYPICAL_LAW
+        if shift.friction is not None:
+            theta = shift.friction.fit.theta
+            order = (MU_C, MU_DROP, MU_V, LOG_V)
+            law = {key: float(theta[i]) for key, i in zip(LAW, order, strict=True)}
+        laws[d.oncoming.name] = law
+        laws.setdefault(d.offgoing.name, law)
+        for e in (d.offgoing, d.oncoming):
+            found |= {f"{e.name}.P0": e.P0.value, f"{e.name}.drum": e.drum.value}
+        if shift.friction is not None:
+            found[f"{d.oncoming.name}.P0"] = shift.friction.P0
+    for name, law in laws.items():
+        found |= {f"{name}.{key}": value for key, value in law.items()}
+    return found

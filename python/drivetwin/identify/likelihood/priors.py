@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: MIT
+"""Which unknowns are free, between what bounds, and what is known of them beforehand.
+
+A design value with a standard deviation is a prior, one without is fixed. The laws' priors are
+those of the linear friction fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from drivetwin.identify.friction import LAW_PRIOR
+from drivetwin.identify.likelihood.problem import Part, Problem
+from drivetwin.identify.likelihood.record import LATEST, record_of
+from drivetwin.identify.likelihood.unknowns import COMMON, LAW, START, TE_OFFSET, Point, Structure
+from drivetwin.identify.momentum import MomentumSettings, rounding_error
+from drivetwin.identify.regression import Prior
+from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals, Span
+from drivetwin.parameters import SPECS
+
+BOUNDS: Mapping[str, tuple[float, float]] = {
+    "te_delay": (-0.5 * LATEST, LATEST),
+    "J_e": (1e-3, SPECS["J_prime"].upper),
+    "J_out": (1e-3, SPECS["J_out"].upper),
+    "J_vehicle": (1.0, SPECS["J_vehicle"].upper),
+    "k_o": (1.0, SPECS["k_o"].upper),
+    "mu_c": (1e-3, 1.0),
+    "mu_drop": (-0.3, 0.5),
+    "mu_v": (-5e-3, 5e-3),
+    "ln_v_s": (float(np.log(1.0)), float(np.log(200.0))),
+    "drum": (0.0, SPECS["J_out"].upper),
+}
+"""Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
+OFF_GOING_LEVEL = 0.03
+"""Spread of the friction level of an element that only lets go, about that of the one coming on."""
+
+
+def problem_of(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    loss_law: str,
+    guess: Mapping[str, float],
+) -> tuple[Problem, Point]:
+    """The fit of all shifts of a log, and where its search starts.
+
+    `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
+    start of each shift's run is read from the first samples. Raises IdentificationError where a
+    shift holds too little.
+    """
+    priors = _priors(signals, drivelines, guess)
+    names = [n for n in (*COMMON, *_laws(drivelines), *_fills(drivelines)) if n not in ()]
+    names = [n for n in names if not _is_known(priors.get(n))]
+    if TE_OFFSET in priors:
+        names.append(TE_OFFSET)
+    fixed = dict(guess) | {n: p.value for n, p in priors.items() if _is_known(p)}
+    parts, start = [], {n: guess.get(n, 0.0) for n in names}
+    for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
+        label = f"start{k}"
+        record = record_of(s, span)
+        structure = Structure(d, "dissipative" if loss_law == "dissipative" else "paper", label, fixed)
+        parts.append(Part.unweighted(structure, record))
+        first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
+        wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
+        values = (first["output_speed"], wheel, first["output_torque"] / guess["k_o"])
+        start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
+    point = Point(tuple(start), np.array(list(start.values())))
+    lower, upper = bounds_of(point.names)
+    entries = {
+        k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
+    }
+    prior = Prior.independent(len(point.names), entries)
+    return Problem(tuple(parts), prior, lower, upper), point
+
+
+def spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
+    """Span [s] of the log that each shift accounts for; no sample is counted twice."""
+    found: list[Span] = []
+    for s in signals:
+        start = s.shift.before[0]
+        if found:
+            start = max(start, found[-1][1])
+        found.append((start, s.shift.after[1]))
+    return tuple(found)
+
+
+def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper bounds (p,) of unknowns."""
+    pairs = []
+    for name in names:
+        stem = name.split(".")[-1]
+        if stem in BOUNDS:
+            pairs.append(BOUNDS[stem])
+        elif stem in SPECS:
+            pairs.append((SPECS[stem].lower, SPECS[stem].upper))
+        else:
+            pairs.append((-np.inf, np.inf))
+    lower, upper = np.array(pairs, dtype=float).T
+    return lower, upper
+
+
+def _laws(drivelines: Sequence[Driveline]) -> list[str]:
+    """Free coefficients of the friction laws."""
+    coming = [d.oncoming.name for d in drivelines]
+    leaving = [d.offgoing.name for d in drivelines if d.offgoing.name not in coming]
+    return [f"{e}.{key}" for e in coming for key in LAW] + [f"{e}.mu_c" for e in leaving]
+
+
+def _fills(drivelines: Sequence[Driveline]) -> list[str]:
+    elements = dict.fromkeys(
+        e.name for d in drivelines for e in (d.oncoming, d.offgoing)
+    )
+    return [f"{e}.{key}" for e in elements for key in ("P0", "drum")]
+
+
+def _priors(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], guess: Mapping[str, float]
+) -> dict[str, PriorValue]:
+    """What is known beforehand, by unknown."""
+    found = {"te_delay": MomentumSettings().delay_prior}
+    if drivelines[0].J_out is not None:
+        found["J_out"] = drivelines[0].J_out
+    step = signals[0].torque_resolution
+    rounding = rounding_error(signals[0].engine_torque, step)
+    if rounding > 0.0:
+        found[TE_OFFSET] = PriorValue(0.0, rounding)
+    law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)}
+    for name in _laws(drivelines):
+        found[name] = law[name.split(".")[-1]]
+    coming = {d.oncoming.name for d in drivelines}
+    for d in drivelines:
+        for e in (d.offgoing, d.oncoming):
+            found |= {f"{e.name}.P0": e.P0, f"{e.name}.drum": e.drum}
+        if d.offgoing.name not in coming:
+            level = guess[f"{d.offgoing.name}.mu_c"]
+            found[f"{d.offgoing.name}.mu_c"] = PriorValue(level, OFF_GOING_LEVEL)
+    return found
+
+
+def _is_known(prior: PriorValue | None) -> bool:
+    return prior is not None and prior.std == 0.0

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+"""The least-squares problem of the fit: residuals of all shifts, their weighting, the priors.
+
+    Q(θ) = Σ_shifts (y - ŷ(θ))ᵀ Σ⁻¹ (y - ŷ(θ)) + (θ - θ₀)ᵀ P₀⁻¹ (θ - θ₀)
+
+ŷ is the output of the core, driven by the measured inputs; its derivatives are the core's, exact
+through lock and break-away. Σ is held while θ moves (Gauss-Newton on a Gaussian likelihood whose
+covariance is known well from the start values).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.driveline import Sensitivities, Signal, Trajectory, sensitivities, simulate
+from drivetwin.errors import InputError
+from drivetwin.identify.likelihood.covariance import Whiteness, sensor_noise, with_input_noise
+from drivetwin.identify.likelihood.record import Record
+from drivetwin.identify.likelihood.response import Response, observed, response_of
+from drivetwin.identify.likelihood.unknowns import TE_OFFSET, Point, Structure
+from drivetwin.identify.regression import Prior
+from drivetwin.identify.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class Part:
+    """One shift: its structure, what was recorded, and the weighting of its residuals."""
+
+    structure: Structure
+    record: Record
+    weighting: Whiteness
+
+    @classmethod
+    def unweighted(cls, structure: Structure, record: Record) -> Part:
+        """A part whose residuals count by the sensors' noise alone."""
+        return cls(structure, record, sensor_noise(record))
+
+    def run(self, point: Point) -> Trajectory | None:
+        """The simulation at `point`; None where it has none or does not reach the end."""
+        try:
+            found = simulate(
+                self.structure.model(point),
+                self._torque(point),
+                self.record.pressures,
+                self.structure.start(point),
+                self.record.time,
+            )
+        except InputError:
+            return None
+        return found if found.status == "completed" else None
+
+    def residual(self, run: Trajectory) -> FloatArray:
+        """Measured minus simulated (n,)."""
+        return self.record.measured - self.record.stacked(run)
+
+    def linearised(self, point: Point) -> tuple[FloatArray, FloatArray] | None:
+        """Residual (n,) and the derivative (n, p) of the simulated samples by `point`."""
+        names, matrix = self.structure.slopes(point)
+        model = self.structure.model(point)
+        try:
+            found: Sensitivities = sensitivities(
+                model,
+                self._torque(point),
+                self.record.pressures,
+                self.structure.start(point),
+                self.record.time,
+                names,
+            )
+        except InputError:
+            return None
+        if found.run.status != "completed":
+            return None
+        columns = np.column_stack([self.record.stacked(found.derivatives[n]) for n in names])
+        slopes = columns @ matrix
+        if TE_OFFSET in point.names:
+            slopes[:, point.names.index(TE_OFFSET)] = self.answer(
+                point, found.run, {"engine torque": -1.0}
+            )
+        if not np.all(np.isfinite(slopes)):
+            return None
+        return self.residual(found.run), slopes
+
+    def response(self, point: Point, run: Trajectory) -> Response:
+        """Linear response to disturbances of the inputs around `run`."""
+        return response_of(self.structure.model(point), run, self.record)
+
+    def answer(self, point: Point, run: Trajectory, offsets: dict[str, float]) -> FloatArray:
+        """Change (n,) of the simulated samples by constant offsets of inputs, by name."""
+        count = self.record.time.size - 1
+        return self.answer_to(point, run, {n: np.full(count, v) for n, v in offsets.items()})
+
+    def answer_to(
+        self, point: Point, run: Trajectory, disturbance: dict[str, FloatArray]
+    ) -> FloatArray:
+        """Change (n,) of the simulated samples by disturbances (N-1,) of inputs, by name."""
+        model = self.structure.model(point)
+        z = self.response(point, run).to(disturbance)
+        return np.concatenate(
+            [z[out.place] @ observed(model, out.name) for out in self.record.outputs]
+        )
+
+    def weighted_by(self, point: Point) -> Part:
+        """The part with the covariance of output and input noise at `point`."""
+        run = self.run(point)
+        if run is None:
+            return self
+        model = self.structure.model(point)
+        whiteness = with_input_noise(model, self.record, response_of(model, run, self.record))
+        return replace(self, weighting=whiteness)
+
+    def _torque(self, point: Point) -> Signal:
+        """Engine torque as it acts: read, less its mean error, moved back by its age."""
+        signal = self.record.engine_torque
+        values = signal.values
+        if TE_OFFSET in point.names:
+            values = values - point[TE_OFFSET]
+        delay = self.structure.value(point, "te_delay")
+        return Signal(signal.time, values, -delay)
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Q and its Gauss-Newton expansion at one point: gradient (p,), information (p, p).
+
+    `data` (p, p) is the information of the measurements alone.
+    """
+
+    cost: float
+    gradient: FloatArray
+    information: FloatArray
+    data: FloatArray
+
+
+@dataclass(frozen=True)
+class Problem:
+    """All parts with the prior and bounds of their unknowns; `lower`, `upper` (p,)."""
+
+    parts: tuple[Part, ...]
+    prior: Prior
+    lower: FloatArray
+    upper: FloatArray
+
+    @property
+    def size(self) -> int:
+        """Number of compared samples."""
+        return sum(part.record.size for part in self.parts)
+
+    def until(self, ends: Sequence[float]) -> Problem:
+        """The problem with each part cut at its end [s], weighted by sensor noise."""
+        cut = [
+            Part.unweighted(part.structure, part.record.until(end))
+            for part, end in zip(self.parts, ends, strict=True)
+        ]
+        return replace(self, parts=tuple(cut))
+
+    def weighted_by(self, point: Point) -> Problem:
+        """The problem with input noise in the covariance, at `point`."""
+        return replace(self, parts=tuple(part.weighted_by(point) for part in self.parts))
+
+    def cost(self, point: Point) -> float:
+        """Q; infinite where a simulation fails."""
+        total = self.prior.cost(point.values)
+        for part in self.parts:
+            run = part.run(point)
+            if run is None:
+                return float("inf")
+            residual = part.residual(run)
+            total += float(residual @ part.weighting.weighted(residual))
+        return total
+
+    def normal(self, point: Point) -> Normal | None:
+        """Expansion of Q at `point`; None where a simulation fails."""
+        size = len(point.names)
+        cost, gradient = self.prior.cost(point.values), self.prior.pull(point.values)
+        data = np.zeros((size, size))
+        for part in self.parts:
+            found = part.linearised(point)
+            if found is None:
+                return None
+            residual, slopes = found
+            weighted = part.weighting.weighted(np.column_stack([residual, slopes]))
+            cost += float(residual @ weighted[:, 0])
+            gradient = gradient - slopes.T @ weighted[:, 0]
+            data += slopes.T @ weighted[:, 1:]
+        data = 0.5 * (data + data.T)
+        return Normal(cost, gradient, data + self.prior.precision, data)

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""One shift as the fit sees it: inputs to the simulation and the outputs it is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.driveline import Signal, Trajectory
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
+
+OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
+"""Compared signals, in the order in which residuals are stacked."""
+LATEST = 0.06
+"""Greatest age of an engine torque value [s]: so much of the end of a log has no input."""
+FLOOR = 1e-5
+"""Least noise of a compared signal as a share of its range: what an ideal sensor is given."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """A compared signal: `values` (n,) at the points `place` (n,) of the record's time grid."""
+
+    name: str
+    place: FloatArray
+    values: FloatArray
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Record:
+    """One shift's span of a log.
+
+    `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
+    `engine_torque` are fresh values at their stamps, held at both ends; `pressures` by element.
+    """
+
+    time: FloatArray
+    engine_torque: Signal
+    pressures: Mapping[str, Signal]
+    outputs: tuple[Output, ...]
+    input_sigma: Mapping[str, float]
+    """White noise of an input sample by name; the engine torque is `engine torque`."""
+
+    @property
+    def size(self) -> int:
+        """Number of compared samples."""
+        return sum(out.values.size for out in self.outputs)
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviation of each compared sample (size,)."""
+        return np.concatenate([np.full(out.values.size, out.sigma) for out in self.outputs])
+
+    @property
+    def measured(self) -> FloatArray:
+        """All compared samples, stacked (size,)."""
+        return np.concatenate([out.values for out in self.outputs])
+
+    def stacked(self, run: Trajectory) -> FloatArray:
+        """The same samples of a run or of its derivative (size,)."""
+        columns = {
+            "output_torque": run.shaft_torque,
+            "engine_speed": run.engine_speed,
+            "output_speed": run.output_speed,
+            "wheel_speed": run.wheel_speed,
+        }
+        return np.concatenate([columns[out.name][out.place] for out in self.outputs])
+
+    def until(self, end: float) -> Record:
+        """The record cut at `end` [s]."""
+        count = int(np.searchsorted(self.time, end, side="right"))
+        outputs = []
+        for out in self.outputs:
+            keep = int(np.searchsorted(out.place, count))
+            outputs.append(Output(out.name, out.place[:keep], out.values[:keep], out.sigma))
+        return Record(
+            self.time[:count], self.engine_torque, self.pressures, tuple(outputs), self.input_sigma
+        )
+
+
+def record_of(signals: ShiftSignals, span: Span) -> Record:
+    """The record of one shift over `span` [s].
+
+    Raises IdentificationError where the span holds too little to compare.
+    """
+    channels = {
+        "output_torque": signals.output_torque,
+        "engine_speed": signals.engine_speed,
+        "output_speed": signals.output_speed,
+        "wheel_speed": signals.wheel_speed,
+    }
+    inputs = (signals.engine_torque, *signals.pressures.values())
+    start = max(span[0], *(s.time[0] for s in inputs))
+    end = min(span[1], *(s.time[-1] for s in inputs)) - LATEST
+    parts = {name: s.within((start, end)) for name, s in channels.items() if s is not None}
+    time = np.unique(np.concatenate([part.time for part in parts.values()]))
+    if time.size < 100:
+        raise IdentificationError(
+            f"only {time.size} samples between {start:.3f} s and {end:.3f} s to fit a model to",
+            "record from a second before the torque phase to a second after lock-up",
+        )
+    outputs = tuple(
+        Output(
+            name,
+            np.searchsorted(time, part.time),
+            part.values,
+            max(part.sigma, FLOOR * float(np.ptp(part.values))),
+        )
+        for name, part in parts.items()
+    )
+    torque = signals.engine_torque
+    return Record(
+        time,
+        _held(torque, 2.0 * LATEST),
+        {name: _held(p, 0.0) for name, p in signals.pressures.items()},
+        outputs,
+        {"engine torque": torque.sigma} | {n: p.sigma for n, p in signals.pressures.items()},
+    )
+
+
+def _held(signal: Sampled, beyond: float) -> Signal:
+    """The signal, its end values held for `beyond` [s] at both ends."""
+    if beyond == 0.0:
+        return Signal(signal.time, signal.values)
+    time = np.concatenate([[signal.time[0] - beyond], signal.time, [signal.time[-1] + beyond]])
+    values = np.concatenate([signal.values[:1], signal.values, signal.values[-1:]])
+    return Signal(time, values)

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""Linear response of a run to small disturbances of its inputs (THEORY section 3, linearised).
+
+State z = (ω_e, ω_out, ω_w, twist). In one friction mode
+
+    z' = A·z + Σ B_u·δu,   u: engine torque and pressures
+
+A locked element takes the motion along its slip out of the accelerations. When an element locks,
+the disturbance jumps so that its slip ends (saltation); at break-away it goes on unchanged.
+Only the spread of the residuals is built on this: the run itself and its derivatives are the
+core's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.driveline import DualClutch, ShiftElement, Trajectory
+from drivetwin.identify.likelihood.record import Record
+from drivetwin.identify.signals import FloatArray
+
+STATES = 4
+
+
+@dataclass(frozen=True)
+class Response:
+    """Discrete linear response on a time grid of N points.
+
+    `transition` (N-1, 4, 4) takes z from one point to the next; `drive` (N-1, 4) by input name is
+    the effect over a step of that input's disturbance; `step` (N-1,) [s].
+    """
+
+    step: FloatArray
+    transition: FloatArray
+    drive: dict[str, FloatArray]
+
+    def to(self, disturbance: dict[str, FloatArray]) -> FloatArray:
+        """z (N, 4) in answer to disturbances (N-1,) of inputs by name, from z = 0."""
+        push = np.zeros_like(next(iter(self.drive.values())))
+        for name, values in disturbance.items():
+            push += self.drive[name] * values[:, None]
+        z = np.zeros((len(push) + 1, STATES))
+        for k, matrix in enumerate(self.transition):
+            z[k + 1] = matrix @ z[k] + push[k]
+        return z
+
+
+def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
+    """Linearise around `run`, simulated on the record's grid."""
+    time = run.time
+    step = np.diff(time)
+    middle = 0.5 * (time[1:] + time[:-1])
+    locked = {one.name: _locked(run, one.name, middle) for one in model.elements}
+    free = np.zeros((step.size, STATES, STATES))
+    free += _shaft(model)
+    torque = np.zeros((step.size, STATES))
+    torque[:, 0] = model.eta
+    force = {"engine torque": torque}
+    for one in model.elements:
+        signal = record.pressures[one.name]
+        pressure = np.interp(middle, signal.time, signal.values)
+        slip = 0.5 * (run.slip[one.name][1:] + run.slip[one.name][:-1])
+        stiffness, gain = _friction(one, slip, pressure)
+        sliding = ~locked[one.name]
+        g = _direction(one)
+        free -= (stiffness * sliding)[:, None, None] * np.outer(g, g)
+        force[one.name] = -(gain * sliding)[:, None] * g
+    inverse = _accelerating(model, locked)
+    rate = inverse @ free
+    rate[:, 3] = (0.0, 1.0, -model.i_f, 0.0)
+    h = step[:, None, None]
+    transition = np.eye(STATES) + rate * h
+    power = rate * h
+    for order in (2, 3, 4):
+        power = power @ rate * (h / order)
+        transition += power
+    for k, jump in _jumps(model, run):
+        transition[k] = jump @ transition[k]
+    drive = {
+        name: np.einsum("kij,kj->ki", inverse, f) * step[:, None] for name, f in force.items()
+    }
+    return Response(step, transition, drive)
+
+
+def observed(model: DualClutch, name: str) -> FloatArray:
+    """Row (4,) that gives a compared signal from the state."""
+    rows = {
+        "output_torque": (0.0, model.c_o, -model.c_o * model.i_f, model.k_o),
+        "engine_speed": (1.0, 0.0, 0.0, 0.0),
+        "output_speed": (0.0, 1.0, 0.0, 0.0),
+        "wheel_speed": (0.0, 0.0, 1.0, 0.0),
+    }
+    return np.array(rows[name])
+
+
+def _direction(one: ShiftElement) -> FloatArray:
+    """Slip as a row of the state: ω_in/i_c - i_out·ω_out (eq. 15)."""
+    return np.array([1.0 / one.i_c, -one.i_out, 0.0, 0.0])
+
+
+def _shaft(model: DualClutch) -> FloatArray:
+    """Forces (4, 4) of the shaft on (ω_e, ω_out, ω_w): -T_o on the output, i_f·T_o at the wheel."""
+    return np.outer([0.0, -1.0, model.i_f, 0.0], observed(model, "output_torque"))
+
+
+def _friction(
+    one: ShiftElement, slip: FloatArray, pressure: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of the sliding torque by slip and by pressure, (n,) each."""
+    above = np.maximum(pressure - one.P0, 0.0) * one.gain
+    mu = one.friction.at(slip)
+    small = 1e-3
+    bend = (one.friction.at(np.abs(slip) + small) - mu) / small
+    return bend * above, mu * one.gain * np.sign(slip) * (above > 0.0)
+
+
+def _locked(run: Trajectory, name: str, middle: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Whether the element is locked at the instants `middle` (n,)."""
+    state = np.abs(run.slip[name][0]) < 1e-9
+    result = np.full(middle.size, state)
+    for event in run.events:
+        if event.element == name and event.kind in ("lock", "break_away"):
+            result[middle > event.time] = event.kind == "lock"
+    return result
+
+
+def _accelerating(
+    model: DualClutch, locked: dict[str, np.ndarray[tuple[int], np.dtype[np.bool_]]]
+) -> FloatArray:
+    """Accelerations per force (n, 4, 4), without those along the slip of locked elements."""
+    mass = np.diag([model.J1 * model.eta + model.J2e, model.J_out, model.J_v, 1.0])
+    for one in model.elements:
+        mass += one.drum_inertia * np.outer(_direction(one), _direction(one))
+    inverse = np.linalg.inv(mass)
+    inverse[3] = 0.0
+    count = len(next(iter(locked.values())))
+    result = np.broadcast_to(inverse, (count, STATES, STATES)).copy()
+    for one in model.elements:
+        held = locked[one.name]
+        if held.any():
+            g = _direction(one)
+            along = inverse @ g
+            result[held] -= np.outer(along, along) / (g @ along)
+    return result
+
+
+def _jumps(model: DualClutch, run: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+    """(step, saltation (4, 4)) of every lock: z moves by the change of acceleration times δt."""
+    inverse = _accelerating(model, {one.name: np.array([False]) for one in model.elements})[0]
+    for event in run.events:
+        if event.kind != "lock":
+            continue
+        one = next(e for e in model.elements if e.name == event.element)
+        g = _direction(one)
+        k = int(np.searchsorted(run.time, event.time)) - 1
+        if 0 <= k < run.time.size - 1:
+            along = inverse @ g
+            yield k, np.eye(STATES) - np.outer(along, g) / (g @ along)

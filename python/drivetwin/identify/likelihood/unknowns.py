@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""The unknowns of the fit and how the simulated model follows from them.
+
+    J1 = Je/η, J2e = 0 (THEORY section 3: only Je = J1·η + J2e can be told)
+    load.constant = i_f·(T_v/i_f), mu_s = mu_c + mu_drop, v_s = exp(ln_v_s)
+
+An element that comes on in one of the shifts has its own Stribeck law; of one that only lets go
+no more than the level of its law shows, through the instant at which it breaks away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.driveline import DualClutch, LossLaw, RoadLoad, ShiftElement, State, Stribeck
+from drivetwin.identify.signals import Coupling, Driveline, FloatArray
+
+COMMON = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
+"""Unknowns of the driveline, the same in all shifts."""
+TE_OFFSET = "te_offset"
+"""Mean rounding error of the engine torque [N m]: what is read is the truth plus this."""
+LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
+START = ("speed", "wheel_speed", "twist")
+"""Unknowns of the start of each shift's run: ω_out and ω_w [rad/s], shaft twist [rad]."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One set of values of all unknowns by name; immutable."""
+
+    names: tuple[str, ...]
+    values: FloatArray
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)])
+
+    def moved(self, values: FloatArray) -> Point:
+        """The same unknowns at other `values` (p,)."""
+        return Point(self.names, values)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What is fixed during a fit: structure of one shift and the laws that are not free.
+
+    `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
+    start unknowns of this shift.
+    """
+
+    driveline: Driveline
+    loss_law: LossLaw
+    label: str
+    fixed: Mapping[str, float]
+
+    @property
+    def elements(self) -> tuple[Coupling, Coupling]:
+        """Off-going and on-coming element."""
+        return (self.driveline.offgoing, self.driveline.oncoming)
+
+    def value(self, point: Point, name: str) -> float:
+        """Value of an unknown, free or fixed."""
+        return point[name] if name in point.names else self.fixed[name]
+
+    def model(self, point: Point) -> DualClutch:
+        """The model to be simulated at `point`."""
+        eta = self.value(point, "eta")
+        return DualClutch(
+            J1=self.value(point, "J_e") / eta,
+            J2e=0.0,
+            eta=eta,
+            loss_law=self.loss_law,
+            i_in=1.0,
+            J_out=self.value(point, "J_out"),
+            i_f=self.driveline.i_f,
+            J_v=self.value(point, "J_vehicle"),
+            k_o=self.value(point, "k_o"),
+            c_o=self.value(point, "c_o"),
+            load=RoadLoad(constant=self.value(point, "Tv_over_if") * self.driveline.i_f),
+            elements=tuple(self._element(point, one) for one in self.elements),
+        )
+
+    def _element(self, point: Point, one: Coupling) -> ShiftElement:
+        c, drop, v, ln_v_s = (self.value(point, f"{one.name}.{key}") for key in LAW)
+        return ShiftElement(
+            name=one.name,
+            i_c=1.0 / one.a,
+            i_out=one.b,
+            gain=one.gain,
+            P0=self.value(point, f"{one.name}.P0"),
+            friction=Stribeck(c, c + drop, float(np.exp(ln_v_s)), v),
+            drum_inertia=self.value(point, f"{one.name}.drum"),
+        )
+
+    def start(self, point: Point) -> State:
+        """Start of the run at `point`: the off-going element is locked."""
+        speed, wheel, twist = (point[f"{self.label}.{key}"] for key in START)
+        ratio = self.driveline.i_before
+        return State(ratio * speed, speed, wheel, twist, (self.driveline.offgoing.name,))
+
+    def slopes(self, point: Point) -> tuple[tuple[str, ...], FloatArray]:
+        """Names the core knows (m,) and the derivative of their values by `point` (m, p)."""
+        entries = [
+            entry for name in point.names for entry in self._entries(point, name)
+        ]
+        core = tuple(dict.fromkeys(entry[0] for entry in entries))
+        matrix = np.zeros((len(core), len(point.names)))
+        for field, name, slope in entries:
+            matrix[core.index(field), point.names.index(name)] = slope
+        return core, matrix
+
+    def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
+        """(name in the core, unknown, derivative) of one unknown; nothing for foreign ones."""
+        i_f, eta, J_e = self.driveline.i_f, self.value(point, "eta"), self.value(point, "J_e")
+        table: dict[str, Sequence[tuple[str, float]]] = {
+            "eta": (("eta", 1.0), ("J1", -J_e / eta**2)),
+            "J_e": (("J1", 1.0 / eta),),
+            "J_out": (("J_out", 1.0),),
+            "J_vehicle": (("J_v", 1.0),),
+            "Tv_over_if": (("load.constant", i_f),),
+            "k_o": (("k_o", 1.0),),
+            "c_o": (("c_o", 1.0),),
+            "te_delay": (("delay.engine torque", -1.0),),
+            f"{self.label}.speed": (
+                ("start.engine_speed", self.driveline.i_before),
+                ("start.output_speed", 1.0),
+            ),
+            f"{self.label}.wheel_speed": (("start.wheel_speed", 1.0),),
+            f"{self.label}.twist": (("start.twist", 1.0),),
+        }
+        for one in self.elements:
+            v_s = float(np.exp(self.value(point, f"{one.name}.ln_v_s")))
+            fields = {
+                "P0": (("P0", 1.0),),
+                "mu_c": (("mu_c", 1.0), ("mu_s", 1.0)),
+                "mu_drop": (("mu_s", 1.0),),
+                "mu_v": (("mu_v", 1.0),),
+                "ln_v_s": (("v_s", v_s),),
+                "drum": (("drum_inertia", 1.0),),
+            }
+            for key, slopes in fields.items():
+                table[f"{one.name}.{key}"] = [(f"{one.name}.{f}", d) for f, d in slopes]
+        for field, slope in table.get(name, ()):
+            yield field, name, slope
