@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The compiled core. Private: use `drivetwin.driveline`, `drivetwin.network` and `drivetwin.gearbox`."""
+"""The compiled core. Private: use `drivetwin.driveline`, `.network` and `.gearbox`."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["gear_statics", "reduce_shift", "simulate", "simulate_network"]
+__all__ = ["gear_statics", "reduce_shift", "sensitivities", "simulate", "simulate_network"]
 
 _Array = NDArray[np.float64]
 _Options = tuple[float, float, int | None, bool]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ def load_gearbox(card: Path | str) -> Gearbox:
         str(card),
         "correct these keys of the gearbox card; docs/reference/gearbox-card.md describes them",
     )
-    return _gearbox(GearboxFile.model_validate(document))
+    return gearbox_of(document)
 
 
 def gearbox_schema() -> dict[str, Any]:
@@ -55,7 +56,9 @@ def _find(card: Path | str) -> Path:
     )
 
 
-def _gearbox(file: GearboxFile) -> Gearbox:
+def gearbox_of(document: Mapping[str, Any]) -> Gearbox:
+    """Return the gearbox of a document that has no faults (see `gearbox_faults`)."""
+    file = GearboxFile.model_validate(document)
     return Gearbox(
         name=file.name,
         input=file.input,
