@@ -43,7 +43,7 @@ def _without(log: ShiftLog, *roles: str) -> ShiftLog:
     step=st.sampled_from([1e-3, 2e-3, 5e-3, 1e-2]),
     seed=st.integers(0, 2**16),
 )
-def test_boundaries_lie_within_their_sigma(
+def test_boundaries_are_where_they_were_made(
     ratio: float,
     ratio_step: float,
     up: bool,
@@ -64,10 +64,33 @@ def test_boundaries_lie_within_their_sigma(
     )
     shift = _only(plan)
     assert (shift.start_gear, shift.end_gear) == tuple(name for name, _ in plan.gears)
-    assert abs(shift.lockup_time - start - duration) < 4.0 * shift.sigma["lockup"] + 1e-4
-    assert abs(shift.inertia_phase[0] - start) < 4.5 * shift.sigma["inertia_start"] + 1e-4
+    # One shift may lie far out in the tails; how many do is the next test's.
+    assert abs(shift.lockup_time - start - duration) < 6.0 * shift.sigma["lockup"] + 1e-4
+    assert abs(shift.inertia_phase[0] - start) < 6.0 * shift.sigma["inertia_start"] + 1e-4
     # No boundary is vaguer than what a reader would see in the plot.
     assert shift.sigma["lockup"] < 0.1 * duration + step
+
+
+def test_sigma_covers_the_errors_of_many_shifts() -> None:
+    """At most 5 % of the boundaries are off by more than two standard deviations, 1 % by three."""
+    rng = np.random.default_rng(7)
+    scores = []
+    for seed in range(100):
+        ratio, start, duration = rng.uniform(0.6, 4.0), rng.uniform(1.0, 2.0), rng.uniform(0.2, 0.8)
+        pair = (("3", ratio * rng.uniform(1.2, 1.9)), ("4", ratio))
+        plan = Plan(
+            gears=pair if rng.random() < 0.5 else pair[::-1],
+            break_aways=(start,),
+            duration=duration,
+            noise=rng.choice([0.02, 0.1, 0.5]),
+            step=rng.choice([1e-3, 2e-3, 5e-3, 1e-2]),
+            seed=seed,
+        )
+        shift = _only(plan)
+        scores.append((shift.inertia_phase[0] - start) / shift.sigma["inertia_start"])
+        scores.append((shift.lockup_time - start - duration) / shift.sigma["lockup"])
+    assert np.mean(np.abs(scores) > 2.0) <= 0.05
+    assert np.mean(np.abs(scores) > 3.0) <= 0.01
 
 
 def test_phases_join_and_are_named() -> None:

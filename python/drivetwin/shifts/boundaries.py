@@ -161,9 +161,11 @@ def _centred(
     anchor, span = where
     hinge: Hinge | None = None
     for _ in range(2):
-        low, high = max(limits[0], anchor - span), min(limits[1], anchor + span)
+        # A gentle onset hides in the noise, so it may lie well before what is first seen to move.
+        before, after = (2 * span, span) if moving is Moving.AFTER else (span, span)
+        low, high = max(limits[0], anchor - before), min(limits[1], anchor + after)
         rest, motion = span // 2, (2 * span) // 3
-        begin, end = (rest, motion) if moving is Moving.AFTER else (motion, rest)
+        begin, end = (span, motion) if moving is Moving.AFTER else (motion, rest)
         begin, end = max(anchor - begin, low + 2), min(anchor + end, high - 2)
         if end <= begin:
             return hinge

@@ -72,7 +72,7 @@ def test_a_refused_stage_says_why(given: tuple[Identification, ShiftLog]) -> Non
 
 
 def test_report_of_a_whole_log_stays_small(given: tuple[Identification, ShiftLog]) -> None:
-    assert len(render_report(*given).encode()) < 6_000_000
+    assert len(render_report(*given).encode()) < 3_000_000
 
 
 def test_without_evidence_nothing_is_drawn() -> None:

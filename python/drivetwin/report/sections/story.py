@@ -120,7 +120,8 @@ def validation_section(validations: tuple[Validation, ...]) -> Section:
         text = (
             f"Shift {shift.start_gear}→{shift.end_gear}: the measured engine torque and pressures "
             "drive the identified model; nothing else is fed in after the start. Below each output "
-            "stands what is left, measured minus simulated."
+            "stands what is left, measured minus simulated. While the on-coming element slips, the "
+            "noise of its pressure sensor passes into the simulated torque and output speed."
         )
         blocks.append(FigureBlock(validation_figure(one), text))
         blocks.append(_event_table(one))

@@ -164,7 +164,8 @@ def fit_table(found: Identification) -> TableBlock:
         rows.append([Cell(label), *(_fit_cell(fit, display) for fit in fits)])
     return TableBlock(
         "Simulation against measurement: fit % = 100·(1 − ‖y − ŷ‖ / ‖y − mean(y)‖), the mean taken "
-        "over the whole log for every phase; root mean square error below.",
+        "over the whole log for every phase; root mean square error below. Where a signal hardly "
+        "moves, fit % is low although only noise is left: the error in its unit tells.",
         head,
         rows,
     )
