@@ -63,6 +63,10 @@ test-wheel: wheel ## run the demo from the wheel where there is no Rust
 bench: $(venv)/.native ## measure what has a stated limit
 	for program in benchmarks/*.py; do $(bin)/python "$$program"; done
 
+.PHONY: fuzz
+fuzz: $(venv)/.native ## 20,000 damaged files through each reader, for an hour or two
+	$(bin)/python -m tests.fuzz.run --count 20000
+
 .PHONY: fmt
 fmt: $(venv)/.dev ## format Rust and Python sources
 	cargo fmt --all

@@ -161,3 +161,28 @@ def test_reading_is_fast() -> None:
         read(data)
         fastest = min(fastest, clock.perf_counter() - start)
     assert fastest < 0.2
+
+
+def test_date_and_clock_in_columns_of_their_own() -> None:
+    log = read("Date;Time;n_in [rpm]\n03.05.2024;23:59:59,9;1200\n04.05.2024;00:00:00,1;1201\n")
+    assert [channel.name for channel in log.channels] == ["n_in"]
+    assert log.channels[0].time == pytest.approx([0.0, 0.2], abs=1e-9)
+
+
+def test_a_unit_row_above_clock_times() -> None:
+    log = read("Zeit,n_in\nhh:mm:ss.ms,rpm\n00:00:01.00,1200\n00:00:01.01,1201\n")
+    assert log.channels[0].unit == "rpm"
+    assert log.channels[0].time == pytest.approx([0.0, 0.01])
+
+
+def test_a_broken_clock_time_is_told_with_its_line() -> None:
+    with pytest.raises(TimeError, match="line 3: 'noon' is no clock time"):
+        read("Time,n_in [rpm]\n12:00:00,1200\nnoon,1201\n")
+
+
+def test_names_and_units_in_comment_lines() -> None:
+    log = read("# logger 7, v2\n# time, n_in, te\n# s, rpm, Nm\n0.0,1200,5\n0.1,1201,6\n")
+    assert [(one.name, one.unit) for one in log.channels] == [("n_in", "rpm"), ("te", "Nm")]
+    log = read("% made by hand\n% time [s];n_in [rpm]\n0,0;1200\n0,1;1201\n")
+    assert [(one.name, one.unit) for one in log.channels] == [("n_in", "rpm")]
+    assert log.channels[0].time.tolist() == [0.0, 0.1]

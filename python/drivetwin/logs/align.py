@@ -28,6 +28,9 @@ _IN_GEAR = 0.01
 _LEAST_TIME = 1.0
 """So much time in gear [s] is needed for a statement."""
 
+_LONGEST = 100.0
+"""Points of the raster for each sample at most: beyond that the log is nearly all gap."""
+
 _SIGNIFICANT = 5.0
 """Standard deviations from which a delay is told ..."""
 
@@ -59,7 +62,7 @@ def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> De
     """
     start = max(faster.time[0], slower.time[0])
     end = min(faster.time[-1], slower.time[-1])
-    if end - start < _LEAST_TIME:
+    if not _LEAST_TIME <= end - start <= _LONGEST * max(faster.time.size, slower.time.size) * _GRID:
         return None
     time = np.arange(start, end, _GRID)
     width = round(_SMOOTH / _GRID)

@@ -39,6 +39,9 @@ _STUCK_SAMPLES = 10
 _STUCK_RELEASE = 8.0
 """A stuck signal jumps at its end by so many usual steps."""
 
+_BEFORE, _RESTLESS = 20, 5
+"""A signal stuck to the end was noisy until then: so many turns in so many last steps."""
+
 _CLIPPED_SAMPLES = 3
 _CLIPPED_RUNS = 3
 """A limit is reached in so many runs of so many equal samples."""
@@ -113,21 +116,21 @@ def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: floa
 
 
 def stuck(time: FloatArray, values: FloatArray) -> Damage | None:
-    """Stretches in which a varying signal repeats one number, then jumps; standstill is none."""
-    same = np.diff(values) == 0.0
-    moving = np.abs(np.diff(values))
+    """Stretches in which a varying signal repeats one number, then jumps or never moves again.
+
+    Standstill is none, nor a signal that comes to rest or starts from rest by itself.
+    """
+    steps = np.diff(values)
+    same, moving = steps == 0.0, np.abs(steps)
     usual = float(np.median(moving[~same])) if (~same).any() else np.inf
-    lengths = [end - start + 1 for start, end in runs(same)]
-    alone = values.size - sum(lengths)
-    fine = alone > 0.9 * values.size  # a signal whose numbers hardly ever repeat
     mask = np.zeros(values.size, np.bool_)
     for start, end in runs(same):
         if end - start < _STUCK_SAMPLES or time[end] - time[start] < _STUCK_TIME:
             continue
-        if values[start] == 0.0:
-            continue
-        jump = moving[end] if end < moving.size else 0.0
-        if fine or jump > _STUCK_RELEASE * usual:
+        released = end < moving.size and moving[end] > _STUCK_RELEASE * usual
+        turns = np.diff(np.sign(steps[max(0, start - _BEFORE) : start]))
+        froze = end == moving.size and np.count_nonzero(turns) >= _RESTLESS
+        if values[start] != 0.0 and (released or froze):
             mask[start + 1 : end + 1] = True
     if not mask.any():
         return None

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from importlib import import_module
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -31,19 +33,24 @@ def require(module: str, extra: str, kind: str, path: Path) -> Any:
 def foreign_parser(kind: str, path: Path) -> Iterator[None]:
     """Turn whatever a foreign parser raises on damaged bytes into FileFormatError.
 
-    Such parsers check little: a flipped bit shows as any exception at all. Their warnings would
-    not reach the user's report; what matters is told by the reader.
+    Such parsers check little: a flipped bit shows as any exception at all. What they print, warn
+    of, and complain about when a half-built object is freed would reach the user without any use.
     """
+    hook = sys.unraisablehook
     try:
-        with warnings.catch_warnings():
+        sys.unraisablehook = lambda _: None
+        with warnings.catch_warnings(), redirect_stdout(StringIO()):
             warnings.simplefilter("ignore")
             yield
     except DrivetwinError:
         raise
     except (Exception, MemoryError) as fault:
+        fault.__traceback__ = None  # frees what the parser built, while nobody listens
         text = " ".join(str(fault).split())[:120] or "no more is known"
         raise FileFormatError(
             f"{kind} cannot be read, it may be cut or damaged ({type(fault).__name__}: {text})",
             "record or export the log again",
             Where(file=str(path)),
         ) from None
+    finally:
+        sys.unraisablehook = hook

@@ -7,6 +7,7 @@ read. asammdf's own resampling and one-table export hold or invent values, so th
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -24,6 +25,8 @@ from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.units import time_factor
 
 _KIND = "an MDF file"
+_FINISHED = b"MDF     "
+_OPTIONS = {"process_bus_logging": False, "use_display_names": False}
 _MOST_INFLATION = 1100
 """Deflate packs zeros about 1030 to 1; a group that claims more than this is damaged."""
 
@@ -41,15 +44,20 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
     Raises MissingExtraError without asammdf, FileFormatError for a damaged file.
     """
     asammdf = require("asammdf", "mdf", _KIND, path)
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what matters becomes an error here
     check_blocks(path)
-    with foreign_parser(_KIND, path):
-        mdf = asammdf.MDF(path, process_bus_logging=False, use_display_names=False)
-    try:
+    with path.open("rb") as file:
+        finished = file.read(8) == _FINISHED
+        file.seek(0)
         with foreign_parser(_KIND, path):
-            recording = MdfRecording(mdf, path, options)
-        yield recording
-    finally:
-        mdf.close()
+            # An unfinished file is completed in a copy, which asammdf makes of a named file only.
+            mdf = asammdf.MDF(file if finished else path, **_OPTIONS)
+        try:
+            with foreign_parser(_KIND, path):
+                recording = MdfRecording(mdf, path, options)
+            yield recording
+        finally:
+            mdf.close()
 
 
 class MdfRecording:
@@ -58,6 +66,7 @@ class MdfRecording:
     def __init__(self, mdf: Any, path: Path, options: ReadOptions) -> None:
         self._mdf = mdf
         self._path = path
+        self._stamps: tuple[int, FloatArray] | None = None
         unit = options.time.unit
         self._factor = 1.0 if unit is None else time_factor(unit, Where(file=str(path)))
         self.warnings: tuple[str, ...] = ()
@@ -118,23 +127,29 @@ class MdfRecording:
         return RawChannel(column.name, column.unit, time, numbers, column.group, notes)
 
     def _time(self, group: int) -> FloatArray:
-        master: FloatArray = np.asarray(self._mdf.get_master(group), dtype=np.float64)
-        return master * self._factor
+        """Stamps [s] of a group; those of the last one stay in memory for its other channels."""
+        if self._stamps is None or self._stamps[0] != group:
+            master = np.asarray(self._mdf.get_master(group), dtype=np.float64)
+            self._stamps = (group, master * self._factor)
+        return self._stamps[1]
 
     def _samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any]:
-        """Values with the conversion of the file, of text tables the numbers before it."""
+        """Values with the conversion of the file, and the recorder's marks for invalid ones.
+
+        Of conversions into texts the numbers before them are taken.
+        """
         wanted = {
             "group": place.group,
             "index": place.index,
             "record_offset": first,
             "record_count": count,
-            "ignore_invalidation_bits": False,
+            "samples_only": True,
+            "ignore_invalidation_bits": True,  # marked samples are left out here, and counted
         }
-        signal = self._mdf.get(raw=False, **wanted)
-        if signal.samples.dtype.kind in "SUO":
-            signal = self._mdf.get(raw=True, **wanted)
-        bits = signal.invalidation_bits
-        return signal.samples, None if bits is None else np.asarray(bits, dtype=np.bool_)
+        samples, marks = self._mdf.get(raw=False, **wanted)
+        if samples.dtype.kind in "SUO":
+            samples, marks = self._mdf.get(raw=True, **wanted)
+        return samples, None if marks is None else np.asarray(marks, dtype=np.bool_)
 
     def _check_size(self, group: Any, name: str) -> None:
         """Refuse a group that claims more records than the file can hold, before it is loaded."""

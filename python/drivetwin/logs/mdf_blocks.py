@@ -10,12 +10,12 @@ from __future__ import annotations
 import mmap
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from drivetwin.errors import FileFormatError, Where
 
 _HEADER4 = 64
-_DEPTH = 16
 _MOST_INFLATION = 1100
 """Deflate packs zeros about 1030 to 1; a block that claims more is damaged."""
 
@@ -25,13 +25,13 @@ _LINKS4: dict[bytes, dict[int, bytes]] = {
     b"##CG": {0: b"##CG", 1: b"##CN"},
     b"##CN": {0: b"##CN", 1: b"", 4: b"##CC"},
     b"##CA": {0: b""},
-    b"##DL": {0: b"##DL"},
-    b"##HL": {0: b"##DL"},
 }
-"""By block: which of its links lead to which block (empty: any), MDF 4.
-
-A conversion may point at others and at texts; its references are walked as well.
+"""By block: which of its links lead to which block (empty: any), MDF 4; of a conversion all from
+the fifth on.
 """
+
+_FIXED, _VIRTUAL = (0, 2, 4, 5), (3, 6)
+"""Kinds of channels whose numbers stand in the record, and of those without numbers."""
 
 _LINKS3: dict[bytes, dict[int, bytes]] = {
     b"HD": {4: b"DG"},
@@ -62,75 +62,145 @@ def _fault(path: Path, what: str) -> FileFormatError:
     )
 
 
+@dataclass(frozen=True)
+class _Block:
+    """A block of an MDF 4 file: its kind, links, and where its own data start."""
+
+    place: int
+    kind: bytes
+    links: tuple[int, ...]
+    body: int
+    end: int
+
+
+def _block(data: mmap.mmap, place: int, expected: bytes) -> _Block | str:
+    """The block at a place, or what is wrong there."""
+    if place % 8 or place + 24 > len(data):
+        return f"a block should stand at byte {place} of {len(data)}"
+    kind = data[place : place + 4]
+    length, links = struct.unpack_from("<QQ", data, place + 8)
+    if (expected and kind != expected) or place + length > len(data) + 8:
+        return f"no sound {expected.decode() or 'block'} at byte {place}"
+    body = place + 24 + 8 * links
+    if body > place + length or body > len(data):
+        return f"the block at byte {place} claims {links} links in {length} bytes"
+    targets = struct.unpack_from(f"<{links}Q", data, place + 24)
+    return _Block(place, kind, targets, body, min(place + length, len(data)))
+
+
 def _walk4(data: mmap.mmap) -> Iterator[str]:
     """Problems of the chains of an MDF 4 file."""
     seen: set[int] = set()
-    waiting = [(_HEADER4, b"##HD", 0)]
+    waiting = [(_HEADER4, b"##HD", (0, 0))]
     while waiting:
-        place, expected, depth = waiting.pop()
-        if place in seen and expected == b"##CC":
+        place, expected, record = waiting.pop()
+        if place in seen and expected in (b"##CC", b""):
             continue  # channels may share a conversion
-        if place in seen or depth > _DEPTH * 1000:
+        if place in seen:
             yield f"blocks at byte {place} form a circle"
             return
         seen.add(place)
-        if place % 8 or place + 24 > len(data):
-            yield f"a block should stand at byte {place} of {len(data)}"
+        block = _block(data, place, expected)
+        if isinstance(block, str):
+            yield block
             return
-        kind = data[place : place + 4]
-        length, links = struct.unpack_from("<QQ", data, place + 8)
-        if (expected and kind != expected) or place + length > len(data) + 8:
-            yield f"no sound {expected.decode() or 'block'} at byte {place}"
-            return
-        if 24 + 8 * links > length:
-            yield f"the block at byte {place} claims {links} links in {length} bytes"
-            return
-        targets = struct.unpack_from(f"<{links}Q", data, place + 24)
-        if kind == b"##DG" and links > 2 and targets[2]:
-            yield from _data_block(data, targets[2])
-        wanted = _LINKS4.get(kind, {})
-        if kind == b"##CC" and links > 4:
-            wanted = dict.fromkeys(range(4, links), b"")
+        if block.kind == b"##DG":
+            yield from _data_group(data, block)
+        if block.kind == b"##CG":
+            record = _record(data, block)
+        if block.kind == b"##CN":
+            yield from _channel(data, block, record)
+        wanted = _LINKS4.get(block.kind, {})
+        if block.kind == b"##CC":
+            wanted = dict.fromkeys(range(4, len(block.links)), b"")
         waiting += [
-            (targets[index], block, depth + 1)
-            for index, block in wanted.items()
-            if index < links and targets[index] and not (kind == b"##CC" and targets[index] in seen)
+            (block.links[index], kind, record)
+            for index, kind in wanted.items()
+            if index < len(block.links) and block.links[index]
         ]
 
 
-def _data_block(data: mmap.mmap, place: int) -> Iterator[str]:
-    """Problems of the samples of a data group: raw, packed, or a list of such."""
+def _record(data: mmap.mmap, group: _Block) -> tuple[int, int]:
+    """Bytes of a record: of its numbers, and of its marks for invalid ones."""
+    if group.body + 32 > group.end:
+        return 0, 0
+    numbers, marks = struct.unpack_from("<II", data, group.body + 24)
+    return numbers, marks
+
+
+def _channel(data: mmap.mmap, block: _Block, record: tuple[int, int]) -> Iterator[str]:
+    """A channel must lie inside the record of its group."""
+    if block.body + 20 > block.end:
+        yield f"the channel at byte {block.place} is cut short"
+        return
+    kind, _, _, first_bit, first, bits, flags, mark = struct.unpack_from(
+        "<BBBBIIII", data, block.body
+    )
+    if kind in _VIRTUAL:
+        return
+    if kind in _FIXED and (first_bit > 7 or 8 * first + first_bit + bits > 8 * record[0]):
+        yield f"the channel at byte {block.place} lies outside its record of {record[0]} bytes"
+    elif flags & 2 and mark >= 8 * record[1]:
+        yield f"the channel at byte {block.place} has its mark outside the record"
+
+
+def _data_group(data: mmap.mmap, block: _Block) -> Iterator[str]:
+    """The samples must be as many as the one group of a sorted data group claims."""
+    if len(block.links) < 3:
+        yield f"the data group at byte {block.place} is cut short"
+        return
+    held = 0
+    if block.links[2]:
+        held, problem = _held(data, block.links[2])
+        if problem:
+            yield problem
+            return
+    group = _block(data, block.links[1], b"##CG") if block.links[1] else ""
+    if isinstance(group, str) or group.links[:1] != (0,) or group.body + 32 > group.end:
+        return  # none, or unsorted: records of several groups mix
+    records = struct.unpack_from("<Q", data, group.body + 8)[0]
+    needed = records * sum(_record(data, group))
+    if needed > held:
+        yield f"{records} records need {needed} bytes, the file holds {held}"
+
+
+def _held(data: mmap.mmap, place: int) -> tuple[int, str]:
+    """Bytes of samples in a data block, raw, packed or a list of such; and what is wrong."""
     lists: set[int] = set()
+    total = 0
     while place:
-        if place in lists or place + 40 > len(data):
-            yield f"the data list at byte {place} is cut or forms a circle"
-            return
+        if place in lists:
+            return 0, f"the data list at byte {place} forms a circle"
         lists.add(place)
-        kind = data[place : place + 4]
-        (links,) = struct.unpack_from("<Q", data, place + 16)
-        if place + 24 + 8 * links > len(data):
-            yield f"the data block at byte {place} claims {links} links"
-            return
-        targets = struct.unpack_from(f"<{links}Q", data, place + 24)
-        if kind == b"##HL" and links:
-            place = targets[0]
+        block = _block(data, place, b"")
+        if isinstance(block, str):
+            return 0, block
+        if block.kind == b"##HL" and block.links:
+            place = block.links[0]
             continue
-        parts = targets[1:] if kind == b"##DL" else (place,)
-        for part in parts:
-            if part:
-                yield from _packed(data, part)
-        place = targets[0] if kind == b"##DL" and links else 0
+        is_list = block.kind in (b"##DL", b"##LD")
+        for part in block.links[1:] if is_list else (place,):
+            size = _size(data, part) if part else 0
+            if isinstance(size, str):
+                return 0, size
+            total += size
+        place = block.links[0] if is_list and block.links else 0
+    return total, ""
 
 
-def _packed(data: mmap.mmap, place: int) -> Iterator[str]:
-    if place + 48 > len(data):
-        yield f"data should stand at byte {place} of {len(data)}"
-        return
-    if data[place : place + 4] != b"##DZ":
-        return
-    original, packed = struct.unpack_from("<QQ", data, place + 32)
-    if place + 48 + packed > len(data) or original > _MOST_INFLATION * packed + 1024:
-        yield f"packed data at byte {place} claim {original} bytes from {packed}"
+def _size(data: mmap.mmap, place: int) -> int | str:
+    """Bytes that a raw or packed data block holds, or what is wrong with it."""
+    block = _block(data, place, b"")
+    if isinstance(block, str):
+        return block
+    if block.kind != b"##DZ":
+        return block.end - block.body
+    if block.body + 24 > block.end:
+        return f"the packed data at byte {place} are cut short"
+    original, packed = struct.unpack_from("<QQ", data, block.body + 8)
+    if block.body + 24 + packed > len(data) or original > _MOST_INFLATION * packed + 1024:
+        return f"packed data at byte {place} claim {original} bytes from {packed}"
+    return int(original)
 
 
 def _walk3(data: mmap.mmap) -> Iterator[str]:

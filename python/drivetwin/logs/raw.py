@@ -26,7 +26,8 @@ class Column:
     """A column of a file by name, unit as written (None: none) and group.
 
     The group is what tells equal names apart: raster of a measurement file, message and sender on a
-    bus; blank where the format has none. `empty`: it is there but holds no number.
+    bus; blank where the format has none. `empty`: it holds too few numbers
+    for any role.
     """
 
     name: str

@@ -12,6 +12,8 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
+import numpy as np
+
 from drivetwin.errors import UnitError, Where
 from drivetwin.logs.shiftlog import FloatArray, Quantity
 
@@ -33,7 +35,8 @@ class Unit:
 
     def to_si(self, values: FloatArray) -> FloatArray:
         """Return `values` (n,) in SI."""
-        return self.factor * values + self.offset
+        with np.errstate(over="ignore"):  # a damaged number may become infinite: no number then
+            return self.factor * values + self.offset
 
 
 _SPELLINGS: dict[Quantity, dict[float, str]] = {
@@ -89,6 +92,7 @@ _TIME = {
     "us": 1e-6,
     "μs": 1e-6,
     "ns": 1e-9,
+    "ps": 1e-12,
     "min": 60.0,
     "h": 3600.0,
 }

@@ -25,6 +25,9 @@ MAX_WRAPS = 3
 SHORTEST_STEP, LONGEST_STEP = 1e-6, 0.9
 """Sample intervals [s] between which a channel can show a shift."""
 
+MAX_SPARSE = 100.0
+"""Time from first to last sample in units of samples times interval; more is mostly gap."""
+
 TYPICAL_STEP = (1e-4, 0.2)
 """Sample interval [s] that a proposed unit of time must lead to."""
 
@@ -160,9 +163,19 @@ def _check_count(channel: Channel, total: int, where: Where) -> None:
 
 
 def _check_rate(channel: Channel, where: Where) -> None:
-    """Refuse stamps in another unit than s: too far apart, or too close, for any shift log."""
+    """Refuse stamps that jump, or are in another unit than s: no shift log is sampled like that."""
+    if channel.quantity is Quantity.STATE:
+        return
     step = channel.step
-    if channel.quantity is Quantity.STATE or SHORTEST_STEP <= step <= LONGEST_STEP:
+    longest = int(np.diff(channel.time).argmax())
+    if channel.time[-1] - channel.time[0] > MAX_SPARSE * channel.time.size * step:
+        pause = float(channel.time[longest + 1] - channel.time[longest])
+        raise TimeError(
+            f"time jumps ahead by {pause:.6g} s between two samples",
+            "a damaged time stamp, or two recordings in one file: cut the log there",
+            Where(where.file, where.channel, float(channel.time[longest])),
+        )
+    if SHORTEST_STEP <= step <= LONGEST_STEP:
         return
     fitting = [
         unit

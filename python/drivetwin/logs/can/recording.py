@@ -20,6 +20,7 @@ from drivetwin.logs.j1939.identifier import group_of, sender_of
 from drivetwin.logs.j1939.transport import Assembled, reassemble
 from drivetwin.logs.raw import BusOptions, Column, RawChannel, Window
 from drivetwin.logs.shiftlog import FloatArray
+from drivetwin.logs.validate import MIN_SAMPLES
 
 
 @dataclass(frozen=True)
@@ -170,12 +171,12 @@ class BusRecording:
 
 
 def _marked(entry: _Entry) -> Column:
-    """The column, marked where a sender never fills the signal."""
+    """The column, marked where a sender never fills the signal, or hardly ever speaks."""
     try:
-        entry.decode()
+        few = entry.decode().time.size < MIN_SAMPLES
     except DamagedChannelError:
-        return replace(entry.column, empty=True)
-    return entry.column
+        few = True
+    return replace(entry.column, empty=few)
 
 
 def _sender(track: Track) -> str:

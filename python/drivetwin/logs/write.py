@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Logs to files that every reader here takes back: CSV, MDF 4, MATLAB, Parquet.
+
+Time bases and numbers come back as they were: a table row exists where any channel has a sample,
+and the others are empty there.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from drivetwin.errors import FileFormatError, Where
+from drivetwin.logs.extras import require
+from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.shiftlog import Channel, FloatArray, ShiftLog
+from drivetwin.logs.units import Unit, lookup
+
+_TIME = "time"
+
+
+def log_channels(log: ShiftLog) -> tuple[RawChannel, ...]:
+    """Return the channels of a log under their names and in the units of its file."""
+    return tuple(_as_recorded(channel) for channel in log.channels.values())
+
+
+def write_log(path: Path, channels: Sequence[RawChannel]) -> None:
+    """Write channels in the format of the suffix: .csv, .mf4, .mat or .parquet.
+
+    An existing file is replaced. Raises FileFormatError for another suffix or for names that repeat
+    or cannot stand in the format, MissingExtraError without the library of the format.
+    """
+    writer = _WRITERS.get(path.suffix.casefold())
+    where = Where(file=str(path))
+    if writer is None:
+        known = ", ".join(_WRITERS)
+        raise FileFormatError(f"no format is known by {path.suffix!r}", f"use {known}", where)
+    names = [channel.name for channel in channels]
+    if len(set(names)) < len(names) or _TIME in names:
+        raise FileFormatError("names repeat, or one is 'time'", "rename the channels", where)
+    writer(path, channels)
+
+
+def _as_recorded(channel: Channel) -> RawChannel:
+    unit = lookup(channel.source_unit) or Unit(1.0, 0.0, channel.quantity)
+    values = (channel.values - unit.offset) / unit.factor
+    return RawChannel(channel.source_name, channel.source_unit or None, channel.time, values)
+
+
+def _table(channels: Sequence[RawChannel]) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
+    """All stamps (n,), and for each channel its column (n,) with a mask (n,) of its samples."""
+    time = np.unique(np.concatenate([channel.time for channel in channels]))
+    columns, masks = [], []
+    for channel in channels:
+        place = np.searchsorted(time, channel.time)
+        column, mask = np.full(time.size, np.nan), np.zeros(time.size)
+        column[place], mask[place] = channel.values, 1.0
+        columns.append(column)
+        masks.append(mask)
+    return time, columns, masks
+
+
+def _write_csv(path: Path, channels: Sequence[RawChannel]) -> None:
+    time, columns, masks = _table(channels)
+    texts = [[repr(stamp) for stamp in time.tolist()]]
+    for column, mask in zip(columns, masks, strict=True):
+        cells = zip(column.tolist(), mask.tolist(), strict=True)
+        texts.append([_cell(value) if there else "" for value, there in cells])
+    names = [_TIME, *(channel.name for channel in channels)]
+    units = ["s", *(channel.unit or "" for channel in channels)]
+    rows = [_quoted(names), _quoted(units), *(",".join(row) for row in zip(*texts, strict=True))]
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+
+
+def _cell(value: float) -> str:
+    return repr(value) if np.isfinite(value) else "NaN"
+
+
+def _quoted(cells: Sequence[str]) -> str:
+    return ",".join(
+        '"' + cell.replace('"', '""') + '"' if re.search('[,"]', cell) else cell for cell in cells
+    )
+
+
+def _write_parquet(path: Path, channels: Sequence[RawChannel]) -> None:
+    require("pyarrow", "io", "a Parquet file", path)
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    time, columns, masks = _table(channels)
+    fields = [pa.field(_TIME, pa.float64(), metadata={"unit": "s"})]
+    arrays = [pa.array(time)]
+    for channel, column, mask in zip(channels, columns, masks, strict=True):
+        metadata = {"unit": channel.unit} if channel.unit else {}
+        fields.append(pa.field(channel.name, pa.float64(), metadata=metadata))
+        arrays.append(pa.array(column, mask=mask == 0.0))
+    units = {channel.name: channel.unit for channel in channels if channel.unit}
+    schema = pa.schema(fields, metadata={"units": json.dumps(units)})
+    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), path)
+
+
+def _write_mat(path: Path, channels: Sequence[RawChannel]) -> None:
+    from scipy.io import savemat
+
+    content: dict[str, object] = {}
+    for channel in channels:
+        if not re.fullmatch(r"[A-Za-z]\w{0,57}", channel.name, re.ASCII):
+            raise FileFormatError(
+                f"{channel.name!r} is no variable name in MATLAB", "rename it", Where(str(path))
+            )
+        content[channel.name] = channel.values
+        content[f"{channel.name}_t"] = channel.time
+        if channel.unit:
+            content[f"{channel.name}_unit"] = channel.unit
+    savemat(path, content, long_field_names=True, do_compression=True)
+
+
+def _write_mf4(path: Path, channels: Sequence[RawChannel]) -> None:
+    asammdf = require("asammdf", "mdf", "an MDF file", path)
+    groups: dict[bytes, list[RawChannel]] = {}
+    for channel in channels:
+        groups.setdefault(channel.time.tobytes(), []).append(channel)
+    with asammdf.MDF(version="4.10") as mdf:
+        for number, group in enumerate(groups.values(), start=1):
+            signals = [
+                asammdf.Signal(
+                    samples=channel.values,
+                    timestamps=channel.time,
+                    name=channel.name,
+                    unit=channel.unit or "",
+                )
+                for channel in group
+            ]
+            mdf.append(signals, acq_name=f"raster {number}", common_timebase=True)
+        mdf.save(path, overwrite=True, compression=1)
+
+
+_WRITERS: dict[str, Callable[[Path, Sequence[RawChannel]], None]] = {
+    ".csv": _write_csv,
+    ".mf4": _write_mf4,
+    ".mat": _write_mat,
+    ".parquet": _write_parquet,
+}

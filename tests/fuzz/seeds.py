@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT
+"""One sound file of every format, small, made here."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.shiftlog import FloatArray
+from drivetwin.logs.write import write_log
+from tests.logs.made import UNITS, columns
+
+
+def channels() -> list[RawChannel]:
+    """The small upshift of the reader tests."""
+    table = columns()
+    time = table.pop("time")
+    return [RawChannel(name, UNITS[name], time, values) for name, values in table.items()]
+
+
+def _written(suffix: str) -> Callable[[Path], bytes]:
+    def make(folder: Path) -> bytes:
+        path = folder / f"seed{suffix}"
+        write_log(path, channels())
+        return path.read_bytes()
+
+    return make
+
+
+def _mdf3(folder: Path) -> bytes:
+    import asammdf
+
+    with warnings.catch_warnings(), asammdf.MDF(version="3.30") as mdf:
+        warnings.simplefilter("ignore")
+        mdf.append(
+            [
+                asammdf.Signal(
+                    samples=one.values, timestamps=one.time, name=one.name, unit=one.unit or ""
+                )
+                for one in channels()
+            ]
+        )
+        return Path(mdf.save(folder / "seed.mdf", overwrite=True)).read_bytes()
+
+
+def _mat73(folder: Path) -> bytes:
+    import h5py
+
+    path = folder / "seed73.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for one in channels():
+            for name, values in ((one.name, one.values), (f"{one.name}_t", one.time)):
+                data = file.create_dataset(name, data=values[:, None])
+                data.attrs["MATLAB_class"] = np.bytes_("double")
+            text = np.array([ord(letter) for letter in one.unit or "-"], np.uint16)
+            unit = file.create_dataset(f"{one.name}_unit", data=text[:, None])
+            unit.attrs["MATLAB_class"] = np.bytes_("char")
+            unit.attrs["MATLAB_int_decode"] = np.int32(2)
+    body = bytearray(path.read_bytes())
+    head = b"MATLAB 7.3 MAT-file, Platform: any, Created on: any HDF5 schema 1.00 ."
+    body[:128] = head.ljust(116) + bytes(8) + b"\x00\x02IM"
+    return bytes(body)
+
+
+def frames() -> list[tuple[float, int, bytes]]:
+    """2 s of ETC1, EEC1, EEC3 and one EC1 by BAM: time [s], identifier, data."""
+    table = columns()
+    sent: list[tuple[float, int, bytes]] = []
+    rows = zip(table["time"], table["SpdIn"], table["SpdOut"], table["EngTrq"], strict=True)
+    for time, inlet, outlet, torque in rows:
+        speeds = struct.pack("<BHBBHB", 0xC5, _code(outlet), 0xFF, 0xFF, _code(inlet), 0x03)
+        sent.append((time, 0x0CF00203, speeds))
+        engine = struct.pack("<BBBHBBB", 0x01, 0xFF, _percent(torque), _code(inlet), 0, 0xFF, 0xFF)
+        sent.append((time + 0.002, 0x0CF00400, engine))
+        sent.append((time + 0.003, 0x18FEDF00, bytes([135, *(7 * [0xFF])])))
+    ec1 = bytes(19) + struct.pack("<H", 2000) + bytes(13)
+    sent.append((0.5005, 0x1CECFF00, struct.pack("<BHBB3s", 32, 34, 5, 255, b"\xe3\xfe\x00")))
+    parts = [ec1[7 * k : 7 * k + 7].ljust(7, b"\xff") for k in range(5)]
+    sent += [(0.55 + 0.05 * k, 0x1CEBFF00, bytes([k + 1]) + part) for k, part in enumerate(parts)]
+    return sorted(sent)
+
+
+def _code(speed: float | FloatArray) -> int:
+    return round(float(speed) / 0.125)
+
+
+def _percent(torque: float | FloatArray) -> int:
+    return round(float(torque) / 20.0) + 125
+
+
+def candump(spaced: bool) -> bytes:
+    """The frames as candump writes them for people, or packed."""
+    lines = []
+    for time, identifier, data in frames():
+        if spaced:
+            text = data.hex(" ").upper()
+            lines.append(f" ({time:010.6f})  can0  {identifier:08X}   [{len(data)}]  {text}")
+        else:
+            lines.append(f"({1.7e9 + time:.6f}) can0 {identifier:08X}#{data.hex().upper()}")
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _vector(suffix: str) -> Callable[[Path], bytes]:
+    def make(folder: Path) -> bytes:
+        import can
+
+        path = folder / f"seed{suffix}"
+        writer = can.ASCWriter(str(path)) if suffix == ".asc" else can.BLFWriter(str(path))
+        with writer:
+            for time, identifier, data in frames():
+                writer.on_message_received(
+                    can.Message(
+                        timestamp=1.7e9 + time, arbitration_id=identifier, data=data, channel=0
+                    )
+                )
+        return path.read_bytes()
+
+    return make
+
+
+SEEDS: dict[str, Callable[[Path], bytes]] = {
+    "csv": _written(".csv"),
+    "mf4": _written(".mf4"),
+    "mdf3": _mdf3,
+    "mat": _written(".mat"),
+    "mat73": _mat73,
+    "parquet": _written(".parquet"),
+    "candump": lambda _: candump(spaced=True),
+    "candump-L": lambda _: candump(spaced=False),
+    "asc": _vector(".asc"),
+    "blf": _vector(".blf"),
+}
+"""By format: the bytes of a sound file, written in the folder given."""

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""Delay and drift between speeds: found where the acceleration changes, silent where not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.logs.align import clock_warnings, speed_delay
+from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
+from tests.logs.made import card
+
+RATIOS = [1.8, 1.4]
+SEED = 3
+
+
+def output(time: FloatArray) -> FloatArray:
+    """A speed with changing acceleration: a ramp with surge."""
+    return 80.0 + 2.0 * time + 3.0 * np.sin(2.0 * np.pi * 0.7 * time)
+
+
+def channel(role: str, time: FloatArray, values: FloatArray) -> Channel:
+    noise = np.random.default_rng(SEED).normal(0.0, 0.05, time.size)
+    return Channel(role, Quantity.SPEED, time, values + noise, role, "rad/s")
+
+
+def pair(delay: float, drift: float = 0.0, off: float = 1.0) -> tuple[Channel, Channel]:
+    """Input speed in 2nd and 3rd gear, and the output speed whose stamps are late."""
+    time = np.arange(0.0, 8.0, 0.01)
+    ratio = np.where(time < 4.0, RATIOS[0], RATIOS[1]) * off
+    late = time + delay + drift * (time - 4.0)
+    return channel("input_speed", time, ratio * output(time)), channel(
+        "output_speed", late, output(time)
+    )
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.03, -0.02])
+@pytest.mark.parametrize("off", [1.0, 1.003])
+def test_the_delay_is_found_whether_or_not_the_ratio_is_exact(delay: float, off: float) -> None:
+    found = speed_delay(*pair(delay, off=off), RATIOS)
+    assert found is not None
+    assert found.value == pytest.approx(delay, abs=max(4.0 * found.sigma, 1e-3))
+    assert found.sigma < 2e-3
+    assert abs(found.drift) < 5.0 * found.drift_sigma + 1e-4
+
+
+def test_drift_is_found() -> None:
+    found = speed_delay(*pair(0.0, drift=0.004), RATIOS)
+    assert found is not None
+    assert found.drift == pytest.approx(0.004, abs=max(4.0 * found.drift_sigma, 4e-4))
+
+
+def test_a_delay_is_told_with_the_mapping_that_cures_it(tmp_path: Path) -> None:
+    faster, slower = pair(0.03)
+    channels = {one.role: one for one in (faster, slower)}
+    (text,) = clock_warnings(channels, card(tmp_path))
+    assert "'output_speed' is 29.8 ms late against 'input_speed'" in text
+    assert "channels.output_speed.time_shift_s = -0.0298" in text
+    faster, slower = pair(0.0)
+    assert clock_warnings({one.role: one for one in (faster, slower)}, card(tmp_path)) == []
+
+
+def test_clocks_that_drift_apart_are_told(tmp_path: Path) -> None:
+    faster, slower = pair(0.0, drift=0.004)
+    texts = clock_warnings({one.role: one for one in (faster, slower)}, card(tmp_path))
+    assert any("drift apart by" in text for text in texts)
+
+
+def test_steady_driving_tells_no_delay() -> None:
+    time = np.arange(0.0, 8.0, 0.01)
+    steady = channel("output_speed", time + 0.05, np.full(time.size, 80.0) + time)
+    found = speed_delay(channel("input_speed", time, 1.8 * (80.0 + time)), steady, RATIOS)
+    assert found is None or abs(found.value) < 5.0 * found.sigma
+
+
+def test_no_gear_held_tells_nothing() -> None:
+    time = np.arange(0.0, 8.0, 0.01)
+    faster = channel("input_speed", time, 2.5 * output(time))
+    assert speed_delay(faster, channel("output_speed", time, output(time)), RATIOS) is None

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""Spikes, stuck and saturated signals are found; sound ones of any shape are left alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivetwin.logs.damage import clipped, missing, runs, spikes, stuck
+from drivetwin.logs.shiftlog import FloatArray, Quantity
+
+TIME = np.arange(0.0, 4.0, 0.002)
+
+
+def speed(seed: int = 1, noise: float = 0.3) -> FloatArray:
+    """An upshift: ramp, fall within 0.3 s, ramp; with noise."""
+    fall = np.clip((TIME - 2.0) / 0.3, 0.0, 1.0)
+    return (120.0 + 8.0 * TIME - 35.0 * fall) + np.random.default_rng(seed).normal(
+        0.0, noise, TIME.size
+    )
+
+
+def torque() -> FloatArray:
+    """A torque with hole, step and a lightly damped 12 Hz oscillation after lock-up."""
+    after = np.clip(TIME - 2.3, 0.0, None)
+    ring = np.where(after > 0.0, 900.0 * np.exp(-3.0 * after) * np.cos(75.0 * after), 0.0)
+    hole = np.where((TIME > 1.8) & (TIME < 2.0), -1500.0, 0.0)
+    return 2500.0 + hole + ring + np.random.default_rng(2).normal(0.0, 8.0, TIME.size)
+
+
+@pytest.mark.parametrize("quantity", [Quantity.SPEED, Quantity.TORQUE])
+@pytest.mark.parametrize("step", [1, 5, 10])
+def test_sound_signals_have_no_spikes(quantity: Quantity, step: int) -> None:
+    for values in (speed(), torque(), np.round(speed()), np.round(torque(), -1)):
+        assert spikes(TIME[::step], values[::step], quantity) is None
+
+
+def test_a_held_signal_has_no_spikes() -> None:
+    held = np.repeat(np.round(torque()[::10], -1), 10)
+    assert spikes(TIME, held, Quantity.TORQUE) is None
+
+
+@pytest.mark.parametrize("width", [1, 2])
+@pytest.mark.parametrize("height", [60.0, -120.0])
+def test_spikes_are_found_to_the_sample(width: int, height: float) -> None:
+    values = speed()
+    for start in (300, 1030, 1700):
+        values[start : start + width] += height
+    found = spikes(TIME, values, Quantity.SPEED)
+    assert found is not None
+    assert runs(found.mask) == [(start, start + width) for start in (300, 1030, 1700)]
+    assert found.text.startswith("3 spikes left out, ")
+
+
+def test_torque_may_move_for_longer_than_a_spike() -> None:
+    time = TIME * 10.0  # 20 ms: one sample of torque reduction is no spike
+    values = torque()
+    values[300] -= 2000.0
+    assert spikes(time, values, Quantity.TORQUE) is None
+
+
+def test_a_stuck_signal_is_found_until_it_jumps() -> None:
+    values = np.round(speed() * 8.0) / 8.0
+    values[400:700] = values[400]
+    found = stuck(TIME, values)
+    assert found is not None
+    assert runs(found.mask) == [(401, 700)]
+    assert "from 0.802 s to 1.398 s" in found.text
+
+
+def test_a_fine_signal_that_stays_to_the_end_is_stuck() -> None:
+    values = speed()
+    values[1500:] = values[1500]
+    found = stuck(TIME, values)
+    assert found is not None
+    assert runs(found.mask) == [(1501, TIME.size)]
+
+
+def test_a_coarse_signal_in_steady_driving_is_not_stuck() -> None:
+    values = np.round(120.0 + 0.4 * TIME)
+    assert stuck(TIME, values) is None
+    assert stuck(TIME, np.zeros(TIME.size)) is None
+
+
+def test_a_signal_without_noise_may_rest() -> None:
+    rest = np.where((TIME > 1.0) & (TIME < 2.5), 40.0 * np.sin(2.0 * (TIME - 1.0)), 0.0)
+    rest = 100.0 + np.where(TIME >= 2.5, 40.0 * np.sin(3.0), rest)
+    settling = 100.0 + np.round(50.0 * np.exp(-8.0 * TIME), 6)
+    for values in (rest, settling):
+        assert stuck(TIME, values) is None
+
+
+def test_standstill_is_not_stuck() -> None:
+    values = np.where(TIME < 1.0, 0.0, speed())
+    assert stuck(TIME, values) is None
+
+
+def test_saturation_is_found() -> None:
+    values = np.minimum(torque(), 2900.0)
+    found = clipped(TIME, values)
+    assert found is not None
+    assert np.array_equal(found.mask, _rests(values == 2900.0))
+    assert "saturated at one number" in found.text
+    assert clipped(TIME, torque()) is None
+    assert clipped(TIME, np.round(torque(), -1)) is None
+
+
+def _rests(mask: np.typing.NDArray[np.bool_]) -> np.typing.NDArray[np.bool_]:
+    """Only stretches of three or more."""
+    kept = np.zeros(mask.size, np.bool_)
+    for start, end in runs(mask):
+        kept[start:end] = end - start >= 3
+    return kept
+
+
+def test_missing_numbers_are_told_by_span() -> None:
+    values = speed()
+    values[100:200] = np.nan
+    found = missing(TIME, values)
+    assert found is not None
+    assert found.text == "no number from 0.2 s to 0.398 s"
+
+
+@given(st.lists(st.booleans(), max_size=60))
+def test_runs_cover_exactly_what_is_true(flags: list[bool]) -> None:
+    mask = np.array(flags, np.bool_)
+    rebuilt = np.zeros(mask.size, np.bool_)
+    for start, end in runs(mask):
+        assert start < end
+        rebuilt[start:end] = True
+    assert np.array_equal(rebuilt, mask)

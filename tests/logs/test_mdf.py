@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT
+"""MDF 3 and 4: each group on its own time base, nothing resampled, damage typed."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import asammdf
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from drivetwin.errors import DamagedChannelError, FileFormatError, MissingExtraError
+from drivetwin.logs.formats import open_recording
+from drivetwin.logs.raw import Column, RawChannel, ReadOptions, TimeColumn
+from drivetwin.logs.read import read_log, read_raw
+from drivetwin.logs.shiftlog import FloatArray
+from drivetwin.vehicle.card import load_card
+
+ROOT = Path(__file__).resolve().parents[2]
+TRUCK_B = ROOT.parent / "shared" / "logs" / "truck_b.mf4"
+
+
+def save(path: Path, groups: Sequence[tuple[str, Sequence[asammdf.Signal]]], version: str) -> Path:
+    with warnings.catch_warnings(), asammdf.MDF(version=version) as mdf:
+        warnings.simplefilter("ignore")
+        for name, signals in groups:
+            mdf.append(list(signals), acq_name=name)
+        return Path(mdf.save(path, overwrite=True))
+
+
+def signal(name: str, time: FloatArray, values: NDArray[Any], unit: str = "Nm") -> asammdf.Signal:
+    return asammdf.Signal(samples=values, timestamps=time, name=name, unit=unit)
+
+
+SLOW = np.arange(0.0004, 2.0, 0.02)
+FAST = np.arange(0.0, 2.0, 0.001)
+
+
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_groups_keep_their_time_bases(tmp_path: Path, version: str) -> None:
+    groups = [
+        ("slow", [signal("te", SLOW, SLOW * 3.0)]),
+        ("fast", [signal("to", FAST, FAST**2), signal("p", FAST, FAST, "bar")]),
+    ]
+    raw = read_raw(save(tmp_path / f"log{version}.mdf", groups, version))
+    found = {channel.name: channel for channel in raw.channels}
+    assert {name: one.unit for name, one in found.items()} == {"te": "Nm", "to": "Nm", "p": "bar"}
+    assert np.array_equal(found["te"].time, SLOW)
+    assert np.array_equal(found["te"].values, SLOW * 3.0)
+    assert np.array_equal(found["to"].time, FAST)
+    assert np.array_equal(found["to"].values, FAST**2)
+
+
+def test_equal_names_are_told_apart_by_group(tmp_path: Path) -> None:
+    groups = [
+        ("10ms task", [signal("n", FAST, FAST, "rpm")]),
+        ("100ms", [signal("n", SLOW, SLOW, "rpm")]),
+    ]
+    raw = read_raw(save(tmp_path / "log.mf4", groups, "4.10"))
+    assert [(one.group, one.time.size) for one in raw.named("n")] == [
+        ("10ms task", FAST.size),
+        ("100ms", SLOW.size),
+    ]
+
+
+def test_a_window_reads_only_its_records(tmp_path: Path) -> None:
+    path = save(tmp_path / "log.mf4", [("g", [signal("x", FAST, FAST)])], "4.10")
+    with open_recording(path) as recording:
+        part = recording.load(0, (0.5, 1.0))
+    inside = FAST[(FAST >= 0.5) & (FAST <= 1.0)]
+    assert np.array_equal(part.time, inside)
+    assert np.array_equal(part.values, inside)
+
+
+def test_samples_marked_invalid_are_left_out_and_told(tmp_path: Path) -> None:
+    marked = asammdf.Signal(
+        samples=FAST, timestamps=FAST, name="x", unit="Nm",
+        invalidation_bits=np.arange(FAST.size) % 4 == 1,
+    )  # fmt: skip
+    channel = read_raw(save(tmp_path / "log.mf4", [("g", [marked])], "4.10")).channels[0]
+    assert channel.time.size == FAST.size - FAST.size // 4
+    assert channel.notes == (f"{FAST.size // 4} samples that the recorder marks invalid left out",)
+
+
+def test_texts_are_no_numbers(tmp_path: Path) -> None:
+    text = asammdf.Signal(
+        samples=np.array([b"on", b"off"] * 50), timestamps=SLOW, name="state", encoding="utf-8"
+    )
+    path = save(tmp_path / "log.mf4", [("g", [text, signal("x", SLOW, SLOW)])], "4.10")
+    raw = read_raw(path)
+    assert [one.name for one in raw.channels] == ["x"]
+    assert "holds text" in raw.unreadable["state (g)"]
+    with open_recording(path) as recording, pytest.raises(DamagedChannelError, match="holds text"):
+        recording.load(recording.columns.index(Column("state", None, "g")))
+
+
+def test_the_unit_of_time_can_be_asserted(tmp_path: Path) -> None:
+    path = save(tmp_path / "log.mf4", [("g", [signal("x", FAST * 1e12, FAST)])], "4.10")
+    options = ReadOptions(TimeColumn(unit="ps"))
+    assert read_raw(path, options).channels[0].time == pytest.approx(FAST)
+
+
+def test_without_the_library_the_install_command_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = save(tmp_path / "log.mf4", [("g", [signal("x", FAST, FAST)])], "4.10")
+    monkeypatch.setitem(sys.modules, "asammdf", None)
+    with pytest.raises(MissingExtraError) as caught:
+        read_raw(path)
+    assert caught.value.remedy == 'pip install "drivetwin[mdf]"'
+
+
+@pytest.mark.parametrize("keep", [20, 64, 100, 200, 600, 3000])
+def test_a_cut_file_is_told(tmp_path: Path, keep: int) -> None:
+    path = save(tmp_path / "log.mf4", [("g", [signal("x", FAST, FAST)])], "4.10")
+    path.write_bytes(path.read_bytes()[:keep])
+    with pytest.raises(FileFormatError, match="cut or damaged") as caught:
+        read_raw(path)
+    assert caught.value.remedy
+
+
+def test_a_circle_of_blocks_is_told(tmp_path: Path) -> None:
+    path = save(tmp_path / "log.mf4", [("g", [signal("x", FAST, FAST)])], "4.10")
+    data = bytearray(path.read_bytes())
+    first = int.from_bytes(data[88:96], "little")  # first link of the header: the data group
+    data[first + 24 : first + 32] = first.to_bytes(8, "little")  # whose next is itself
+    path.write_bytes(data)
+    with pytest.raises(FileFormatError, match=f"blocks at byte {first} form a circle"):
+        read_raw(path)
+
+
+@given(
+    rows=st.lists(
+        st.tuples(st.floats(1e-3, 10.0), st.floats(-1e6, 1e6), st.integers(0, 255)),
+        min_size=1, max_size=30,
+    ),
+    compressed=st.booleans(),
+)  # fmt: skip
+@settings(
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_round_trip(tmp_path: Path, rows: list[tuple[float, float, int]], compressed: bool) -> None:
+    time = np.cumsum([row[0] for row in rows])
+    numbers, gear = np.array([row[1] for row in rows]), np.array([row[2] for row in rows], np.uint8)
+    path = tmp_path / "log.mf4"
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([signal("x", time, numbers), signal("gear", time, gear, "")], acq_name="g")
+        mdf.save(path, overwrite=True, compression=1 if compressed else 0)
+    channels: tuple[RawChannel, ...] = read_raw(path).channels
+    assert [(one.name, one.unit) for one in channels] == [("x", "Nm"), ("gear", None)]
+    for channel, values in zip(channels, (numbers, gear), strict=True):
+        assert np.array_equal(channel.time, time)
+        assert np.array_equal(channel.values, values)
+
+
+def test_a_recorded_log_with_german_names_and_three_time_bases() -> None:
+    if not TRUCK_B.exists():
+        pytest.skip("the shared logs are not beside the repository")
+    log = read_log(TRUCK_B, load_card(ROOT / "examples" / "vehicles" / "truck_b.toml"))
+    assert {role: one.source_name for role, one in log.channels.items()} == {
+        "engine_torque": "MMot_Ist_c",
+        "output_torque": "MAbtr_Mess",
+        "input_speed": "nGetrEin",
+        "output_speed": "nGetrAus",
+        "wheel_speed": "nRad",
+        "pressure.B2": "pB2",
+        "pressure.B3": "pB3",
+        "pressure.K2": "pK2",
+    }
+    assert log["engine_torque"].time[0] == 0.0004
+    assert {one.time.size for one in log.channels.values()} == {1200, 12000}
+    assert log["input_speed"].values[0] == pytest.approx(
+        log["output_speed"].values[0] * 1.91, rel=5e-3
+    )
+    assert log.warnings == ()

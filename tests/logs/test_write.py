@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""One log in every format reads back as the same log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import FileFormatError
+from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.read import read_log, read_raw
+from drivetwin.logs.write import log_channels, write_log
+from drivetwin.vehicle.card import load_card
+from tests.logs.made import card, columns, write
+
+ROOT = Path(__file__).resolve().parents[2]
+SHARED = ROOT.parent / "shared"
+SUFFIXES = [".csv", ".mf4", ".mat", ".parquet"]
+
+
+def channels() -> list[RawChannel]:
+    """Three time bases that share some stamps, one channel with a missing number."""
+    stamps = np.array([0.0004 + 0.02 * k for k in range(100)])
+    slow = RawChannel("te", "Nm", stamps, np.linspace(100.0, 900.0, 100))
+    time = np.array([0.01 * k for k in range(200)])
+    fast = RawChannel("n_in", "1/min", time, 1500.0 + np.sin(time))
+    speed = RawChannel("n_ab", "U/min", time, np.where(time == 0.5, np.nan, 800.0 + time))
+    plain = RawChannel("x", None, time[::3], time[::3] / 3.0)
+    return [slow, fast, speed, plain]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_columns_return_bit_by_bit(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"log{suffix}"
+    write_log(path, channels())
+    read = {channel.name: channel for channel in read_raw(path).channels}
+    assert set(read) == {"te", "n_in", "n_ab", "x"}
+    for sent in channels():
+        got = read[sent.name]
+        assert got.unit == sent.unit
+        assert np.array_equal(got.time, sent.time)
+        assert np.array_equal(got.values, sent.values, equal_nan=True)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_shift_log_is_the_same_in_every_format(tmp_path: Path, suffix: str) -> None:
+    first = read_log(write(tmp_path, columns()), card(tmp_path))
+    path = tmp_path / f"again{suffix}"
+    write_log(path, log_channels(first))
+    again = read_log(path, card(tmp_path))
+    assert set(again.channels) == set(first.channels)
+    for role, channel in first.channels.items():
+        assert np.array_equal(again[role].time, channel.time)
+        assert again[role].values == pytest.approx(channel.values, rel=1e-14)
+        assert again[role].held == channel.held
+    assert again.warnings == first.warnings
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_recorded_log_is_the_same_in_every_format(tmp_path: Path, suffix: str) -> None:
+    source = SHARED / "logs" / "truck_b.mf4"
+    if not source.exists():
+        pytest.skip("the shared logs are not beside the repository")
+    vehicle = load_card(ROOT / "examples" / "vehicles" / "truck_b.toml")
+    first = read_log(source, vehicle)
+    path = tmp_path / f"again{suffix}"
+    write_log(path, log_channels(first))
+    again = read_log(path, vehicle)
+    for role, channel in first.channels.items():
+        assert np.array_equal(again[role].time, channel.time)
+        assert again[role].values == pytest.approx(channel.values, rel=1e-14, abs=1e-9)
+
+
+def test_what_a_format_cannot_hold_is_refused(tmp_path: Path) -> None:
+    one = channels()[0]
+    with pytest.raises(FileFormatError, match=r"no format is known by '\.xls'"):
+        write_log(tmp_path / "log.xls", [one])
+    with pytest.raises(FileFormatError, match="names repeat"):
+        write_log(tmp_path / "log.csv", [one, one])
+    odd = RawChannel("n ab", "rpm", one.time, one.values)
+    with pytest.raises(FileFormatError, match="'n ab' is no variable name in MATLAB"):
+        write_log(tmp_path / "log.mat", [odd])

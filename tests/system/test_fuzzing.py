@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: MIT
+"""A short run of the fuzzing that `make fuzz` does at length."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.mutate import mutate
+from tests.fuzz.run import outcome
+from tests.fuzz.seeds import SEEDS
+
+COUNT = 60
+
+
+def test_the_same_seed_damages_the_same() -> None:
+    data = bytes(range(256)) * 20
+    assert mutate(data, 7) == mutate(data, 7)
+    assert len({mutate(data, seed) for seed in range(50)}) == 50
+
+
+@pytest.mark.parametrize("name", SEEDS)
+def test_damaged_files_give_a_log_or_a_typed_error(name: str, tmp_path: Path) -> None:
+    whole = SEEDS[name](tmp_path)
+    path = tmp_path / "damaged.log"
+    path.write_bytes(whole)
+    assert outcome(path, tmp_path).startswith("log")
+    outcomes = set()
+    for seed in range(COUNT):
+        path.write_bytes(mutate(whole, seed))
+        outcomes.add(outcome(path, tmp_path))
+    assert outcomes - {"log"}, "no damage was noticed at all"
