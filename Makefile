@@ -59,6 +59,10 @@ wheel: $(venv)/.dev ## the abi3 wheel, into dist/
 test-wheel: wheel ## run the demo from the wheel where there is no Rust
 	tools/try_wheel.sh $(bin)/python dist/drivetwin-*.whl
 
+.PHONY: reference
+reference: $(venv)/.native ## solve the reference problems anew with SciPy
+	$(bin)/python -m reference
+
 .PHONY: bench
 bench: $(venv)/.native ## measure what has a stated limit
 	for program in benchmarks/*.py; do $(bin)/python "$$program"; done

@@ -30,7 +30,7 @@ class March:
         self.t = 0.0
         self.x: Array = np.array(state, dtype=np.float64)
         self.instants = instants
-        self.observed: list[Array] = []
+        self.observed: list[list[float]] = []
 
     def advance(
         self,
@@ -73,11 +73,12 @@ class March:
             events=[_closing(gap) for gap in gaps],
         )
         self.t, self.x = float(done.t[-1]), done.y[:, -1]
+        assert done.sol is not None
         while len(self.observed) < self.instants.size:
             instant = float(self.instants[len(self.observed)])
             if instant > self.t:
                 break
-            self.observed.append(np.array(observe(instant, done.sol(instant))))
+            self.observed.append([float(v) for v in observe(instant, done.sol(instant))])
         fired = [i for i, times in enumerate(done.t_events or []) if times.size]
         return fired[0] if fired else None
 

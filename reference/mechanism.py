@@ -97,10 +97,8 @@ class Mechanism:
         return self.peak * np.array(self.capacity(t, np.zeros(len(self.elements))))
 
 
-def solve(
-    system: Mechanism, instants: Array, outputs: dict[Column, Observation]
-) -> Solution:
-    """Solve to the last knot. """
+def solve(system: Mechanism, instants: Array, outputs: dict[Column, Observation]) -> Solution:
+    """Solve to the last knot."""
     march = March([*system.start[0], *system.start[1]], instants)
     changes: list[Change] = []
     modes: Modes = tuple(None for _ in system.elements)

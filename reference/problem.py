@@ -95,7 +95,7 @@ def _states(start: Start) -> list[Output]:
 
 def _end_state(start: Start, part: NetworkRun) -> Start:
     """What a phase leaves to the next."""
-    locked = {name: True for name in start.locked}
+    locked = dict.fromkeys(start.locked, True)
     for event in part.events:
         locked[event.element] = event.kind == "lock"
     return Start(

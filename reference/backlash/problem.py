@@ -30,10 +30,10 @@ PROBLEM = Problem(
     start=Start({"loose": 0.0, "tight": 0.0}, {"play": math.pi / 2, "shaft": math.pi / 2}),
     time=np.linspace(0.0, 1.0, 201),
     tolerance={
-        ("speed", "loose"): 1e-8,
-        ("twist", "play"): 1e-9,
-        ("speed", "tight"): 1e-8,
-        ("twist", "shaft"): 1e-9,
-        ("shaft_torque", "play"): 1e-5,
+        ("speed", "loose"): 1e-9,
+        ("twist", "play"): 1e-10,
+        ("speed", "tight"): 1e-9,
+        ("twist", "shaft"): 1e-10,
+        ("shaft_torque", "play"): 1e-6,
     },
 )

@@ -26,7 +26,6 @@ SYNCHRONOUS = 1.0
 FILL_ENDS = 2.5 + 0.8 * P_0 / 8e5
 
 
-
 def _target(t: float, engine: float) -> float:
     rows = [float(np.interp(engine, SPEEDS, row)) for row in TORQUES]
     return float(np.interp(np.interp(t, PEDAL_TIMES, PEDAL), THROTTLES, rows))

@@ -37,6 +37,6 @@ PROBLEM = Problem(
     ),
     start=Start({"w1": 10.0, "w2": 0.0, "w3": 0.0, "w4": 0.0}),
     time=TIME,
-    tolerance={**dict.fromkeys(SPEEDS, 1e-8), ("angle", "w1"): 1e-9},
+    tolerance={**dict.fromkeys(SPEEDS, 1e-9), ("angle", "w1"): 1e-9},
     events_of=("c1", "c2", "c3"),
 )

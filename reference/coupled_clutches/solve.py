@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from reference.mechanism import Mechanism, solve, speed, state
 from reference.march import Array
+from reference.mechanism import Mechanism, solve, speed, state
 from reference.tables import Solution
 
 

@@ -43,7 +43,7 @@ def shift_element(name: str, ratio: float, gain: float) -> tuple[Element, ...]:
 ELEMENTS: tuple[Element, ...] = (
     inertia("engine", 20.3),
     torque("engine", "torque"),
-    gear("gearbox", "engine", "input", 1.0) | {"loss": {"law": "paper", "eta": 0.85}},
+    {**gear("gearbox", "engine", "input", 1.0), "loss": {"law": "paper", "eta": 0.85}},
     *shift_element("B2", 1.91, 0.0378),
     *shift_element("B3", 1.43, 0.027),
     inertia("output", 0.9),

@@ -87,7 +87,9 @@ OUTPUTS: dict[tuple[str, str], Observation] = {
 
 def solution(time: Array) -> Solution:
     """Speeds, twist and shaft torque at `time` (n,) [s]."""
-    engine = Line((0.0, 0.45, 0.55, 0.80, 0.95, 1.4), (1545.0, 1545.0, 900.0, 900.0, 1545.0, 1545.0))
+    engine = Line(
+        (0.0, 0.45, 0.55, 0.80, 0.95, 1.4), (1545.0, 1545.0, 900.0, 900.0, 1545.0, 1545.0)
+    )
     b2 = Line((0.0, 0.28, 0.30, 0.42, 1.4), (14e5, 14e5, 4.5e5, 0.0, 0.0))
     b3 = Line(
         (0.0, 0.10, 0.15, 0.28, 0.44, 0.75, 1.0, 1.4),

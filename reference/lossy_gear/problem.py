@@ -30,6 +30,6 @@ PROBLEM = Problem(
     phases=(PHASE,),
     start=Start({"b": 0.0}),
     time=np.linspace(0.0, 0.5, 201),
-    tolerance={("speed", "a"): 1e-10, ("speed", "b"): 1e-10, ("angle", "b"): 1e-11},
+    tolerance={("speed", "a"): 1e-12, ("speed", "b"): 1e-12, ("angle", "b"): 1e-13},
     events_of=("gear",),
 )

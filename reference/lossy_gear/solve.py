@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from reference.march import Array, March
+from reference.march import Array, Gap, March
 from reference.tables import Change, Solution, Table
 
 ETA, J_A, J_B = 0.5, 1.0, 1.5
@@ -39,37 +39,51 @@ def moving(t: float, drag: Drag) -> float:
     return next(directions, 0.0)
 
 
+class Motion:
+    """Speed and angle of shaft b while it turns in one direction or rests (0)."""
+
+    def __init__(self, direction: float, drag: Drag) -> None:
+        self.direction = direction
+        self.drag = drag
+
+    def rate(self, t: float, x: Array) -> Array:
+        """Of speed and angle."""
+        if not self.direction:
+            return np.array([0.0, x[0]])
+        return np.array([acceleration(t, x[0], self.direction, self.drag)[0], x[0]])
+
+    def gaps(self) -> list[Gap]:
+        """What ends it: no speed, or at rest what keeps it from moving either way."""
+        if self.direction:
+            return [lambda _t, x: float(self.direction * x[0])]
+        return [self._reserve(way) for way in (1.0, -1.0)]
+
+    def kinks(self) -> list[Gap]:
+        """Where the direction of power changes."""
+        if not self.direction:
+            return []
+        return [lambda t, x: acceleration(t, x[0], self.direction, self.drag)[1]]
+
+    def _reserve(self, way: float) -> Gap:
+        return lambda t, _x: -way * acceleration(t, 0.0, way, self.drag)[0]
+
+
 def solve(time: Array, element: str, drag: Drag) -> Solution:
     """Speeds and angle at `time` (n,) [s]; changes are those of `element`."""
     march = March([0.0, 0.0], time)
     changes: list[Change] = []
-    direction = moving(1e-9, drag)
+    motion = Motion(moving(1e-9, drag), drag)
     while march.t < END:
-        way = direction
-
-        def rate(t: float, x: Array, way: float = way) -> Array:
-            return np.array([acceleration(t, x[0], way, drag)[0] if way else 0.0, x[0]])
-
-        def through(t: float, x: Array, way: float = way) -> float:
-            return acceleration(t, x[0], way, drag)[1]
-
-        def reserve(t: float, _x: Array, away: float) -> float:
-            return -away * acceleration(t, 0.0, away, drag)[0]
-
-        if way:
-            gaps, kinks = [lambda _t, x, w=way: float(w * x[0])], [through]
-        else:
-            gaps = [lambda t, x: reserve(t, x, 1.0), lambda t, x: reserve(t, x, -1.0)]
-            kinks = []
-        fired = march.advance(rate, END, gaps, lambda _t, x: (2.0 * x[0], x[0], x[1]), kinks)
+        gaps, kinks = motion.gaps(), motion.kinks()
+        fired = march.advance(motion.rate, END, gaps, lambda _t, x: (2.0 * x[0], x[0], x[1]), kinks)
         if fired is None:
             break
-        if way:
+        if motion.direction:
             march.x[0] = 0.0
-            direction = moving(march.t + 1e-9, drag)
-            changes.append(Change(march.t, element, "reverse" if direction else "lock"))
+            motion = Motion(moving(march.t + 1e-9, drag), drag)
+            changes.append(Change(march.t, element, "reverse" if motion.direction else "lock"))
         else:
-            direction = (1.0, -1.0)[fired]
+            motion = Motion((1.0, -1.0)[fired], drag)
             changes.append(Change(march.t, element, "break_away"))
     columns = zip((("speed", "a"), ("speed", "b"), ("angle", "b")), march.columns(), strict=True)
     return Solution(Table(time, dict(columns)), tuple(changes))

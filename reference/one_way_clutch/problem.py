@@ -29,10 +29,10 @@ PROBLEM = Problem(
     start=Start({"in": -0.5, "out": 0.0}),
     time=np.linspace(0.0, 2.0, 201),
     tolerance={
-        ("speed", "in"): 1e-8,
-        ("speed", "out"): 1e-8,
-        ("angle", "in"): 1e-8,
-        ("angle", "out"): 1e-8,
+        ("speed", "in"): 1e-9,
+        ("speed", "out"): 1e-9,
+        ("angle", "in"): 1e-9,
+        ("angle", "out"): 1e-9,
     },
     events_of=("freewheel",),
 )

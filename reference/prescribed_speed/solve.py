@@ -50,10 +50,9 @@ def solution(time: Array) -> Solution:
     mode = 0
     for i, end in enumerate(KNOTS[1:]):
         motor_rate = (SPEEDS[i + 1] - SPEEDS[i]) / (end - KNOTS[i])
-        if i > 0 and (SPEEDS[i] == 0.0) and (motor_rate != 0.0):
-            changes.append(Change(march.t, "brake", "break_away"))
-        if i > 0 and SPEEDS[i] == 0.0 and motor_rate == 0.0:
-            changes.append(Change(march.t, "brake", "lock"))
+        if i > 0 and SPEEDS[i] == 0.0:
+            kind = "lock" if motor_rate == 0.0 else "break_away"
+            changes.append(Change(march.t, "brake", kind))
         if mode == 0:
             mode = _mode_from(march.x, motor_rate)
             if mode != 0:

@@ -49,10 +49,10 @@ PROBLEM = Problem(
     start=Start({"sun": 0.0, "carrier": 0.0}),
     time=np.linspace(0.0, END, 251),
     tolerance={
-        ("speed", "sun"): 1e-8,
-        ("speed", "carrier"): 1e-8,
-        ("speed", "ring"): 1e-8,
-        ("angle", "sun"): 1e-8,
+        ("speed", "sun"): 1e-9,
+        ("speed", "carrier"): 1e-9,
+        ("speed", "ring"): 1e-9,
+        ("angle", "sun"): 1e-9,
     },
     events_of=("clutch", "brake"),
 )

@@ -57,9 +57,7 @@ CASES: dict[tuple[str, str], dict[str, Signal]] = {
     ("one_way_clutch", "OneWayClutch"): {
         "inertiaIn.w": single(("speed", "in"), 2.4e-5),
         "oneWayClutch.w_rel": relative("out", "in", 1.4e-5),
-        "oneWayClutch.phi_rel": Signal(
-            ((1.0, ("angle", "out")), (-1.0, ("angle", "in"))), 1.4e-6
-        ),
+        "oneWayClutch.phi_rel": Signal(((1.0, ("angle", "out")), (-1.0, ("angle", "in"))), 1.4e-6),
     },
     ("lossy_gear", "LossyGearDemo1"): {
         "Inertia2.w": single(("speed", "b"), 2.1e-8),
