@@ -71,6 +71,10 @@ bench: $(venv)/.native ## measure what has a stated limit
 fuzz: $(venv)/.native ## 20,000 damaged files through each reader, for an hour or two
 	$(bin)/python -m tests.fuzz.run --count 20000
 
+.PHONY: picture
+picture: $(venv)/.native ## draw the README's picture (needs Chromium)
+	$(bin)/python -m tools.picture
+
 .PHONY: fmt
 fmt: $(venv)/.dev ## format Rust and Python sources
 	cargo fmt --all

@@ -1,2 +1,81 @@
 # SPDX-License-Identifier: MIT
-"""drivetwin: from gear-shift logs to validated driveline models."""
+"""drivetwin: from gear-shift logs to validated driveline models.
+
+The names below are the whole of what a script needs, in the order of use; each is imported when
+it is first asked for, so that `import drivetwin` costs nothing.
+
+    card = drivetwin.load_card(path)                             what is known from design
+    log = drivetwin.read_log(path, card)                         channels, SI
+    found = drivetwin.find_shifts(log, card)                     shifts and their phases
+    result = drivetwin.identify_shifts(log, card, found)         estimates with verdicts
+    twin = drivetwin.Twin.from_identification(result, card)      the model
+    run = drivetwin.validate_shift(twin, log, found.shifts[0])   simulation over measurement
+    result = drivetwin.validated(result, twin, log)              the same of all shifts, into result
+    drivetwin.save_result(path, result)                          result.json
+    drivetwin.save_report(path, result, log)                     report.html
+
+`DualClutch` and `simulate` are the model without a log; all errors derive from `DrivetwinError`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from drivetwin.driveline import DualClutch, simulate
+    from drivetwin.errors import DrivetwinError
+    from drivetwin.identify.method import Method
+    from drivetwin.identify.pipeline import identify as identify_shifts
+    from drivetwin.logs.read import read_log
+    from drivetwin.report.html import save_report
+    from drivetwin.results.result_file import save_result
+    from drivetwin.shifts.find import find_shifts
+    from drivetwin.twin import Twin
+    from drivetwin.validate import validate as validate_shift
+    from drivetwin.validate import validated
+    from drivetwin.vehicle.card import load_card
+
+_HOME = {
+    "DrivetwinError": ("errors", "DrivetwinError"),
+    "DualClutch": ("driveline", "DualClutch"),
+    "Method": ("identify.method", "Method"),
+    "Twin": ("twin", "Twin"),
+    "find_shifts": ("shifts.find", "find_shifts"),
+    "identify_shifts": ("identify.pipeline", "identify"),
+    "load_card": ("vehicle.card", "load_card"),
+    "read_log": ("logs.read", "read_log"),
+    "save_report": ("report.html", "save_report"),
+    "save_result": ("results.result_file", "save_result"),
+    "simulate": ("driveline", "simulate"),
+    "validate_shift": ("validate", "validate"),
+    "validated": ("validate", "validated"),
+}
+"""Module below the package, and the name there. `identify` and `validate` are modules, so the
+functions of these names are called after what they take."""
+
+__all__ = [
+    "DrivetwinError",
+    "DualClutch",
+    "Method",
+    "Twin",
+    "find_shifts",
+    "identify_shifts",
+    "load_card",
+    "read_log",
+    "save_report",
+    "save_result",
+    "simulate",
+    "validate_shift",
+    "validated",
+]
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name):
+        """Import a public name when it is first asked for (PEP 562); typed by the imports above."""
+        if name not in _HOME:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        module, original = _HOME[name]
+        return getattr(import_module(f"drivetwin.{module}"), original)
