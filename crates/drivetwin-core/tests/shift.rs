@@ -60,7 +60,7 @@ fn error(order: usize, max_step: f64, exact: &DualClutchRun<f64>) -> f64 {
     let settings = Settings { order: Some(order), max_step, ..Settings::default() };
     let run = shift(&paper_driveline(LossLaw::Paper), 1.0, settings);
     let pairs = run.columns[SHAFT_TORQUE].iter().zip(&exact.columns[SHAFT_TORQUE]);
-    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    pairs.map(|(a, b): (&f64, &f64)| (a - b).abs()).fold(0.0, f64::max)
 }
 
 #[test]

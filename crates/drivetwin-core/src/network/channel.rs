@@ -105,6 +105,12 @@ impl<T: Real> Normal<T> {
 }
 
 impl<T: Real> Channel<T> {
+    /// Whether the torque is a product of arguments: it may then start with a power of time twice as
+    /// high as theirs, after terms that are all zero.
+    pub fn is_product(&self) -> bool {
+        matches!(self.law, Law::Quadratic(_) | Law::Map { .. } | Law::Converter { .. })
+    }
+
     /// Whether the active cell depends on an input and may change when that jumps.
     pub fn follows_inputs(&self) -> bool {
         matches!(self.law, Law::Map { .. })

@@ -120,40 +120,66 @@ pub fn solve<T: Real>(a: &Matrix<T>, b: &Matrix<T>) -> Result<Matrix<T>, usize> 
     Ok(x)
 }
 
-/// Rows of `a` that are linearly independent to `1e-9`, in order of choice.
+/// Rows of `a` that are linearly independent of those before them, to `1e-9` of their length.
 pub fn independent_rows<T: Real>(a: &Matrix<T>) -> Vec<usize> {
-    let mut work = a.clone();
-    let scale = a.max_abs();
-    let mut chosen: Vec<usize> = Vec::new();
-    for _ in 0..a.rows.min(a.cols) {
-        let mut best = (0, 0, 1e-9 * scale);
-        for i in (0..a.rows).filter(|i| !chosen.contains(i)) {
-            for j in 0..a.cols {
-                if work[(i, j)].re().abs() > best.2 {
-                    best = (i, j, work[(i, j)].re().abs());
-                }
-            }
-        }
-        let (row, col, size) = best;
-        if size <= 1e-9 * scale {
-            break;
-        }
-        for r in (0..a.rows).filter(|&r| r != row) {
-            let factor = work[(r, col)] / work[(row, col)];
-            subtract_row(&mut work, r, row, factor);
-        }
-        chosen.push(row);
-    }
-    chosen
+    orthogonalised(a).kept
 }
 
-/// Least-norm solution of the consistent system `a x = b`, which may be rank deficient.
+/// Least-norm solution of the consistent system `a x = b`, which may be rank deficient: with
+/// `a = l q` and orthonormal rows of `q`, `x = qᵀ l⁻¹ b`.
 pub fn least_norm<T: Real>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
-    let keep = independent_rows(a);
-    let (a, b) = (a.select_rows(&keep), b.select_rows(&keep));
-    let at = a.transposed();
-    let y = solve(&a.times(&at), &b).expect("independent rows have a regular Gram matrix");
-    at.times(&y)
+    let Orthogonalised { kept, q, l } = orthogonalised(a);
+    let mut y = b.select_rows(&kept);
+    for i in 0..kept.len() {
+        for j in 0..i {
+            for c in 0..y.cols {
+                let known = y[(j, c)];
+                y[(i, c)] -= l[(i, j)] * known;
+            }
+        }
+        let inverse = l[(i, i)].recip();
+        y.row_mut(i).iter_mut().for_each(|v| *v *= inverse);
+    }
+    q.transposed().times(&y)
+}
+
+/// Factors of the independent rows of a matrix.
+struct Orthogonalised<T> {
+    kept: Vec<usize>,
+    q: Matrix<T>,
+    l: Matrix<T>,
+}
+
+/// Modified Gram-Schmidt over the rows, twice for full orthogonality.
+fn orthogonalised<T: Real>(a: &Matrix<T>) -> Orthogonalised<T> {
+    let norm = |row: &[T]| row.iter().fold(T::zero_(), |sum, &v| sum + v * v);
+    let mut kept = Vec::new();
+    let mut q = Matrix::zeros(a.rows, a.cols);
+    let mut l = Matrix::zeros(a.rows, a.rows);
+    for i in 0..a.rows {
+        let k = kept.len();
+        let mut row = a.row(i).to_vec();
+        for _ in 0..2 {
+            for j in 0..k {
+                let basis = q.row(j);
+                let part = row.iter().zip(basis).fold(T::zero_(), |sum, (&r, &b)| sum + r * b);
+                row.iter_mut().zip(basis).for_each(|(r, &b)| *r -= part * b);
+                l[(k, j)] += part;
+            }
+        }
+        let (left, length) = (norm(&row), norm(a.row(i)).re());
+        if left.re() > 1e-18 * length {
+            let left = left.sqrt();
+            l[(k, k)] = left;
+            row.iter_mut().for_each(|r| *r /= left);
+            q.row_mut(k).copy_from_slice(&row);
+            kept.push(i);
+        } else {
+            l.row_mut(k).iter_mut().for_each(|v| *v = T::zero_());
+        }
+    }
+    let index: Vec<usize> = (0..kept.len()).collect();
+    Orthogonalised { q: q.select_rows(&index), l: l.select_rows(&index), kept }
 }
 
 fn largest_in_column<T: Real>(a: &Matrix<T>, c: usize, from: usize) -> usize {

@@ -227,9 +227,13 @@ impl<T: Real> Network<T> {
     /// What each held speed's torque can be, for the split of redundant locks; prescribed speeds,
     /// which come last, and one-way clutches carry what the others cannot.
     fn weights(&self, stuck: &[Row], capacity: &[T]) -> Vec<T> {
-        let unbounded = capacity.iter().fold(1.0, |m, c| c.re().max(m)) * 1e3;
+        let largest = capacity.iter().fold(1.0, |m, c| c.re().max(m));
+        let unbounded = largest * 1e2;
         let weight = |&row: &Row| match row {
-            Row::Friction(j) if !self.frictions[j].one_way => capacity[j] + 1e-9,
+            Row::Friction(j) if !self.frictions[j].one_way => {
+                let least = largest * 1e-3;
+                if capacity[j].re() > least { capacity[j] } else { T::of(least) }
+            }
             Row::Friction(_) => T::of(unbounded),
             Row::Gear(_) => T::of(1.0),
         };

@@ -37,6 +37,14 @@ pub enum StartError {
         /// Nodes whose speeds are not implied.
         free: String,
     },
+    /// A one-way clutch would slip in the direction that it blocks.
+    #[error("{element} starts with a slip of {slip} rad/s in the direction that it blocks")]
+    Overrun {
+        /// The one-way clutch.
+        element: String,
+        /// Slip, rad/s.
+        slip: f64,
+    },
     /// Speeds that contradict the rigid couplings.
     #[error("the start speed {stated} rad/s of {node:?} contradicts the others: {implied} rad/s")]
     Contradiction {
@@ -59,6 +67,12 @@ impl<T: Real> Start<T> {
             .map(|name| find("friction element", name, &elements))
             .collect::<Result<Vec<_>, _>>()?;
         let mut x = self.speeds_of(network)?;
+        for friction in network.frictions.iter().filter(|friction| friction.one_way) {
+            let slip = form(&friction.slip, &x).re();
+            if slip > 1e-9 && !self.locked.contains(&friction.element) {
+                return Err(StartError::Overrun { element: friction.element.clone(), slip });
+            }
+        }
         x.resize(network.states(), T::zero_());
         let springs: Vec<&str> =
             network.mechanism.springs.iter().map(|s| s.element.as_str()).collect();

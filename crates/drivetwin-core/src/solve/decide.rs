@@ -7,7 +7,7 @@ use super::status::Status;
 use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::{Cell, GearState, Mode, ModeKey, Row};
-use crate::number::Real;
+use crate::number::{Real, TERMS, evaluate};
 use std::sync::Arc;
 
 /// A trial: the state of every friction element and of every lossy gear.
@@ -23,6 +23,8 @@ pub(super) struct Assignment {
 const ROUND_OFF: f64 = 1e-10;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
 const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
+/// How far ahead a decision looks, s.
+const LOOK_AHEAD: f64 = 1e-10;
 /// Most trials before every assignment is tried in turn.
 const MAX_TRIALS: usize = 200;
 /// Most rows at zero speed for which every assignment is tried.
@@ -42,13 +44,12 @@ impl<T: Real> Integrator<'_, T> {
     /// Decide anew the state of everything at zero speed. `overloaded` names what has just reached
     /// its bound, with the torque's sign.
     pub(super) fn decide(&mut self, overloaded: Option<(Row, f64)>) -> Result<(), Status> {
+        self.look_ahead();
         let candidates = self.at_zero_speed();
         let mut trial = self.assignment();
         for &row in &candidates {
             // An overload asks for more: what is at its capacity already stays there.
-            let saturated = matches!(row, Row::Friction(j)
-                if matches!(trial.rows[j], RowState::Saturated { .. }));
-            if overloaded.is_none() || !saturated {
+            if overloaded.is_none() || !trial.is_at_capacity(row) {
                 trial.rest(row);
             }
         }
@@ -104,6 +105,23 @@ impl<T: Real> Integrator<'_, T> {
         Err(Status::Undecidable { time: self.t.re(), element: element.to_owned() })
     }
 
+    /// Inputs and state a moment from now, as the present mode would have them: where torques and
+    /// capacities agree, or all start from zero, their rates decide.
+    fn look_ahead(&mut self) {
+        let remaining = self.inputs.span(self.segment).1 - self.t.re();
+        let moment = T::of(LOOK_AHEAD.min(1e-4 * remaining.max(0.0)));
+        for (ahead, now) in self.ahead.iter_mut().zip(&self.expansion.inputs) {
+            *ahead = *now;
+            ahead[0] = evaluate(now, TERMS - 1, moment);
+        }
+        self.x_ahead.clone_from(&self.x);
+        let mut basis = self.basis_without_channels();
+        basis.extend((0..self.network.channels.len()).map(|i| self.channel_ahead(i)));
+        for (i, ahead) in self.x_ahead.iter_mut().enumerate() {
+            *ahead += form(self.mode.derivative.row(i), &basis) * moment;
+        }
+    }
+
     fn blocks_forward(&self, row: Row) -> bool {
         matches!(row, Row::Friction(j) if self.network.frictions[j].one_way)
     }
@@ -136,7 +154,7 @@ impl<T: Real> Integrator<'_, T> {
         let mut basis = self.basis_without_channels();
         for (j, row) in self.network.frictions.iter().enumerate() {
             let at_rest = candidates.contains(&Row::Friction(j));
-            let slip = if at_rest { T::zero_() } else { form(&row.slip, &self.x) };
+            let slip = if at_rest { T::zero_() } else { form(&row.slip, &self.x_ahead) };
             let normal = self.normal(j);
             basis.push(match trial.rows[j] {
                 RowState::Slipping { sign } => row.law.at(slip * sign) * normal * sign,
@@ -145,13 +163,13 @@ impl<T: Real> Integrator<'_, T> {
             });
         }
         let others = self.network.frictions.len()..self.network.channels.len();
-        basis.extend(others.map(|i| self.channel_now(i)));
+        basis.extend(others.map(|i| self.channel_ahead(i)));
         basis
     }
 
     /// Normal load of an element now, cut at zero.
     fn normal(&self, j: usize) -> T {
-        let normal = self.network.frictions[j].normal.term(&self.expansion.inputs, 0);
+        let normal = self.network.frictions[j].normal.term(&self.ahead, 0);
         if self.pressed[j] && normal.re() > 0.0 { normal } else { T::zero_() }
     }
 
@@ -215,7 +233,7 @@ impl<T: Real> Integrator<'_, T> {
 
     /// What a row at rest may accelerate by round-off; more is forced on it by prescribed speeds.
     fn forced_acceleration(&self) -> f64 {
-        let rate = |&(_, input): &(Vec<T>, usize)| self.expansion.inputs[input][1].re().abs();
+        let rate = |&(_, input): &(Vec<T>, usize)| self.ahead[input][1].re().abs();
         self.network
             .prescribed
             .iter()
@@ -261,15 +279,15 @@ impl<T: Real> Integrator<'_, T> {
         }
         for j in 0..trial.rows.len() {
             if let RowState::Saturated { sign } = trial.rows[j]
-                && !self.held_by_others(trial, j)
+                && !self.held_by_others(trial, Row::Friction(j))
             {
                 trial.rows[j] = RowState::Slipping { sign };
             }
         }
     }
 
-    /// Whether what is at rest alone keeps element `j` from slipping.
-    fn held_by_others(&self, trial: &Assignment, j: usize) -> bool {
+    /// Whether what is at rest keeps a row that is not from moving.
+    fn held_by_others(&self, trial: &Assignment, row: Row) -> bool {
         let mut stuck = self.key_of(trial).rows();
         let rank = |rows: &[Row]| {
             let mut speeds = Matrix::zeros(rows.len(), self.network.speeds());
@@ -279,7 +297,7 @@ impl<T: Real> Integrator<'_, T> {
             independent_rows(&speeds).len()
         };
         let alone = rank(&stuck);
-        stuck.push(Row::Friction(j));
+        stuck.push(row);
         rank(&stuck) == alone
     }
 
@@ -289,6 +307,10 @@ impl<T: Real> Integrator<'_, T> {
         for &row in candidates {
             let index = self.index_of(row);
             self.released[index] = trial.direction(row).is_some();
+        }
+        for i in 0..trial.gears.len() {
+            let rolling = matches!(trial.gears[i], GearState::Rolling { .. });
+            self.blocked[i] = rolling && self.held_by_others(&trial, Row::Gear(i));
         }
         self.record_changes(&trial);
         self.rows = trial.rows;
@@ -321,6 +343,14 @@ impl Assignment {
         match row {
             Row::Friction(j) => self.rows[j] = RowState::Slipping { sign },
             Row::Gear(i) => self.gears[i] = GearState::Rolling { sign, backward: false },
+        }
+    }
+
+    /// Whether a row at zero speed carries all it can.
+    fn is_at_capacity(&self, row: Row) -> bool {
+        match row {
+            Row::Friction(j) => matches!(self.rows[j], RowState::Saturated { .. }),
+            Row::Gear(i) => matches!(self.gears[i], GearState::Rolling { .. }),
         }
     }
 

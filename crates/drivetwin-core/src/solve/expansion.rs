@@ -2,7 +2,7 @@
 //! Taylor expansion in time of the whole state in one mode.
 
 use crate::network::channel::ChannelSeries;
-use crate::network::{Cell, Mode, Network};
+use crate::network::{Cell, Channel, Mode, Network};
 use crate::number::{Real, Series, TERMS, evaluate, slope};
 
 /// Coefficients of states and channels over one step, and the working space to compute them.
@@ -64,16 +64,19 @@ impl<T: Real> Expansion<T> {
             series[0] = value;
         }
         let last = accuracy.order.unwrap_or(TERMS - 1);
-        // Two successive terms, because every other one of an even or odd motion is zero.
+        let products = network.channels.iter().any(Channel::is_product);
+        // Successive terms that must be small: every other one of an even or odd motion is zero, and
+        // products of motions that start with high powers of time leave longer gaps.
+        let window = if products { 4 } else { 2 };
+        let mut sizes = [f64::INFINITY; TERMS];
         let mut power = 1.0;
-        let (mut before, mut size) = (f64::INFINITY, f64::INFINITY);
         for k in 0..last {
             self.channel_terms(network, cells, k);
             self.next_term(network, mode, k);
             power *= h;
-            before = size;
-            size = self.relative_size(network, k + 1).max(self.input_size(k + 1)) * power;
-            if accuracy.order.is_none() && k >= 2 && size.max(before) <= accuracy.tolerance {
+            sizes[k + 1] = self.relative_size(network, k + 1).max(self.input_size(k + 1)) * power;
+            let recent = largest(&sizes[(k + 2).saturating_sub(window)..k + 2]);
+            if accuracy.order.is_none() && recent <= accuracy.tolerance {
                 self.finish(network, cells, k + 1);
                 return h;
             }
@@ -82,7 +85,7 @@ impl<T: Real> Expansion<T> {
         if accuracy.order.is_some() {
             return h;
         }
-        let excess = before.max(size) / accuracy.tolerance;
+        let excess = largest(&sizes[TERMS - window..]) / accuracy.tolerance;
         h * (0.8 * excess.powf(-1.0 / last as f64)).min(1.0)
     }
 
@@ -178,4 +181,8 @@ impl<T: Real> Expansion<T> {
         let size = |(i, s): (usize, &Series<T>)| s[k].re().abs() / s[0].re().abs().max(floor(i));
         self.states.iter().enumerate().map(size).fold(0.0, f64::max)
     }
+}
+
+fn largest(sizes: &[f64]) -> f64 {
+    sizes.iter().copied().fold(0.0, f64::max)
 }

@@ -20,6 +20,8 @@ pub enum Cause {
     PowerReversal(usize),
     /// A channel enters another cell.
     Border(usize, Cell),
+    /// Events at one instant did not come to an end; everything is decided anew a moment later.
+    Stalled,
 }
 
 /// The discrete state that guards depend on.
@@ -32,6 +34,8 @@ pub struct Watch<'a, T> {
     pub rows: &'a [RowState],
     /// Whether an element has a normal load.
     pub pressed: &'a [bool],
+    /// Whether a rolling gear is kept at rest by others.
+    pub blocked: &'a [bool],
     /// Whether an element or gear moves off from exact zero at the start of the step.
     pub released: &'a [bool],
     /// Active cell of every channel.
@@ -116,6 +120,9 @@ fn gear_guards<T: Real>(
             power[0] -= gear.loss.threshold();
             let power = if backward { scaled(&power, T::of(-1.0)) } else { power };
             consider(power, Cause::PowerReversal(i));
+            if watch.blocked[i] {
+                return;
+            }
             let released = watch.released[watch.rows.len() + i];
             let speed = expansion.speed_form(&gear.speed);
             consider(departing(&speed, sign, released), Cause::AtRest(Row::Gear(i)));

@@ -6,7 +6,7 @@ use super::guard::{Cause, Watch, earliest};
 use super::inputs::Inputs;
 use super::status::Status;
 use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
-use crate::number::Real;
+use crate::number::{Real, Series, TERMS};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -81,8 +81,10 @@ pub struct Step<T> {
     pub length: T,
 }
 
-/// Most steps without progress before a run counts as chattering.
-const MAX_STALLED: usize = 60;
+/// Steps without progress after which the run moves on by [`NUDGE`] and decides anew.
+const MAX_STALLED: usize = 20;
+/// Time that a stalled run moves on, s.
+const NUDGE: f64 = 1e-10;
 /// Events over which a run must advance by at least [`MIN_PROGRESS`].
 const PROGRESS_WINDOW: usize = 1000;
 /// Least advance over a window of events, s; below lies Zeno behaviour.
@@ -106,6 +108,11 @@ pub struct Integrator<'a, T> {
     pub(super) cells: Vec<Cell>,
     pub(super) released: Vec<bool>,
     pub(super) pressed: Vec<bool>,
+    /// Whether a gear that carries all it can is kept from rolling by others.
+    pub(super) blocked: Vec<bool>,
+    /// Inputs and state as decisions see them.
+    pub(super) ahead: Vec<Series<T>>,
+    pub(super) x_ahead: Vec<T>,
     /// States of lossy gears during the last step.
     pub gears: Vec<GearState>,
     pub(super) inputs: &'a Inputs<T>,
@@ -132,7 +139,6 @@ impl<'a, T: Real> Integrator<'a, T> {
         let none = vec![T::zero_(); frictions];
         let mode = network.mode(ModeKey::default(), &none);
         let mut run = Self {
-            x,
             rows: vec![RowState::Open; frictions],
             mode: Arc::new(mode.ok_or_else(|| self_locking(network, t))?),
             expansion: Expansion::new(network),
@@ -141,6 +147,10 @@ impl<'a, T: Real> Integrator<'a, T> {
             cells: vec![Cell::Off; network.channels.len()],
             released: vec![false; frictions + network.losses.len()],
             pressed: vec![false; frictions],
+            blocked: vec![false; network.losses.len()],
+            x_ahead: x.clone(),
+            x,
+            ahead: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             gears: vec![GearState::Rolling { sign: 1.0, backward: false }; network.losses.len()],
             network,
             inputs,
@@ -178,7 +188,11 @@ impl<'a, T: Real> Integrator<'a, T> {
         if h < 1e-14 * (1.0 + end.abs()) && h < remaining {
             return Err(Status::StepTooSmall { time: self.t.re() });
         }
-        let event = earliest(&self.watch(&mode), &self.expansion, h);
+        let stalled = self.stalled >= MAX_STALLED;
+        let event = match stalled {
+            true => Some((T::of(h.min(NUDGE)), Cause::Stalled)),
+            false => earliest(&self.watch(&mode), &self.expansion, h),
+        };
         let start = self.t;
         let length = match event {
             Some((at, _)) => at,
@@ -214,6 +228,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             released: &self.released,
             cells: &self.cells,
             pressed: &self.pressed,
+            blocked: &self.blocked,
             gears: &self.gears,
         }
     }
@@ -255,7 +270,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             creeping = time - self.window.1 < MIN_PROGRESS;
             self.window = (0, time);
         }
-        if self.stalled > MAX_STALLED || creeping {
+        if creeping {
             return Err(Status::Chattering { time, element: self.culprit(cause) });
         }
         Ok(())
@@ -268,6 +283,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             Cause::PowerReversal(i) => Row::Gear(i),
             Cause::Border(channel, _) if channel < self.rows.len() => Row::Friction(channel),
             Cause::Border(channel, _) => return format!("torque law {channel}"),
+            Cause::Stalled => return "several elements at once".to_owned(),
         };
         self.network.element_of(row).to_owned()
     }

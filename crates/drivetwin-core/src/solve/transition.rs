@@ -24,6 +24,10 @@ impl<T: Real> Integrator<'_, T> {
                 self.press(j, !self.pressed[j]);
                 self.decide(None)
             }
+            Cause::Overload(Row::Friction(j), _) if self.is_about_to_vent(j) => {
+                self.press(j, false);
+                self.decide(None)
+            }
             Cause::Overload(row, sign) => {
                 self.bring_to_rest(&[]);
                 self.decide(Some((row, sign)))
@@ -34,11 +38,32 @@ impl<T: Real> Integrator<'_, T> {
                 }
                 self.decide(None)
             }
+            Cause::Stalled => {
+                self.bring_to_rest(&self.nearly_at_rest());
+                self.decide(None)
+            }
             Cause::Border(channel, cell) => {
                 self.cells[channel] = cell;
                 Ok(())
             }
         }
+    }
+
+    /// Rows that can have moved only within the moment that a stalled run moved on.
+    fn nearly_at_rest(&self) -> Vec<Row> {
+        let frictions = (0..self.rows.len()).filter(|&j| self.rows[j] != RowState::Open);
+        let directional = |i: &usize| self.network.losses[*i].loss.is_directional();
+        let gears = (0..self.gears.len()).filter(directional);
+        let rows = frictions.map(Row::Friction).chain(gears.map(Row::Gear));
+        rows.filter(|&row| form(self.network.slip_of(row), &self.x).re().abs() < 1e-6).collect()
+    }
+
+    /// Whether the normal load is gone within round-off of the time: what is left of the capacity is
+    /// then no larger than what is left of the torque.
+    fn is_about_to_vent(&self, j: usize) -> bool {
+        let normal = &self.network.frictions[j].normal;
+        let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
+        now <= -rate * 1e-11
     }
 
     /// Start of a run: prescribed speeds, elements at rest, directions of gears, cells.
@@ -75,7 +100,8 @@ impl<T: Real> Integrator<'_, T> {
     /// decided anew at every sample; accelerations do not depend on the split.
     pub(super) fn refresh_split(&mut self) -> Result<(), Status> {
         let saturated = |row: &RowState| matches!(row, RowState::Saturated { .. });
-        if self.mode.redundant || self.rows.iter().any(saturated) {
+        let full = self.rows.iter().any(saturated) || self.blocked.contains(&true);
+        if self.mode.redundant || full {
             self.decide(None)?;
         }
         Ok(())
@@ -131,24 +157,24 @@ impl<T: Real> Integrator<'_, T> {
         }
     }
 
-    /// State and inputs of the basis at this instant, without the channels.
+    /// State and inputs of the basis for a decision, without the channels.
     pub(super) fn basis_without_channels(&self) -> Vec<T> {
-        let inputs = &self.expansion.inputs;
-        let mut basis = self.x.clone();
+        let inputs = &self.ahead;
+        let mut basis = self.x_ahead.clone();
         basis.extend(inputs.iter().map(|input| input[0]));
         basis.extend(self.network.prescribed.iter().map(|&(_, input)| inputs[input][1]));
         basis.push(T::of(1.0));
         basis
     }
 
-    /// Torque of a channel at this instant, in its present cell.
-    pub(super) fn channel_now(&self, i: usize) -> T {
+    /// Torque of a channel for a decision, in its present cell.
+    pub(super) fn channel_ahead(&self, i: usize) -> T {
         let channel = &self.network.channels[i];
         let mut series = ChannelSeries::default();
         for (argument, row) in series.arguments.iter_mut().zip(&channel.arguments) {
-            argument[0] = form(row, &self.x);
+            argument[0] = form(row, &self.x_ahead);
         }
-        channel.term(self.cells[i], &self.expansion.inputs, &mut series, 0);
+        channel.term(self.cells[i], &self.ahead, &mut series, 0);
         series.torque[0]
     }
 

@@ -166,3 +166,8 @@ fn interpolate(points: &[(f64, f64)], t: f64) -> f64 {
     let ((a, x), (b, y)) = (points[next - 1], points[next]);
     x + (y - x) * (t - a) / (b - a)
 }
+
+/// Compile, or `None` where the driveline is refused with a typed error.
+pub fn compile_or_refuse(elements: Vec<Element<f64>>) -> Option<Network<f64>> {
+    Network::compile(&Driveline { elements }).ok()
+}

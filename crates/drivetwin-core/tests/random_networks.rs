@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: MIT
+//! Random drivelines under random pressures: every run ends, with a status where it fails; what is
+//! locked does not slip; no capacity is exceeded; the energy balance closes.
+//!
+//! `PROPTEST_CASES=10000 cargo test --release -p drivetwin-core --test random_networks` is the long
+//! form.
+
+mod common;
+
+use common::{compile_or_refuse, gear, inertia, load, shaft, torque};
+use drivetwin_core::model::elements::{
+    Bearing, Clutch, Element, Gear, GearLoss, OneWayClutch, Planetary,
+};
+use drivetwin_core::model::mechanism::LossLaw;
+use drivetwin_core::model::{FrictionLaw, Stribeck};
+use drivetwin_core::simulate::{Output, Start, Trajectory, run};
+use drivetwin_core::solve::{EventKind, Settings, Signal, Status};
+use proptest::prelude::*;
+
+const NODES: [&str; 5] = ["a", "b", "c", "d", "ground"];
+const SECONDS: f64 = 1.0;
+const SAMPLES: usize = 41;
+
+/// One random friction element with its pressure [N·m of capacity over μ].
+#[derive(Clone, Debug)]
+struct RandomClutch {
+    a: usize,
+    b: usize,
+    peak: f64,
+    stribeck: bool,
+    pressure: Vec<f64>,
+}
+
+#[derive(Clone, Debug)]
+enum RandomElement {
+    Shaft(usize, usize, f64, f64),
+    Gear(usize, f64, Option<(f64, f64)>),
+    Planetary(f64),
+    OneWay(usize, usize),
+    Bearing(usize, f64),
+    Load(usize, f64, f64, f64),
+}
+
+#[derive(Clone, Debug)]
+struct Case {
+    inertias: [f64; 4],
+    speeds: [f64; 4],
+    drive: Vec<f64>,
+    clutches: Vec<RandomClutch>,
+    others: Vec<RandomElement>,
+}
+
+fn pressure() -> impl Strategy<Value = Vec<f64>> {
+    let level = prop_oneof![Just(0.0), Just(50.0), -20.0..100.0];
+    prop::collection::vec(level, 5)
+}
+
+fn clutch() -> impl Strategy<Value = RandomClutch> {
+    let peak = prop_oneof![Just(1.0), 1.0..1.5];
+    (0..4usize, 0..5usize, peak, any::<bool>(), pressure())
+        .prop_filter("different sides", |c| c.0 != c.1)
+        .prop_map(|(a, b, peak, stribeck, pressure)| RandomClutch {
+            a,
+            b,
+            peak,
+            stribeck,
+            pressure,
+        })
+}
+
+fn element() -> impl Strategy<Value = RandomElement> {
+    let loss = prop::option::of((0.3..1.0, 0.3..1.0));
+    prop_oneof![
+        (0..4usize, 0..4usize, 10.0..1e4, 0.0..20.0)
+            .prop_filter("different ends", |s| s.0 != s.1)
+            .prop_map(|(a, b, k, c)| RandomElement::Shaft(a, b, k, c)),
+        (0..4usize, prop_oneof![-4.0..-0.3, 0.3..4.0], loss)
+            .prop_map(|(a, ratio, loss)| RandomElement::Gear(a, ratio, loss)),
+        prop_oneof![-3.0..-1.3, 1.2..4.0].prop_map(RandomElement::Planetary),
+        (0..4usize, 0..5usize)
+            .prop_filter("different sides", |s| s.0 != s.1)
+            .prop_map(|(a, b)| RandomElement::OneWay(a, b)),
+        (0..4usize, 0.0..5.0).prop_map(|(a, t)| RandomElement::Bearing(a, t)),
+        (0..4usize, -20.0..20.0, 0.0..10.0, 0.0..0.1).prop_map(|(a, constant, rolling, aero)| {
+            RandomElement::Load(a, constant, rolling, aero)
+        }),
+    ]
+}
+
+fn case() -> impl Strategy<Value = Case> {
+    let speed = prop_oneof![Just(0.0), -50.0..50.0];
+    (
+        prop::array::uniform4(0.05..5.0),
+        prop::array::uniform4(speed),
+        prop::collection::vec(prop_oneof![Just(0.0), -60.0..60.0], 5),
+        prop::collection::vec(clutch(), 1..5),
+        prop::collection::vec(element(), 0..4),
+    )
+        .prop_map(|(inertias, speeds, drive, clutches, others)| Case {
+            inertias,
+            speeds,
+            drive,
+            clutches,
+            others,
+        })
+}
+
+fn friction(stribeck: bool) -> FrictionLaw<f64> {
+    if stribeck {
+        FrictionLaw::Stribeck(Stribeck { mu_c: 0.8, mu_s: 1.0, v_s: 5.0, mu_v: 1e-3 })
+    } else {
+        FrictionLaw::constant(1.0)
+    }
+}
+
+fn elements(case: &Case) -> Vec<Element<f64>> {
+    let mut all: Vec<Element<f64>> = (0..4).map(|i| inertia(NODES[i], case.inertias[i])).collect();
+    all.push(torque("a", "drive"));
+    for (i, c) in case.clutches.iter().enumerate() {
+        all.push(Element::Clutch(Clutch {
+            friction: friction(c.stribeck),
+            peak: c.peak,
+            ..common::clutch(&format!("clutch {i}"), NODES[c.a], NODES[c.b])
+        }));
+    }
+    for (i, other) in case.others.iter().enumerate() {
+        let name = format!("element {i}");
+        let element = match *other {
+            RandomElement::Shaft(a, b, k, c) => renamed(shaft(NODES[a], NODES[b], k, c), name),
+            RandomElement::Gear(a, ratio, loss) => {
+                let far = format!("far {i}");
+                all.push(renamed(inertia(&far, 0.3), format!("J {i}")));
+                let loss = loss.map(|(eta, eta_backward)| GearLoss {
+                    eta_backward: Some(eta_backward),
+                    ..GearLoss::by_efficiency(LossLaw::Dissipative, eta)
+                });
+                let Element::Gear(plain) = gear(NODES[a], &far, ratio) else { unreachable!() };
+                Element::Gear(Gear { name, loss, ..plain })
+            }
+            RandomElement::Planetary(z) => Element::Planetary(Planetary {
+                name,
+                sun: "a".into(),
+                ring: format!("ring {i}"),
+                carrier: "b".into(),
+                z,
+                planet_inertia: None,
+            }),
+            RandomElement::OneWay(a, b) => Element::OneWayClutch(OneWayClutch {
+                name,
+                a: NODES[a].into(),
+                b: NODES[b].into(),
+                clutch: None,
+            }),
+            RandomElement::Bearing(a, torque) => Element::Bearing(Bearing {
+                name,
+                a: NODES[a].into(),
+                b: "ground".into(),
+                speed: vec![0.0, 10.0],
+                torque: vec![torque, 2.0 * torque],
+                peak: 1.0,
+            }),
+            RandomElement::Load(a, constant, rolling, aero) => {
+                renamed(load(NODES[a], constant, rolling, aero), name)
+            }
+        };
+        all.push(element);
+    }
+    all
+}
+
+fn renamed(mut element: Element<f64>, name: String) -> Element<f64> {
+    match &mut element {
+        Element::SpringDamper(e) => e.name = name,
+        Element::RoadLoad(e) => e.name = name,
+        Element::Inertia(e) => e.name = name,
+        _ => unreachable!("only these are renamed"),
+    }
+    element
+}
+
+fn simulate(case: &Case) -> Option<Trajectory<f64>> {
+    let network = compile_or_refuse(elements(case))?;
+    let times: Vec<f64> = (0..5).map(|i| SECONDS * i as f64 / 4.0).collect();
+    let names: Vec<String> = (0..case.clutches.len()).map(|i| format!("P clutch {i}")).collect();
+    let mut signals = vec![("drive", Signal::samples(&times, &case.drive))];
+    for (name, c) in names.iter().zip(&case.clutches) {
+        signals.push((name, Signal::samples(&times, &c.pressure)));
+    }
+    let outputs: Vec<Output> = (0..case.clutches.len())
+        .flat_map(|i| {
+            let name = format!("clutch {i}");
+            [Output::Slip(name.clone()), Output::FrictionTorque(name)]
+        })
+        .collect();
+    let start = Start {
+        speeds: (0..4).map(|i| (NODES[i].to_owned(), case.speeds[i])).collect(),
+        ..Start::default()
+    };
+    let grid = common::grid(SECONDS, SAMPLES);
+    run(&network, &signals, &start, &grid, &outputs, (Settings::default(), true)).ok()
+}
+
+fn interpolated(values: &[f64], t: f64) -> f64 {
+    let position = (t / SECONDS * 4.0).clamp(0.0, 4.0);
+    let i = (position as usize).min(3);
+    values[i] + (values[i + 1] - values[i]) * (position - i as f64)
+}
+
+fn check(case: &Case, trajectory: &Trajectory<f64>) {
+    let complete = trajectory.status == Status::Completed;
+    for column in &trajectory.columns {
+        assert_eq!(column.len(), SAMPLES);
+        assert!(!complete || column.iter().all(|v| v.is_finite()), "NaN without a status");
+    }
+    for (i, c) in case.clutches.iter().enumerate() {
+        let (slip, torque) = (&trajectory.columns[2 * i], &trajectory.columns[2 * i + 1]);
+        let mut locked = false;
+        let mut changes = trajectory.events.iter().filter(|e| e.element == i).peekable();
+        for (k, &t) in trajectory.time.iter().enumerate() {
+            while let Some(event) = changes.next_if(|e| e.time <= t) {
+                locked = event.kind == EventKind::Lock;
+            }
+            if slip[k].is_nan() {
+                break;
+            }
+            let normal = interpolated(&c.pressure, t).max(0.0);
+            let capacity = normal * c.peak.max(1.0 + 1e-3 * slip[k].abs());
+            let allowed = capacity + 1e-6 * (1.0 + capacity);
+            assert!(torque[k].abs() <= allowed, "{t}: {} exceeds {capacity}", torque[k]);
+            assert!(!locked || slip[k].abs() < 1e-9, "{t}: locked with slip {}", slip[k]);
+            assert!(slip[k] * torque[k] > -1e-6, "{t}: friction drives its slip");
+        }
+    }
+    if let (true, Some(audit)) = (complete, trajectory.audit) {
+        let size = audit.source.abs() + audit.stored.abs() + audit.friction + audit.load.abs();
+        assert!(audit.error.abs() < 1e-6 * (1.0 + size), "{audit:?}");
+        assert!(audit.created <= 1e-9 * (1.0 + size), "dissipative gears create energy: {audit:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, max_shrink_iters: 2000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn every_run_ends_and_obeys_the_friction_laws(case in case()) {
+        if let Some(trajectory) = simulate(&case) {
+            check(&case, &trajectory);
+        }
+    }
+}
