@@ -62,6 +62,15 @@ def test_a_delay_is_told_with_the_mapping_that_cures_it(tmp_path: Path) -> None:
     assert clock_warnings({one.role: one for one in (faster, slower)}, card(tmp_path)) == []
 
 
+def test_an_early_engine_speed_is_brought_to_the_gearbox_speeds(tmp_path: Path) -> None:
+    time = np.arange(0.0, 8.0, 0.01)
+    engine = channel("engine_speed", time - 0.03, output(time))
+    inlet = channel("input_speed", time, output(time))
+    (text,) = clock_warnings({"engine_speed": engine, "input_speed": inlet}, card(tmp_path))
+    assert "'engine_speed' is 29.9 ms early against 'input_speed'" in text
+    assert "channels.engine_speed.time_shift_s = 0.0299" in text
+
+
 def test_clocks_that_drift_apart_are_told(tmp_path: Path) -> None:
     faster, slower = pair(0.0, drift=0.004)
     texts = clock_warnings({one.role: one for one in (faster, slower)}, card(tmp_path))

@@ -10,7 +10,7 @@ import pytest
 from drivetwin.errors import MappingError
 from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.logs.profile import ByRole, ChannelTable, read_mapping, write_mapping
-from drivetwin.logs.raw import TimeColumn
+from drivetwin.logs.raw import BusOptions, ReadOptions, TimeColumn
 from drivetwin.logs.roles import ROLES
 
 
@@ -25,6 +25,16 @@ def test_a_written_mapping_reads_back(tmp_path: Path) -> None:
     write_mapping(path, channels)
     assert read_mapping(path).channels == channels
     assert path.read_text(encoding="utf-8").startswith("# Channel mapping")
+
+
+def test_options_for_the_whole_file_read_back(tmp_path: Path) -> None:
+    bus = BusOptions((tmp_path / "bus.dbc",), 1109.0)
+    options = ReadOptions(TimeColumn("clk", "ms"), bus)
+    path = tmp_path / "map.toml"
+    write_mapping(path, {"gear": ChannelSpec("Gang", group="10ms")}, options)
+    again = read_mapping(path)
+    assert again.options == options
+    assert again.channels == {"gear": ChannelSpec("Gang", group="10ms")}
 
 
 def test_the_time_column_can_be_mapped(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def inspect(
     if write_mapping is not None:
         from drivetwin.logs import profile
 
-        profile.write_mapping(write_mapping, found.mapping)
+        profile.write_mapping(write_mapping, found.mapping, found.options)
     if as_json:
         print_json(found.document())
         return

@@ -11,6 +11,7 @@ from typing import Any
 from drivetwin.logs.mapping import ChannelSpec, Mapped, guess, spec_of
 from drivetwin.logs.profile import read_mapping
 from drivetwin.logs.raw import Column as LogColumn
+from drivetwin.logs.raw import ReadOptions
 from drivetwin.logs.roles import NEEDED, PRESSURE
 from drivetwin.logs.summary import ColumnSummary, summarise
 from drivetwin.vehicle.card import VehicleCard, load_card
@@ -43,6 +44,7 @@ class Survey:
     source: str
     columns: tuple[Column, ...]
     mapping: Mapping[str, ChannelSpec]
+    options: ReadOptions
     notes: tuple[str, ...]
 
     def document(self) -> dict[str, Any]:
@@ -82,6 +84,7 @@ def survey(log: Path, vehicle: Path | None, channels: Path | None) -> Survey:
         source=str(log),
         columns=tuple(_column(one, candidates) for one in summary.columns if not one.fault),
         mapping=mapping,
+        options=stated.options,
         notes=(*summary.warnings, *faults, *_notes(candidates, card)),
     )
 

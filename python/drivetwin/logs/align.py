@@ -8,7 +8,7 @@ It is told, with the mapping line that cures it, and never applied unasked.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -111,35 +111,39 @@ def _fit(design: FloatArray, error: FloatArray, time: FloatArray) -> Delay | Non
 
 
 def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
-    """Tell delays and drifts of speed channels against each other that are beyond doubt."""
-    pairs = (
-        ("input_speed", "output_speed", [gear.ratio for gear in card.gears]),
-        ("engine_speed", "input_speed", [card.i_in]),
-    )
-    return [
-        text
-        for faster, slower, ratios in pairs
-        if faster in channels and slower in channels
-        for text in _told(channels[faster], channels[slower], ratios)
-    ]
+    """Tell delays and drifts of speed channels against the input speed that are beyond doubt."""
+    if "input_speed" not in channels:
+        return []
+    inlet = channels["input_speed"]
+    texts: list[str] = []
+    if "output_speed" in channels:
+        outlet = channels["output_speed"]
+        found = speed_delay(inlet, outlet, [gear.ratio for gear in card.gears])
+        texts += _told(found, outlet, inlet)
+    if "engine_speed" in channels:
+        engine = channels["engine_speed"]
+        found = speed_delay(engine, inlet, [card.i_in])
+        turned = None if found is None else replace(found, value=-found.value, drift=-found.drift)
+        texts += _told(turned, engine, inlet)
+    return texts
 
 
-def _told(faster: Channel, slower: Channel, ratios: Sequence[float]) -> list[str]:
-    delay = speed_delay(faster, slower, ratios)
+def _told(delay: Delay | None, other: Channel, reference: Channel) -> list[str]:
+    """Words for the delay of `other` against `reference`, if it is large and certain enough."""
     if delay is None:
         return []
-    least = max(_LEAST_DELAY, 0.5 * faster.step, 0.5 * slower.step)
+    least = max(_LEAST_DELAY, 0.5 * other.step, 0.5 * reference.step)
     texts = []
     if abs(delay.value) > max(least, _SIGNIFICANT * delay.sigma):
-        late, early = (slower, faster) if delay.value > 0.0 else (faster, slower)
+        side = "late" if delay.value > 0.0 else "early"
         texts.append(
-            f"channel {late.source_name!r} is {1e3 * abs(delay.value):.1f} ms late against "
-            f"{early.source_name!r} (± {1e3 * delay.sigma:.1f} ms): to correct it set "
-            f"channels.{late.role}.time_shift_s = {-abs(delay.value):.4f} in the channel mapping"
+            f"channel {other.source_name!r} is {1e3 * abs(delay.value):.1f} ms {side} against "
+            f"{reference.source_name!r} (± {1e3 * delay.sigma:.1f} ms): to correct it set "
+            f"channels.{other.role}.time_shift_s = {-delay.value:.4f} in the channel mapping"
         )
     if abs(delay.drift) * delay.span > max(least, _SIGNIFICANT * delay.drift_sigma * delay.span):
         texts.append(
-            f"the clocks of {faster.source_name!r} and {slower.source_name!r} drift apart by "
+            f"the clocks of {other.source_name!r} and {reference.source_name!r} drift apart by "
             f"{1e6 * abs(delay.drift):.0f} µs/s: export both on one clock"
         )
     return texts

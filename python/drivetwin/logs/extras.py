@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import warnings
 from collections.abc import Iterator
@@ -16,7 +17,11 @@ from drivetwin.errors import DrivetwinError, FileFormatError, MissingExtraError,
 
 
 def require(module: str, extra: str, kind: str, path: Path) -> Any:
-    """Import a library of an extra; MissingExtraError names the install command."""
+    """Import a library of an extra; MissingExtraError names the install command.
+
+    Its own log lines are silenced: what matters becomes an error or a warning of the reader.
+    """
+    logging.getLogger(module.partition(".")[0]).setLevel(logging.CRITICAL)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

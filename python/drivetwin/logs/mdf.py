@@ -7,7 +7,6 @@ read. asammdf's own resampling and one-table export hold or invent values, so th
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +24,9 @@ from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.units import time_factor
 
 _KIND = "an MDF file"
+_FRAGMENT = 1 << 23
+"""Bytes of records read at a time, of all channels; bounds the memory for one channel."""
+
 _FINISHED = b"MDF     "
 _OPTIONS = {"process_bus_logging": False, "use_display_names": False}
 _MOST_INFLATION = 1100
@@ -44,7 +46,6 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
     Raises MissingExtraError without asammdf, FileFormatError for a damaged file.
     """
     asammdf = require("asammdf", "mdf", _KIND, path)
-    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what matters becomes an error here
     check_blocks(path)
     with path.open("rb") as file:
         finished = file.read(8) == _FINISHED
@@ -52,6 +53,7 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
         with foreign_parser(_KIND, path):
             # An unfinished file is completed in a copy, which asammdf makes of a named file only.
             mdf = asammdf.MDF(file if finished else path, **_OPTIONS)
+            mdf.configure(read_fragment_size=_FRAGMENT)
         try:
             with foreign_parser(_KIND, path):
                 recording = MdfRecording(mdf, path, options)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.errors import DamagedChannelError, TimeError, Where
+from drivetwin.errors import DamagedChannelError, FileFormatError, TimeError, Where
 from drivetwin.logs.extras import foreign_parser, require
 from drivetwin.logs.names import name_and_unit, time_index
 from drivetwin.logs.raw import Column, RawChannel, ReadOptions, Recording, Window
@@ -63,6 +63,9 @@ class ParquetRecording:
         column = self.columns[index]
         where = Where(file=str(self._path), channel=column.name)
         values, present = self._numbers(self._fields[index], where)
+        if values.size != self._seconds.size:
+            what = f"{values.size} values for {self._seconds.size} time stamps"
+            raise FileFormatError(what, "export the log again", where)
         channel = RawChannel(column.name, column.unit, self._seconds[present], values[present])
         return channel.within(window)
 

@@ -107,12 +107,20 @@ def read_mapping(path: Path) -> Mapped:
     return Mapped(channels, ReadOptions(TimeColumn(file.time.source, file.time.unit), bus))
 
 
-def write_mapping(path: Path, channels: Mapping[str, ChannelSpec]) -> None:
-    """Write `channels` (by role) as a mapping file to edit; an existing file is replaced."""
+def write_mapping(
+    path: Path, channels: Mapping[str, ChannelSpec], options: ReadOptions | None = None
+) -> None:
+    """Write `channels` (by role) as a mapping file to edit; an existing file is replaced.
+
+    `options` for the file as a whole stand before them, DBC files with their full path.
+    """
     document = tomlkit.document()
     document.add(tomlkit.comment("Channel mapping: which column is what to the driveline."))
     document.add(tomlkit.comment("value = sign * (scale * column + offset), in `unit`;"))
     document.add(tomlkit.comment("time_shift_s is added to the time stamps of the channel."))
+    for name, entries in _options(options or ReadOptions()).items():
+        if entries:
+            document.add(name, tomlkit.item(entries))
     tables = tomlkit.table(is_super_table=True)
     pressures = tomlkit.table(is_super_table=True)
     for role, spec in channels.items():
@@ -124,6 +132,19 @@ def write_mapping(path: Path, channels: Mapping[str, ChannelSpec]) -> None:
         tables.add(PRESSURE.rstrip("."), pressures)
     document.add("channels", tables)
     path.write_text(tomlkit.dumps(document), encoding="utf-8")
+
+
+def _options(options: ReadOptions) -> dict[str, dict[str, object]]:
+    """The tables `[time]` and `[bus]`, without what is not stated."""
+    time = {"source": options.time.source, "unit": options.time.unit}
+    bus = {
+        "dbc": [str(path.resolve()) for path in options.bus.databases] or None,
+        "reference_torque_Nm": options.bus.reference_torque,
+    }
+    return {
+        name: {key: value for key, value in table.items() if value is not None}
+        for name, table in (("time", time), ("bus", bus))
+    }
 
 
 def _table(spec: ChannelSpec) -> tomlkit.items.Table:

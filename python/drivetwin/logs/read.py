@@ -95,7 +95,7 @@ def _channel(role: str, spec: ChannelSpec, source: RawChannel, file: str) -> Cha
     return Channel(
         role=role,
         quantity=quantity,
-        time=source.time + spec.time_shift,
+        time=source.time if spec.time_shift == 0.0 else source.time + spec.time_shift,
         values=unit.to_si(spec.sign * (spec.scale * source.values + spec.offset)),
         source_name=source.name,
         source_unit=unit_text or "",
