@@ -219,8 +219,8 @@ def test_a_prescribed_speed_tears_a_resting_brake_loose() -> None:
     result = run(elements, Start({"a": 0.0}), ("speed", "a"), speed=start, pressure=ONE)
     expected = 10.0 * np.maximum(SECOND - 0.5, 0.0)
     assert np.abs(result.columns["speed", "a"] - expected).max() < 1e-12
-    events = [(event.element, event.kind, event.time) for event in result.events]
-    assert events == [("brake", "break_away", pytest.approx(0.5))]
+    assert [(event.element, event.kind) for event in result.events] == [("brake", "break_away")]
+    assert result.events[0].time == pytest.approx(0.5)
 
 
 def test_a_prescribed_speed_may_not_jump() -> None:
