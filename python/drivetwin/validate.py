@@ -66,7 +66,7 @@ def validate(
     window = _window(log, shift)
     engine_torque = _moved(log["engine_torque"], -twin.value("te_delay", 0.0))
     pressures = {element.name: _signal(log.pressure(element.name)) for element in model.elements}
-    count = round((window[1] - window[0]) / _GRID)
+    count = int((window[1] - window[0]) / _GRID + 1e-6)
     time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
     start = start_state(model, log, shift, window[0])
     trajectory = simulate(model, engine_torque, pressures, start, time)

@@ -10,6 +10,10 @@ import numpy as np
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.signals import FloatArray, PriorValue
 
+NUGGET = 1e-7
+"""Variance, as a share of a parameter's own, by which derived parameters may leave the equation
+that makes them: of k_o, J′ and ω_d one follows from the others, so their covariance is singular."""
+
 
 def combine(
     shifts: Sequence[IntegralShift], J_out: PriorValue | None
@@ -31,9 +35,7 @@ def combine(
     for shift in shifts:
         place = [ids.index(name) for name in shift.ids]
         unit = scale[place]
-        weight = np.linalg.pinv(
-            shift.covariance / np.outer(unit, unit), rcond=1e-12, hermitian=True
-        )
+        weight = np.linalg.inv(shift.covariance / np.outer(unit, unit) + NUGGET * np.eye(unit.size))
         information[np.ix_(place, place)] += weight
         pull[place] += weight @ (shift.values / unit)
     if J_out is not None and J_out.std > 0.0:
@@ -41,5 +43,5 @@ def combine(
         surplus = (len(shifts) - 1) * (scale[k] / J_out.std) ** 2
         information[k, k] -= surplus
         pull[k] -= surplus * J_out.value / scale[k]
-    covariance = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
+    covariance = np.linalg.inv(information)
     return ids, (covariance @ pull) * scale, covariance * np.outer(scale, scale)

@@ -230,10 +230,11 @@ def solve(
             break
     information = point.hessian - _spurious(assemble(theta), point, theta.size)
     chi2 = point.q / max(point.residual.size - theta.size, 1)
-    covariance = _inverse(_positive(information) + prior.precision)
+    # More residual than the stated noise lowers what the data tell, not what the design tells.
+    covariance = _inverse(_positive(information) / max(1.0, chi2) + prior.precision)
     return Fit(
         theta,
-        covariance * max(1.0, chi2),
+        covariance,
         information,
         point.residual,
         np.sqrt(point.variance),
