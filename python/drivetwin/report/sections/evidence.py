@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.literal import PaperShift
@@ -40,14 +41,24 @@ LOAD_LABELS = WlseLabels(
     torque="T_o − T_v/i_f [Nm]",
     inertia="J3",
 )
-_LOAD_TEXT = "Default method, momentum form: one point per window."
 _Kind = TypeVar("_Kind")
+
+
+@dataclass(frozen=True)
+class _Stages(Generic[_Kind]):
+    """One method's stages on one shift; `by` says which method, and of several shifts which."""
+
+    by: str
+    stages: _Kind
+
+
+_AnyStages = _Stages[IntegralShift] | _Stages[PaperShift]
 
 
 def evidence_sections(found: Identification) -> list[Section]:
     """One section per question: inertia and efficiency, load, output shaft."""
-    integral, paper = _of_kind(found, IntegralShift), _of_kind(found, PaperShift)
-    shifts: list[IntegralShift | PaperShift] = [*integral, *paper]
+    integral = _stages(found, IntegralShift, "default method")
+    paper = _stages(found, PaperShift, "the paper's method")
     return [
         Section(
             "inertia",
@@ -56,8 +67,12 @@ def evidence_sections(found: Identification) -> list[Section]:
             "agree with one η and one J′.",
             [
                 *_momentum_blocks(integral),
-                *_grid_blocks(
-                    ((p.inertia, p.doubts.get("eta", "")) for p in paper), INERTIA_LABELS
+                *(
+                    block
+                    for one in paper
+                    for block in _grid_blocks(
+                        one.by, one.stages.inertia, one.stages.doubts.get("eta"), INERTIA_LABELS
+                    )
                 ),
             ],
         ),
@@ -67,8 +82,12 @@ def evidence_sections(found: Identification) -> list[Section]:
             "Eq. 11: T_o − T_v/i_f = (J3/i_f)·ω_w′.",
             [
                 *_load_blocks(found, integral),
-                *_grid_blocks(
-                    ((p.load, p.doubts.get("J_vehicle", "")) for p in paper), LOAD_LABELS
+                *(
+                    block
+                    for one in paper
+                    for block in _grid_blocks(
+                        one.by, one.stages.load, one.stages.doubts.get("J_vehicle"), LOAD_LABELS
+                    )
                 ),
             ],
         ),
@@ -78,8 +97,8 @@ def evidence_sections(found: Identification) -> list[Section]:
             "After lock-up the inertias on both sides of the output shaft swing against each "
             "other; frequency and decay give stiffness and damping (eqs. 12–14).",
             [
-                *_ring_blocks(shifts),
-                *_refusals(shifts, "shaft"),
+                *_ring_blocks([*integral, *paper]),
+                *_refusals([*integral, *paper], "shaft"),
             ],
         ),
     ]
@@ -93,13 +112,22 @@ def _of_kind(found: Identification, kind: type[_Kind]) -> list[_Kind]:
     return [item for item in items if isinstance(item, kind)]
 
 
-def _momentum_blocks(shifts: Iterable[IntegralShift]) -> list[Block]:
+def _stages(found: Identification, kind: type[_Kind], method: str) -> list[_Stages[_Kind]]:
+    """Evidence of one method, each with the shift it is of where there are several."""
+    stages = _of_kind(found, kind)
+    names = [f"Shift {one.start_gear}→{one.end_gear}, {method}" for one in found.shifts]
+    if len(stages) < 2 or len(stages) != len(names):
+        names = [method[0].upper() + method[1:]] * len(stages)
+    return [_Stages(name, one) for name, one in zip(names, stages, strict=True)]
+
+
+def _momentum_blocks(shifts: Iterable[_Stages[IntegralShift]]) -> list[Block]:
     return [
         FigureBlock(
-            momentum_figure(one.momentum),
-            "Default method, momentum form: each point is a window weighted by a smooth kernel, so "
+            momentum_figure(one.stages.momentum),
+            f"{one.by}, momentum form: each point is a window weighted by a smooth kernel, so "
             "no speed is differentiated. Right: how the misfit rises as the engine torque is taken "
-            "to be older or younger than it is." + _without_age(one),
+            "to be older or younger than it is." + _without_age(one.stages),
         )
         for one in shifts
     ]
@@ -110,26 +138,29 @@ def _without_age(shift: IntegralShift) -> str:
     return f" Here {why}; the least misfit is noise, and no age is assumed." if why else ""
 
 
-def _load_blocks(found: Identification, shifts: Iterable[IntegralShift]) -> list[Block]:
+def _load_blocks(found: Identification, shifts: Iterable[_Stages[IntegralShift]]) -> list[Block]:
     validations = _of_kind(found, Validation)
     final_drive = validations[0].model.i_f if validations else None
-    return [FigureBlock(load_figure(one.load, final_drive), _LOAD_TEXT) for one in shifts]
-
-
-def _grid_blocks(fits: Iterable[tuple[GridFit, str]], labels: WlseLabels) -> list[Block]:
-    """Figure and table of each grid search; a doubt about it stands between the two."""
-    blocks: list[Block] = []
-    for fit, doubt in fits:
-        text = (
-            "The paper's weighted least squares (Fig. 6): samples whose own quotient lies in the "
-            "plausible range weigh 1, others 0.01; the grid value of least RMS error is kept. "
-            "Noise in the differenced speed biases it."
+    return [
+        FigureBlock(
+            load_figure(one.stages.load, final_drive),
+            f"{one.by}, momentum form: one point per window.",
         )
-        blocks.append(FigureBlock(wlse_figure(fit, labels), text))
-        if doubt:
-            blocks.append(NotesBlock("Not to be relied on", [doubt], Tone.DOUBTFUL))
-        blocks.append(grid_table(fit, labels, Tone.DOUBTFUL if doubt else Tone.GOOD))
-    return blocks
+        for one in shifts
+    ]
+
+
+def _grid_blocks(by: str, fit: GridFit, doubt: str | None, labels: WlseLabels) -> list[Block]:
+    """Figure and table of a grid search; a doubt about it stands between the two."""
+    text = (
+        f"{by}, weighted least squares (Fig. 6): samples whose own quotient lies in the plausible "
+        "range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise in the "
+        "differenced speed biases it."
+    )
+    blocks: list[Block] = [FigureBlock(wlse_figure(fit, labels), text)]
+    if doubt:
+        blocks.append(NotesBlock("Not to be relied on", [doubt], Tone.DOUBTFUL))
+    return [*blocks, grid_table(fit, labels, Tone.DOUBTFUL if doubt else Tone.GOOD)]
 
 
 def grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -> TableBlock:
@@ -152,25 +183,24 @@ def grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -> Tabl
     return TableBlock("Grid search as in Table 1, RMS error at the output shaft.", head, rows)
 
 
-def _ring_blocks(shifts: Iterable[IntegralShift | PaperShift]) -> list[Block]:
+def _ring_blocks(shifts: Iterable[_AnyStages]) -> list[Block]:
     blocks: list[Block] = []
     for one in shifts:
-        if one.ring is None:
+        ring = one.stages.ring
+        if ring is None:
             continue
         how = (
             "read from the extremes of the averaged curve"
-            if isinstance(one, PaperShift)
+            if isinstance(one.stages, PaperShift)
             else "from a decaying sine on a parabola, the engine torque's own motion included"
         )
-        text = f"{_by(one)}: {one.ring.f_d:.3f} Hz, damping ratio {one.ring.zeta:.4f}, {how}."
-        blocks.append(FigureBlock(ringdown_figure(one.ring), text))
+        text = f"{one.by}: {ring.f_d:.3f} Hz, damping ratio {ring.zeta:.4f}, {how}."
+        blocks.append(FigureBlock(ringdown_figure(ring), text))
     return blocks
 
 
-def _by(shift: IntegralShift | PaperShift) -> str:
-    return "The paper's method" if isinstance(shift, PaperShift) else "Default method"
-
-
-def _refusals(shifts: Iterable[IntegralShift | PaperShift], stage: str) -> list[Block]:
-    texts = [f"{_by(one)}: {one.refusals[stage]}" for one in shifts if stage in one.refusals]
+def _refusals(shifts: Iterable[_AnyStages], stage: str) -> list[Block]:
+    texts = [
+        f"{one.by}: {one.stages.refusals[stage]}" for one in shifts if stage in one.stages.refusals
+    ]
     return [NotesBlock("Not possible here", texts, Tone.DOUBTFUL)] if texts else []
