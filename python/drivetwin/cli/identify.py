@@ -24,7 +24,7 @@ def identify(
     channels: ChannelsFile = None,
     method: Annotated[
         Method, typer.Option(metavar="METHOD", help="paper, integral or likelihood.")
-    ] = Method.INTEGRAL,
+    ] = Method.LIKELIHOOD,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Where result, twin and report go."),

@@ -61,7 +61,7 @@ def conclude(
     J_out = drivelines[0].J_out
     ids, values, covariance = combine(shifts, J_out)
     std = np.sqrt(np.diag(covariance))
-    notes = _notes(signals)
+    notes = low_gear_notes(signals)
     estimates = {}
     for name, value, noise in zip(ids, values, std, strict=True):
         prior = J_out if name == "J_out" else _fill_prior(name, drivelines)
@@ -85,7 +85,8 @@ def conclude(
     )
 
 
-def _notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
+def low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
+    """By parameter id what a still engine torque in the lower gear costs it."""
     notes: dict[str, str] = {}
     for s in signals:
         note = _low_gear_note(s, s.shift.start_gear)

@@ -13,21 +13,36 @@ from drivetwin.identify.signals import FloatArray
 
 _THIRD_DIFFERENCE_GAIN = np.sqrt(20.0)
 """Standard deviation of the third difference of unit white noise: sqrt(1 + 9 + 9 + 1)."""
+_CLIP = 3.0
+"""Deviates beyond so many sigma are corners of the signal, not noise."""
+_INNER_POWER = 0.97334
+"""Variance of unit normal deviates cut at 3 sigma."""
+_PASSES = 10
 
 
 def white_noise(values: FloatArray, block: int = 25, spread: float = 3.0) -> float:
     """Standard deviation of the sample-to-sample noise of `values` (n,), in their unit.
 
     The mean square of the third difference is averaged over the blocks of `block` samples whose
-    own mean square is at most `spread` times the median's. Rounding counts as noise.
+    own mean square is at most `spread` times the median's, without the single corners that stand
+    out of it. Rounding counts as noise.
     """
     third = np.diff(values, 3) / _THIRD_DIFFERENCE_GAIN
     count = third.size // block
     if count < 2:
         return float(np.sqrt(np.mean(third**2)))
-    power = np.mean(third[: count * block].reshape(count, block) ** 2, axis=1)
-    calm = power[power <= spread * np.median(power)]
-    return float(np.sqrt(np.mean(calm)))
+    blocks = third[: count * block].reshape(count, block) ** 2
+    power = np.mean(blocks, axis=1)
+    return _without_corners(blocks[power <= spread * np.median(power)].ravel())
+
+
+def _without_corners(squares: FloatArray) -> float:
+    """Root mean of squares (n,) of normal deviates, those beyond `_CLIP` sigma left out."""
+    level = float(np.mean(squares))
+    for _ in range(_PASSES):
+        inner = squares[squares <= _CLIP**2 * level]
+        level = float(np.mean(inner)) / _INNER_POWER
+    return float(np.sqrt(level))
 
 
 def resolution(values: FloatArray) -> float:

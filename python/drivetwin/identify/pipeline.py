@@ -10,11 +10,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from drivetwin.errors import IdentificationError, InputError, NoShiftError, Where
+from drivetwin.errors import IdentificationError, NoShiftError, Where
 from drivetwin.identify.conclude import Conclusions, conclude, with_systematic_band
 from drivetwin.identify.friction import FrictionSettings, stribeck_at
 from drivetwin.identify.inputs import driveline_of, signals_of
 from drivetwin.identify.integral import IntegralShift, identify_shift
+from drivetwin.identify.likelihood.run import likelihood
 from drivetwin.identify.literal import PaperShift, paper_shift
 from drivetwin.identify.literal_result import paper_conclusions
 from drivetwin.identify.method import Method
@@ -40,20 +41,17 @@ class Shifts(Protocol):
 
 
 def identify(
-    log: ShiftLog, card: VehicleCard, shifts: Shifts, method: Method = Method.INTEGRAL
+    log: ShiftLog, card: VehicleCard, shifts: Shifts, method: Method = Method.LIKELIHOOD
 ) -> Identification:
     """Identify the driveline from all usable shifts of a log.
 
     `evidence["paper"]` holds a PaperShift and `evidence["integral"]` an IntegralShift per shift;
-    the paper's stages run beside the default method for comparison.
+    the paper's stages run beside the other methods for comparison. The likelihood method starts
+    from the integral one, adds `evidence["likelihood"]` (a LikelihoodFit), and leaves the integral
+    result with a warning where it does not converge.
     Raises NoShiftError without a shift, IdentificationError where the data cannot carry it,
     MissingChannelError for a missing channel.
     """
-    if method is Method.LIKELIHOOD:
-        raise InputError(
-            "the likelihood method is not part of this version",
-            f"use --method {Method.INTEGRAL} or {Method.PAPER}",
-        )
     if not shifts.shifts:
         raise NoShiftError(
             "the log holds no usable gear shift",
@@ -68,6 +66,15 @@ def identify(
         found = paper_conclusions(paper, signals, drivelines)
     else:
         found, evidence["integral"] = _integral(signals, drivelines, card)
+        if method is Method.LIKELIHOOD:
+            try:
+                found, evidence["likelihood"] = likelihood(
+                    signals, drivelines, (found, evidence["integral"]), card
+                )
+            except IdentificationError as error:
+                method = Method.INTEGRAL
+                text = f"likelihood: {error.what}; the values are those of the integral method"
+                found = replace(found, warnings=(text, *found.warnings))
         try:
             paper = _paper_shifts(signals, drivelines, card)
         except IdentificationError as error:

@@ -33,16 +33,29 @@ the random walk over a log stays below what the sensors show of the state."""
 
 
 @dataclass(frozen=True)
+class NoisePath:
+    """How input noise reaches the outputs.
+
+    `seen` is H, `factor` the banded Cholesky factor, `inverse` (N, 4, 4) the inverse process noise
+    of each step, `power` (N-1,) the variance of an input's noise over a step, by name.
+    """
+
+    response: Response
+    power: dict[str, FloatArray]
+    inverse: FloatArray
+    seen: csr_array
+    factor: FloatArray
+
+
+@dataclass(frozen=True)
 class Whiteness:
     """Weighting of residuals (n,) by the inverse of their covariance.
 
-    `factor` is the banded Cholesky factor and `seen` the matrix H of the input noise; None where
-    the outputs' noise counts alone.
+    `path` describes the input noise; None where the outputs' noise counts alone.
     """
 
     variance: FloatArray
-    seen: csr_array | None = None
-    factor: FloatArray | None = None
+    path: NoisePath | None = None
 
     def weighted(self, columns: FloatArray) -> FloatArray:
         """Σ⁻¹·columns, (n,) or (n, q)."""
@@ -51,13 +64,30 @@ class Whiteness:
 
     def driven(self, columns: FloatArray) -> FloatArray:
         """The part of residual columns (n,) or (n, q) that input noise explains best."""
-        if self.seen is None or self.factor is None:
+        if self.path is None:
             return np.zeros_like(columns)
+        return np.asarray(self.path.seen @ self._state(self.path, columns))
+
+    def input_noise(self, residual: FloatArray) -> dict[str, FloatArray]:
+        """Expected noise (N-1,) of every input per step, by name, given the residual (n,).
+
+        The run was driven by input plus noise, so the residual shows the noise with minus sign.
+        """
+        if self.path is None:
+            return {}
+        z = self._state(self.path, residual).reshape(-1, STATES)
+        w = z[1:] - np.einsum("kij,kj->ki", self.path.response.transition, z[:-1])
+        pull = np.einsum("kij,kj->ki", self.path.inverse[1:], w)
+        return {
+            name: -self.path.power[name] * np.einsum("ki,ki->k", drive, pull)
+            for name, drive in self.path.response.drive.items()
+        }
+
+    def _state(self, path: NoisePath, columns: FloatArray) -> FloatArray:
+        """Expected disturbance of the state (4N,) or (4N, q), given residual columns."""
         variance = self.variance if columns.ndim == 1 else self.variance[:, None]
-        z = cho_solve_banded(
-            (self.factor, True), self.seen.T @ (columns / variance), check_finite=False
-        )
-        return np.asarray(self.seen @ z)
+        pull = path.seen.T @ (columns / variance)
+        return np.asarray(cho_solve_banded((path.factor, True), pull, check_finite=False))
 
 
 def sensor_noise(record: Record) -> Whiteness:
@@ -67,19 +97,31 @@ def sensor_noise(record: Record) -> Whiteness:
 
 def with_input_noise(model: DualClutch, record: Record, response: Response) -> Whiteness:
     """Weighting with the noise of engine torque and pressures in it."""
-    seen = _seen(model, record)
-    variance = record.sigma**2
-    inverse = np.linalg.inv(_process(model, record, response))
+    power = _power(record, response)
+    inverse = np.asarray(np.linalg.inv(_process(model, record, response, power)), dtype=float)
     factor = cholesky_banded(
         _information(inverse, response.transition, model, record),
         overwrite_ab=True,
         lower=True,
         check_finite=False,
     )
-    return Whiteness(variance, seen, factor)
+    path = NoisePath(response, power, inverse, _seen(model, record), factor)
+    return Whiteness(record.sigma**2, path)
 
 
-def _process(model: DualClutch, record: Record, response: Response) -> FloatArray:
+def _power(record: Record, response: Response) -> dict[str, FloatArray]:
+    """Variance (N-1,) of an input's noise as constant over each step, by name."""
+    found = {}
+    for name in response.drive:
+        signal = record.engine_torque if name == "engine torque" else record.pressures[name]
+        between = float(np.median(np.diff(signal.time)))
+        found[name] = record.input_sigma[name] ** 2 * between / response.step
+    return found
+
+
+def _process(
+    model: DualClutch, record: Record, response: Response, power: dict[str, FloatArray]
+) -> FloatArray:
     """Process noise (N, 4, 4) that enters between a grid point and the one before; first: start."""
     sigma = {out.name: out.sigma for out in record.outputs}
     wheel = sigma.get("wheel_speed", sigma["output_speed"] / model.i_f)
@@ -88,10 +130,7 @@ def _process(model: DualClutch, record: Record, response: Response) -> FloatArra
     )
     noise = np.zeros((record.time.size, STATES, STATES)) + np.diag(quiet**2)
     for name, drive in response.drive.items():
-        signal = record.engine_torque if name == "engine torque" else record.pressures[name]
-        between = float(np.median(np.diff(signal.time)))
-        power = record.input_sigma[name] ** 2 * between / response.step
-        noise[1:] += power[:, None, None] * drive[:, :, None] * drive[:, None, :]
+        noise[1:] += power[name][:, None, None] * drive[:, :, None] * drive[:, None, :]
     return noise
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.newton import Found, minimise
+from drivetwin.identify.likelihood.newton import minimise
 from drivetwin.identify.likelihood.output_error import staged
-from drivetwin.identify.likelihood.problem import Problem
+from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import FloatArray
 from drivetwin.shifts.shift import Shift
@@ -24,14 +24,14 @@ PLAUSIBLE = 2.0
 class LikelihoodFit:
     """The minimum of Q: `point` with `covariance` (p, p), both of the unknowns of the fit.
 
-    `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum. `data`
-    (p, p) is the information of the measurements without the priors.
+    `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
+    the expansion of Q there. The covariance is widened where chi2 exceeds 1.
     """
 
     problem: Problem
     point: Point
     covariance: FloatArray
-    data: FloatArray
+    normal: Normal
     chi2: float
     iterations: int
 
@@ -55,27 +55,27 @@ def fit(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFi
 
 
 def _likelihood(problem: Problem, start: Point) -> LikelihoodFit | None:
-    """Minimum of Q with input noise, weighted at the start and again where that led."""
-    iterations = 0
-    point = start
-    for _ in range(2):
-        weighted = problem.weighted_by(point)
-        found = minimise(weighted, point)
-        if found is None or not found.converged:
-            return None
-        point, iterations = found.point, iterations + found.iterations
-    chi2 = (found.normal.cost - problem.prior.cost(point.values)) / problem.size
+    """Minimum of Q with input noise; weighting and expected inputs follow the point."""
+
+    def refresh(present: Problem, point: Point) -> Problem:
+        if present is problem:
+            return problem.weighted_by(point)
+        return present.with_expected_inputs(point, problem).weighted_by(point)
+
+    found = minimise(problem, start, refresh)
+    if found is None or not found.converged:
+        return None
+    chi2 = (found.normal.cost - problem.prior.cost(found.point.values)) / problem.size
     if chi2 > PLAUSIBLE:
         return None
+    covariance = max(chi2, 1.0) * covariance_of(found.normal.information)
     return LikelihoodFit(
-        weighted, point, covariance_of(found), found.normal.data, chi2, iterations
+        found.problem, found.point, covariance, found.normal, chi2, found.iterations
     )
 
 
-def covariance_of(found: Found) -> FloatArray:
-    """Inverse of the information (p, p), formed after scaling to a unit diagonal."""
-    matrix = found.normal.information
+def covariance_of(matrix: FloatArray) -> FloatArray:
+    """Inverse of an information matrix (p, p), formed after scaling to a unit diagonal."""
     scale = np.sqrt(np.diag(matrix))
-    return np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-14, hermitian=True) / np.outer(
-        scale, scale
-    )
+    inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-14, hermitian=True)
+    return np.asarray(inverse / np.outer(scale, scale))

@@ -18,9 +18,7 @@ TYPICAL_MODE = (2.0 * np.pi * 10.0, 0.06)
 """Angular frequency [rad/s] and damping ratio of a driveline where no ring-down was clean."""
 
 
-def guess_of(
-    shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]
-) -> dict[str, float]:
+def guess_of(shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]) -> dict[str, float]:
     """A value for every unknown of the driveline and every law, from the linear fits."""
     first = shifts[0]
     told = dict(zip(first.ids, first.values, strict=True))
@@ -35,8 +33,10 @@ def guess_of(
         "Tv_over_if": told["Tv_over_if"],
         "te_delay": first.momentum.value("te_delay"),
     }
-    shaft = {key: told[key] for key in ("k_o", "c_o") if key in told}
-    found |= shaft or _typical_shaft(found, drivelines[0])
+    if "k_o" in told:
+        found |= {"k_o": told["k_o"], "c_o": told["c_o"]}
+    else:
+        found |= _typical_shaft(found, drivelines[0])
     return {k: float(v) for k, v in found.items()} | _laws(shifts, drivelines)
 
 

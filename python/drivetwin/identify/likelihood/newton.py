@@ -8,6 +8,7 @@ one, which is the same part of a standard deviation squared for every unknown.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,18 +17,29 @@ from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import FloatArray
 
-ENOUGH = 1e-3
-"""Expected fall of Q at which the search ends: 0.03 standard deviations."""
+ENOUGH = 1e-2
+"""Expected fall of Q at which the search ends: 0.1 standard deviations."""
+STALLED = 0.1
+"""Expected fall of Q below which a point from which no step lowers Q is a minimum all the same.
+
+Pressure noise about P0 fills and vents an element many times, and each such instant is a small
+kink of Q."""
 DAMPING = 1e-3
 """First damping relative to the diagonal of the information."""
 LARGEST = 1e8
 """Damping at which no step is left to try."""
+MAX_STEPS = 40
+REFRESHES = 3
+"""Points at which Q is formed anew: it settles in two, and may alternate about a kink after."""
+
+Refresh = Callable[[Problem, Point], Problem]
 
 
 @dataclass(frozen=True)
 class Found:
-    """Where a search ended: the point, its expansion, and whether it is a minimum."""
+    """Where a search ended: the point, Q and its expansion there, and whether it is a minimum."""
 
+    problem: Problem
     point: Point
     normal: Normal
     converged: bool
@@ -39,36 +51,51 @@ def step_of(matrix: FloatArray, gradient: FloatArray, damping: float = 0.0) -> F
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     unit = matrix / np.outer(scale, scale)
     unit[np.diag_indices_from(unit)] += damping
-    return np.asarray(
-        -np.linalg.lstsq(unit, gradient / scale, rcond=1e-13)[0] / scale, dtype=float
-    )
+    return np.asarray(-np.linalg.lstsq(unit, gradient / scale, rcond=1e-13)[0] / scale, dtype=float)
 
 
-def minimise(problem: Problem, start: Point, limit: int = 30) -> Found | None:
+def unchanged(problem: Problem, _: Point) -> Problem:
+    """A Q that stays the same during the search."""
+    return problem
+
+
+def minimise(problem: Problem, start: Point, refresh: Refresh = unchanged) -> Found | None:
     """Search from `start`; None where the simulation fails there.
 
-    Not converged after `limit` expansions of Q says so; the values are then no estimate.
+    `refresh` gives Q anew at the first `REFRESHES` points, for a weighting that follows the point.
+    Not converged after `MAX_STEPS` says so; the values are then no estimate.
     """
     point = start.moved(np.clip(start.values, problem.lower, problem.upper))
-    normal = problem.normal(point)
-    if normal is None:
-        return None
     damping = DAMPING
-    for iteration in range(limit):
-        if _expected(problem, point, normal) < ENOUGH:
-            return Found(point, normal, True, iteration)
-        accepted = None
-        while accepted is None and damping < LARGEST:
-            step = step_of(normal.information, normal.gradient, damping)
-            trial = point.moved(np.clip(point.values + step, problem.lower, problem.upper))
-            cost = problem.cost(trial)
-            if cost < normal.cost:
-                accepted = problem.normal(trial)
-            damping = damping / 10.0 if accepted else damping * 10.0
-        if accepted is None:
-            return Found(point, normal, False, iteration)
-        point, normal = trial, accepted
-    return Found(point, normal, False, limit)
+    for iteration in range(MAX_STEPS):
+        if iteration < REFRESHES:
+            problem = refresh(problem, point)
+        normal = problem.normal(point)
+        if normal is None:
+            return None
+        expected = _expected(problem, point, normal)
+        settled = iteration + 1 >= REFRESHES or refresh is unchanged
+        if expected < ENOUGH and settled:
+            return Found(problem, point, normal, True, iteration)
+        trial, damping = _better(problem, point, normal, damping)
+        if trial is None:
+            return Found(problem, point, normal, expected < STALLED, iteration)
+        point = trial
+    last = problem.normal(point)
+    return None if last is None else Found(problem, point, last, False, MAX_STEPS)
+
+
+def _better(
+    problem: Problem, point: Point, normal: Normal, damping: float
+) -> tuple[Point | None, float]:
+    """A point with less Q, the damping raised until there is one, and the next damping."""
+    while damping < LARGEST:
+        step = step_of(normal.information, normal.gradient, damping)
+        trial = point.moved(np.clip(point.values + step, problem.lower, problem.upper))
+        if problem.cost(trial) < normal.cost:
+            return trial, damping / 10.0
+        damping *= 10.0
+    return None, damping
 
 
 def _expected(problem: Problem, point: Point, normal: Normal) -> float:

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from drivetwin.driveline import LossLaw
 from drivetwin.identify.friction import LAW_PRIOR
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import LATEST, record_of
@@ -40,7 +41,7 @@ OFF_GOING_LEVEL = 0.03
 def problem_of(
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[Driveline],
-    loss_law: str,
+    loss_law: LossLaw,
     guess: Mapping[str, float],
 ) -> tuple[Problem, Point]:
     """The fit of all shifts of a log, and where its search starts.
@@ -50,16 +51,16 @@ def problem_of(
     shift holds too little.
     """
     priors = _priors(signals, drivelines, guess)
-    names = [n for n in (*COMMON, *_laws(drivelines), *_fills(drivelines)) if n not in ()]
-    names = [n for n in names if not _is_known(priors.get(n))]
+    every = (*COMMON, *_laws(drivelines), *_fills(drivelines))
+    names = [n for n in every if not _is_known(priors.get(n))]
     if TE_OFFSET in priors:
         names.append(TE_OFFSET)
     fixed = dict(guess) | {n: p.value for n, p in priors.items() if _is_known(p)}
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
         label = f"start{k}"
-        record = record_of(s, span)
-        structure = Structure(d, "dissipative" if loss_law == "dissipative" else "paper", label, fixed)
+        record = record_of(s, d, span)
+        structure = Structure(d, loss_law, label, fixed)
         parts.append(Part.unweighted(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
@@ -108,9 +109,7 @@ def _laws(drivelines: Sequence[Driveline]) -> list[str]:
 
 
 def _fills(drivelines: Sequence[Driveline]) -> list[str]:
-    elements = dict.fromkeys(
-        e.name for d in drivelines for e in (d.oncoming, d.offgoing)
-    )
+    elements = dict.fromkeys(e.name for d in drivelines for e in (d.oncoming, d.offgoing))
     return [f"{e}.{key}" for e in elements for key in ("P0", "drum")]
 
 

@@ -3,9 +3,14 @@
 
     Q(θ) = Σ_shifts (y - ŷ(θ))ᵀ Σ⁻¹ (y - ŷ(θ)) + (θ - θ₀)ᵀ P₀⁻¹ (θ - θ₀)
 
-ŷ is the output of the core, driven by the measured inputs; its derivatives are the core's, exact
-through lock and break-away. Σ is held while θ moves (Gauss-Newton on a Gaussian likelihood whose
-covariance is known well from the start values).
+ŷ is the output of the core, its derivatives are the core's, exact through lock and break-away. Σ
+is held while θ moves.
+
+Driven by the inputs as measured, ŷ and its derivatives carry the same input noise, and their
+product has a mean: parameters that attenuate the noise (Jo′ before all) come out too large. So
+the run is driven by the expected inputs û, the measured ones less the noise that the residual
+shows, and what that takes off the residual, G·(u - û), is put back linearly. At the minimum this
+is the joint maximum over parameters and inputs (total least squares as in regression.py).
 """
 
 from __future__ import annotations
@@ -24,14 +29,22 @@ from drivetwin.identify.likelihood.unknowns import TE_OFFSET, Point, Structure
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import FloatArray
 
+LARGEST = 1e9
+"""Residual in standard deviations from which a run counts as failed."""
+
 
 @dataclass(frozen=True)
 class Part:
-    """One shift: its structure, what was recorded, and the weighting of its residuals."""
+    """One shift: its structure, what was recorded, and the weighting of its residuals.
+
+    `record` has the inputs that drive the run; `returned` (n,) is G·(u - û), 0 while the inputs
+    are those measured.
+    """
 
     structure: Structure
     record: Record
     weighting: Whiteness
+    returned: FloatArray | float = 0.0
 
     @classmethod
     def unweighted(cls, structure: Structure, record: Record) -> Part:
@@ -50,11 +63,16 @@ class Part:
             )
         except InputError:
             return None
-        return found if found.status == "completed" else None
+        return found if self._whole(found) else None
+
+    def _whole(self, run: Trajectory) -> bool:
+        """Whether a run reached its end with outputs that can be squared."""
+        worst = np.max(np.abs(self.residual(run)) / self.record.sigma)
+        return run.status == "completed" and bool(worst < LARGEST)
 
     def residual(self, run: Trajectory) -> FloatArray:
-        """Measured minus simulated (n,)."""
-        return self.record.measured - self.record.stacked(run)
+        """Measured minus simulated (n,), the latter as the measured inputs would have it."""
+        return self.record.measured - self.record.stacked(run) - self.returned
 
     def linearised(self, point: Point) -> tuple[FloatArray, FloatArray] | None:
         """Residual (n,) and the derivative (n, p) of the simulated samples by `point`."""
@@ -71,7 +89,7 @@ class Part:
             )
         except InputError:
             return None
-        if found.run.status != "completed":
+        if not self._whole(found.run):
             return None
         columns = np.column_stack([self.record.stacked(found.derivatives[n]) for n in names])
         slopes = columns @ matrix
@@ -111,6 +129,25 @@ class Part:
         whiteness = with_input_noise(model, self.record, response_of(model, run, self.record))
         return replace(self, weighting=whiteness)
 
+    def with_expected_inputs(self, point: Point, measured: Record) -> Part:
+        """The part driven by the `measured` inputs less their expected noise at `point`."""
+        run = self.run(point)
+        if run is None:
+            return self
+        noise = self.weighting.input_noise(self.residual(run))
+        age = self.structure.value(point, "te_delay")
+        record = measured.less(noise, age)
+        part = replace(self, record=record)
+        middle = 0.5 * (run.time[1:] + run.time[:-1])
+        taken = {
+            name: np.interp(middle, signal.time, signal.values)
+            for name, signal in measured.difference(record, age).items()
+        }
+        run = part.run(point)
+        if run is None:
+            return self
+        return replace(part, returned=part.answer_to(point, run, taken))
+
     def _torque(self, point: Point) -> Signal:
         """Engine torque as it acts: read, less its mean error, moved back by its age."""
         signal = self.record.engine_torque
@@ -125,13 +162,16 @@ class Part:
 class Normal:
     """Q and its Gauss-Newton expansion at one point: gradient (p,), information (p, p).
 
-    `data` (p, p) is the information of the measurements alone.
+    `data` (p, p) is the information of the measurements alone. Per part: `residuals` (n,) and the
+    weighted derivatives `regressors` (n, p), Σ⁻¹ times those of the simulated samples.
     """
 
     cost: float
     gradient: FloatArray
     information: FloatArray
     data: FloatArray
+    residuals: tuple[FloatArray, ...]
+    regressors: tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True)
@@ -160,6 +200,11 @@ class Problem:
         """The problem with input noise in the covariance, at `point`."""
         return replace(self, parts=tuple(part.weighted_by(point) for part in self.parts))
 
+    def with_expected_inputs(self, point: Point, measured: Problem) -> Problem:
+        """The problem driven by the expected inputs at `point`."""
+        pairs = zip(self.parts, measured.parts, strict=True)
+        return replace(self, parts=tuple(p.with_expected_inputs(point, m.record) for p, m in pairs))
+
     def cost(self, point: Point) -> float:
         """Q; infinite where a simulation fails."""
         total = self.prior.cost(point.values)
@@ -176,6 +221,7 @@ class Problem:
         size = len(point.names)
         cost, gradient = self.prior.cost(point.values), self.prior.pull(point.values)
         data = np.zeros((size, size))
+        residuals, regressors = [], []
         for part in self.parts:
             found = part.linearised(point)
             if found is None:
@@ -185,5 +231,8 @@ class Problem:
             cost += float(residual @ weighted[:, 0])
             gradient = gradient - slopes.T @ weighted[:, 0]
             data += slopes.T @ weighted[:, 1:]
+            residuals.append(residual)
+            regressors.append(weighted[:, 1:])
         data = 0.5 * (data + data.T)
-        return Normal(cost, gradient, data + self.prior.precision, data)
+        information = data + self.prior.precision
+        return Normal(cost, gradient, information, data, tuple(residuals), tuple(regressors))

@@ -4,13 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin.driveline import Signal, Trajectory
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
+from drivetwin.identify.likelihood.fill import near_fill
+from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
+
+IndexArray = NDArray[np.intp]
 
 OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
 """Compared signals, in the order in which residuals are stacked."""
@@ -25,7 +29,7 @@ class Output:
     """A compared signal: `values` (n,) at the points `place` (n,) of the record's time grid."""
 
     name: str
-    place: FloatArray
+    place: IndexArray
     values: FloatArray
     sigma: float
 
@@ -70,6 +74,26 @@ class Record:
         }
         return np.concatenate([columns[out.name][out.place] for out in self.outputs])
 
+    def less(self, noise: Mapping[str, FloatArray], age: float) -> Record:
+        """The record with expected `noise` (N-1,) per step of the grid taken off its inputs."""
+        torque = self.engine_torque
+        shown = _at_samples(self.time, noise["engine torque"], torque.time - age)
+        pressures = {
+            name: Signal(p.time, p.values - _at_samples(self.time, noise[name], p.time))
+            for name, p in self.pressures.items()
+        }
+        torque = Signal(torque.time, torque.values - shown)
+        return replace(self, engine_torque=torque, pressures=pressures)
+
+    def difference(self, other: Record, age: float) -> dict[str, Signal]:
+        """Inputs of this record minus those of `other`, over the time at which they act."""
+        torque = self.engine_torque
+        apart = torque.values - other.engine_torque.values
+        found = {"engine torque": Signal(torque.time - age, apart)}
+        for name, p in self.pressures.items():
+            found[name] = Signal(p.time, p.values - other.pressures[name].values)
+        return found
+
     def until(self, end: float) -> Record:
         """The record cut at `end` [s]."""
         count = int(np.searchsorted(self.time, end, side="right"))
@@ -82,7 +106,7 @@ class Record:
         )
 
 
-def record_of(signals: ShiftSignals, span: Span) -> Record:
+def record_of(signals: ShiftSignals, driveline: Driveline, span: Span) -> Record:
     """The record of one shift over `span` [s].
 
     Raises IdentificationError where the span holds too little to compare.
@@ -115,17 +139,27 @@ def record_of(signals: ShiftSignals, span: Span) -> Record:
     torque = signals.engine_torque
     return Record(
         time,
-        _held(torque, 2.0 * LATEST),
-        {name: _held(p, 0.0) for name, p in signals.pressures.items()},
+        _held(torque),
+        {
+            name: Signal(p.time, near_fill(p, driveline.couplings[name].P0))
+            for name, p in signals.pressures.items()
+        },
         outputs,
         {"engine torque": torque.sigma} | {n: p.sigma for n, p in signals.pressures.items()},
     )
 
 
-def _held(signal: Sampled, beyond: float) -> Signal:
-    """The signal, its end values held for `beyond` [s] at both ends."""
-    if beyond == 0.0:
-        return Signal(signal.time, signal.values)
+def _at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:
+    """Mean (m,) of what is constant over each step of `grid` within half a period of `stamps`."""
+    half = 0.5 * float(np.median(np.diff(stamps)))
+    total = np.concatenate([[0.0], np.cumsum(steps * np.diff(grid))])
+    ends = np.interp(stamps + half, grid, total) - np.interp(stamps - half, grid, total)
+    return np.asarray(ends / (2.0 * half))
+
+
+def _held(signal: Sampled) -> Signal:
+    """The signal, its end values held so far that any plausible age finds a value."""
+    beyond = 2.0 * LATEST
     time = np.concatenate([[signal.time[0] - beyond], signal.time, [signal.time[-1] + beyond]])
     values = np.concatenate([signal.values[:1], signal.values, signal.values[-1:]])
     return Signal(time, values)

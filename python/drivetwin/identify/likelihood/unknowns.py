@@ -102,9 +102,7 @@ class Structure:
 
     def slopes(self, point: Point) -> tuple[tuple[str, ...], FloatArray]:
         """Names the core knows (m,) and the derivative of their values by `point` (m, p)."""
-        entries = [
-            entry for name in point.names for entry in self._entries(point, name)
-        ]
+        entries = [entry for name in point.names for entry in self._entries(point, name)]
         core = tuple(dict.fromkeys(entry[0] for entry in entries))
         matrix = np.zeros((len(core), len(point.names)))
         for field, name, slope in entries:

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Conclusions of the likelihood method: estimates, verdicts, curves and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from drivetwin.identify.conclude import (
+    ADDS_LITTLE,
+    KNOWN,
+    PRIOR_SHARE,
+    Conclusions,
+    low_gear_notes,
+)
+from drivetwin.identify.likelihood.curves import METHOD, curves_of
+from drivetwin.identify.likelihood.derived import parameters, slopes
+from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.null_space import null_directions
+from drivetwin.identify.likelihood.residuals import residual_tests
+from drivetwin.identify.likelihood.tolerance import sensor_shifts
+from drivetwin.identify.result import Estimate, FrictionCurve
+from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
+from drivetwin.identify.uncertainty import correlation, designed, judge
+from drivetwin.vehicle.spec import SensorTolerance
+
+WITH_PRIOR = "likelihood with design prior"
+"""Method of a parameter whose own design value took part in its estimate."""
+
+
+def conclude(
+    fit: LikelihoodFit,
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    linear: Mapping[str, FrictionCurve],
+    tolerances: Mapping[str, SensorTolerance],
+) -> Conclusions:
+    """Judge every parameter. `linear` are the friction curves of the linear method, by element."""
+    shifts = sensor_shifts(fit, tolerances)
+    systematic = sum(
+        (np.outer(shift, shift) for shift in shifts.values()), np.zeros_like(fit.covariance)
+    )
+    values = parameters(fit.problem, fit.point, signals)
+    matrix = slopes(fit.problem, fit.point, np.sqrt(np.diag(fit.covariance)), signals)
+    covariance = matrix @ fit.covariance @ matrix.T
+    spread = _systematic(matrix, systematic) if shifts else {}
+    notes = low_gear_notes(signals)
+    estimates = {
+        name: _estimate(
+            (name, value, float(np.sqrt(max(variance, 0.0)))),
+            _design(name, drivelines),
+            spread.get(k),
+            notes.get(name, ""),
+        )
+        for k, (name, value, variance) in enumerate(
+            zip(values, values.values(), np.diag(covariance), strict=True)
+        )
+    }
+    return Conclusions(
+        estimates,
+        curves_of(fit, linear, systematic),
+        tuple(values),
+        correlation(covariance),
+        (*dict.fromkeys(notes.values()), *_warnings(fit, signals)),
+    )
+
+
+def _estimate(
+    told: tuple[str, float, float], design: PriorValue | None, systematic: float | None, note: str
+) -> Estimate:
+    """Verdict on (id, value, standard deviation from noise)."""
+    name, value, std = told
+    if design is not None and (design.std == 0.0 or std >= PRIOR_SHARE * design.std):
+        known = design.std == 0.0
+        return designed(name, value, 0.0 if known else std, KNOWN if known else ADDS_LITTLE)
+    method = METHOD if design is None else WITH_PRIOR
+    return judge(name, value, std, method, systematic, note)
+
+
+def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
+    """Design value of a parameter itself, where the card states one."""
+    if name == "J_out":
+        return drivelines[0].J_out
+    if name.startswith("P0."):
+        couplings = [c for d in drivelines for c in (d.offgoing, d.oncoming)]
+        return next(c.P0 for c in couplings if c.name == name.removeprefix("P0."))
+    return None
+
+
+def _systematic(matrix: FloatArray, systematic: FloatArray) -> dict[int, float]:
+    variance = np.einsum("qp,pr,qr->q", matrix, systematic, matrix)
+    return {k: float(np.sqrt(max(v, 0.0))) for k, v in enumerate(variance)}
+
+
+def _warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
+    texts = []
+    for s, tests in zip(signals, residual_tests(fit).values(), strict=True):
+        label = f"shift {s.shift.start_gear}-{s.shift.end_gear}"
+        texts += list(s.shift.warnings)
+        texts += [f"{label}: {text}" for test in tests for text in test.warnings]
+    return (*texts, *null_directions(fit))

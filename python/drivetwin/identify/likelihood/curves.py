@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""Friction curves of the fit, with bands from its covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin.identify.friction import stribeck
+from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.likelihood.unknowns import LAW
+from drivetwin.identify.result import FrictionCurve
+from drivetwin.identify.signals import FloatArray
+
+METHOD = "likelihood"
+POINTS = 60
+
+
+def curves_of(
+    fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], systematic: FloatArray
+) -> dict[str, FrictionCurve]:
+    """Curve of every element that comes on.
+
+    `linear` are the curves of the linear method: their points and slip range are shown. Its
+    place is taken by the slips of the simulation where there is none. `systematic` (p, p) is the
+    covariance from the sensors' tolerances; it widens the band.
+    """
+    found = {}
+    for part in fit.problem.parts:
+        name = part.structure.driveline.oncoming.name
+        base = linear.get(name) or _seen(fit, part)
+        index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
+        theta, square = fit.point.values[index], np.ix_(index, index)
+        mu, slopes = stribeck(theta, base.slip)
+        total = (fit.covariance + systematic)[square]
+        half = 1.96 * np.sqrt(np.einsum("pn,pq,qn->n", slopes, total, slopes))
+        mu_c, drop, mu_v, ln_v_s = (float(v) for v in theta)
+        v_s = float(np.exp(ln_v_s))
+        to_law = np.array([[1.0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, v_s], [0, 0, 1, 0]])
+        found[name] = replace(
+            base,
+            mu=mu,
+            mu_lo=mu - half,
+            mu_hi=mu + half,
+            stribeck={"mu_c": mu_c, "mu_s": mu_c + drop, "v_s": v_s, "mu_v": mu_v},
+            method=METHOD,
+            stribeck_covariance=to_law @ fit.covariance[square] @ to_law.T,
+        )
+    return found
+
+
+def _seen(fit: LikelihoodFit, part: Part) -> FrictionCurve:
+    """An empty curve over the slips at which the simulated element carried torque."""
+    name = part.structure.driveline.oncoming.name
+    run = part.run(fit.point)
+    assert run is not None
+    slip = np.abs(run.slip[name][np.abs(run.clutch_torque[name]) > 0.0])
+    grid = np.linspace(float(slip.min()), float(slip.max()), POINTS)
+    nothing, empty = np.zeros(POINTS), np.empty(0)
+    return FrictionCurve(grid, nothing, nothing, nothing, empty, empty, None, METHOD)

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""From the unknowns of the fit to the parameters that are reported.
+
+J′_g = Je + Jo′/i_g²                                 (THEORY section 4)
+J4 = (Je + Σ I_drum·(a - b/i)²)·i² + Jo′,  J5 = J_v/i_f²,  1/J = 1/J4 + 1/J5
+ω_n² = k_o/J,  ζ = c_o/(2·sqrt(J·k_o))               (eqs. 12-14 read backwards)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drivetwin.identify.likelihood.problem import Problem
+from drivetwin.identify.likelihood.unknowns import Point, Structure
+from drivetwin.identify.signals import FloatArray, ShiftSignals
+
+DIRECT = ("J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+"""Unknowns that are parameters themselves."""
+
+
+def parameters(problem: Problem, point: Point, signals: Sequence[ShiftSignals]) -> dict[str, float]:
+    """Every parameter by id at `point`, in the order in which they are reported."""
+    structures = [part.structure for part in problem.parts]
+    first = structures[0]
+    values = {"eta": first.value(point, "eta")}
+    for structure, s in zip(structures, signals, strict=True):
+        d = structure.driveline
+        for gear, ratio in ((s.shift.start_gear, d.i_before), (s.shift.end_gear, d.i_after)):
+            J_out = structure.value(point, "J_out")
+            values[f"J_prime_{gear}"] = structure.value(point, "J_e") + J_out / ratio**2
+    values |= {name: first.value(point, name) for name in DIRECT}
+    for structure, s in zip(structures, signals, strict=True):
+        f_d, zeta = oscillation(structure, point)
+        values |= {f"f_d_{s.shift.end_gear}": f_d, f"zeta_{s.shift.end_gear}": zeta}
+        for element in structure.elements:
+            values[f"P0.{element.name}"] = structure.value(point, f"{element.name}.P0")
+    return values
+
+
+def oscillation(structure: Structure, point: Point) -> tuple[float, float]:
+    """Damped frequency [Hz] and damping ratio of the lock-up oscillation."""
+    d = structure.driveline
+    inertia = structure.value(point, "J_e")
+    for one in structure.elements:
+        inertia += structure.value(point, f"{one.name}.drum") * (one.a - one.b / d.i_after) ** 2
+    J4 = inertia * d.i_after**2 + structure.value(point, "J_out")
+    J5 = structure.value(point, "J_vehicle") / d.i_f**2
+    J = J4 * J5 / (J4 + J5)
+    k_o, c_o = structure.value(point, "k_o"), structure.value(point, "c_o")
+    zeta = c_o / (2.0 * np.sqrt(J * k_o))
+    return float(np.sqrt(k_o / J * max(1.0 - zeta**2, 0.0)) / (2.0 * np.pi)), float(zeta)
+
+
+def slopes(
+    problem: Problem, point: Point, std: FloatArray, signals: Sequence[ShiftSignals]
+) -> FloatArray:
+    """Derivative (q, p) of the parameters by the unknowns, central over a part of `std` (p,)."""
+    columns = []
+    for k, width in enumerate(0.01 * std):
+        shift = np.zeros_like(std)
+        shift[k] = width
+        ahead, behind = (
+            np.array(list(parameters(problem, point.moved(x), signals).values()))
+            for x in (point.values + shift, point.values - shift)
+        )
+        columns.append((ahead - behind) / (2.0 * width))
+    return np.column_stack(columns)

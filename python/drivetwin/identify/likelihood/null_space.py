@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""Combinations of parameters that the measurements alone cannot tell, in words.
+
+A direction of the information matrix without priors along which all parameters may move by
+several per cent at no cost is named by the parameters that make it up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.signals import FloatArray
+
+LOOSE = 0.2
+"""Relative standard deviation along a direction from which it counts as not told."""
+SHARE = 0.3
+"""Share of a parameter in a direction from which it is named."""
+NAMED = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "mu_c", "P0", "drum")
+SHOWN = {"eta": "η", "J_e": "J′", "J_out": "Jo′", "J_vehicle": "J3", "Tv_over_if": "T_v"}
+
+
+def null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
+    """One sentence for each direction that the log leaves open without its priors."""
+    names = fit.point.names
+    keep = [k for k, name in enumerate(names) if name.split(".")[-1] in NAMED]
+    rest = [k for k in range(len(names)) if k not in keep]
+    size = np.abs(fit.point.values[keep])
+    relative = _reduced(fit.normal.data, keep, rest) * np.outer(size, size)
+    power, directions = np.linalg.eigh(relative)
+    texts = []
+    for value, direction in zip(power, directions.T, strict=True):
+        std = 1.0 / np.sqrt(max(float(value), 1e-12))
+        if std < LOOSE:
+            break
+        strong = [k for k in np.argsort(-np.abs(direction)) if abs(direction[k]) > SHARE]
+        shown = " and ".join(_shown(names[keep[k]]) for k in strong)
+        texts.append(
+            f"without the card's design values the log leaves {shown} open "
+            + ("together: only their combination is told" if len(strong) > 1 else "")
+        )
+    return tuple(text.strip() for text in texts)
+
+
+def _reduced(matrix: FloatArray, keep: list[int], rest: list[int]) -> FloatArray:
+    """Information on `keep` with the `rest` unknown (Schur complement), scaled on the way."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    unit = matrix / np.outer(scale, scale)
+    inner = np.linalg.pinv(unit[np.ix_(rest, rest)], rcond=1e-13, hermitian=True)
+    cross = unit[np.ix_(keep, rest)]
+    reduced = unit[np.ix_(keep, keep)] - cross @ inner @ cross.T
+    return np.asarray(reduced * np.outer(scale[keep], scale[keep]))
+
+
+def _shown(name: str) -> str:
+    element, _, key = name.rpartition(".")
+    symbol = SHOWN.get(key, {"mu_c": "μ", "drum": "drum inertia"}.get(key, key))
+    return f"{symbol} of {element}" if element else symbol

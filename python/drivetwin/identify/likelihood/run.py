@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT
+"""The likelihood method over all shifts of a log, started from the linear method."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin.identify.conclude import Conclusions
+from drivetwin.identify.integral import IntegralShift
+from drivetwin.identify.likelihood.conclude import conclude
+from drivetwin.identify.likelihood.fit import LikelihoodFit, fit
+from drivetwin.identify.likelihood.guess import guess_of
+from drivetwin.identify.likelihood.priors import problem_of
+from drivetwin.identify.signals import Driveline, ShiftSignals
+from drivetwin.vehicle.spec import VehicleCard
+
+DISAGREE = 5.0
+"""Difference of the two methods in its standard deviations from which a warning is due."""
+
+
+def likelihood(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    linear: tuple[Conclusions, Sequence[IntegralShift]],
+    card: VehicleCard,
+) -> tuple[Conclusions, LikelihoodFit]:
+    """Fit all shifts together and judge the result; `linear` is what the linear method found.
+
+    Raises IdentificationError where the fit does not reach a plausible minimum.
+    """
+    found, shifts = linear
+    problem, start = problem_of(signals, drivelines, card.loss_law, guess_of(shifts, drivelines))
+    best = fit(problem, start, [s.shift for s in signals])
+    told = conclude(best, signals, drivelines, found.friction, card.sensors)
+    warnings = (*told.warnings, *_disagreements(told, found))
+    return replace(told, warnings=warnings), best
+
+
+def _disagreements(told: Conclusions, linear: Conclusions) -> list[str]:
+    """Parameters on which the two methods differ by more than their noise explains."""
+    texts = []
+    for name, estimate in told.estimates.items():
+        other = linear.estimates.get(name)
+        if other is None or other.value is None or estimate.value is None:
+            continue
+        spread = float(np.hypot(estimate.std_noise or 0.0, other.std_noise or 0.0))
+        if spread > 0.0 and abs(estimate.value - other.value) > DISAGREE * spread:
+            texts.append(
+                f"{name}: the likelihood gives {estimate.value:.4g}, the linear method "
+                f"{other.value:.4g} {estimate.unit}; their noise does not explain the difference"
+            )
+    return texts
