@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import PlausibilityError
-from drivetwin.logs.agreement import check_gearing
+from drivetwin.logs.agreement import check_gearing, check_torque_signs, torque_balance
 from drivetwin.logs.roles import quantity_of
 from drivetwin.logs.shiftlog import Channel
 from tests.logs.made import card
@@ -45,3 +45,33 @@ def test_standstill_and_absent_speeds_show_no_gearing(tmp_path: Path) -> None:
     vehicle = card(tmp_path)
     check_gearing(speeds(input_speed=70.0, output_speed=0.0), vehicle, "log.csv")
     check_gearing(speeds(input_speed=70.0), vehicle, "log.csv")
+
+
+def powered(ratio: float, share: float) -> dict[str, Channel]:
+    """A gear of `ratio`, whose output torque is `share` of ratio times engine torque."""
+    made = speeds(input_speed=100.0 * ratio, output_speed=100.0)
+    for role, level in (("engine_torque", 800.0), ("output_torque", 800.0 * ratio * share)):
+        made[role] = Channel(role, quantity_of(role), TIME, np.full(50, level), role, "Nm")
+    return made
+
+
+def test_opposite_torques_are_refused() -> None:
+    check_torque_signs(powered(1.8, 0.9), "log.csv")
+    with pytest.raises(PlausibilityError, match="opposite signs") as caught:
+        check_torque_signs(powered(1.8, -0.9), "log.csv")
+    assert "sign = -1" in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("share", "told"), [(0.9, False), (0.65, False), (0.45, True), (1.8, True)]
+)
+def test_a_torque_of_the_wrong_scale_is_told(tmp_path: Path, share: float, told: bool) -> None:
+    texts = torque_balance(powered(1.8, share), card(tmp_path))
+    assert bool(texts) == told
+    if told:
+        assert f"in gear 2 the output torque is {share:.2f} of ratio times" in texts[0]
+
+
+def test_without_a_gear_there_is_no_balance(tmp_path: Path) -> None:
+    assert torque_balance(powered(2.5, 0.3), card(tmp_path)) == []
+    assert torque_balance(speeds(input_speed=180.0, output_speed=100.0), card(tmp_path)) == []

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.logs.damage import clipped, missing, runs, spikes, stuck
+from drivetwin.logs.damage import clipped, dropouts, missing, runs, spikes, stuck
 from drivetwin.logs.shiftlog import FloatArray, Quantity
 
 TIME = np.arange(0.0, 4.0, 0.002)
@@ -64,7 +64,7 @@ def test_torque_may_move_for_longer_than_a_spike() -> None:
 def test_a_stuck_signal_is_found_until_it_jumps() -> None:
     values = np.round(speed() * 8.0) / 8.0
     values[400:700] = values[400]
-    found = stuck(TIME, values)
+    found = stuck(TIME, values, Quantity.SPEED)
     assert found is not None
     assert runs(found.mask) == [(401, 700)]
     assert "from 0.802 s to 1.398 s" in found.text
@@ -73,15 +73,40 @@ def test_a_stuck_signal_is_found_until_it_jumps() -> None:
 def test_a_fine_signal_that_stays_to_the_end_is_stuck() -> None:
     values = speed()
     values[1500:] = values[1500]
-    found = stuck(TIME, values)
+    found = stuck(TIME, values, Quantity.SPEED)
     assert found is not None
     assert runs(found.mask) == [(1501, TIME.size)]
 
 
+def test_a_noisy_torque_that_rests_shortly_is_stuck() -> None:
+    values = torque()
+    values[600:650] = values[600]
+    found = stuck(TIME, values, Quantity.TORQUE)
+    assert found is not None
+    assert runs(found.mask) == [(601, 650)]
+
+
+def test_a_pressure_without_noise_may_rest_and_fall_at_once() -> None:
+    values = np.where(TIME < 2.0, 14e5, 0.0)
+    assert stuck(TIME, values + TIME, Quantity.PRESSURE) is None
+    assert stuck(TIME, values, Quantity.PRESSURE) is None
+
+
+def test_dropouts_to_zero_are_found() -> None:
+    values = speed()
+    values[400:407] = 0.0
+    values[900] = 0.0
+    found = dropouts(TIME, values)
+    assert found is not None
+    assert runs(found.mask) == [(400, 407), (900, 901)]
+    assert dropouts(TIME, np.where(TIME < 1.0, 0.0, 40.0 * (TIME - 1.0))) is None
+    assert dropouts(TIME, speed()) is None
+
+
 def test_a_coarse_signal_in_steady_driving_is_not_stuck() -> None:
     values = np.round(120.0 + 0.4 * TIME)
-    assert stuck(TIME, values) is None
-    assert stuck(TIME, np.zeros(TIME.size)) is None
+    assert stuck(TIME, values, Quantity.SPEED) is None
+    assert stuck(TIME, np.zeros(TIME.size), Quantity.SPEED) is None
 
 
 def test_a_signal_without_noise_may_rest() -> None:
@@ -89,12 +114,12 @@ def test_a_signal_without_noise_may_rest() -> None:
     rest = 100.0 + np.where(TIME >= 2.5, 40.0 * np.sin(3.0), rest)
     settling = 100.0 + np.round(50.0 * np.exp(-8.0 * TIME), 6)
     for values in (rest, settling):
-        assert stuck(TIME, values) is None
+        assert stuck(TIME, values, Quantity.SPEED) is None
 
 
 def test_standstill_is_not_stuck() -> None:
     values = np.where(TIME < 1.0, 0.0, speed())
-    assert stuck(TIME, values) is None
+    assert stuck(TIME, values, Quantity.SPEED) is None
 
 
 def test_saturation_is_found() -> None:

@@ -160,3 +160,27 @@ def test_a_negative_speed_asks_for_the_sign() -> None:
         check_channel(backward, "log.csv")
     assert 'channels.wheel_speed = { source = "X", sign = -1 }' in caught.value.remedy
     check_channel(replace(backward, values=-backward.values), "log.csv")
+
+
+def test_a_gap_of_the_file_is_told() -> None:
+    time = np.concatenate((TIME[:40], TIME[60:]))
+    checked = check_channel(channel("input_speed", ramp(100, 150)[:80], time=time), "log.csv")
+    assert checked.warnings == ("channel 'X': no samples from 0.39 s to 0.6 s",)
+
+
+def test_a_stamp_far_ahead_is_refused() -> None:
+    time = np.concatenate((TIME[:-1], [1e6]))
+    with pytest.raises(TimeError, match="time jumps ahead by 999999 s"):
+        check_channel(channel("input_speed", ramp(100, 150), time=time), "log.csv")
+
+
+def test_an_engine_torque_at_its_limit_is_told() -> None:
+    values = np.minimum(ramp(100.0, 900.0), 700.0)
+    (text,) = check_channel(channel("engine_torque", values), "log.csv").warnings
+    assert "at its largest number for 25 % of the log" in text
+
+
+def test_suction_asks_for_the_sign() -> None:
+    with pytest.raises(PlausibilityError, match="goes down to -14 bar") as caught:
+        check_channel(channel("pressure.B2", ramp(-14e5, 0.1e5), "bar"), "log.csv")
+    assert 'channels.pressure.B2 = { source = "X", sign = -1 }' in caught.value.remedy

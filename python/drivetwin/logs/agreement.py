@@ -20,6 +20,18 @@ FINAL_DRIVE_TOLERANCE = 0.2
 GEAR_MARGIN = 3.0
 """Factor around the card's gears, for logs that also hold other gears; rpm/(rad/s) is 9.5."""
 
+TORQUE_BALANCE = (0.6, 1.1)
+"""Output torque over ratio times engine torque in a gear; losses and acceleration keep it below 1.
+
+The limits leave room for both; a factor of two, as of a wrong scale, is outside.
+"""
+
+LEAST_LOAD = 0.2
+"""Share of the largest engine torque above which the balance is looked at."""
+
+IN_GEAR, LEAST_SAMPLES = 0.01, 20
+"""A gear is held within this relative distance of its ratio; so few samples tell nothing."""
+
 OPPOSED = -0.5
 """Normalised product of two torques below which one has the wrong sign."""
 
@@ -91,3 +103,29 @@ def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
             f'{{ source = "{output.source_name}", sign = -1 }}, or that of the engine torque',
             Where(file=file),
         )
+
+
+def torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
+    """Tell where output and engine torque do not fit the ratio of the gear that is held."""
+    roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
+    if not all(role in channels for role in roles):
+        return []
+    engine = channels["engine_torque"]
+    output, inlet, outlet = (channels[role].at(engine.time) for role in roles[1:])
+    low, high = TORQUE_BALANCE
+    texts = []
+    loaded = (engine.values > LEAST_LOAD * engine.values.max()) & np.isfinite(output)
+    for gear in card.gears:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            held = loaded & (np.abs(inlet / outlet / gear.ratio - 1.0) < IN_GEAR)
+        if np.count_nonzero(held) < LEAST_SAMPLES:
+            continue
+        driving = card.ratio(gear.name) * float(engine.values[held].sum())
+        share = float(output[held].sum()) / driving
+        if not low <= share <= high:
+            texts.append(
+                f"in gear {gear.name} the output torque is {share:.2f} of ratio times engine "
+                f"torque, {low:g} to {high:g} is usual: check scale and unit of "
+                f"{engine.source_name!r} and {channels['output_torque'].source_name!r}"
+            )
+    return texts

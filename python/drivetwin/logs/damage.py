@@ -37,10 +37,18 @@ _STUCK_TIME = 0.25
 
 _STUCK_SAMPLES = 10
 _STUCK_RELEASE = 8.0
-"""A stuck signal jumps at its end by so many usual steps."""
+"""A stuck signal jumps at its end by so many usual steps ..."""
 
-_BEFORE, _RESTLESS = 20, 5
-"""A signal stuck to the end was noisy until then: so many turns in so many last steps."""
+_ENOUGH, _MOVING = 100, 0.9
+"""... or its numbers hardly ever repeat: of so many other steps such a share moves, ..."""
+
+_BEFORE, _RESTLESS, _ALIVE = 20, 5, 0.2
+"""... and noise stops or starts with the repeat: so many turns in so many steps of at least
+this share of the usual size.
+"""
+
+_DROP = 0.3
+"""Least step into and out of a dropout as a share of the signal's level."""
 
 _CLIPPED_SAMPLES = 3
 _CLIPPED_RUNS = 3
@@ -115,26 +123,53 @@ def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: floa
     return (np.flatnonzero(found) + 1).tolist()
 
 
-def stuck(time: FloatArray, values: FloatArray) -> Damage | None:
-    """Stretches in which a varying signal repeats one number, then jumps or never moves again.
+def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
+    """Stretches in which a varying signal repeats one number as it never does elsewhere.
 
-    Standstill is none, nor a signal that comes to rest or starts from rest by itself.
+    Noise stops at the start or comes back at the end, or it is a speed, which cannot jump, and
+    jumps at the end. Standstill is none, nor a signal without noise that comes to rest or starts
+    from rest by itself.
     """
     steps = np.diff(values)
     same, moving = steps == 0.0, np.abs(steps)
     usual = float(np.median(moving[~same])) if (~same).any() else np.inf
+    long = [(start, end) for start, end in runs(same) if end - start >= _STUCK_SAMPLES]
+    outside = steps.size - sum(end - start for start, end in long)
+    fine = outside >= _ENOUGH and np.count_nonzero(~same) > _MOVING * outside
     mask = np.zeros(values.size, np.bool_)
-    for start, end in runs(same):
-        if end - start < _STUCK_SAMPLES or time[end] - time[start] < _STUCK_TIME:
+    for start, end in long:
+        if values[start] == 0.0:
             continue
+        slow = quantity is Quantity.SPEED and time[end] - time[start] >= _STUCK_TIME
         released = end < moving.size and moving[end] > _STUCK_RELEASE * usual
-        turns = np.diff(np.sign(steps[max(0, start - _BEFORE) : start]))
-        froze = end == moving.size and np.count_nonzero(turns) >= _RESTLESS
-        if values[start] != 0.0 and (released or froze):
+        beside = (steps[max(0, start - _BEFORE) : start], steps[end : end + _BEFORE])
+        noisy = any(_restless(some, usual) for some in beside)
+        if (slow and released) or (fine and noisy):
             mask[start + 1 : end + 1] = True
     if not mask.any():
         return None
     return Damage(mask, f"stuck at one number {_spans(time, runs(mask))}, left out")
+
+
+def _restless(steps: FloatArray, usual: float) -> bool:
+    """Tell whether successive steps are as large as usual and turn as noise does."""
+    turns = np.count_nonzero(np.diff(np.sign(steps)))
+    return bool(turns >= _RESTLESS and np.median(np.abs(steps)) > _ALIVE * usual)
+
+
+def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Stretches of exact zeros that the signal falls to, and leaves, in one step."""
+    level = float(np.percentile(np.abs(values), 98.0))
+    moving = np.abs(np.diff(values))
+    mask = np.zeros(values.size, np.bool_)
+    for start, end in runs(values == 0.0):
+        fell = start > 0 and moving[start - 1] > _DROP * level
+        rose = end < values.size and moving[end - 1] > _DROP * level
+        if fell and rose:
+            mask[start:end] = True
+    if not mask.any():
+        return None
+    return Damage(mask, f"fell to zero {_spans(time, runs(mask))}, left out")
 
 
 def clipped(time: FloatArray, values: FloatArray) -> Damage | None:

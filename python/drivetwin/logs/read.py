@@ -9,7 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from drivetwin.errors import DamagedChannelError, Where
-from drivetwin.logs.agreement import check_common_span, check_gearing, check_torque_signs
+from drivetwin.logs.agreement import (
+    check_common_span,
+    check_gearing,
+    check_torque_signs,
+    torque_balance,
+)
 from drivetwin.logs.align import clock_warnings
 from drivetwin.logs.formats import open_recording
 from drivetwin.logs.held import find_raster
@@ -59,7 +64,7 @@ def read_log(
     check_common_span(channels, str(path))
     check_gearing(channels, card, str(path))
     check_torque_signs(channels, str(path))
-    warnings += clock_warnings(channels, card)
+    warnings += [*torque_balance(channels, card), *clock_warnings(channels, card)]
     return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
 
 

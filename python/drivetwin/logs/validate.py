@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
-from drivetwin.logs.damage import Damage, clipped, missing, spikes, stuck
+from drivetwin.logs.damage import Damage, clipped, dropouts, missing, spikes, stuck
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.logs.units import usual_units
 
@@ -30,6 +30,12 @@ MAX_SPARSE = 100.0
 
 TYPICAL_STEP = (1e-4, 0.2)
 """Sample interval [s] that a proposed unit of time must lead to."""
+
+MAX_AT_LIMIT = 0.1
+"""Share of samples at the largest number above which an engine torque may be saturated."""
+
+LEAST_SUCTION = 1e5
+"""A gauge pressure below -1 bar [Pa] does not exist."""
 
 MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
 """Speed change [rad/s] and rate [rad/s2] that no shaft of a driveline shows between samples."""
@@ -79,18 +85,46 @@ def check_channel(channel: Channel, file: str) -> Checked:
     _check_order(channel.time, where)
     _check_count(channel, channel.time.size, where)
     _check_rate(channel, where)
+    warnings += _gaps(channel)
     total = channel.time.size
     found = missing(channel.time, channel.values)
     channel = _without(channel, found, warnings)
     _check_count(channel, total, where)
     _check_variation(channel, where)
-    for look in (_spikes, _stuck, _clipped):
+    for look in (_dropouts, _spikes, _stuck, _clipped):
         channel = _without(channel, look(channel), warnings)
         _check_count(channel, total, where)
     _check_magnitude(channel, where)
     _check_sign(channel, where)
     _check_jumps(channel, where)
+    warnings += _at_limit(channel)
     return Checked(channel, tuple(warnings))
+
+
+def _gaps(channel: Channel) -> list[str]:
+    """Words for the gaps that the file itself has."""
+    if not channel.gaps:
+        return []
+    spans = ", ".join(f"{start:.6g} s to {end:.6g} s" for start, end in channel.gaps[:3])
+    more = f" and {len(channel.gaps) - 3} more" if len(channel.gaps) > 3 else ""
+    return [f"channel {channel.source_name!r}: no samples from {spans}{more}"]
+
+
+def _at_limit(channel: Channel) -> list[str]:
+    """Words for an engine torque that rests at its largest number; it may have reason to."""
+    share = float(np.mean(channel.values == channel.values.max()))
+    if channel.role != "engine_torque" or not MAX_AT_LIMIT < share < 1.0:
+        return []
+    return [
+        f"channel {channel.source_name!r}: at its largest number for {100 * share:.0f} % of the "
+        "log; if it is saturated there, results that rest on it are wrong"
+    ]
+
+
+def _dropouts(channel: Channel) -> Damage | None:
+    if channel.quantity not in (Quantity.SPEED, Quantity.TORQUE):
+        return None
+    return dropouts(channel.time, channel.values)
 
 
 def _spikes(channel: Channel) -> Damage | None:
@@ -98,7 +132,8 @@ def _spikes(channel: Channel) -> Damage | None:
 
 
 def _stuck(channel: Channel) -> Damage | None:
-    return stuck(channel.time, channel.values) if channel.role in _MUST_VARY else None
+    measured = channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
+    return stuck(channel.time, channel.values, channel.quantity) if measured else None
 
 
 def _clipped(channel: Channel) -> Damage | None:
@@ -264,6 +299,16 @@ def _show(value: float, quantity: Quantity) -> str:
 
 
 def _check_sign(channel: Channel, where: Where) -> None:
+    if channel.quantity is Quantity.PRESSURE:
+        lowest, highest = float(channel.values.min()), float(channel.values.max())
+        if -lowest > max(highest, LEAST_SUCTION):
+            raise PlausibilityError(
+                f"gauge pressure goes down to {_show(lowest, channel.quantity)}, but up to "
+                f"{_show(highest, channel.quantity)} only",
+                f"set the sign in the channel mapping: channels.{channel.role} = "
+                f'{{ source = "{channel.source_name}", sign = -1 }}',
+                where,
+            )
     if channel.quantity is Quantity.SPEED and float(np.median(channel.values)) < 0.0:
         raise PlausibilityError(
             "the speed is negative for most of the log; forward motion counts positive",
