@@ -9,6 +9,7 @@ import numpy as np
 
 from drivetwin.driveline import DualClutch, State
 from drivetwin.errors import MissingChannelError, Where
+from drivetwin.identify.noise import white_noise
 from drivetwin.identify.result import FloatArray
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.shift import Shift
@@ -19,13 +20,35 @@ _CURVED_FROM = 6
 """Number of samples from which a parabola is fitted, a straight line below."""
 
 
+_CALM = 1.5
+"""Scatter about the local fit, relative to the usual one, up to which a moment is calm."""
+_RIPPLE = 1e-3
+"""Scatter that always counts as calm, relative to the largest torque: noise-free data have none."""
+
+
 @dataclass(frozen=True)
 class _Local:
-    """Value, slope [1/s] and variance of the value at the start of a local fit."""
+    """Value, slope [1/s] and variance of the value at the start of a local fit; its scatter."""
 
     value: float
     slope: float
     variance: float
+    scatter: float
+
+
+def calm_moment(log: ShiftLog, span: tuple[float, float]) -> float:
+    """First time in `span` [s] at which a local fit describes the output torque.
+
+    In the lock-up oscillation of the shift before, or in a throttle step, the shaft's state cannot
+    be read off a few samples. Without an output-torque channel: the start of the span.
+    """
+    times = np.arange(span[0], span[1] - _SPAN, _SPAN)
+    if "output_torque" not in log or times.size == 0:
+        return span[0]
+    torque = log["output_torque"]
+    scatter = np.array([_local(torque, float(time)).scatter for time in times])
+    calm = scatter <= _CALM * np.median(scatter) + _RIPPLE * float(np.abs(torque.values).max())
+    return float(times[np.argmax(calm)])
 
 
 def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> State:
@@ -96,16 +119,14 @@ def _local(channel: Channel, time: float) -> _Local:
     degree = 2 if t.size >= _CURVED_FROM else min(1, t.size - 1)
     design = np.vander(t, degree + 1, increasing=True)
     coefficients: FloatArray = np.linalg.lstsq(design, values, rcond=None)[0].astype(np.float64)
+    freedom = max(1, values.size - coefficients.size)
+    scatter = float(np.sqrt(np.sum((values - design @ coefficients) ** 2) / freedom))
+    # A few samples may by chance agree better than their noise allows.
+    noise = max(scatter, white_noise(channel.values))
+    floor = 1e-9 * (1.0 + float(np.abs(values).max()))
     return _Local(
         value=float(coefficients[0]),
         slope=float(coefficients[1]) if degree else 0.0,
-        variance=_value_variance(design, values, coefficients),
+        variance=max(noise**2 * float(np.linalg.pinv(design.T @ design)[0, 0]), floor**2),
+        scatter=scatter,
     )
-
-
-def _value_variance(design: FloatArray, values: FloatArray, coefficients: FloatArray) -> float:
-    """Variance of the fitted start value from the scatter about the fit; never zero."""
-    freedom = max(1, values.size - coefficients.size)
-    scatter = float(np.sum((values - design @ coefficients) ** 2)) / freedom
-    floor = (1e-9 * (1.0 + float(np.abs(values).max()))) ** 2
-    return max(scatter * float(np.linalg.pinv(design.T @ design)[0, 0]), floor)

@@ -14,7 +14,7 @@ from drivetwin.identify.result import FloatArray, Identification, SignalFit
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.shift import Shift
-from drivetwin.start_state import start_state
+from drivetwin.start_state import calm_moment, start_state
 from drivetwin.twin import Twin
 
 SIGNALS = ("output_torque", "input_speed", "output_speed")
@@ -56,7 +56,7 @@ class Validation:
 def validate(
     twin: Twin, log: ShiftLog, shift: Shift, model: DualClutch | None = None
 ) -> Validation:
-    """Simulate one shift, from `before` to the end of `after`, with the log's inputs.
+    """Simulate one shift, from a calm moment in `before` to the end of `after`.
 
     The engine torque is moved by the twin's `te_delay`; the start state comes from the first
     measured moments. `model` replaces the twin's own (e.g. the other loss law).
@@ -136,12 +136,12 @@ def phases_of(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[floa
 
 
 def _window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
-    """Span of the shift's four phases that all compared and driving channels cover."""
+    """Span of the shift's four phases that all channels cover, from a calm moment on."""
     roles = ["engine_torque", f"pressure.{shift.offgoing}", f"pressure.{shift.oncoming}"]
     channels = [log[role] for role in (*roles, *(name for name in SIGNALS if name in log))]
     start = max(shift.before[0], *(channel.time[0] for channel in channels))
     end = min(shift.after[1], *(channel.time[-1] for channel in channels))
-    return float(start), float(end)
+    return calm_moment(log, (float(start), shift.before[1])), float(end)
 
 
 def _signal(channel: Channel) -> Signal:
