@@ -67,7 +67,7 @@ def test_a_refused_stage_says_why(given: tuple[Identification, ShiftLog]) -> Non
     refused = replace(one, ring=None, refusals={"shaft": "no oscillation"})
     shaft = evidence_sections(replace(found, evidence={"integral": (refused,)}))[2]
     assert [block.items for block in shaft.blocks if isinstance(block, NotesBlock)] == [
-        ["Default method: no oscillation"]
+        ["Integral method: no oscillation"]
     ]
 
 

@@ -57,7 +57,7 @@ _AnyStages = _Stages[IntegralShift] | _Stages[PaperShift]
 
 def evidence_sections(found: Identification) -> list[Section]:
     """One section per question: inertia and efficiency, load, output shaft."""
-    integral = _stages(found, IntegralShift, "default method")
+    integral = _stages(found, IntegralShift, "integral method")
     paper = _stages(found, PaperShift, "the paper's method")
     return [
         Section(
