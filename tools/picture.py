@@ -18,7 +18,7 @@ from drivetwin.cli.pipeline import run
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.identify.method import Method
+from drivetwin.identify.method import DEFAULT_METHOD
 from drivetwin.report.figures.validation import validation_figure
 
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "img" / "validation.png"
@@ -39,7 +39,7 @@ OPTIONS = (
 def page(folder: Path) -> Path:
     """Make the demo's log in `folder`, identify it, and write a page of the figure alone."""
     log, card, _ = write_run(folder / "shift.csv", run_dyno(paper_steps(), seed=0))
-    (validation,) = run(log, card, None, Method.INTEGRAL).found.evidence["validation"]
+    (validation,) = run(log, card, None, DEFAULT_METHOD).found.evidence["validation"]
     figure = validation_figure(validation)
     figure.update_layout(width=WIDTH, height=HEIGHT, paper_bgcolor="white")
     figure.layout.updatemenus = ()

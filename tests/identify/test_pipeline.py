@@ -106,7 +106,6 @@ def test_design_values_do_not_pass_for_measured_ones(method: Method) -> None:
         assert "card" in estimate.reason
 
 
-
 def test_sensor_tolerances_widen_the_total_interval_only() -> None:
     log, card, shifts = recording("truck_a")
     strict = identified("truck_a", Method.INTEGRAL)

@@ -11,14 +11,14 @@ import typer
 from drivetwin.cli.output import JsonFlag, print_json, say, show, table_of
 from drivetwin.cli.synth import NoiseOption, ScenarioOption, SeedOption
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.identify.method import Method
+from drivetwin.identify.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from drivetwin.cli.comparison import Row
 
-_METHODS = (Method.INTEGRAL, Method.PAPER)
+_METHODS = (DEFAULT_METHOD, Method.PAPER)
 
 
 def demo(
@@ -44,7 +44,7 @@ def demo(
         write(outcome, output / method)
     found = {method: outcome.found for method, outcome in outcomes.items()}
     rows = compare(bench.truth, found)
-    report = output / Method.INTEGRAL / REPORT
+    report = output / DEFAULT_METHOD / REPORT
     if as_json:
         print_json({"parameters": [row.document() for row in rows], "log": log, "report": report})
         return
@@ -61,10 +61,11 @@ def _table(rows: list[Row], scenario: ScenarioName) -> Table:
     table = table_of(
         f"Scenario {scenario}: truth and what the log tells",
         "parameter", "truth", "paper", "off %",
-        "integral", "95 %", "off %", "unit", right=("truth", "paper", "off %", "integral", "95 %"),
+        DEFAULT_METHOD, "95 %", "off %", "unit",
+        right=("truth", "paper", "off %", DEFAULT_METHOD, "95 %"),
     )  # fmt: skip
     for row in rows:
-        paper, default = row.found[Method.PAPER], row.found[Method.INTEGRAL]
+        paper, default = row.found[Method.PAPER], row.found[DEFAULT_METHOD]
         value, interval, unit = shown(default.value, default.interval, row.unit)
         table.add_row(
             row.id,

@@ -12,7 +12,7 @@ import typer
 from drivetwin.cli.arguments import ChannelsFile, VehicleFile
 from drivetwin.cli.output import JsonFlag, note, print_json, say, show
 from drivetwin.errors import InputError, Where
-from drivetwin.identify.method import Method
+from drivetwin.identify.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
     from drivetwin.cli.pipeline import Outcome
@@ -24,7 +24,7 @@ def identify(
     channels: ChannelsFile = None,
     method: Annotated[
         Method, typer.Option(metavar="METHOD", help="paper, integral or likelihood.")
-    ] = Method.LIKELIHOOD,
+    ] = DEFAULT_METHOD,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Where result, twin and report go."),

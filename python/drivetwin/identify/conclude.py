@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Conclusions of the default method: estimates, verdicts, curves, warnings and assumptions."""
+"""Conclusions of the integral method: estimates, verdicts, curves, warnings and assumptions."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The default method on one shift: all stages in momentum form, and what follows from them."""
+"""The integral method on one shift: all stages in momentum form, and what follows from them."""
 
 from __future__ import annotations
 

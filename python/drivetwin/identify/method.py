@@ -12,3 +12,7 @@ class Method(StrEnum):
     PAPER = "paper"
     INTEGRAL = "integral"
     LIKELIHOOD = "likelihood"
+
+
+DEFAULT_METHOD = Method.LIKELIHOOD
+"""What answers where nobody asks for another."""

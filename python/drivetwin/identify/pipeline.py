@@ -18,7 +18,7 @@ from drivetwin.identify.integral import IntegralShift, identify_shift
 from drivetwin.identify.likelihood.run import likelihood
 from drivetwin.identify.literal import PaperShift, paper_shift
 from drivetwin.identify.literal_result import paper_conclusions
-from drivetwin.identify.method import Method
+from drivetwin.identify.method import DEFAULT_METHOD, Method
 from drivetwin.identify.momentum import MomentumSettings
 from drivetwin.identify.result import FloatArray, Identification
 from drivetwin.identify.signals import Driveline, ShiftSignals
@@ -41,7 +41,7 @@ class Shifts(Protocol):
 
 
 def identify(
-    log: ShiftLog, card: VehicleCard, shifts: Shifts, method: Method = Method.LIKELIHOOD
+    log: ShiftLog, card: VehicleCard, shifts: Shifts, method: Method = DEFAULT_METHOD
 ) -> Identification:
     """Identify the driveline from all usable shifts of a log.
 
