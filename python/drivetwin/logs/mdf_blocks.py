@@ -42,6 +42,10 @@ _LINKS3: dict[bytes, dict[int, bytes]] = {
 """By block: offsets of its links and what they lead to, MDF 3."""
 
 
+_SIZE3 = {b"HD": 164, b"DG": 24, b"CG": 26, b"CN": 190}
+"""Bytes of each MDF 3 block that are looked at."""
+
+
 def check_blocks(path: Path) -> None:
     """Raise FileFormatError where the blocks of an MDF file do not form sound chains."""
     size = path.stat().st_size
@@ -207,17 +211,48 @@ def _walk3(data: mmap.mmap) -> Iterator[str]:
     """Problems of the chains of an MDF 3 file."""
     order = ">" if data[24:26] not in (b"\0\0", b"  ") else "<"
     seen: set[int] = set()
-    waiting = [(_HEADER4, b"HD")]
+    waiting = [(_HEADER4, b"HD", 0)]
     while waiting:
-        place, expected = waiting.pop()
-        if place in seen or place + 12 > len(data):
+        place, expected, record = waiting.pop()
+        if place in seen or place + _SIZE3[expected] > len(data):
             yield f"blocks at byte {place} of {len(data)} form a circle or end outside"
             return
         seen.add(place)
         if data[place : place + 2] != expected:
             yield f"no {expected.decode()} block at byte {place}"
             return
+        if expected == b"DG":
+            yield from _data_group3(data, place, order)
+        if expected == b"CG":
+            record = struct.unpack_from(f"{order}H", data, place + 20)[0]
+        if expected == b"CN":
+            yield from _channel3(data, place, order, record)
         for offset, block in _LINKS3[expected].items():
             target = struct.unpack_from(f"{order}I", data, place + offset)[0]
             if target:
-                waiting.append((target, block))
+                waiting.append((target, block, record))
+
+
+def _channel3(data: mmap.mmap, place: int, order: str, record: int) -> Iterator[str]:
+    """A channel must lie inside the record of its group."""
+    length = struct.unpack_from(f"{order}H", data, place + 2)[0]
+    first, bits = struct.unpack_from(f"{order}HH", data, place + 186)
+    if length >= 228 and place + 228 <= len(data):
+        first += 8 * struct.unpack_from(f"{order}H", data, place + 226)[0]
+    if first + bits > 8 * record:
+        yield f"the channel at byte {place} lies outside its record of {record} bytes"
+
+
+def _data_group3(data: mmap.mmap, place: int, order: str) -> Iterator[str]:
+    """The records of a data group must lie inside the file."""
+    group, _, start = struct.unpack_from(f"{order}III", data, place + 8)
+    marks = struct.unpack_from(f"{order}H", data, place + 22)[0]
+    needed = 0
+    places: set[int] = set()
+    while group and group not in places and group + _SIZE3[b"CG"] <= len(data):
+        places.add(group)
+        width, records = struct.unpack_from(f"{order}HI", data, group + 20)
+        needed += records * (width + marks)
+        group = struct.unpack_from(f"{order}I", data, group + 4)[0]
+    if start + needed > len(data):
+        yield f"records need {needed} bytes from byte {start}, the file has {len(data)}"
