@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.errors import IdentificationError, InputError, NoShiftError
+from drivetwin.errors import IdentificationError, NoShiftError
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.literal import PaperShift
 from drivetwin.identify.method import Method
@@ -110,7 +110,7 @@ def test_sensor_tolerances_widen_the_total_interval_only() -> None:
     log, card, shifts = recording("truck_a")
     strict = identified("truck_a", Method.INTEGRAL)
     stated = replace(card, sensors={"output_torque": SensorTolerance(gain=0.01)})
-    found = identify(log, stated, shifts)
+    found = identify(log, stated, shifts, Method.INTEGRAL)
     for name in ("k_o", "Tv_over_if", "J_vehicle"):
         wide, narrow = found.estimates[name], strict.estimates[name]
         assert wide.std_noise == pytest.approx(narrow.std_noise)
@@ -122,8 +122,6 @@ def test_sensor_tolerances_widen_the_total_interval_only() -> None:
 
 def test_refusals() -> None:
     log, card, shifts = recording("truck_a")
-    with pytest.raises(InputError, match="likelihood method is not part"):
-        identify(log, card, shifts, Method.LIKELIHOOD)
     with pytest.raises(NoShiftError, match="no usable gear shift"):
         identify(log, card, FoundShifts((), ()))
     channels = {role: c for role, c in log.channels.items() if role != "output_torque"}

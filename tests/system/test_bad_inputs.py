@@ -166,15 +166,3 @@ def test_missing_files_are_named(
         arguments = ["identify", str(tmp_path / log), "--vehicle", str(tmp_path / card)]
         assert main(arguments) == 2
         assert "nothing" in capsys.readouterr().err
-
-
-def test_likelihood_is_refused_with_what_to_use_instead(
-    good: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    log, card, out = tmp_path / "log.csv", tmp_path / "card.toml", tmp_path / "out"
-    log.write_text(good[0])
-    card.write_text(good[1])
-    command = ["identify", str(log), "--vehicle", str(card), "--method", "likelihood"]
-    assert main([*command, "-o", str(out)]) == 2
-    assert "integral" in capsys.readouterr().err
-    assert not out.exists()
