@@ -22,9 +22,10 @@ from drivetwin.identify.likelihood.residuals import residual_tests
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
 from drivetwin.identify.result import Estimate, FrictionCurve
 from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
-from drivetwin.identify.uncertainty import correlation, designed, judge
+from drivetwin.identify.uncertainty import correlation, designed, judge, refused
 from drivetwin.vehicle.spec import SensorTolerance
 
+NO_AGE = "the engine torque moves too little for its age to show"
 WITH_PRIOR = "likelihood with design prior"
 """Method of a parameter whose own design value took part in its estimate."""
 
@@ -57,6 +58,8 @@ def conclude(
             zip(values, values.values(), np.diag(covariance), strict=True)
         )
     }
+    if "te_delay" not in fit.point.names:
+        estimates["te_delay"] = refused("te_delay", METHOD, NO_AGE)
     return Conclusions(
         estimates,
         curves_of(fit, linear, systematic),

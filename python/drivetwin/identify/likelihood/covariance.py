@@ -27,7 +27,7 @@ from drivetwin.identify.likelihood.record import Record
 from drivetwin.identify.likelihood.response import STATES, Response, observed
 from drivetwin.identify.signals import FloatArray
 
-QUIET = 3e-5
+QUIET = 1e-4
 """Process noise per step given to every state, as a share of a sensor's noise: W stays finite and
 the random walk over a log stays below what the sensors show of the state."""
 

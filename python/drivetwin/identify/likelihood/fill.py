@@ -14,7 +14,7 @@ import numpy as np
 
 from drivetwin.identify.signals import FloatArray, PriorValue, Sampled
 
-HALF_WIDTHS = (2, 4, 8, 16, 32, 64)
+HALF_WIDTHS = (0, 1, 2, 4, 8, 16, 32, 64)
 """Windows tried: so many samples on either side."""
 INTERVAL = 2.5
 """Half width of an interval in standard deviations of its mean."""
@@ -24,16 +24,19 @@ NEAR = 5.0
 
 def near_fill(pressure: Sampled, P0: PriorValue) -> FloatArray:
     """Pressure (n,) with local means in place of samples near `P0`; as read where it is exact."""
-    if pressure.sigma == 0.0 or pressure.values.size <= 2 * HALF_WIDTHS[-1]:
+    if pressure.sigma == 0.0:
         return pressure.values
-    mean = _local_mean(pressure)
+    mean = local_mean(pressure)
     reach = NEAR * pressure.sigma + 2.0 * P0.std
     share = np.clip(2.0 - np.abs(mean - P0.value) / reach, 0.0, 1.0)
     return np.asarray(share * mean + (1.0 - share) * pressure.values)
 
 
-def _local_mean(signal: Sampled) -> FloatArray:
-    """Mean over the longest window at every sample that agrees with all shorter ones."""
+def local_mean(signal: Sampled) -> FloatArray:
+    """Signal (n,) without its noise, as far as the noise level allows to tell it.
+
+    At every sample the mean over the longest window that agrees with those over all shorter ones.
+    """
     values = signal.values
     low, high = np.full(values.size, -np.inf), np.full(values.size, np.inf)
     mean, open_ = values.copy(), np.ones(values.size, dtype=bool)

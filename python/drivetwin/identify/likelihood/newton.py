@@ -19,11 +19,11 @@ from drivetwin.identify.signals import FloatArray
 
 ENOUGH = 1e-2
 """Expected fall of Q at which the search ends: 0.1 standard deviations."""
-STALLED = 0.1
-"""Expected fall of Q below which a point from which no step lowers Q is a minimum all the same.
+STALLED = 0.3
+"""Expected fall of Q below which a point that no step improves is a minimum all the same.
 
 Pressure noise about P0 fills and vents an element many times, and each such instant is a small
-kink of Q."""
+kink of Q, where the expansion promises what no step keeps."""
 DAMPING = 1e-3
 """First damping relative to the diagonal of the information."""
 LARGEST = 1e8
@@ -77,8 +77,8 @@ def minimise(problem: Problem, start: Point, refresh: Refresh = unchanged) -> Fo
         settled = iteration + 1 >= REFRESHES or refresh is unchanged
         if expected < ENOUGH and settled:
             return Found(problem, point, normal, True, iteration)
-        trial, damping = _better(problem, point, normal, damping)
-        if trial is None:
+        trial, fall, damping = _better(problem, point, normal, damping)
+        if trial is None or (fall < ENOUGH and expected < STALLED and settled):
             return Found(problem, point, normal, expected < STALLED, iteration)
         point = trial
     last = problem.normal(point)
@@ -87,15 +87,16 @@ def minimise(problem: Problem, start: Point, refresh: Refresh = unchanged) -> Fo
 
 def _better(
     problem: Problem, point: Point, normal: Normal, damping: float
-) -> tuple[Point | None, float]:
-    """A point with less Q, the damping raised until there is one, and the next damping."""
+) -> tuple[Point | None, float, float]:
+    """A point with less Q, by how much less, and the next damping, raised until there is one."""
     while damping < LARGEST:
         step = step_of(normal.information, normal.gradient, damping)
         trial = point.moved(np.clip(point.values + step, problem.lower, problem.upper))
-        if problem.cost(trial) < normal.cost:
-            return trial, damping / 10.0
+        fall = normal.cost - problem.cost(trial)
+        if fall > 0.0:
+            return trial, fall, damping / 10.0
         damping *= 10.0
-    return None, damping
+    return None, 0.0, damping
 
 
 def _expected(problem: Problem, point: Point, normal: Normal) -> float:

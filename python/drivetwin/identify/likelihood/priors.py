@@ -13,12 +13,20 @@ import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.identify.friction import LAW_PRIOR
+from drivetwin.identify.likelihood.fill import local_mean
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import LATEST, record_of
 from drivetwin.identify.likelihood.unknowns import COMMON, LAW, START, TE_OFFSET, Point, Structure
-from drivetwin.identify.momentum import MomentumSettings, rounding_error
+from drivetwin.identify.momentum import DELAY_STD_MAX, MomentumSettings, rounding_error
 from drivetwin.identify.regression import Prior
-from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals, Span
+from drivetwin.identify.signals import (
+    Driveline,
+    FloatArray,
+    PriorValue,
+    Sampled,
+    ShiftSignals,
+    Span,
+)
 from drivetwin.parameters import SPECS
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
@@ -47,12 +55,15 @@ def problem_of(
     """The fit of all shifts of a log, and where its search starts.
 
     `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
-    start of each shift's run is read from the first samples. Raises IdentificationError where a
+    start of each shift's run is read from the first samples. The age of the engine torque is held
+    where no torque step shows it. Raises IdentificationError where a
     shift holds too little.
     """
     priors = _priors(signals, drivelines, guess)
     every = (*COMMON, *_laws(drivelines), *_fills(drivelines))
     names = [n for n in every if not _is_known(priors.get(n))]
+    if not all(shows_age(s.engine_torque) for s in signals):
+        names.remove("te_delay")
     if TE_OFFSET in priors:
         names.append(TE_OFFSET)
     fixed = dict(guess) | {n: p.value for n, p in priors.items() if _is_known(p)}
@@ -73,6 +84,14 @@ def problem_of(
     }
     prior = Prior.independent(len(point.names), entries)
     return Problem(tuple(parts), prior, lower, upper), point
+
+
+def shows_age(torque: Sampled) -> bool:
+    """Whether the engine torque moves enough, against its noise, for its age to show."""
+    if torque.sigma == 0.0:
+        return bool(np.ptp(torque.values) > 0.0)
+    rate = np.diff(local_mean(torque)) / np.diff(torque.time)
+    return bool(np.sum((rate / torque.sigma) ** 2) > DELAY_STD_MAX**-2)
 
 
 def spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:

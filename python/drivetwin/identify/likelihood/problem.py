@@ -93,22 +93,29 @@ class Part:
             return None
         columns = np.column_stack([self.record.stacked(found.derivatives[n]) for n in names])
         slopes = columns @ matrix
-        if TE_OFFSET in point.names:
-            slopes[:, point.names.index(TE_OFFSET)] = self.answer(
-                point, found.run, {"engine torque": -1.0}
+        for name, disturbance in self._torque_changes(point).items():
+            slopes[:, point.names.index(name)] = self.answer_to(
+                point, found.run, {"engine torque": disturbance}
             )
         if not np.all(np.isfinite(slopes)):
             return None
         return self.residual(found.run), slopes
 
+    def _torque_changes(self, point: Point) -> dict[str, FloatArray]:
+        """How the acting engine torque changes (N-1,) per unit of its own unknowns.
+
+        The rate is that of the torque without noise: jitter has no age, and would seem to show one.
+        """
+        found = {}
+        if "te_delay" in point.names:
+            found["te_delay"] = self.record.torque_rate(point["te_delay"])
+        if TE_OFFSET in point.names:
+            found[TE_OFFSET] = np.full(self.record.time.size - 1, -1.0)
+        return found
+
     def response(self, point: Point, run: Trajectory) -> Response:
         """Linear response to disturbances of the inputs around `run`."""
         return response_of(self.structure.model(point), run, self.record)
-
-    def answer(self, point: Point, run: Trajectory, offsets: dict[str, float]) -> FloatArray:
-        """Change (n,) of the simulated samples by constant offsets of inputs, by name."""
-        count = self.record.time.size - 1
-        return self.answer_to(point, run, {n: np.full(count, v) for n, v in offsets.items()})
 
     def answer_to(
         self, point: Point, run: Trajectory, disturbance: dict[str, FloatArray]
@@ -121,13 +128,19 @@ class Part:
         )
 
     def weighted_by(self, point: Point) -> Part:
-        """The part with the covariance of output and input noise at `point`."""
+        """The part with the covariance of output and input noise at `point`.
+
+        The part as it is where the simulation fails there, or has no finite response.
+        """
         run = self.run(point)
         if run is None:
             return self
         model = self.structure.model(point)
-        whiteness = with_input_noise(model, self.record, response_of(model, run, self.record))
-        return replace(self, weighting=whiteness)
+        response = response_of(model, run, self.record)
+        try:
+            return replace(self, weighting=with_input_noise(model, self.record, response))
+        except np.linalg.LinAlgError:
+            return self
 
     def with_expected_inputs(self, point: Point, measured: Record) -> Part:
         """The part driven by the `measured` inputs less their expected noise at `point`."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drivetwin.driveline import Signal, Trajectory
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fill import near_fill
+from drivetwin.identify.likelihood.fill import local_mean, near_fill
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
 
 IndexArray = NDArray[np.intp]
@@ -46,6 +46,8 @@ class Record:
     engine_torque: Signal
     pressures: Mapping[str, Signal]
     outputs: tuple[Output, ...]
+    steady_torque: Signal
+    """Engine torque without its noise: what its rate of change is taken from."""
     input_sigma: Mapping[str, float]
     """White noise of an input sample by name; the engine torque is `engine torque`."""
 
@@ -94,6 +96,12 @@ class Record:
             found[name] = Signal(p.time, p.values - other.pressures[name].values)
         return found
 
+    def torque_rate(self, age: float) -> FloatArray:
+        """Rate of the engine torque [N m/s] as it acts over each step of the grid (N-1,)."""
+        signal = self.steady_torque
+        ends = np.interp(self.time + age, signal.time, signal.values)
+        return np.asarray(np.diff(ends) / np.diff(self.time))
+
     def until(self, end: float) -> Record:
         """The record cut at `end` [s]."""
         count = int(np.searchsorted(self.time, end, side="right"))
@@ -102,7 +110,12 @@ class Record:
             keep = int(np.searchsorted(out.place, count))
             outputs.append(Output(out.name, out.place[:keep], out.values[:keep], out.sigma))
         return Record(
-            self.time[:count], self.engine_torque, self.pressures, tuple(outputs), self.input_sigma
+            self.time[:count],
+            self.engine_torque,
+            self.pressures,
+            tuple(outputs),
+            self.steady_torque,
+            self.input_sigma,
         )
 
 
@@ -145,6 +158,7 @@ def record_of(signals: ShiftSignals, driveline: Driveline, span: Span) -> Record
             for name, p in signals.pressures.items()
         },
         outputs,
+        _held(replace(torque, values=local_mean(torque))),
         {"engine torque": torque.sigma} | {n: p.sigma for n, p in signals.pressures.items()},
     )
 

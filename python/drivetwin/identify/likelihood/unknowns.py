@@ -120,7 +120,6 @@ class Structure:
             "Tv_over_if": (("load.constant", i_f),),
             "k_o": (("k_o", 1.0),),
             "c_o": (("c_o", 1.0),),
-            "te_delay": (("delay.engine torque", -1.0),),
             f"{self.label}.speed": (
                 ("start.engine_speed", self.driveline.i_before),
                 ("start.output_speed", 1.0),

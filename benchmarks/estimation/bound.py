@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""The Cramér-Rao bound of a scenario: Fisher information at the truth with input noise.
+
+Nothing of the fit's own covariance is used. G, the response of all outputs to every input sample,
+comes from simulating each sample's disturbance; R + G·Q·Gᵀ is then inverted as a dense matrix by
+Woodbury's identity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.estimation.bench import Bench
+from drivetwin.driveline import Signal
+from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.regression import Prior
+from drivetwin.identify.signals import FloatArray
+
+STEPS = {"engine torque": 1.0}
+"""Disturbance of one engine torque sample [N m]."""
+PRESSURE_STEP = 100.0
+"""Disturbance of one pressure sample [Pa]: small against the distance to P0 in the shift."""
+SILENT = 1e-12
+"""Response below which a sample of an input does not act at all."""
+
+
+def sensor_std(bench: Bench, role: str) -> float:
+    """White noise of a sensor with its rounding, as the scenario states it."""
+    sensor = next(s for s in bench.run.scenario.sensors if s.role == role)
+    return float(np.hypot(sensor.noise, sensor.resolution / np.sqrt(12.0)))
+
+
+def bound(bench: Bench, part: Part, truth: Point, prior: Prior) -> FloatArray:
+    """Least covariance (p, p) of the unknowns; `bench` and `part` are those without noise."""
+    found = part.linearised(truth)
+    assert found is not None
+    slopes = found[1]
+    outputs = part.record.outputs
+    names = {"engine_speed": "input_speed"}
+    sigma = np.concatenate(
+        [
+            np.full(out.values.size, sensor_std(bench, names.get(out.name, out.name)))
+            for out in outputs
+        ]
+    )
+    G = input_response(bench, part, truth) / sigma[:, None]
+    slopes = slopes / sigma[:, None]
+    inner = np.eye(G.shape[1]) + G.T @ G
+    through = G.T @ slopes
+    information = slopes.T @ slopes - through.T @ np.linalg.solve(inner, through)
+    information += prior.precision
+    scale = np.sqrt(np.diag(information))
+    inverse = np.linalg.inv(information / np.outer(scale, scale))
+    return np.asarray(inverse / np.outer(scale, scale))
+
+
+def input_response(bench: Bench, part: Part, truth: Point) -> FloatArray:
+    """G·Q^½ (n, m): change of the outputs by one sigma of each input sample that acts."""
+    base = part.run(truth)
+    assert base is not None
+    start = part.record.stacked(base)
+    columns = []
+    for name, signal in _inputs(part).items():
+        role = "engine_torque" if name == "engine torque" else f"pressure.{name}"
+        std, step = sensor_std(bench, role), STEPS.get(name, PRESSURE_STEP)
+        for k in range(signal.values.size):
+            if not _may_act(part, name, float(signal.time[k])):
+                continue
+            run = _disturbed(part, name, k, step).run(truth)
+            assert run is not None
+            change = (part.record.stacked(run) - start) * (std / step)
+            if np.max(np.abs(change)) > SILENT:
+                columns.append(change)
+    return np.column_stack(columns)
+
+
+def _inputs(part: Part) -> dict[str, Signal]:
+    return {"engine torque": part.record.engine_torque} | dict(part.record.pressures)
+
+
+def _may_act(part: Part, name: str, stamp: float) -> bool:
+    """Whether a sample can act: pressures do so only where the element is not held fast."""
+    time = part.record.time
+    if name == "engine torque":
+        return bool(time[0] - 0.1 < stamp < time[-1] + 0.1)
+    pressure = part.record.pressures[name]
+    low = part.structure.driveline.couplings[name].P0.value - PRESSURE_STEP
+    value = float(np.interp(stamp, pressure.time, pressure.values))
+    return bool(time[0] < stamp < time[-1]) and value > low
+
+
+def _disturbed(part: Part, name: str, index: int, step: float) -> Part:
+    record = part.record
+    signal = _inputs(part)[name]
+    values = signal.values.copy()
+    values[index] += step
+    changed = Signal(signal.time, values)
+    if name == "engine torque":
+        return replace(part, record=replace(record, engine_torque=changed))
+    return replace(part, record=replace(record, pressures={**record.pressures, name: changed}))
