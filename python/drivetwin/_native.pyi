@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 __all__ = ["gear_statics", "reduce_shift", "sensitivities", "simulate", "simulate_network"]
 
 _Array = NDArray[np.float64]
-_Options = tuple[float, float, int | None, bool]
+_Options = tuple[float, float, int | None, bool, bool]
 _Run = tuple[
     _Array,
     list[tuple[float, str, str]],

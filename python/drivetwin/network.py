@@ -89,7 +89,7 @@ def simulate(
             (samples, sines),
             (list(start.speeds.items()), list(start.twists.items()), list(start.locked)),
             _array(time),
-            (accuracy.tolerance, accuracy.max_step, accuracy.order, audit),
+            (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit),
         )
     except ValueError as error:
         raise InputError(str(error), "correct the elements, their inputs or the start") from error

@@ -57,7 +57,7 @@ fn events_of_an_upshift_come_in_order() {
 
 /// Error in shaft torque of a fixed order and step against round-off accuracy.
 fn error(order: usize, max_step: f64, exact: &DualClutchRun<f64>) -> f64 {
-    let settings = Settings { order: Some(order), max_step, ..Settings::default() };
+    let settings = Settings { order: Some(order), max_step, ..Settings::exact() };
     let run = shift(&paper_driveline(LossLaw::Paper), 1.0, settings);
     let pairs = run.columns[SHAFT_TORQUE].iter().zip(&exact.columns[SHAFT_TORQUE]);
     pairs.map(|(a, b): (&f64, &f64)| (a - b).abs()).fold(0.0, f64::max)
@@ -65,7 +65,7 @@ fn error(order: usize, max_step: f64, exact: &DualClutchRun<f64>) -> f64 {
 
 #[test]
 fn halving_the_step_divides_the_error_by_two_to_the_order() {
-    let exact = shift(&paper_driveline::<f64>(LossLaw::Paper), 1.0, Settings::default());
+    let exact = shift(&paper_driveline::<f64>(LossLaw::Paper), 1.0, Settings::exact());
     for order in [2, 3, 4] {
         let (coarse, fine) = (error(order, 1e-3, &exact), error(order, 0.5e-3, &exact));
         let observed = (coarse / fine).log2();
@@ -120,4 +120,28 @@ fn dual_numbers_carry_exact_derivatives_through_lock_and_break_away() {
         }
         assert!(exact.events[3].time.re > 0.5);
     }
+}
+
+#[test]
+fn passing_whole_samples_stays_close_to_the_exact_motion() {
+    let model = paper_driveline::<f64>(LossLaw::Paper);
+    let exact = unaudited(&model, Settings::exact());
+    let quick = unaudited(&model, Settings::default());
+    assert_eq!(quick.status, Status::Completed);
+    for (column, allowed) in [(0, 1e-5), (1, 1e-5), (2, 1e-5), (SHAFT_TORQUE, 0.02)] {
+        let pairs = quick.columns[column].iter().zip(&exact.columns[column]);
+        let worst = pairs.map(|(a, b): (&f64, &f64)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < allowed, "column {column}: {worst:.2e}");
+    }
+    assert_eq!(quick.events.len(), exact.events.len());
+    for (a, b) in quick.events.iter().zip(&exact.events) {
+        assert!((a.time - b.time).abs() < 1e-7, "{a:?} against {b:?}");
+    }
+}
+
+fn unaudited(model: &DualClutch<f64>, settings: Settings) -> DualClutchRun<f64> {
+    let signals = upshift(1.0);
+    let inputs: Vec<(&str, Signal<'_, f64>)> =
+        signals.iter().map(|s| (s.0, Signal::samples(&s.1, &s.2))).collect();
+    simulate_dual_clutch(model, &inputs, &second_gear(), &signals[0].1, (settings, false)).unwrap()
 }

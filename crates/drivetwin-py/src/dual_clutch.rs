@@ -13,8 +13,9 @@ use pyo3::prelude::*;
 type Samples<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
 /// Speeds of engine, output and wheel [rad/s], twist [rad], names of locked elements.
 type Start = (f64, f64, f64, f64, Vec<String>);
-/// Tolerance, longest step [s], fixed order, whether to audit the energy.
-type Options = (f64, f64, Option<usize>, bool);
+/// Tolerance, longest step [s], fixed order, whether samples without events may be passed at once,
+/// whether to audit the energy.
+type Options = (f64, f64, Option<usize>, bool, bool);
 /// Columns (n_columns, n_time), events, status, audit.
 type Run<'py> = (Bound<'py, PyArray2<f64>>, Vec<Event>, String, Option<Audit>);
 
@@ -39,8 +40,8 @@ pub fn simulate<'py>(
         .collect::<PyResult<Vec<_>>>()?;
     let (engine_speed, output_speed, wheel_speed, twist, locked) = start;
     let start = DualClutchStart { engine_speed, output_speed, wheel_speed, twist, locked };
-    let (tolerance, max_step, order, audit) = options;
-    let settings = Settings { tolerance, max_step, order };
+    let (tolerance, max_step, order, sprint, audit) = options;
+    let settings = Settings { tolerance, max_step, order, sprint };
     let run = py
         .detach(|| simulate_dual_clutch(&model, &signals, &start, grid, (settings, audit)))
         .map_err(|e| PyValueError::new_err(e.to_string()))?;

@@ -16,8 +16,9 @@ type Samples<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f
 type Sine = (String, f64, f64, f64, f64);
 /// Speeds [rad/s] by node, twists [rad] by shaft, names of elements at rest.
 type StartState = (Vec<(String, f64)>, Vec<(String, f64)>, Vec<String>);
-/// Tolerance, longest step [s], fixed order, whether to audit the energy.
-type Options = (f64, f64, Option<usize>, bool);
+/// Tolerance, longest step [s], fixed order, whether samples without events may be passed at once,
+/// whether to audit the energy.
+type Options = (f64, f64, Option<usize>, bool, bool);
 /// Columns (n_outputs, n_time), events, status, audit.
 type Run<'py> = (Bound<'py, PyArray2<f64>>, Vec<Event>, String, Option<Audit>);
 
@@ -49,8 +50,8 @@ pub fn simulate_network<'py>(
     }));
     let (speeds, twists, locked) = start;
     let start = Start { speeds, twists, locked };
-    let (tolerance, max_step, order, audit) = options;
-    let settings = Settings { tolerance, max_step, order };
+    let (tolerance, max_step, order, sprint, audit) = options;
+    let settings = Settings { tolerance, max_step, order, sprint };
     let trajectory = py
         .detach(|| {
             let network = Network::compile(&driveline)?;

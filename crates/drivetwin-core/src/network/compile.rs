@@ -184,6 +184,14 @@ impl<T: Real> Network<T> {
             .collect()
     }
 
+    /// Normal load of friction element `j` as `gain (basis[input] - p0)`: input, gain, p0.
+    pub fn load_of(&self, j: usize) -> (usize, T, T) {
+        match self.frictions[j].normal {
+            Normal::Pressure { input, gain, p0 } => (self.first_input() + input, gain, p0),
+            Normal::Constant(normal) => (self.one(), normal, T::zero_()),
+        }
+    }
+
     fn node_speed(&self, node: usize) -> Vec<T> {
         self.over_speeds(&vec![(node, T::of(1.0))])
     }

@@ -67,6 +67,8 @@ impl ModeKey {
 /// Linear maps over the basis.
 #[derive(Clone, Debug)]
 pub struct Mode<T> {
+    /// What it was compiled for.
+    pub key: ModeKey,
     /// State derivatives, states × basis.
     pub derivative: Matrix<T>,
     /// Rows at rest.
@@ -169,6 +171,7 @@ impl<T: Real> Network<T> {
         let torques = difference(&node_torques, &nodes.times(&stuck_torque));
         let residual = difference(&torques, &self.inertia.times(n).times(&acceleration));
         Some(Mode {
+            key,
             derivative: self.with_other_states(&acceleration),
             gear_torque: self.gear_torques(&force_rows, &residual, (&stuck, &stuck_torque))?,
             stuck_torque,

@@ -41,28 +41,22 @@ pub fn run<T: Real>(
 ) -> Result<Trajectory<T>, SimulateError> {
     check_grid(grid)?;
     let span = (grid[0], grid[grid.len() - 1]);
-    let ordered = network
-        .mechanism
-        .inputs
-        .iter()
-        .map(|name| {
-            let found = signals.iter().find(|signal| signal.0 == name);
-            found.copied().ok_or_else(|| InputError::Missing { name: name.clone() })
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    for prescribed in &network.mechanism.prescribed {
-        refuse_jump(ordered[prescribed.input])?;
-    }
-    let inputs = Inputs::join(&ordered, span)?;
+    let inputs = join(network, signals, span)?;
     let (x, locked) = start.state(network)?;
     let mut recorder = Recorder::new(network, outputs, grid)?;
     let mut events = Vec::new();
     let mut balance = None;
+    // Between samples only the expansion knows the motion.
+    let dense = audit || recorder.needs_motion() || !inputs.has_knots(grid);
+    let settings = Settings { sprint: settings.sprint && !dense, ..settings };
     let mut integrate = || -> Result<(), Status> {
         let mut run = Integrator::start(network, &inputs, settings, x.clone(), &locked)?;
         let mut auditor = audit.then(|| Auditor::new(network, &run.x));
         let end = loop {
-            match run.advance() {
+            let mut passed = |time: f64, basis: &[T], run: &Integrator<'_, T>| {
+                recorder.sample_basis(time, basis, run);
+            };
+            match run.advance(&mut passed) {
                 Ok(Some(step)) => {
                     let last = (step.start + step.length).re() >= span.1;
                     recorder.sample(&run, &step, last);
@@ -85,6 +79,27 @@ pub fn run<T: Real>(
         frictions.chain(network.losses.iter().map(|gear| gear.element.clone())).collect();
     let time = grid.to_vec();
     Ok(Trajectory { time, columns, elements, events, status, audit: balance })
+}
+
+/// The signals in the order in which the network numbers its inputs.
+fn join<T: Real>(
+    network: &Network<T>,
+    signals: &[(&str, Signal<'_, T>)],
+    span: (f64, f64),
+) -> Result<Inputs<T>, InputError> {
+    let ordered = network
+        .mechanism
+        .inputs
+        .iter()
+        .map(|name| {
+            let found = signals.iter().find(|signal| signal.0 == name);
+            found.copied().ok_or_else(|| InputError::Missing { name: name.clone() })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    for prescribed in &network.mechanism.prescribed {
+        refuse_jump(ordered[prescribed.input])?;
+    }
+    Inputs::join(&ordered, span)
 }
 
 fn check_grid(grid: &[f64]) -> Result<(), SimulateError> {

@@ -6,7 +6,7 @@ use super::start::{StartError, find};
 use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
 use crate::network::{Network, Row};
-use crate::number::{Real, evaluate};
+use crate::number::Real;
 use crate::solve::{Event, Integrator, RowState, Status, Step};
 use serde::{Deserialize, Serialize};
 
@@ -28,13 +28,13 @@ pub enum Output {
     FrictionTorque(String),
 }
 
-/// An output with its index in the network.
+/// An output resolved against a network.
 enum Column<T> {
-    Speeds(Vec<T>),
-    /// Speed of the node and the angle at the start of the present step.
+    /// Linear form over the basis: position and coefficient of its terms.
+    Linear(Vec<(usize, T)>),
+    /// Speed of a node over the independent speeds, and the angle at the start of the present step.
     Angle(Vec<T>, T),
-    Twist(usize),
-    Shaft(usize),
+    /// Torque of a friction element.
     Friction(usize),
 }
 
@@ -83,8 +83,12 @@ impl<'g, T: Real> Recorder<'g, T> {
                 break;
             }
             let h = if t >= start { -step.start + t } else { T::zero_() };
+            let basis = run.expansion.basis_at(run.network, h);
             for (column, values) in &mut self.columns {
-                values.push(value(column, run, h));
+                values.push(match column {
+                    Column::Angle(row, angle) => *angle + integral(run, row, h),
+                    other => value(other, run, &basis),
+                });
             }
             self.next += 1;
         }
@@ -92,6 +96,21 @@ impl<'g, T: Real> Recorder<'g, T> {
             if let Column::Angle(row, angle) = column {
                 *angle += integral(run, row, step.length);
             }
+        }
+    }
+
+    /// Whether a column depends on the motion between samples.
+    pub fn needs_motion(&self) -> bool {
+        self.columns.iter().any(|(column, _)| matches!(column, Column::Angle(..)))
+    }
+
+    /// Record the grid points at a sample, given by its basis.
+    pub fn sample_basis(&mut self, time: f64, basis: &[T], run: &Integrator<'_, T>) {
+        while self.grid.get(self.next).is_some_and(|&t| t <= time) {
+            for (column, values) in &mut self.columns {
+                values.push(value(column, run, basis));
+            }
+            self.next += 1;
         }
     }
 
@@ -111,20 +130,21 @@ fn resolve<T: Real>(network: &Network<T>, output: &Output) -> Result<Column<T>, 
     let nodes: Vec<&str> = m.nodes.iter().map(String::as_str).collect();
     let springs: Vec<&str> = m.springs.iter().map(|s| s.element.as_str()).collect();
     let frictions: Vec<&str> = m.frictions.iter().map(|f| f.element.as_str()).collect();
+    let speed = |node| Column::Linear(terms(&network.over_speeds(&vec![(node, T::of(1.0))])));
     Ok(match output {
-        Output::Speed(name) => {
-            let node = find("node", name, &nodes)?;
-            Column::Speeds(network.over_speeds(&vec![(node, T::of(1.0))]))
-        }
+        Output::Speed(name) => speed(find("node", name, &nodes)?),
         Output::Angle(name) => {
             let node = find("node", name, &nodes)?;
             Column::Angle(network.over_speeds(&vec![(node, T::of(1.0))]), T::zero_())
         }
-        Output::Twist(name) => Column::Twist(find("shaft", name, &springs)?),
-        Output::ShaftTorque(name) => Column::Shaft(find("shaft", name, &springs)?),
+        Output::Twist(name) => {
+            let twist = network.speeds() + find("shaft", name, &springs)?;
+            Column::Linear(vec![(twist, T::of(1.0))])
+        }
+        Output::ShaftTorque(name) => shaft_torque(network, find("shaft", name, &springs)?),
         Output::Slip(name) => {
             let element = find("friction element", name, &frictions)?;
-            Column::Speeds(network.frictions[element].slip.clone())
+            Column::Linear(terms(&network.frictions[element].slip))
         }
         Output::FrictionTorque(name) => {
             Column::Friction(find("friction element", name, &frictions)?)
@@ -132,45 +152,48 @@ fn resolve<T: Real>(network: &Network<T>, output: &Output) -> Result<Column<T>, 
     })
 }
 
-/// Value of a column `h` seconds into the present step.
-fn value<T: Real>(column: &Column<T>, run: &Integrator<'_, T>, h: T) -> T {
-    let order = run.expansion.order;
-    let state = |i: usize| evaluate(&run.expansion.states[i], order, h);
-    let linear =
-        |row: &[T]| row.iter().enumerate().fold(T::zero_(), |sum, (i, &c)| sum + c * state(i));
-    match column {
-        Column::Speeds(row) => linear(row),
-        Column::Twist(i) => state(run.network.speeds() + i),
-        Column::Shaft(i) => shaft_torque(run, *i, h),
-        Column::Friction(j) => match run.rows[*j] {
-            RowState::Open => T::zero_(),
-            RowState::Slipping { .. } | RowState::Saturated { .. } => {
-                evaluate(&run.expansion.channels[*j].torque, order, h)
-            }
-            RowState::Stuck => {
-                let position = run.mode.stuck.iter().position(|&s| s == Row::Friction(*j));
-                let position = position.expect("a stuck element belongs to the mode");
-                form(run.mode.stuck_torque.row(position), &run.expansion.basis_at(run.network, h))
-            }
-        },
-        Column::Angle(row, angle) => *angle + integral(run, row, h),
+/// Terms of a row that are not zero.
+fn terms<T: Real>(row: &[T]) -> Vec<(usize, T)> {
+    row.iter().copied().enumerate().filter(|(_, c)| c.re() != 0.0).collect()
+}
+
+fn shaft_torque<T: Real>(network: &Network<T>, i: usize) -> Column<T> {
+    match network.mechanism.springs[i].law {
+        SpringLaw::Linear { stiffness, damping } => {
+            let mut row: Vec<T> = network.twist_rates.row(i).iter().map(|&c| c * damping).collect();
+            row.resize(network.states(), T::zero_());
+            row[network.speeds() + i] = stiffness;
+            Column::Linear(terms(&row))
+        }
+        SpringLaw::Backlash { .. } => {
+            let springs = &network.mechanism.springs[..i];
+            let backlashes =
+                springs.iter().filter(|s| matches!(s.law, SpringLaw::Backlash { .. })).count();
+            Column::Linear(vec![(network.drives[backlashes].basis, T::of(1.0))])
+        }
     }
 }
 
-fn shaft_torque<T: Real>(run: &Integrator<'_, T>, i: usize, h: T) -> T {
-    let basis = run.expansion.basis_at(run.network, h);
-    match run.network.mechanism.springs[i].law {
-        SpringLaw::Linear { stiffness, damping } => {
-            let rate = form(run.network.twist_rates.row(i), &basis);
-            stiffness * basis[run.network.speeds() + i] + damping * rate
+/// Value of a column from the basis at an instant; an angle is that at the start of the step.
+fn value<T: Real>(column: &Column<T>, run: &Integrator<'_, T>, basis: &[T]) -> T {
+    match column {
+        Column::Linear(terms) => {
+            terms.iter().fold(T::zero_(), |sum, &(position, c)| sum + c * basis[position])
         }
-        SpringLaw::Backlash { .. } => {
-            let springs = &run.network.mechanism.springs[..i];
-            let backlashes =
-                springs.iter().filter(|s| matches!(s.law, SpringLaw::Backlash { .. })).count();
-            basis[run.network.drives[backlashes].basis]
-        }
+        Column::Angle(_, angle) => *angle,
+        Column::Friction(j) => match run.rows[*j] {
+            RowState::Open => T::zero_(),
+            RowState::Slipping { .. } | RowState::Saturated { .. } => {
+                basis[run.network.first_channel() + j]
+            }
+            RowState::Stuck => holding_torque(run, *j, basis),
+        },
     }
+}
+
+fn holding_torque<T: Real>(run: &Integrator<'_, T>, j: usize, basis: &[T]) -> T {
+    let position = run.mode.stuck.iter().position(|&s| s == Row::Friction(j));
+    form(run.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode")), basis)
 }
 
 /// Angle turned within the first `h` seconds of the present step.

@@ -138,16 +138,20 @@ impl<T: Real> Inputs<T> {
                 }
             }
         }
+        // Stable, so that signals on a common raster are merged in linear time.
         knots.sort_by(f64::total_cmp);
         let knots = merge_knots(&knots, &jumps);
         let mut lines = Vec::with_capacity((knots.len() - 1) * signals.len());
+        let mut cursors = vec![0; signals.len()];
         for span in knots.windows(2) {
-            lines.extend(signals.iter().map(|(_, signal)| match signal {
-                Signal::Samples { times, values, delay } => {
-                    line(times, values, *delay, (span[0], span[1]))
-                }
-                Signal::Sine { offset, .. } => [*offset, T::zero_()],
-            }));
+            for ((_, signal), cursor) in signals.iter().zip(&mut cursors) {
+                lines.push(match signal {
+                    Signal::Samples { times, values, delay } => {
+                        line(times, values, *delay, (span[0], span[1]), cursor)
+                    }
+                    Signal::Sine { offset, .. } => [*offset, T::zero_()],
+                });
+            }
         }
         Ok(Self { knots, lines, sines })
     }
@@ -160,6 +164,22 @@ impl<T: Real> Inputs<T> {
     /// Start and end of segment `i` [s].
     pub fn span(&self, i: usize) -> (f64, f64) {
         (self.knots[i], self.knots[i + 1])
+    }
+
+    /// Whether all inputs are linear within every segment.
+    pub fn is_sampled(&self) -> bool {
+        self.sines.iter().all(Option::is_none)
+    }
+
+    /// Whether every point of an increasing grid [s] is a knot.
+    pub fn has_knots(&self, grid: &[f64]) -> bool {
+        let mut knots = self.knots.iter();
+        grid.iter().all(|&t| knots.any(|&knot| knot == t))
+    }
+
+    /// Value at the start of segment `i` and rate within it, of every input.
+    pub fn lines(&self, i: usize) -> &[[T; 2]] {
+        &self.lines[i * self.sines.len()..(i + 1) * self.sines.len()]
     }
 
     /// Taylor coefficients of every input at `t` within segment `i`.
@@ -247,10 +267,18 @@ fn merge_knots(sorted: &[f64], jumps: &[f64]) -> Vec<f64> {
 }
 
 /// Value at the start of a segment and rate within it. The samples' interval is found by the
-/// middle of the segment, so that round-off of the knots cannot pick a neighbour.
-fn line<T: Real>(times: &[f64], values: &[T], delay: T, (from, to): (f64, f64)) -> [T; 2] {
+/// middle of the segment, so that round-off of the knots cannot pick a neighbour; `cursor` remembers
+/// it for the segments that follow.
+fn line<T: Real>(
+    times: &[f64],
+    values: &[T],
+    delay: T,
+    (from, to): (f64, f64),
+    cursor: &mut usize,
+) -> [T; 2] {
     let middle = 0.5 * (from + to) - delay.re();
-    let next = times.partition_point(|&t| t <= middle);
+    *cursor += times[*cursor..].iter().take_while(|&&t| t <= middle).count();
+    let next = *cursor;
     if next == 0 || next == times.len() {
         return [values[next.saturating_sub(1)], T::zero_()];
     }

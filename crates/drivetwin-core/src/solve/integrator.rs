@@ -4,6 +4,7 @@
 use super::expansion::{Accuracy, Expansion};
 use super::guard::{Cause, Watch, earliest};
 use super::inputs::Inputs;
+use super::sprint::Cache;
 use super::status::Status;
 use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
 use crate::number::{Real, Series, TERMS};
@@ -64,11 +65,21 @@ pub struct Settings {
     pub max_step: f64,
     /// Fixed order instead of one that follows the tolerance; for convergence studies.
     pub order: Option<usize>,
+    /// Pass samples without events by exact operators, with slipping torques as cubics in time:
+    /// about twenty times faster at an error of some 1e-3 N·m on 1 ms samples.
+    pub sprint: bool,
+}
+
+impl Settings {
+    /// Round-off accuracy throughout.
+    pub fn exact() -> Self {
+        Self { sprint: false, ..Self::default() }
+    }
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { tolerance: 1e-12, max_step: f64::INFINITY, order: None }
+        Self { tolerance: 1e-12, max_step: f64::INFINITY, order: None, sprint: true }
     }
 }
 
@@ -116,7 +127,8 @@ pub struct Integrator<'a, T> {
     /// States of lossy gears during the last step.
     pub gears: Vec<GearState>,
     pub(super) inputs: &'a Inputs<T>,
-    settings: Settings,
+    pub(super) settings: Settings,
+    pub(super) sprints: Cache<T>,
     modes: HashMap<ModeKey, Arc<Mode<T>>>,
     pub(super) segment: usize,
     pub(super) pending: Option<Cause>,
@@ -156,6 +168,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             inputs,
             settings,
             modes: HashMap::new(),
+            sprints: Cache::new(),
             segment: 0,
             pending: None,
             stalled: 0,
@@ -172,11 +185,19 @@ impl<'a, T: Real> Integrator<'a, T> {
         self.t
     }
 
-    /// Advance by one step, to the next input sample or event; `None` at the end of the inputs.
-    pub fn advance(&mut self) -> Result<Option<Step<T>>, Status> {
+    /// Advance to the next input sample or event; `None` at the end of the inputs. Where the settings
+    /// allow it, whole samples without events are passed first; `passed` gets time [s] and basis at
+    /// the start of each.
+    pub fn advance(
+        &mut self,
+        passed: &mut impl FnMut(f64, &[T], &Self),
+    ) -> Result<Option<Step<T>>, Status> {
         self.change_mode()?;
         if !self.enter_segment()? {
             return Ok(None);
+        }
+        if self.settings.sprint {
+            self.sprint(passed);
         }
         let end = self.inputs.span(self.segment).1;
         let remaining = (-self.t + end).re();

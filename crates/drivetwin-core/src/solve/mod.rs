@@ -11,6 +11,8 @@ mod first_fall;
 mod guard;
 mod inputs;
 mod integrator;
+mod operators;
+mod sprint;
 mod status;
 mod transition;
 
