@@ -27,7 +27,7 @@ _MAY_NOT_USE = {
 PYTHON_LAYERS = (
     frozenset({"errors", "parameters", "driveline", "network", "tomlfile", "_native"}),
     frozenset({"logs", "vehicle", "held", "gearbox"}),
-    frozenset({"shifts", "dyno"}),
+    frozenset({"shifts", "dyno", "drive"}),
     frozenset({"identify"}),
     frozenset({"twin", "results", "start_state", "validate"}),
     frozenset({"report"}),

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from drivetwin.cli.demo import demo
+from drivetwin.cli.drive import drive
 from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
 from drivetwin.cli.inspect import inspect
@@ -27,7 +28,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for command in (demo, synth, inspect, shifts, identify, simulate, report, gearbox, reduce):
+for command in (demo, synth, inspect, shifts, identify, simulate, report, gearbox, reduce, drive):
     app.command()(command)
 
 

@@ -50,8 +50,17 @@ def stacked(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
     `phases` maps `before`, `torque`, `inertia`, `after` to intervals [s]; the view opens on the
     shift, buttons zoom to the phases.
     """
-    figure = go.Figure()
     view = _view(phases)
+    figure = over_time(panels, view, height)
+    figure.update_layout(updatemenus=[_zoom_buttons(panels, phases, view)])
+    figure.update_layout(margin={"t": 64})
+    _mark_phases(figure, phases)
+    return figure
+
+
+def over_time(panels: Sequence[Panel], view: tuple[float, float], height: int) -> go.Figure:
+    """Draw panels from top to bottom over a common time axis [s] that opens on `view`."""
+    figure = go.Figure()
     domains = _domains([panel.weight for panel in panels])
     options: dict[str, Any] = {}
     for number, (panel, domain) in enumerate(zip(panels, domains, strict=True), start=1):
@@ -79,12 +88,10 @@ def stacked(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
     )
     figure.update_layout(layout(height, **options))
     figure.update_layout(
-        margin={"t": 64, "r": 150},
+        margin={"r": 150},
         hovermode="x unified",
         hoversubplots="axis",
-        updatemenus=[_zoom_buttons(panels, phases, view)],
     )
-    _mark_phases(figure, phases)
     return figure
 
 

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin drive [CARD]`: a launch and all gears with the whole driveline."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step, table_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from drivetwin.drive import DriveRun
+    from drivetwin.drive.result import Maneuver
+
+FIGURE, TRACES = "drive.html", "drive.csv"
+
+
+class Course(StrEnum):
+    """Built-in plans of a drive."""
+
+    LAUNCH = "launch"
+    ALL_KINDS = "all_kinds"
+
+
+def drive(
+    card: Annotated[
+        str,
+        typer.Argument(metavar="[CARD]", help="Gearbox card (TOML), or the name of a built-in."),
+    ] = "three-set-4000cr",
+    course: Annotated[
+        Course,
+        typer.Option(
+            help="launch: standstill to the highest gear under power; all_kinds: the same, then "
+            "kick-down, up-shift with closed pedal, coast-down to first gear."
+        ),
+    ] = Course.ALL_KINDS,
+    powertrain: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Powertrain file (TOML), or the name of a built-in."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help=f"Where {FIGURE} and {TRACES} go."),
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Drive from standstill: converter, lock-up, shifts of all kinds, the full gearbox.
+
+    A table of all shifts: when they begin, how long the input slips, friction work and peak power
+    of the off-going and the on-coming element, lowest and highest torque of the output shaft; and
+    where the energy went.
+    """
+    from drivetwin.drive import all_kinds, launch, load_powertrain, run, suited_powertrain
+    from drivetwin.gearbox import load_gearbox
+
+    box = load_gearbox(card)
+    chosen = load_powertrain(powertrain or suited_powertrain(box))
+    plan = {Course.LAUNCH: launch, Course.ALL_KINDS: all_kinds}[course](box, chosen.control)
+    with step(f"driving {box.name}"):
+        motion = run(box, chosen, plan)
+        files = () if output is None else _write(output, motion, f"{box.name}, {chosen.name}")
+    if as_json:
+        print_json(_document(motion) | {"gearbox": box.name, "powertrain": chosen.name})
+        return
+    show(_shifts(motion, f"{box.name}, {chosen.name}"))
+    show(_energy(motion))
+    for warning in motion.warnings:
+        note(f"warning: {warning}")
+    for file in files:
+        say(f"wrote {file}")
+
+
+def _write(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
+    """Write figure and traces, both or none."""
+    from drivetwin.cli.staging import staged
+    from drivetwin.report.drive import render_drive, traces_text
+
+    texts = {FIGURE: render_drive(motion, title), TRACES: traces_text(motion)}
+    with staged(folder) as place:
+        for name, text in texts.items():
+            (place / name).write_text(text, encoding="utf-8", newline="\n")
+    return tuple(folder / name for name in texts)
+
+
+def _shifts(motion: DriveRun, title: str) -> Table:
+    """One row a shift; work and peak power of the off-going, then of the on-coming element."""
+    numbers = ("at s", "slip s", "kJ", "kW", "shaft Nm")
+    table = table_of(title, "shift", "kind", "off on", *numbers, right=numbers)
+    for each in motion.maneuvers:
+        low, high = each.shaft_torque
+        table.add_row(
+            each.action.label,
+            each.action.kind,
+            " ".join(work.element for work in each.work),
+            f"{each.action.start:.1f}",
+            _slip_time(each),
+            " ".join(f"{abs(work.work) / 1e3:.1f}" for work in each.work),
+            " ".join(f"{work.peak_power / 1e3:.0f}" for work in each.work),
+            f"{low:.0f}..{high:.0f}",
+        )
+    return table
+
+
+def _slip_time(maneuver: Maneuver) -> str:
+    """Duration of the inertia phase, where there is one."""
+    if maneuver.break_away is None or maneuver.lock is None:
+        return ""
+    return f"{maneuver.lock - maneuver.break_away:.2f}"
+
+
+def _energy(motion: DriveRun) -> Table:
+    table = table_of("Energy over the drive", "part", "kJ", right=("kJ",))
+    for part, value in _balance(motion).items():
+        table.add_row(part, f"{value / 1e3:.3f}")
+    return table
+
+
+def _balance(motion: DriveRun) -> dict[str, float]:
+    """The audit, with the friction of shift elements apart from that of brake and rolling."""
+    audit = motion.audit
+    elements = sum(motion.work.values())
+    return {
+        "engine": audit.source,
+        "gain of kinetic and elastic energy": audit.stored,
+        "torque converter": audit.converter,
+        "clutches and brakes of the transmission": elements,
+        "service brake and rolling resistance": audit.friction - elements,
+        "air and grade": audit.load,
+        "damping of the output shaft": audit.shaft,
+        "unexplained": audit.error,
+    }
+
+
+def _document(motion: DriveRun) -> dict[str, Any]:
+    return {
+        "duration": float(motion.time[-1]),
+        "shifts": [
+            {
+                "label": each.action.label,
+                "kind": each.action.kind,
+                "start": each.action.start,
+                "end": each.action.end,
+                "break_away": each.break_away,
+                "lock": each.lock,
+                "shaft_torque": list(each.shaft_torque),
+                "elements": [vars(work) for work in each.work],
+            }
+            for each in motion.maneuvers
+        ],
+        "friction_work": dict(motion.work),
+        "energy": vars(motion.audit),
+        "warnings": list(motion.warnings),
+    }

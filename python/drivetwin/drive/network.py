@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""The whole driveline of the paper's Fig. 1 as elements of the core, and its standstill.
+
+Engine map, torque converter with the lock-up clutch beside it, gearbox with the inertias of its
+members, output shaft, final drive, vehicle with service brake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from drivetwin.drive.powertrain import Powertrain
+from drivetwin.errors import InputError
+from drivetwin.gearbox import Drive, Gearbox, gear_statics, network_elements
+from drivetwin.gearbox.spec import ElementKind
+from drivetwin.network import Element, Output, Start
+
+CRANK, AXLE, WHEEL = "crankshaft", "axle beyond the shaft", "wheel of the vehicle"
+SHAFT, ROAD = "shaft to the axle", "rolling resistance"
+LOCK_UP, BRAKE = "lock-up", "service brake"
+"""Friction elements beside those of the gearbox; the inputs of their names are the pressure [Pa]
+and the brake torque [N m]."""
+PEDAL = "pedal"
+
+
+def driveline_elements(gearbox: Gearbox, powertrain: Powertrain) -> list[Element]:
+    """Return the elements; inputs are PEDAL, BRAKE and the pressures by element.
+
+    Raises CardError where the gearbox card has no [drive], InputError where it has dogs, which
+    cannot launch or shift under power.
+    """
+    drive = gearbox.require_drive()
+    dogs = [e.name for e in gearbox.elements.values() if e.kind is ElementKind.DOG]
+    if dogs:
+        raise InputError(
+            f"{gearbox.name} shifts with dogs ({', '.join(dogs)})",
+            "choose a gearbox whose gears are made by clutches and brakes alone",
+        )
+    return [
+        *_engine(powertrain, drive),
+        *_converter(powertrain, gearbox.input),
+        *network_elements(gearbox),
+        *_vehicle(powertrain, drive, gearbox.output),
+    ]
+
+
+def _engine(powertrain: Powertrain, drive: Drive) -> list[Element]:
+    engine = powertrain.engine
+    table = {"throttle": [0.0, 1.0], "speed": engine.speed, "torque": [engine.closed, engine.full]}
+    return [
+        _element("inertia", "engine", node=CRANK, inertia=drive.engine_inertia),
+        _element("engine_map", "map", node=CRANK, throttle=PEDAL, lag=engine.lag, map=table),
+    ]
+
+
+def _converter(powertrain: Powertrain, turbine: str) -> list[Element]:
+    table, clutch = asdict(powertrain.converter), powertrain.lock_up
+    return [
+        _element("torque_converter", "converter", pump=CRANK, turbine=turbine, map=table),
+        _element(
+            "clutch",
+            LOCK_UP,
+            a=CRANK,
+            b=turbine,
+            friction=asdict(clutch.friction),
+            gain=clutch.gain,
+            p0=clutch.P0,
+            peak=clutch.peak,
+            pressure=LOCK_UP,
+            drum_inertia=0.0,
+        ),
+    ]
+
+
+def _vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[Element]:
+    road = asdict(powertrain.road)
+    # A disc brake by its torque: unit gain and friction make the input a capacity in N m.
+    unit = {"slip": [0.0], "mu": [1.0]}
+    return [
+        _element("spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o),
+        _element("gear", "final drive", a=AXLE, b=WHEEL, ratio=drive.i_f),
+        _element("inertia", "vehicle", node=WHEEL, inertia=drive.vehicle_inertia),
+        _element("road_load", ROAD, node=WHEEL, **road),
+        _element(
+            "clutch",
+            BRAKE,
+            a=WHEEL,
+            b="ground",
+            friction=unit,
+            gain=1.0,
+            p0=0.0,
+            peak=1.0,
+            pressure=BRAKE,
+            drum_inertia=0.0,
+        ),
+    ]
+
+
+def _element(kind: str, name: str, **fields: Any) -> Element:
+    return {"type": kind, "name": name, **fields}
+
+
+def standstill(gearbox: Gearbox, gear: str, idle: float) -> Start:
+    """Return the vehicle at rest in `gear`, the engine at `idle` [rad/s]."""
+    members: Mapping[str, float | None] = gear_statics(gearbox, gear).speeds
+    speeds = dict.fromkeys(members, 0.0)
+    locked = (*gearbox.gear(gear).elements, ROAD, BRAKE)
+    return Start(speeds | {CRANK: idle, WHEEL: 0.0}, locked=locked)
+
+
+def friction_elements(gearbox: Gearbox) -> tuple[str, ...]:
+    """Names of the lock-up clutch and the gearbox's shift elements."""
+    return (LOCK_UP, *gearbox.elements)
+
+
+def recorded(gearbox: Gearbox) -> Sequence[Output]:
+    """What a drive records: speeds, shaft torque, slip and torque of every shift element."""
+    nodes = (CRANK, gearbox.input, gearbox.output, WHEEL)
+    elements = friction_elements(gearbox)
+    return [
+        *(("speed", node) for node in nodes),
+        ("shaft_torque", SHAFT),
+        *(("slip", name) for name in elements),
+        *(("friction_torque", name) for name in elements),
+    ]

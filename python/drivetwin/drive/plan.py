@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""What a drive consists of: legs with pedal and brake, each ended by a condition and an action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivetwin.drive.powertrain import Control
+from drivetwin.errors import InputError
+from drivetwin.gearbox import Gearbox, gear_statics
+
+
+class Watched(StrEnum):
+    """What ends a leg: time in the leg [s], speed of the gearbox input [rad/s], ν of converter."""
+
+    TIME = "time"
+    INPUT_SPEED = "input speed"
+    SPEED_RATIO = "speed ratio"
+
+
+@dataclass(frozen=True)
+class Until:
+    """A leg ends when `watched` has risen to `value`, or fallen to it."""
+
+    watched: Watched
+    value: float
+    falling: bool = False
+
+
+@dataclass(frozen=True)
+class ShiftTo:
+    """Shift to this gear."""
+
+    gear: str
+
+
+@dataclass(frozen=True)
+class LockUp:
+    """Close the lock-up clutch, or open it."""
+
+    closed: bool
+
+
+@dataclass(frozen=True)
+class Leg:
+    """Pedal (0 to 1) and service brake [N m at the wheel] until a condition; then the action."""
+
+    pedal: float
+    until: Until
+    then: ShiftTo | LockUp | None = None
+    brake: float = 0.0
+
+
+Plan = tuple[Leg, ...]
+
+LAUNCH_PEDAL = 0.8
+_HOLD = 3.0
+"""Service brake at standstill over that of a coast-down: more than the creep in first gear."""
+_STANDING = 1.0
+"""Time at standstill before the launch, s: the engine idles against the converter."""
+_KICK_DOWN = 0.6
+"""Time at full pedal before the kick-down, s: the engine torque has come up."""
+_LIFT = 1.0
+"""Time with closed pedal before the up-shift without power, s: the engine torque is gone."""
+_CRUISE = 2.0
+"""Time between two manoeuvres, s: the shaft oscillation has died away."""
+
+
+def forward_gears(gearbox: Gearbox) -> tuple[str, ...]:
+    """Names of the forward gears from low to high."""
+    ratios = {gear.name: gear_statics(gearbox, gear.name).ratio for gear in gearbox.gears}
+    forward = [name for name, ratio in ratios.items() if ratio > 0.0]
+    return tuple(sorted(forward, key=lambda name: -ratios[name]))
+
+
+def launch(gearbox: Gearbox, control: Control, pedal: float = LAUNCH_PEDAL) -> Plan:
+    """From standstill through all gears under power.
+
+    First to second gear with the converter, lock-up in second, the other up-shifts locked up.
+    Raises InputError for a gearbox of fewer than three forward gears.
+    """
+    gears = forward_gears(gearbox)
+    if len(gears) < 3:
+        raise InputError(
+            f"{gearbox.name} has {len(gears)} forward gears",
+            "choose a gearbox with three or more, or write the plan yourself",
+        )
+    ready = Until(Watched.INPUT_SPEED, control.upshift)
+    return (
+        Leg(0.0, Until(Watched.TIME, _STANDING), brake=_HOLD * control.brake),
+        Leg(pedal, Until(Watched.INPUT_SPEED, control.launch_upshift), ShiftTo(gears[1])),
+        Leg(pedal, Until(Watched.SPEED_RATIO, control.lock_up_ratio), LockUp(closed=True)),
+        *(Leg(pedal, ready, ShiftTo(gear)) for gear in gears[2:]),
+        Leg(pedal, Until(Watched.TIME, _CRUISE)),
+    )
+
+
+def coast_down(gearbox: Gearbox, control: Control) -> Plan:
+    """From the highest gear down to first, pedal closed, with the service brake.
+
+    The lock-up clutch opens in second gear.
+    """
+    gears = forward_gears(gearbox)
+    low = Until(Watched.INPUT_SPEED, control.downshift, falling=True)
+    slow = Until(Watched.INPUT_SPEED, control.release, falling=True)
+    slower = Until(Watched.INPUT_SPEED, 0.75 * control.release, falling=True)
+    return (
+        *(Leg(0.0, low, ShiftTo(gear), control.brake) for gear in gears[-2:0:-1]),
+        Leg(0.0, slow, LockUp(closed=False), control.brake),
+        Leg(0.0, slower, ShiftTo(gears[0]), control.brake),
+        Leg(0.0, Until(Watched.TIME, _CRUISE), brake=control.brake),
+    )
+
+
+def all_kinds(gearbox: Gearbox, control: Control) -> Plan:
+    """All four kinds of shift: launch, kick-down, up-shift with closed pedal, coast-down."""
+    gears = forward_gears(gearbox)
+    return (
+        *launch(gearbox, control),
+        Leg(1.0, Until(Watched.TIME, _KICK_DOWN), ShiftTo(gears[-2])),
+        Leg(1.0, Until(Watched.TIME, _LIFT)),
+        Leg(0.0, Until(Watched.TIME, _LIFT), ShiftTo(gears[-1])),
+        Leg(0.0, Until(Watched.TIME, _CRUISE)),
+        *coast_down(gearbox, control),
+    )

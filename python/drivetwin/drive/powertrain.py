@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""Engine, torque converter, lock-up clutch, road and control thresholds of a whole drive, in SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from drivetwin.driveline import FloatArray, RoadLoad
+from drivetwin.gearbox.spec import Capacity
+
+
+@dataclass(frozen=True)
+class Engine:
+    """Steady torque [N m] at closed and full pedal over `speed` (n,) [rad/s], linear between both.
+
+    The closed-pedal line holds `idle` [rad/s] against a load. The torque follows with the time
+    constant `lag` [s].
+    """
+
+    speed: tuple[float, ...]
+    closed: tuple[float, ...]
+    full: tuple[float, ...]
+    lag: float
+    idle: float
+
+    def steady(self, pedal: FloatArray | float, speed: FloatArray | float) -> FloatArray:
+        """Torque [N m] that the map asks for at pedal positions and speeds of one shape."""
+        low = np.interp(speed, self.speed, self.closed)
+        high = np.interp(speed, self.speed, self.full)
+        return np.asarray(low + pedal * (high - low), dtype=np.float64)
+
+    def lagged(self, time: FloatArray, steady: FloatArray) -> FloatArray:
+        """Torque (n,) [N m] behind `steady` (n,) at evenly spaced `time` (n,) [s], from 0.
+
+        The lag is solved exactly for a demand that is linear between the samples.
+        """
+        step = float(time[1] - time[0])
+        decay = np.exp(-step / self.lag)
+        mean = self.lag / step * (1.0 - decay)
+        b, a = [1.0 - mean, mean - decay], [1.0, -decay]
+        torque, _ = signal.lfilter(b, a, steady[1:], zi=[(mean - decay) * steady[0]])
+        return np.concatenate([[0.0], torque])
+
+
+@dataclass(frozen=True)
+class Converter:
+    """Steady-state map over ν = ω_turbine/ω_pump: `capacity` [N m s^2/rad^2] and torque ratio."""
+
+    speed_ratio: tuple[float, ...]
+    capacity: tuple[float, ...]
+    torque_ratio: tuple[float, ...]
+
+    def pump_torque(self, pump: FloatArray | float, turbine: FloatArray | float) -> FloatArray:
+        """Torque that the pump takes [N m] at speeds of pump and turbine [rad/s], pump > 0."""
+        capacity = np.interp(np.divide(turbine, pump), self.speed_ratio, self.capacity)
+        return np.asarray(capacity * np.square(pump), dtype=np.float64)
+
+    def ratio(self, pump: FloatArray | float, turbine: FloatArray | float) -> FloatArray:
+        """Turbine torque over pump torque."""
+        ratio = np.interp(np.divide(turbine, pump), self.speed_ratio, self.torque_ratio)
+        return np.asarray(ratio, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Control:
+    """When the transmission acts.
+
+    Speeds of the gearbox input [rad/s]: `upshift`, `downshift` with the lock-up clutch closed,
+    `launch_upshift` from first gear with the converter, `release` of the lock-up clutch in
+    coast-down. `lock_up_ratio` is the speed ratio at which the lock-up clutch closes, `main` the
+    pressure of a closed element [Pa], `brake` the service brake of a coast-down [N m at the wheel].
+    """
+
+    upshift: float
+    downshift: float
+    launch_upshift: float
+    release: float
+    lock_up_ratio: float
+    main: float
+    brake: float
+
+
+@dataclass(frozen=True)
+class Powertrain:
+    """What a drive needs beside the gearbox card; `source` says where the numbers are from."""
+
+    name: str
+    source: str
+    engine: Engine
+    converter: Converter
+    lock_up: Capacity
+    road: RoadLoad
+    control: Control

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""What a drive shows: motion, converter, and what every shift did to its elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.drive.network import BRAKE, CRANK, PEDAL, SHAFT, WHEEL, friction_elements
+from drivetwin.drive.powertrain import Powertrain
+from drivetwin.drive.schedule import Schedule
+from drivetwin.driveline import EnergyAudit, Event, FloatArray
+from drivetwin.gearbox import Gearbox
+from drivetwin.network import NetworkRun
+
+
+@dataclass(frozen=True)
+class Action:
+    """A shift, or a move of the lock-up clutch, from `start` to `end` [s].
+
+    `kind` says which of the four kinds of shift it is; None where an element is not part of it.
+    """
+
+    label: str
+    kind: str
+    start: float
+    end: float
+    off_going: str | None
+    on_coming: str | None
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """The elements that change."""
+        return tuple(name for name in (self.off_going, self.on_coming) if name is not None)
+
+
+@dataclass(frozen=True)
+class ElementWork:
+    """What slip did to one element in one manoeuvre: `work` [J], `peak_power` [W]."""
+
+    element: str
+    work: float
+    peak_power: float
+
+
+@dataclass(frozen=True)
+class Maneuver:
+    """What an action did: times [s] where the off-going element broke away and the on-coming one
+    locked for good, None where that did not happen; the lowest and the highest torque of the output
+    shaft meanwhile [N m].
+    """
+
+    action: Action
+    break_away: float | None
+    lock: float | None
+    shaft_torque: tuple[float, float]
+    work: tuple[ElementWork, ...]
+
+
+@dataclass(frozen=True)
+class DriveRun:
+    """A drive; arrays (n,) on `time` [s], SI.
+
+    `engine_torque` is that of the lagging map, `brake_torque` what the service brake can hold;
+    `speed_ratio` and `torque_ratio` are the converter's and `turbine_torque` what it gives to the
+    gearbox; `slip`, `torque`, `pressure` go by element. `work` is the friction work of each element
+    over the whole drive [J]; `warnings` name elements that slip where they should hold.
+    """
+
+    time: FloatArray
+    engine_speed: FloatArray
+    input_speed: FloatArray
+    output_speed: FloatArray
+    wheel_speed: FloatArray
+    engine_torque: FloatArray
+    shaft_torque: FloatArray
+    pedal: FloatArray
+    brake_torque: FloatArray
+    speed_ratio: FloatArray
+    torque_ratio: FloatArray
+    turbine_torque: FloatArray
+    slip: Mapping[str, FloatArray]
+    torque: Mapping[str, FloatArray]
+    pressure: Mapping[str, FloatArray]
+    maneuvers: tuple[Maneuver, ...]
+    work: Mapping[str, float]
+    events: tuple[Event, ...]
+    audit: EnergyAudit
+    warnings: tuple[str, ...]
+
+
+def observe(
+    gearbox: Gearbox,
+    powertrain: Powertrain,
+    schedule: Schedule,
+    actions: Sequence[Action],
+    motion: NetworkRun,
+) -> DriveRun:
+    """Make a drive of its motion, which has been audited, and of what was decided."""
+    time, columns, audit = motion.time, motion.columns, motion.audit
+    if audit is None:
+        raise ValueError("the motion has not been audited")
+    crank, turbine = columns["speed", CRANK], columns["speed", gearbox.input]
+    engine, converter = powertrain.engine, powertrain.converter
+    pedal = schedule.at(PEDAL, time)
+    torque_ratio = converter.ratio(crank, turbine)
+    elements = friction_elements(gearbox)
+    slip = {name: columns["slip", name] for name in elements}
+    torque = {name: columns["friction_torque", name] for name in elements}
+    power = {name: slip[name] * torque[name] for name in elements}
+    shaft_torque = columns["shaft_torque", SHAFT]
+    return DriveRun(
+        time=time,
+        engine_speed=crank,
+        input_speed=turbine,
+        output_speed=columns["speed", gearbox.output],
+        wheel_speed=columns["speed", WHEEL],
+        engine_torque=engine.lagged(time, engine.steady(pedal, crank)),
+        shaft_torque=shaft_torque,
+        pedal=pedal,
+        brake_torque=schedule.at(BRAKE, time),
+        speed_ratio=turbine / crank,
+        torque_ratio=torque_ratio,
+        turbine_torque=torque_ratio * converter.pump_torque(crank, turbine),
+        slip=slip,
+        torque=torque,
+        pressure={name: schedule.at(name, time) for name in elements},
+        maneuvers=tuple(_maneuver(each, motion, power) for each in actions),
+        work={name: float(np.trapezoid(power[name], time)) for name in elements},
+        events=motion.events,
+        audit=audit,
+        warnings=_unwanted_slip(elements, actions, motion.events),
+    )
+
+
+def _maneuver(action: Action, motion: NetworkRun, power: Mapping[str, FloatArray]) -> Maneuver:
+    inside = slice(*np.searchsorted(motion.time, (action.start, action.end), side="right"))
+    shaft_torque = motion.columns["shaft_torque", SHAFT][inside]
+    events = [event for event in motion.events if action.start <= event.time <= action.end]
+
+    def times(element: str | None, kind: str) -> list[float]:
+        return [event.time for event in events if (event.element, event.kind) == (element, kind)]
+
+    broke, locked = times(action.off_going, "break_away"), times(action.on_coming, "lock")
+    return Maneuver(
+        action=action,
+        break_away=broke[0] if broke else None,
+        lock=locked[-1] if locked else None,
+        shaft_torque=(float(shaft_torque.min()), float(shaft_torque.max())),
+        work=tuple(
+            ElementWork(
+                name,
+                float(np.trapezoid(power[name][inside], motion.time[inside])),
+                float(power[name][inside].max()),
+            )
+            for name in action.elements
+        ),
+    )
+
+
+def _unwanted_slip(
+    elements: Sequence[str], actions: Sequence[Action], events: Sequence[Event]
+) -> tuple[str, ...]:
+    """One sentence for each element that breaks away outside the actions it takes part in."""
+    found: dict[str, float] = {}
+    for event in events:
+        if event.kind != "break_away" or event.element not in elements:
+            continue
+        wanted = any(
+            event.element in action.elements and action.start <= event.time <= action.end
+            for action in actions
+        )
+        if not wanted:
+            found.setdefault(event.element, event.time)
+    return tuple(
+        f"{element} slips at {time:.2f} s where it should hold: the main pressure is too low"
+        for element, time in found.items()
+    )

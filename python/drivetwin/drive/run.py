@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: MIT
+"""A drive: the driver's plan and a simple shift controller over the whole driveline.
+
+The controller decides at instants (a threshold reached, synchronism reached) from the motion up to
+there. Each decision runs the drive again from standstill with the inputs decided so far: what has
+been does not change, since the last value of every input holds until the next decision. The last
+run is the drive: one simulation without a seam, with one energy audit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from drivetwin.drive.network import (
+    BRAKE,
+    CRANK,
+    LOCK_UP,
+    PEDAL,
+    driveline_elements,
+    recorded,
+    standstill,
+)
+from drivetwin.drive.plan import Leg, LockUp, Plan, ShiftTo, Watched, forward_gears
+from drivetwin.drive.powertrain import Powertrain
+from drivetwin.drive.result import Action, DriveRun, observe
+from drivetwin.drive.schedule import Knots, Schedule
+from drivetwin.drive.shift import CLOSE, FILL, OPEN, RAMP, ShiftPlan, pressure
+from drivetwin.driveline import FloatArray
+from drivetwin.errors import SimulationError
+from drivetwin.gearbox import Gearbox, Reduction, reduce
+from drivetwin.network import NetworkRun, Output, simulate
+
+STEP = 1e-3
+"""Time between recorded samples, s: eighty per period of the output shaft."""
+_PEDAL_RAMP = 0.2
+"""Time in which pedal and brake move, s."""
+_LOCK_UP_RAMP = 0.5
+"""Time in which the lock-up clutch takes the torque over, s."""
+_LOCK_UP_MARGIN = 1.3
+"""Torque of the closing lock-up clutch over the engine torque: what slows the engine down."""
+_LOCK_UP_HOLD = 0.3
+"""Time that it is given to lock before main pressure, s."""
+_LOOK_AHEAD = 8.0
+"""How far the drive is run at first in search of the end of a leg, s."""
+_PATIENCE = 240.0
+"""Longest leg, s."""
+_LONGEST_SHIFT = 3.0
+"""Longest time from the begin of a shift to synchronism, s."""
+_NO_SLIP = 1e-6
+"""Slip below which an element is synchronous, rad/s."""
+
+
+def run(gearbox: Gearbox, powertrain: Powertrain, plan: Plan) -> DriveRun:
+    """Drive the plan from standstill in the lowest gear and return the motion.
+
+    Raises SimulationError where a leg does not end, a shift does not reach synchronism, or the
+    simulation does not complete; ReductionError for a shift that is not one element off and one on.
+    """
+    driver = _Driver(gearbox, powertrain)
+    state = driver.begin(plan[0])
+    for leg in plan:
+        state = driver.drive(leg, state)
+    motion = driver.simulate(state.schedule, _grid(0, round(state.time / STEP)), audit=True)
+    return observe(gearbox, powertrain, state.schedule, state.actions, motion)
+
+
+def _grid(first: int, last: int) -> FloatArray:
+    """Sample times from one index to another, both included [s]."""
+    return np.asarray(np.arange(first, last + 1) * STEP, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class _State:
+    """How far the drive is decided: up to `time` [s], with the lock-up clutch `locked_up`."""
+
+    time: float
+    gear: str
+    locked_up: bool
+    schedule: Schedule
+    actions: tuple[Action, ...] = ()
+
+
+class _Driver:
+    """The driveline of a drive, and the decisions on it."""
+
+    def __init__(self, gearbox: Gearbox, powertrain: Powertrain) -> None:
+        self.gearbox = gearbox
+        self.powertrain = powertrain
+        self.elements = driveline_elements(gearbox, powertrain)
+        self.first = forward_gears(gearbox)[0]
+        self.start = standstill(gearbox, self.first, powertrain.engine.idle)
+        self.outputs = recorded(gearbox)
+        self.reduced = cache(lambda old, new: reduce(gearbox, old, new))
+
+    def begin(self, leg: Leg) -> _State:
+        """Standstill in the lowest gear with the first leg's pedal and brake."""
+        engaged = self.gearbox.gear(self.first).elements
+        main = self.powertrain.control.main
+        levels = {name: main if name in engaged else OPEN for name in self.gearbox.elements}
+        levels |= {LOCK_UP: OPEN, PEDAL: leg.pedal, BRAKE: leg.brake}
+        schedule = Schedule({name: ((0.0, value),) for name, value in levels.items()})
+        return _State(0.0, self.first, False, schedule)
+
+    def simulate(self, schedule: Schedule, time: FloatArray, *, audit: bool = False) -> NetworkRun:
+        """Return the motion at `time` (n,) [s], which begins with 0."""
+        inputs = schedule.signals(float(time[-1]))
+        motion = simulate(self.elements, inputs, self.start, time, self.outputs, audit=audit)
+        if motion.status != "completed":
+            raise SimulationError(
+                f"the drive ended: {motion.status}",
+                "look at the capacities on the gearbox card and at the main pressure",
+            )
+        return motion
+
+    def drive(self, leg: Leg, state: _State) -> _State:
+        """One leg and its action."""
+        schedule = state.schedule.go(PEDAL, state.time, (_PEDAL_RAMP, leg.pedal))
+        schedule = schedule.go(BRAKE, state.time, (_PEDAL_RAMP, leg.brake))
+        state = _State(state.time, state.gear, state.locked_up, schedule, state.actions)
+        end, now = self._end_of(leg, state)
+        match leg.then:
+            case ShiftTo(gear):
+                return self._shift(gear, leg, state, end, now)
+            case LockUp(closed):
+                return self._lock_up(closed, leg, state, end, now)
+            case None:
+                return _State(end, state.gear, state.locked_up, schedule, state.actions)
+
+    def _end_of(self, leg: Leg, state: _State) -> tuple[float, Mapping[Output, float]]:
+        """Time at which the leg's condition is met, and the motion then."""
+        until = leg.until
+        ahead = until.value if until.watched is Watched.TIME else _LOOK_AHEAD
+        while ahead <= _PATIENCE:
+            time, motion = self._look(state.schedule, state.time, ahead)
+            value = self._watched(until.watched, time - state.time, motion)
+            met = value <= until.value if until.falling else value >= until.value - 0.5 * STEP
+            if met.any():
+                at = int(np.argmax(met))
+                return float(time[at]), {key: float(c[at]) for key, c in motion.items()}
+            ahead *= 2.0
+        raise SimulationError(
+            f"{until.watched} does not {'fall' if until.falling else 'rise'} to {until.value:.4g} "
+            f"within {_PATIENCE:g} s after {state.time:.1f} s",
+            "change pedal, brake or threshold of the leg, or the road load",
+        )
+
+    def _look(
+        self, schedule: Schedule, start: float, ahead: float
+    ) -> tuple[FloatArray, Mapping[Output, FloatArray]]:
+        """Samples (n,) from `start` [s] on, and the columns over them."""
+        first, last = round(start / STEP), round((start + ahead) / STEP)
+        time = _grid(first, last)
+        grid = time if first == 0 else np.concatenate([np.zeros(1), time])
+        motion = self.simulate(schedule, grid)
+        return time, {key: column[-time.size :] for key, column in motion.columns.items()}
+
+    def _watched(
+        self, what: Watched, elapsed: FloatArray, motion: Mapping[Output, FloatArray]
+    ) -> FloatArray:
+        turbine = motion["speed", self.gearbox.input]
+        match what:
+            case Watched.TIME:
+                return elapsed
+            case Watched.INPUT_SPEED:
+                return turbine
+            case Watched.SPEED_RATIO:
+                return turbine / motion["speed", CRANK]
+
+    def _shift(
+        self, gear: str, leg: Leg, state: _State, start: float, now: Mapping[Output, float]
+    ) -> _State:
+        plan = self._plan(self.reduced(state.gear, gear), leg, state.locked_up, (start, now))
+        schedule = plan.begin(state.schedule)
+        time, motion = self._look(schedule, plan.filled, _LONGEST_SHIFT)
+        slip = motion["slip", plan.reduction.on_coming.element]
+        side = np.sign(now["slip", plan.reduction.on_coming.element])
+        reached = slip * side <= _NO_SLIP
+        if not reached.any():
+            raise SimulationError(
+                f"shift {state.gear}-{gear} begun at {start:.2f} s does not reach synchronism "
+                f"within {_LONGEST_SHIFT:g} s",
+                "shift at another speed or pedal position, or choose a powertrain that suits the "
+                "gearbox and a main pressure that holds its torque",
+            )
+        synchronous = float(time[np.argmax(reached)])
+        schedule = plan.close(schedule, synchronous)
+        done = synchronous + RAMP + CLOSE
+        old, new = plan.reduction.off_going.element, plan.reduction.on_coming.element
+        action = Action(f"{state.gear}→{gear}", plan.kind, start, done, old, new)
+        return _State(done, gear, state.locked_up, schedule, (*state.actions, action))
+
+    def _plan(
+        self,
+        reduction: Reduction,
+        leg: Leg,
+        locked_up: bool,
+        at: tuple[float, Mapping[Output, float]],
+    ) -> ShiftPlan:
+        start, now = at
+        drive = self.gearbox.require_drive()
+        crank, turbine = now["speed", CRANK], now["speed", self.gearbox.input]
+        old, new = reduction.off_going, reduction.on_coming
+        swing = new.ratio * now["speed", self.gearbox.output] - turbine
+        if locked_up:
+            torque = float(self.powertrain.engine.steady(leg.pedal, crank))
+        else:
+            converter = self.powertrain.converter
+            after = (crank, turbine + swing)
+            torque = float(converter.ratio(*after) * converter.pump_torque(*after))
+        return ShiftPlan(
+            reduction=reduction,
+            drive=drive,
+            start=start,
+            held=old.sense * now["friction_torque", old.element] / old.i_c,
+            torque=torque,
+            swing=swing,
+            slip=abs(now["slip", new.element]),
+            inertia=reduction.M11 + (drive.engine_inertia if locked_up else 0.0),
+            main=self.powertrain.control.main,
+        )
+
+    def _lock_up(
+        self, closed: bool, leg: Leg, state: _State, start: float, now: Mapping[Output, float]
+    ) -> _State:
+        points: Knots = ((CLOSE, OPEN),)
+        if closed:
+            points = self._closing(leg.pedal, now)
+        schedule = state.schedule.go(LOCK_UP, start, *points)
+        done = start + points[-1][0]
+        label, elements = ("lock-up", (None, LOCK_UP)) if closed else ("release", (LOCK_UP, None))
+        action = Action(label, "converter", start, done, *elements)
+        return _State(done, state.gear, closed, schedule, (*state.actions, action))
+
+    def _closing(self, pedal: float, now: Mapping[Output, float]) -> Knots:
+        """Pressures of the lock-up clutch: it takes the engine torque over, locks, is held."""
+        clutch = self.powertrain.lock_up
+        torque = float(self.powertrain.engine.steady(pedal, now["speed", self.gearbox.input]))
+        carrying = pressure(clutch, _LOCK_UP_MARGIN * abs(torque), abs(now["slip", LOCK_UP]))
+        taken = FILL + _LOCK_UP_RAMP
+        held = taken + _LOCK_UP_HOLD
+        main = self.powertrain.control.main
+        return (FILL, clutch.P0), (taken, carrying), (held, carrying), (held + CLOSE, main)

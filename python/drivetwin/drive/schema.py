@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: MIT
+"""The powertrain file: pydantic models of its tables, keys with unit suffix."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from drivetwin.drive.powertrain import Control, Converter, Engine, Powertrain
+from drivetwin.driveline import RoadLoad, Stribeck
+from drivetwin.gearbox.schema import BAR, RPM
+from drivetwin.gearbox.spec import Capacity
+from drivetwin.tomlfile import StrictModel
+
+AIR_DENSITY = 1.188
+"""kg/m^3, as VECTO takes it."""
+GRAVITY = 9.81
+
+Positive = Annotated[float, Field(gt=0)]
+Curve = Annotated[list[float], Field(min_length=2)]
+
+
+def _increases(values: list[float]) -> bool:
+    return all(a < b for a, b in pairwise(values))
+
+
+class EngineTable(StrictModel):
+    """`[engine]`: full-load and motoring torque over speed, lag, idle speed and its governor.
+
+    With closed pedal the governor gives full load `governor_rpm` below idle, nothing at idle and
+    the motoring torque as much above.
+    """
+
+    speed_rpm: Curve
+    full_load_Nm: Curve
+    motoring_Nm: Curve
+    lag_s: Positive
+    idle_rpm: Positive
+    governor_rpm: Positive
+
+    @model_validator(mode="after")
+    def _fits(self) -> EngineTable:
+        if not len(self.speed_rpm) == len(self.full_load_Nm) == len(self.motoring_Nm):
+            raise ValueError("speed_rpm, full_load_Nm and motoring_Nm have as many entries")
+        if not _increases(self.speed_rpm):
+            raise ValueError("speed_rpm must increase")
+        return self
+
+    def spec(self) -> Engine:
+        """Return the engine in SI, its closed-pedal line with the idle governor."""
+        low, high = self.idle_rpm - self.governor_rpm, self.idle_rpm + self.governor_rpm
+        speed = np.union1d(self.speed_rpm, [low, self.idle_rpm, high])
+        full = np.interp(speed, self.speed_rpm, self.full_load_Nm)
+        motoring = np.interp(speed, self.speed_rpm, self.motoring_Nm)
+        idling = np.interp(self.idle_rpm, self.speed_rpm, self.full_load_Nm)
+        governor = np.interp(
+            speed,
+            [low, self.idle_rpm, high],
+            [float(idling), 0.0, float(np.interp(high, self.speed_rpm, self.motoring_Nm))],
+        )
+        closed = np.where(speed < high, governor, motoring)
+        return Engine(
+            speed=tuple((speed * RPM).tolist()),
+            closed=tuple(closed.tolist()),
+            full=tuple(full.tolist()),
+            lag=self.lag_s,
+            idle=self.idle_rpm * RPM,
+        )
+
+
+class ConverterTable(StrictModel):
+    """`[converter]`: pump torque at 1000 rpm times `scale`, and torque ratio, over speed ratio."""
+
+    speed_ratio: Curve
+    torque_ratio: Curve
+    pump_torque_at_1000rpm_Nm: Curve
+    scale: Positive = 1.0
+
+    @model_validator(mode="after")
+    def _fits(self) -> ConverterTable:
+        lengths = {len(self.torque_ratio), len(self.pump_torque_at_1000rpm_Nm)}
+        if lengths != {len(self.speed_ratio)}:
+            raise ValueError("torque_ratio and pump_torque go with the points of speed_ratio")
+        if not _increases(self.speed_ratio):
+            raise ValueError("speed_ratio must increase")
+        return self
+
+    def spec(self) -> Converter:
+        """Return the map in SI."""
+        per_square = self.scale / (1000.0 * RPM) ** 2
+        return Converter(
+            speed_ratio=tuple(self.speed_ratio),
+            capacity=tuple(torque * per_square for torque in self.pump_torque_at_1000rpm_Nm),
+            torque_ratio=tuple(self.torque_ratio),
+        )
+
+
+class LockUpTable(StrictModel):
+    """`[lock_up]`: geometry and lining of the clutch beside the converter."""
+
+    surfaces: Annotated[int, Field(ge=1)]
+    derating: Annotated[float, Field(gt=0, le=1)]
+    area_m2: Positive
+    radius_m: Positive
+    P0_bar: float
+    mu_c: Positive
+    mu_s: Positive
+    v_s_rad_s: Positive
+    mu_v_s: float = 0.0
+
+    def spec(self) -> Capacity:
+        """Return what the clutch transmits, in SI."""
+        gain = self.surfaces * self.derating * self.area_m2 * self.radius_m
+        lining = Stribeck(self.mu_c, self.mu_s, self.v_s_rad_s, self.mu_v_s)
+        return Capacity(gain, self.P0_bar * BAR, 1.0, lining)
+
+
+class RoadTable(StrictModel):
+    """`[road]`: vehicle mass, tyre radius and resistances; `grade` is rise over distance."""
+
+    mass_kg: Positive
+    radius_m: Positive
+    rolling_resistance: Annotated[float, Field(ge=0)]
+    cda_m2: Annotated[float, Field(ge=0)]
+    grade: float = 0.0
+
+    def spec(self) -> RoadLoad:
+        """Return the torques at the wheel."""
+        weight = self.mass_kg * GRAVITY * self.radius_m
+        slope = math.atan(self.grade)
+        return RoadLoad(
+            constant=weight * math.sin(slope),
+            rolling=weight * math.cos(slope) * self.rolling_resistance,
+            aero=0.5 * AIR_DENSITY * self.cda_m2 * self.radius_m**3,
+        )
+
+
+class ControlTable(StrictModel):
+    """`[control]`: when the transmission acts, its main pressure, the brake of a coast-down."""
+
+    upshift_rpm: Positive
+    downshift_rpm: Positive
+    launch_upshift_rpm: Positive
+    release_rpm: Positive
+    lock_up_ratio: Annotated[float, Field(gt=0, lt=1)]
+    main_bar: Positive
+    brake_Nm: Annotated[float, Field(ge=0)]
+
+    def spec(self) -> Control:
+        """Return the thresholds in SI."""
+        return Control(
+            upshift=self.upshift_rpm * RPM,
+            downshift=self.downshift_rpm * RPM,
+            launch_upshift=self.launch_upshift_rpm * RPM,
+            release=self.release_rpm * RPM,
+            lock_up_ratio=self.lock_up_ratio,
+            main=self.main_bar * BAR,
+            brake=self.brake_Nm,
+        )
+
+
+class PowertrainFile(StrictModel):
+    """A powertrain file."""
+
+    name: str
+    source: str
+    engine: EngineTable
+    converter: ConverterTable
+    lock_up: LockUpTable
+    road: RoadTable
+    control: ControlTable
+
+    def spec(self) -> Powertrain:
+        """Return the powertrain in SI."""
+        return Powertrain(
+            name=self.name,
+            source=self.source,
+            engine=self.engine.spec(),
+            converter=self.converter.spec(),
+            lock_up=self.lock_up.spec(),
+            road=self.road.spec(),
+            control=self.control.spec(),
+        )

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT
+"""Pressures of one shift of any of the four kinds, from the torque and the speeds it begins with.
+
+Where the input torque would slow the shift down (power-on up, power-off down), the on-coming
+element takes the torque over first and then brings the input to its new speed. Where the input
+torque itself changes the speed the right way (power-off up, power-on down), the off-going element
+lets go as far as the pace wants it, and the on-coming one takes over at synchronism. All torques
+are those of the dual-clutch form (THEORY section 2): η = 1, `J ω_in' = T_in - Σ T_k / i_c,k`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from drivetwin.drive.schedule import Knots, Schedule
+from drivetwin.gearbox import Drive, Reduction
+from drivetwin.gearbox.spec import Capacity
+
+FILL = 0.12
+"""Time to fill the on-coming element, while the off-going one falls to what it has to hold, s."""
+RAMP = 0.05
+"""Time in which a pressure goes to the level of the inertia phase or from it, s."""
+FORCE = 1.0
+"""Time after the planned inertia phase in which the speed change is forced to its end, s."""
+CLOSE = 0.20
+"""Time from there to main pressure, s."""
+FAST, SLOW = 1.3, 0.5
+"""Pace of the speed change at the begin and at the end of the inertia phase, over its mean."""
+MARGIN = 1.2
+"""Capacity of the off-going element before the torque phase, over the torque it holds."""
+OPEN = 0.0
+"""Pressure of an open element, Pa."""
+
+
+class ShiftKind(StrEnum):
+    """Sign of the input torque and direction of the speed change."""
+
+    POWER_ON_UP = "power-on up"
+    POWER_OFF_UP = "power-off up"
+    POWER_ON_DOWN = "power-on down"
+    POWER_OFF_DOWN = "power-off down"
+
+
+def kind_of(torque: float, swing: float) -> ShiftKind:
+    """Kind of a shift from input torque [N m] and speed change of the input [rad/s]."""
+    if swing < 0.0:
+        return ShiftKind.POWER_ON_UP if torque > 0.0 else ShiftKind.POWER_OFF_UP
+    return ShiftKind.POWER_ON_DOWN if torque > 0.0 else ShiftKind.POWER_OFF_DOWN
+
+
+@dataclass(frozen=True)
+class ShiftPlan:
+    """One shift as it is decided at `start` [s].
+
+    `held` is the torque that the old gear carries, `torque` what drives the input while its speed
+    changes, both at the input [N m]; `swing` is the speed change to the new gear, `slip` the
+    on-coming element's, without sign [rad/s]; `inertia` is what the swing accelerates [kg m^2],
+    `main` the pressure of a closed element [Pa].
+    """
+
+    reduction: Reduction
+    drive: Drive
+    start: float
+    held: float
+    torque: float
+    swing: float
+    slip: float
+    inertia: float
+    main: float
+
+    @property
+    def kind(self) -> ShiftKind:
+        """Which of the four kinds it is."""
+        return kind_of(self.torque, self.swing)
+
+    @property
+    def torque_first(self) -> bool:
+        """Whether the on-coming element takes the torque before the speed changes."""
+        return self.kind in (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_DOWN)
+
+    @property
+    def filled(self) -> float:
+        """Time at which the on-coming element is filled [s]."""
+        return self.start + FILL
+
+    def begin(self, schedule: Schedule) -> Schedule:
+        """Add the pressures up to the inertia phase, which they keep."""
+        old, new = self.reduction.off_going, self.reduction.on_coming
+        off, on = self._capacities()
+        hold = min(pressure(off, MARGIN * abs(self.held) * old.i_c, 0.0), self.main)
+        schedule = schedule.go(old.element, self.start, (FILL, hold))
+        schedule = schedule.go(new.element, self.start, (FILL, on.P0))
+        if self.torque_first:
+            phase = self.drive.torque_phase
+            handed = pressure(on, abs(self.held) * new.i_c, self.slip)
+            schedule = schedule.go(old.element, self.filled, (phase, off.P0), (phase + RAMP, OPEN))
+            pulling = self._pulling(phase)
+            return schedule.go(new.element, self.filled, (phase, handed), *pulling)
+        taken = self._taken(1.0)
+        if taken * self.torque > 0.0:
+            kept = pressure(off, abs(taken) * old.i_c, 0.0)
+            late = RAMP + self.drive.inertia_phase
+            return schedule.go(
+                old.element, self.filled, (RAMP, kept), (late, kept), (late + FORCE, OPEN)
+            )
+        schedule = schedule.go(old.element, self.filled, (RAMP, OPEN))
+        return schedule.go(new.element, self.filled, *self._pulling(0.0))
+
+    def _taken(self, pace: float) -> float:
+        """What both elements take from the input [N m] at `pace`, relative to the mean swing."""
+        return self.torque - pace * self.inertia * self.swing / self.drive.inertia_phase
+
+    def _pulling(self, after: float) -> Knots:
+        """Pressures of the on-coming element that bring the input to the new gear.
+
+        They start `after` the fill [s]. The pace falls from FAST to SLOW, so that the torque jumps
+        less when the element locks. An element that is late is forced.
+        """
+        _, on = self._capacities()
+        i_c, phase = self.reduction.on_coming.i_c, self.drive.inertia_phase
+        first = pressure(on, abs(self._taken(FAST)) * i_c, self.slip)
+        last = pressure(on, abs(self._taken(SLOW)) * i_c, 0.0)
+        late = after + RAMP + phase
+        return (after + RAMP, first), (late, last), (late + FORCE, max(self.main, last))
+
+    def close(self, schedule: Schedule, synchronous: float) -> Schedule:
+        """Add what follows the time at which the input has the speed of the new gear [s]."""
+        old, new = self.reduction.off_going, self.reduction.on_coming
+        _, on = self._capacities()
+        enough = pressure(on, MARGIN * abs(self.torque) * new.i_c, 0.0)
+        enough = max(enough, float(schedule.at(new.element, np.array([synchronous]))[0]))
+        schedule = schedule.go(old.element, synchronous, (RAMP, OPEN))
+        closing = ((RAMP, enough), (RAMP + CLOSE, self.main))
+        return schedule.go(new.element, synchronous, *closing)
+
+    def _capacities(self) -> tuple[Capacity, Capacity]:
+        box = self.reduction.gearbox
+        names = (self.reduction.off_going.element, self.reduction.on_coming.element)
+        return box.capacity(names[0]), box.capacity(names[1])
+
+
+def pressure(capacity: Capacity, torque: float, slip: float) -> float:
+    """Pressure [Pa] at which an element transmits `torque` [N m] at `slip` [rad/s], both >= 0."""
+    mu = float(capacity.friction.at(np.array([slip]))[0])
+    return capacity.P0 + torque / (mu * capacity.gain)

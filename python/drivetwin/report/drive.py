@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""A drive as one HTML page that opens offline, and its traces as a table."""
+
+from __future__ import annotations
+
+from io import StringIO
+
+import numpy as np
+
+from drivetwin.drive.result import DriveRun
+from drivetwin.report.figures.drive import energy_figure, motion_figure, shift_figure
+from drivetwin.report.html import render_page
+from drivetwin.report.sections.blocks import Cell, FigureBlock, Section, TableBlock, cells
+
+_TRACE_STEP = 10
+"""Every so many samples go into the table: 100 Hz, enough for any plot."""
+
+
+def render_drive(run: DriveRun, title: str) -> str:
+    """HTML text of the page; equal drives give equal text."""
+    motion = FigureBlock(motion_figure(run), "Speeds, torques, converter and pressures.")
+    shifts = [
+        FigureBlock(shift_figure(run, each), f"{each.action.label}, {each.action.kind}.")
+        for each in run.maneuvers
+        if each.action.off_going and each.action.on_coming
+    ]
+    sections = [
+        Section("drive", "The drive", "From standstill to the end of the plan.", [motion]),
+        Section("work", "Friction", "What each shift did to its elements.", [_table(run)]),
+        Section("shifts", "Shifts", "Each shift in the order of the drive.", shifts),
+        Section(
+            "energy",
+            "Energy",
+            "Where the work of the engine went.",
+            [FigureBlock(energy_figure(run), "Energy by part, kJ.")],
+        ),
+    ]
+    return render_page(title, f"{run.time[-1]:.1f} s from standstill", sections)
+
+
+def _table(run: DriveRun) -> TableBlock:
+    names = ("shift", "kind", "element", "begin [s]", "work [kJ]", "peak power [kW]")
+    rows = [
+        (
+            *cells(each.action.label, each.action.kind, work.element),
+            Cell(f"{each.action.start:.2f}", number=True),
+            Cell(f"{abs(work.work) / 1e3:.2f}", number=True),
+            Cell(f"{work.peak_power / 1e3:.1f}", number=True),
+        )
+        for each in run.maneuvers
+        for work in each.work
+    ]
+    head = (*cells(*names[:3]), *cells(*names[3:], number=True))
+    return TableBlock("Friction work and peak power of the elements", head, rows)
+
+
+def traces_text(run: DriveRun) -> str:
+    """CSV with a unit row: the motion at 100 Hz, SI."""
+    columns = {
+        ("time", "s"): run.time,
+        ("engine_speed", "rad/s"): run.engine_speed,
+        ("input_speed", "rad/s"): run.input_speed,
+        ("output_speed", "rad/s"): run.output_speed,
+        ("wheel_speed", "rad/s"): run.wheel_speed,
+        ("engine_torque", "N*m"): run.engine_torque,
+        ("turbine_torque", "N*m"): run.turbine_torque,
+        ("shaft_torque", "N*m"): run.shaft_torque,
+        ("speed_ratio", "1"): run.speed_ratio,
+        ("torque_ratio", "1"): run.torque_ratio,
+        **{(f"pressure.{name}", "Pa"): values for name, values in run.pressure.items()},
+        **{(f"slip.{name}", "rad/s"): values for name, values in run.slip.items()},
+        **{(f"torque.{name}", "N*m"): values for name, values in run.torque.items()},
+    }
+    text = StringIO()
+    text.write(",".join(name for name, _ in columns) + "\n")
+    text.write(",".join(unit for _, unit in columns) + "\n")
+    table = np.column_stack([values[::_TRACE_STEP] for values in columns.values()])
+    np.savetxt(text, table, fmt="%.9g", delimiter=",")
+    return text.getvalue()

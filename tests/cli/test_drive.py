@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin drive`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli import main
+
+
+def test_writes_page_and_traces_and_tells_every_shift(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["drive", "simpson-3", "--course", "launch", "-o", str(tmp_path / "out")]) == 0
+    text = capsys.readouterr().out
+    assert "1→2" in text
+    assert "2→3" in text
+    assert "unexplained" in text
+    assert max(len(line) for line in text.splitlines()) <= max(80, len(str(tmp_path)) + 40)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"drive.html", "drive.csv"}
+
+
+def test_json_carries_shifts_and_energy(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["drive", "simpson-3", "--course", "launch", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [each["label"] for each in document["shifts"]] == ["1→2", "lock-up", "2→3"]
+    assert document["powertrain"] == "Car, 350 N m"
+    assert abs(document["energy"]["error"]) < 1e-6 * document["energy"]["source"]
+
+
+def test_what_cannot_be_driven_is_an_error_and_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["drive", "manual-6", "-o", str(tmp_path / "out")]) == 2
+    assert "dogs" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

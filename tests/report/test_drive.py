@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""Page and table of a drive."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from drivetwin.drive import DriveRun, launch, load_powertrain, run
+from drivetwin.gearbox import load_gearbox
+from drivetwin.report.drive import render_drive, traces_text
+from drivetwin.report.figures.drive import energy_figure, motion_figure, shift_figure
+
+
+@pytest.fixture(scope="module")
+def motion() -> DriveRun:
+    box, car = load_gearbox("simpson-3"), load_powertrain("car-350nm")
+    return run(box, car, launch(box, car.control))
+
+
+def test_page_opens_offline_and_shows_every_shift(motion: DriveRun) -> None:
+    page = render_drive(motion, "A <drive>")
+    assert "A &lt;drive&gt;" in page
+    assert not re.findall(r'(?:src|href)="https?:', page)
+    assert page.count('class="figure"') >= 4 or page.count('type="application/json"') >= 4
+    for each in motion.maneuvers:
+        assert each.action.label in page
+
+
+def test_traces_are_the_motion(motion: DriveRun) -> None:
+    names, units, *rows = traces_text(motion).splitlines()
+    assert names.split(",")[:3] == ["time", "engine_speed", "input_speed"]
+    assert units.split(",")[:3] == ["s", "rad/s", "rad/s"]
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    assert np.allclose(table[:, 0], motion.time[::10])
+    assert np.allclose(table[:, 1], motion.engine_speed[::10], rtol=1e-8)
+
+
+def test_figures_show_display_units_and_all_elements(motion: DriveRun) -> None:
+    whole = motion_figure(motion)
+    assert {"engine", "speed ratio", "lock-up", "direct"} <= {trace.name for trace in whole.data}
+    engine = next(trace for trace in whole.data if trace.name == "engine")
+    assert max(engine.y) == pytest.approx(motion.engine_speed.max() * 30.0 / np.pi, rel=1e-6)
+    single = shift_figure(motion, motion.maneuvers[-1])
+    start, end = single.layout.xaxis.range
+    assert start < motion.maneuvers[-1].action.start < motion.maneuvers[-1].action.end < end
+    (bars,) = energy_figure(motion).data
+    assert dict(zip(bars.y, bars.x, strict=True))["direct"] == pytest.approx(
+        motion.work["direct"] / 1e3
+    )
