@@ -106,6 +106,45 @@ def test_design_values_do_not_pass_for_measured_ones(method: Method) -> None:
         assert "card" in estimate.reason
 
 
+def test_the_default_method_agrees_with_the_linear_one_and_knows_more() -> None:
+    found = identified("truck_a", Method.LIKELIHOOD)
+    linear = identified("truck_a", Method.INTEGRAL)
+    assert found.method is Method.LIKELIHOOD
+    for name in ("eta", "J_prime_2", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay"):
+        new, old = found.estimates[name], linear.estimates[name]
+        assert new.verdict is Verdict.IDENTIFIED
+        assert new.value is not None
+        assert old.value is not None
+        assert new.std_noise is not None
+        assert old.std_noise is not None
+        assert new.std_noise < old.std_noise
+        assert abs(new.value - old.value) < 4.0 * old.std_noise, name
+    assert found.estimates["J_out"].method == "likelihood with design prior"
+    assert found.evidence["likelihood"].chi2 == pytest.approx(1.0, abs=0.05)
+
+
+def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object) -> None:
+        raise IdentificationError("the simulation went astray", "nothing")
+
+    monkeypatch.setattr("drivetwin.identify.likelihood.run.fit", fail)
+    found = identify(*recording("truck_a"), Method.LIKELIHOOD)
+    assert found.method is Method.INTEGRAL
+    assert any("went astray" in text for text in found.warnings)
+
+
+def test_tolerances_enter_the_likelihood_as_shifts_of_its_minimum() -> None:
+    log, card, shifts = recording("truck_a")
+    stated = replace(card, sensors={"output_torque": SensorTolerance(gain=0.01)})
+    found = identify(log, stated, shifts, Method.LIKELIHOOD)
+    for name in ("eta", "k_o", "Tv_over_if", "J_vehicle"):
+        estimate = found.estimates[name]
+        assert estimate.value is not None
+        assert estimate.std_systematic == pytest.approx(0.01 * estimate.value, rel=0.1), name
+
+
 def test_sensor_tolerances_widen_the_total_interval_only() -> None:
     log, card, shifts = recording("truck_a")
     strict = identified("truck_a", Method.INTEGRAL)

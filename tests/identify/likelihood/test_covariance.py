@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""The banded weighting is the dense R + G·Q·Gᵀ, and the expected inputs are the right way round."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.identify.likelihood.covariance import sensor_noise, with_input_noise
+from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.likelihood.response import observed, response_of
+from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.signals import FloatArray
+from tests.identify.likelihood.made import bench, fitted, problem
+
+
+def _short() -> tuple[Part, Point]:
+    posed, start = problem(bench())
+    part = posed.parts[0]
+    return Part.unweighted(part.structure, part.record.until(part.record.time[0] + 0.15)), start
+
+
+def test_weighting_equals_the_dense_covariance() -> None:
+    part, point = _short()
+    run = part.run(point)
+    assert run is not None
+    model, record = part.structure.model(point), part.record
+    response = response_of(model, run, record)
+    whiteness = with_input_noise(model, record, response)
+    assert whiteness.path is not None
+    columns = []
+    for name, power in whiteness.path.power.items():
+        for k in range(record.time.size - 1):
+            impulse = np.zeros(record.time.size - 1)
+            impulse[k] = np.sqrt(power[k])
+            z = response.to({name: impulse})
+            columns.append(
+                np.concatenate([z[out.place] @ observed(model, out.name) for out in record.outputs])
+            )
+    G = np.column_stack(columns)
+    dense = np.diag(record.sigma**2) + G @ G.T
+    columns_in: FloatArray = np.random.default_rng(0).standard_normal((record.size, 3))
+    columns_in *= record.sigma[:, None]
+    expected = np.linalg.solve(dense, columns_in)
+    found = whiteness.weighted(columns_in) * record.sigma[:, None]
+    assert np.allclose(found, expected * record.sigma[:, None], rtol=1e-3, atol=1e-2)
+
+
+def test_without_input_noise_the_sensors_weigh_alone() -> None:
+    part, _ = _short()
+    residual = np.ones(part.record.size)
+    assert np.allclose(sensor_noise(part.record).weighted(residual), part.record.sigma**-2)
+    assert not np.any(sensor_noise(part.record).driven(residual))
+
+
+def test_expected_inputs_move_back_towards_the_truth() -> None:
+    found = fitted(0)
+    part = found.problem.parts[0]
+    run = part.run(found.point)
+    assert run is not None
+    measured, _ = problem(bench())
+    record, exact = measured.parts[0].record, bench(noise=0.0).signals.pressures["B3"]
+    shift = bench().signals.shift
+    inside = (exact.time > shift.inertia_phase[0] + 0.02) & (exact.time < shift.lockup_time - 0.02)
+    errors = [
+        np.convolve(
+            (one.pressures["B3"].values - exact.values)[inside], np.ones(10) / 10.0, "valid"
+        )
+        for one in (record, part.record)
+    ]
+    assert np.std(errors[1]) < 0.8 * np.std(errors[0])

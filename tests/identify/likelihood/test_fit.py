@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""The fit against known truth: exact without noise, honest with it, and failing aloud."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.estimation.bench import Knowledge
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.likelihood.fit import fit
+from tests.identify.likelihood.made import bench, fitted, problem, truth_of
+
+DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+
+
+def test_ideal_sensors_return_every_parameter_from_a_start_beside_it() -> None:
+    made = bench(noise=0.0, know=Knowledge(J_out=1.0))
+    posed, start = problem(made, off=0.05)
+    found = fit(posed, start, [made.signals.shift])
+    truth = truth_of(made)
+    for name in (*DRIVELINE, "B3.mu_c", "B3.mu_drop", "B3.mu_v", "B3.ln_v_s"):
+        assert found.point[name] == pytest.approx(truth[name], rel=2e-4), name
+    assert found.point["te_delay"] == pytest.approx(truth["te_delay"], abs=2e-5)
+
+
+def test_intervals_hold_the_truth_over_noise_realisations() -> None:
+    deviates = []
+    for seed in range(5):
+        found, truth = fitted(seed), truth_of(bench(seed))
+        std = np.sqrt(np.diag(found.covariance))
+        assert found.chi2 == pytest.approx(1.0, abs=0.05)
+        deviates += [
+            (found.point[name] - truth[name]) / std[found.point.names.index(name)]
+            for name in (*DRIVELINE, "te_delay", "B3.P0", "B3.mu_c")
+        ]
+    assert float(np.mean(np.square(deviates))) < 1.6
+    assert float(np.max(np.abs(deviates))) < 4.0
+
+
+def test_a_wrong_start_is_brought_in_by_stages() -> None:
+    made = bench()
+    posed, start = problem(made, off=0.4)
+    found = fit(posed, start, [made.signals.shift])
+    assert found.chi2 < 1.05
+    near = fitted()
+    std = np.sqrt(np.diag(near.covariance))
+    shared = [near.point.names.index(name) for name in DRIVELINE]
+    assert np.all(np.abs(found.point.values - near.point.values)[shared] < 0.5 * std[shared])
+
+
+def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
+    made = bench()
+    posed, start = problem(made)
+    part = posed.parts[0]
+    driveline = replace(part.structure.driveline, i_f=1.3 * part.structure.driveline.i_f)
+    wrong = replace(part, structure=replace(part.structure, driveline=driveline))
+    with pytest.raises(IdentificationError, match="could not be brought onto the measurement"):
+        fit(replace(posed, parts=(wrong,)), start, [made.signals.shift])

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: MIT
+"""The linear response against differences of the core's runs, through break-away and lock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.driveline import Signal
+from tests.identify.likelihood.made import bench, problem
+
+
+@pytest.mark.parametrize("name", ["engine torque", "B3"])
+def test_disturbed_inputs_move_the_run_as_the_response_says(name: str) -> None:
+    posed, point = problem(bench(noise=0.0))
+    part = posed.parts[0]
+    base = part.run(point)
+    assert base is not None
+    shift = bench(noise=0.0).signals.shift
+    size, start = (0.5, 3.0) if name == "engine torque" else (50.0, shift.inertia_phase[0] + 0.05)
+
+    def bump(
+        time: np.ndarray[tuple[int], np.dtype[np.float64]],
+    ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        return size * np.asarray((time > start) & (time < start + 0.2), dtype=float)
+
+    inputs = {"engine torque": part.record.engine_torque} | dict(part.record.pressures)
+    old = inputs[name]
+    new = Signal(old.time, old.values + bump(old.time))
+    if name == "engine torque":
+        record = replace(part.record, engine_torque=new)
+    else:
+        record = replace(part.record, pressures={**part.record.pressures, name: new})
+    run = replace(part, record=record).run(point)
+    assert run is not None
+    middle = 0.5 * (base.time[1:] + base.time[:-1])
+    change = np.interp(middle, new.time, new.values - old.values)
+    expected = part.answer_to(point, base, {name: change})
+    found = part.record.stacked(run) - part.record.stacked(base)
+    near_lock = np.abs(
+        np.concatenate([base.time[out.place] for out in part.record.outputs]) - shift.lockup_time
+    )
+    clear = near_lock > 0.003
+    weight = clear / part.record.sigma
+    miss = np.linalg.norm((found - expected) * weight) / np.linalg.norm(found * weight)
+    assert miss < 0.03
