@@ -212,7 +212,6 @@ def test_a_brake_slips_against_a_prescribed_speed() -> None:
     assert result.audit.source == pytest.approx(35.0 + (36.0 - 1.0), rel=1e-9)
 
 
-@pytest.mark.xfail(reason="a resting brake does not follow a prescribed speed")
 def test_a_prescribed_speed_tears_a_resting_brake_loose() -> None:
     elements = [inertia("a"), driven("a"), clutch("brake", "a", "ground")]
     start = line((0.0, 0.0), (0.5, 0.0), (1.0, 5.0))

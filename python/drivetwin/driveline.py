@@ -230,7 +230,7 @@ def simulate(
     options = (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit)
     try:
         columns, events, status, energy = _native.simulate(
-            _as_json(model),
+            as_json(asdict(model)),
             [(name, _array(s.time + s.delay), _array(s.values)) for name, s in signals.items()],
             _start(start),
             _array(time),
@@ -263,7 +263,7 @@ def sensitivities(
     options = (Accuracy().tolerance, list(parameters))
     try:
         columns, events, status, derivatives, event_derivatives = _native.sensitivities(
-            _as_json(model), delayed, _start(start), _array(time), options
+            as_json(asdict(model)), delayed, _start(start), _array(time), options
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
@@ -307,15 +307,14 @@ def _trajectory(
     )
 
 
-def _as_json(model: DualClutch) -> str:
-    """The model as the core reads it; JSON has no NaN, so these are refused by name here."""
-    fields = asdict(model)
-    bad = [key for key, value in _leaves("", fields) if not np.isfinite(value)]
+def as_json(description: object) -> str:
+    """A description as the core reads it; JSON has no NaN, so these are refused by name here."""
+    bad = [key for key, value in _leaves("", description) if not np.isfinite(value)]
     if bad:
         raise InputError(
             f"not a finite number: {', '.join(bad)}", "give every parameter of the model a value"
         )
-    return json.dumps(fields)
+    return json.dumps(description)
 
 
 def _leaves(path: str, value: object) -> Iterator[tuple[str, float]]:

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from drivetwin import _native
-from drivetwin.driveline import Accuracy, EnergyAudit, Event, FloatArray, Signal
+from drivetwin.driveline import Accuracy, EnergyAudit, Event, FloatArray, Signal, as_json
 from drivetwin.errors import InputError
 
 Element = Mapping[str, Any]
@@ -84,7 +84,7 @@ def simulate(
     ]
     try:
         columns, events, status, energy = _native.simulate_network(
-            json.dumps({"elements": list(elements)}),
+            as_json(list(elements)),
             json.dumps([{kind: name} for kind, name in outputs]),
             (samples, sines),
             (list(start.speeds.items()), list(start.twists.items()), list(start.locked)),

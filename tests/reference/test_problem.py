@@ -19,19 +19,6 @@ COMPARED = ("lock", "break_away", "reverse")
 """Fill and vent follow from the inputs alone."""
 
 
-MOVING_OFF = pytest.mark.xfail(reason="a resting brake does not follow a prescribed speed")
-COMING_TO_REST = pytest.mark.xfail(
-    reason="nothing is decided where a prescribed speed has a corner"
-)
-MOTION = [
-    pytest.param(name, marks=[MOVING_OFF] if name == "prescribed_speed" else []) for name in names()
-]
-EVENTS = [
-    pytest.param(name, marks=[COMING_TO_REST] if name == "prescribed_speed" else [])
-    for name in names()
-]
-
-
 def changes(events: Iterable[Event], elements: tuple[str, ...]) -> list[Change]:
     """Events to compare; a lock that ends within the tolerance is a touch and none."""
     kept: list[Change] = []
@@ -48,7 +35,7 @@ def changes(events: Iterable[Event], elements: tuple[str, ...]) -> list[Change]:
     return kept
 
 
-@pytest.mark.parametrize("name", MOTION)
+@pytest.mark.parametrize("name", names())
 def test_a_run_agrees_with_the_independent_solution(name: str) -> None:
     problem, expected = load(name), tables.read(ROOT / name)
     result = run(problem)
@@ -60,7 +47,7 @@ def test_a_run_agrees_with_the_independent_solution(name: str) -> None:
         assert difference < tolerance, output
 
 
-@pytest.mark.parametrize("name", EVENTS)
+@pytest.mark.parametrize("name", names())
 def test_the_events_of_a_run_are_those_of_the_independent_solution(name: str) -> None:
     problem, expected = load(name), tables.read(ROOT / name)
     seen = changes(run(problem).events, problem.events_of)

@@ -2,7 +2,7 @@
 //! Simulation of any network of elements; see `drivetwin.network.simulate`.
 
 use crate::plain::{Audit, Event, as_tuple, events_of};
-use drivetwin_core::model::Driveline;
+use drivetwin_core::model::{Driveline, Element};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{Output, Start, run};
 use drivetwin_core::solve::{Settings, Signal};
@@ -35,7 +35,7 @@ pub fn simulate_network<'py>(
     options: Options,
 ) -> PyResult<Run<'py>> {
     let refuse = |e: serde_json::Error| PyValueError::new_err(e.to_string());
-    let driveline: Driveline<f64> = serde_json::from_str(driveline).map_err(refuse)?;
+    let driveline = parse(driveline)?;
     let outputs: Vec<Output> = serde_json::from_str(outputs).map_err(refuse)?;
     let grid = grid.as_slice()?;
     let (samples, sines) = signals;
@@ -61,4 +61,18 @@ pub fn simulate_network<'py>(
     let columns = PyArray2::from_vec2(py, &trajectory.columns)?;
     let events = events_of(&trajectory);
     Ok((columns, events, trajectory.status.to_string(), trajectory.audit.map(as_tuple)))
+}
+
+/// Read the elements one by one, so that a fault names its element.
+fn parse(elements: &str) -> PyResult<Driveline<f64>> {
+    let refuse = |name: &str, e: serde_json::Error| PyValueError::new_err(format!("{name}: {e}"));
+    let all: Vec<serde_json::Value> =
+        serde_json::from_str(elements).map_err(|e| refuse("elements", e))?;
+    let element = |(i, value): (usize, serde_json::Value)| -> PyResult<Element<f64>> {
+        let name = value.get("name").and_then(|name| name.as_str());
+        let name = name.map_or_else(|| format!("element {i}"), ToOwned::to_owned);
+        serde_json::from_value(value).map_err(|e| refuse(&name, e))
+    };
+    let elements = all.into_iter().enumerate().map(element).collect::<PyResult<_>>()?;
+    Ok(Driveline { elements })
 }

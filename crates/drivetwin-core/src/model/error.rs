@@ -35,6 +35,12 @@ pub enum ModelError {
         /// The name.
         element: String,
     },
+    /// An element that acts on a speed sits on the ground.
+    #[error("{element}: its node is the ground, which does not turn; name a shaft")]
+    OnGround {
+        /// Name of the element.
+        element: String,
+    },
     /// Both flanges of an element sit on the same node.
     #[error("{element}: both flanges are on node {node:?}, so the element has no effect")]
     ShortCircuit {
@@ -75,6 +81,15 @@ pub(crate) fn require(
 pub(crate) fn require_apart(element: &str, a: &str, b: &str) -> Result<(), ModelError> {
     if a == b {
         Err(ModelError::ShortCircuit { element: element.to_owned(), node: a.to_owned() })
+    } else {
+        Ok(())
+    }
+}
+
+/// Require a node that can turn.
+pub(crate) fn require_moving(element: &str, node: &str) -> Result<(), ModelError> {
+    if node == super::GROUND {
+        Err(ModelError::OnGround { element: element.to_owned() })
     } else {
         Ok(())
     }

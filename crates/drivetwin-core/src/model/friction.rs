@@ -34,7 +34,10 @@ pub struct FrictionTable<T> {
 
 /// μ over |slip|.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "friction takes mu_c, mu_s, v_s and mu_v of a Stribeck law, or slip and mu of a table"
+)]
 pub enum FrictionLaw<T> {
     /// Exponential plus viscous.
     Stribeck(Stribeck<T>),

@@ -4,7 +4,7 @@
 use super::channel::{Channel, Law};
 use super::constraints::{Coordinates, coordinates};
 use super::error::CompileError;
-use super::linalg::{Matrix, solve};
+use super::linalg::{Matrix, independent_rows, solve};
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
 use crate::model::{Driveline, FrictionLaw};
 use crate::number::Real;
@@ -131,6 +131,7 @@ impl<T: Real> Network<T> {
         network.give_mass_between_frictions();
         network.refuse_massless()?;
         network.add_rows();
+        network.refuse_prescribed_twice()?;
         network.add_drives();
         network.node_torques = network.assemble_node_torques();
         Ok(network)
@@ -230,6 +231,18 @@ impl<T: Real> Network<T> {
         let moved = |&node: &usize| n[(node, column)].re() != 0.0;
         let members = (0..n.rows).filter(moved).map(|i| self.mechanism.nodes[i].clone()).collect();
         Err(CompileError::Massless { members })
+    }
+
+    fn refuse_prescribed_twice(&self) -> Result<(), CompileError> {
+        let mut rows = Matrix::zeros(self.prescribed.len(), self.speeds());
+        for (i, (speed, _)) in self.prescribed.iter().enumerate() {
+            rows.row_mut(i).copy_from_slice(speed);
+        }
+        if independent_rows(&rows).len() == rows.rows {
+            return Ok(());
+        }
+        let elements = self.mechanism.prescribed.iter().map(|p| p.element.clone()).collect();
+        Err(CompileError::PrescribedTwice { elements })
     }
 
     /// Everything that is a linear form over the speeds: twists, slips, gears, prescribed speeds.

@@ -12,7 +12,8 @@ pub enum CompileError {
     Model(#[from] ModelFaults),
     /// Rigid couplings that repeat or contradict each other.
     #[error(
-        "the rigid couplings of {} depend on each other; remove one of them or put a compliance          between them",
+        "the rigid couplings of {} depend on each other; remove one of them or put a compliance \
+         between them",
         elements.join(", ")
     )]
     DependentConstraints {
@@ -21,12 +22,22 @@ pub enum CompileError {
     },
     /// A member has no inertia and nothing determines its acceleration.
     #[error(
-        "nothing determines the acceleration of {}: give one of these members an inertia or a          rigid connection to one that has it",
+        "nothing determines the acceleration of {}: give one of these members an inertia or a \
+         rigid connection to one that has it",
         members.join(", ")
     )]
     Massless {
         /// Nodes that move in the undetermined direction.
         members: Vec<String>,
+    },
+    /// Prescribed speeds that determine each other.
+    #[error(
+        "the prescribed speeds of {} determine each other through rigid couplings; keep one",
+        elements.join(", ")
+    )]
+    PrescribedTwice {
+        /// The elements.
+        elements: Vec<String>,
     },
     /// Everything is rigidly connected to the ground.
     #[error("the mechanism cannot move: its rigid couplings leave no independent speed")]

@@ -165,8 +165,12 @@ impl<T: Real> Network<T> {
         for i in 0..self.prescribed.len() {
             needed[(stuck.len() + i, self.first_rate() + i)] -= 1.0;
         }
-        let (stuck_torque, redundant) =
-            holding_torque(&speeds.times(&response), &needed, &self.weights(&stuck, capacity));
+        let (stuck_torque, redundant) = holding_torque(
+            &speeds.times(&response),
+            &needed,
+            &self.weights(&stuck, capacity),
+            stuck.len(),
+        );
         let acceleration = difference(&free, &response.times(&stuck_torque));
         let torques = difference(&node_torques, &nodes.times(&stuck_torque));
         let residual = difference(&torques, &self.inertia.times(n).times(&acceleration));
@@ -287,18 +291,25 @@ impl<T: Real> Network<T> {
 }
 
 /// Solve `W τ = b` for the torques that hold the speeds. For redundant locks the torques are those of
-/// least `Σ (τ_j / weight_j)²`.
-fn holding_torque<T: Real>(w: &Matrix<T>, b: &Matrix<T>, weights: &[T]) -> (Matrix<T>, bool) {
+/// least `Σ (τ_j / weight_j)²`. Prescribed speeds, from row `stuck` on, win where the rows contradict
+/// each other.
+fn holding_torque<T: Real>(
+    w: &Matrix<T>,
+    b: &Matrix<T>,
+    weights: &[T],
+    stuck: usize,
+) -> (Matrix<T>, bool) {
     if independent_rows(w).len() == w.rows {
         return (solve(w, b).expect("independent rows"), false);
     }
-    let mut scaled = w.clone();
+    let order: Vec<usize> = (stuck..w.rows).chain(0..stuck).collect();
+    let (mut scaled, b) = (w.select_rows(&order), b.select_rows(&order));
     for r in 0..w.rows {
         for c in 0..w.cols {
             scaled[(r, c)] *= weights[c];
         }
     }
-    let mut torque = least_norm(&scaled, b);
+    let mut torque = least_norm(&scaled, &b);
     for i in 0..torque.rows {
         torque.row_mut(i).iter_mut().for_each(|t| *t *= weights[i]);
     }

@@ -19,7 +19,9 @@ type Dual = DualSVec64<LANES>;
 pub enum SensitivityError {
     /// A name that is no parameter.
     #[error(
-        "parameter {name:?} is unknown; known are the fields of the model (eta, J1, load.constant,          B2.P0, B2.mu_c, ...), start.engine_speed, start.output_speed, start.wheel_speed,          start.twist and delay.<input>"
+        "parameter {name:?} is unknown; known are the fields of the model (eta, J1, load.constant, \
+         B2.P0, B2.mu_c, ...), start.engine_speed, start.output_speed, start.wheel_speed, \
+         start.twist and delay.<input>"
     )]
     Unknown {
         /// The name.

@@ -267,7 +267,8 @@ impl<'a, T: Real> Integrator<'a, T> {
             jumped |= from == to;
         }
         self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
-        if jumped {
+        // Where a prescribed acceleration jumps, everything that holds against it is decided anew.
+        if jumped || (entered && !self.network.prescribed.is_empty()) {
             self.refresh()?;
         } else if entered {
             self.refresh_split()?;

@@ -14,6 +14,7 @@ impl<T: Real> Integrator<'_, T> {
     /// Carry out what the last event caused.
     pub(super) fn change_mode(&mut self) -> Result<(), Status> {
         let Some(cause) = self.pending.take() else { return Ok(()) };
+        self.move_to_sample();
         self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
         match cause {
             Cause::AtRest(row) => {
@@ -46,6 +47,17 @@ impl<T: Real> Integrator<'_, T> {
                 self.cells[channel] = cell;
                 Ok(())
             }
+        }
+    }
+
+    /// An event within round-off of a sample is decided by what holds from there on.
+    fn move_to_sample(&mut self) {
+        let end = self.inputs.span(self.segment).1;
+        let next = self.segment + 1;
+        let near = end - self.t.re() <= 1e-12 * (1.0 + end.abs());
+        if near && next < self.inputs.segments() && self.inputs.span(next).1 > end {
+            self.t += end - self.t.re();
+            self.segment = next;
         }
     }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! An engine by its steady-state map over throttle and speed (paper eq. 2).
 
-use crate::model::error::{ModelError, require};
+use crate::model::error::{ModelError, require, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::model::torque_map::TorqueMap;
 use crate::number::Real;
@@ -26,6 +26,7 @@ pub struct EngineMap<T> {
 
 impl<T: Real> EngineMap<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
+        require_moving(&self.name, &self.node)?;
         if let Some(lag) = self.lag {
             require(&self.name, "lag", lag.re(), |v| v > 0.0, "> 0 s")?;
         }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A rotating mass.
 
-use crate::model::error::{ModelError, require};
+use crate::model::error::{ModelError, require, require_moving};
 use crate::model::mechanism::{self, Mechanism};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
@@ -20,6 +20,7 @@ pub struct Inertia<T> {
 
 impl<T: Real> Inertia<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
+        require_moving(&self.name, &self.node)?;
         require(&self.name, "inertia", self.inertia.re(), |v| v >= 0.0, ">= 0 kg m^2")
     }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! External resistance of the vehicle (paper eq. 9): grade, rolling, aerodynamic.
 
-use crate::model::error::{ModelError, require};
+use crate::model::error::{ModelError, require, require_moving};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Account, Force, ForceLaw, Friction, Mechanism, Normal};
 use crate::number::Real;
@@ -25,6 +25,7 @@ pub struct RoadLoad<T> {
 
 impl<T: Real> RoadLoad<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
+        require_moving(&self.name, &self.node)?;
         require(&self.name, "constant", self.constant.re(), |_| true, "finite")?;
         require(&self.name, "rolling", self.rolling.re(), |v| v >= 0.0, ">= 0 N m")?;
         require(&self.name, "aero", self.aero.re(), |v| v >= 0.0, ">= 0 N m s^2/rad^2")

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A prescribed torque, such as a measured engine torque.
 
-use crate::model::error::ModelError;
+use crate::model::error::{ModelError, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
@@ -23,10 +23,8 @@ pub struct Torque<T> {
 }
 
 impl<T: Real> Torque<T> {
-    #[expect(clippy::unnecessary_wraps, reason = "all elements share one form")]
-    #[expect(clippy::unused_self, reason = "all elements share one form")]
     pub(crate) fn check(&self) -> Result<(), ModelError> {
-        Ok(())
+        require_moving(&self.name, &self.node)
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {

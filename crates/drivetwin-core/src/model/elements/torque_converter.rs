@@ -2,7 +2,7 @@
 //! A hydrodynamic torque converter by its steady-state map.
 
 use crate::model::converter_map::ConverterMap;
-use crate::model::error::{ModelError, require_apart};
+use crate::model::error::{ModelError, require_apart, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,8 @@ pub struct TorqueConverter<T> {
 impl<T: Real> TorqueConverter<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.pump, &self.turbine)?;
+        require_moving(&self.name, &self.pump)?;
+        require_moving(&self.name, &self.turbine)?;
         self.map.check(&self.name)
     }
 
