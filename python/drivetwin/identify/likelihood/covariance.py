@@ -144,7 +144,7 @@ def _information(
     diagonal[:-1] += transition.transpose(0, 2, 1) @ through
     for out in record.outputs:
         row = observed(model, out.name)
-        diagonal[out.place] += np.outer(row, row) / out.sigma**2
+        np.add.at(diagonal, out.centre, np.outer(row, row) / out.sigma**2)
     banded = np.zeros((2 * STATES, STATES * count))
     for i in range(STATES):
         for j in range(i + 1):
@@ -158,9 +158,9 @@ def _seen(model: DualClutch, record: Record) -> csr_array:
     """What the sensors see of the state: (compared samples, 4N)."""
     data, columns, count = [], [], 0
     for out in record.outputs:
-        data.append(np.tile(observed(model, out.name), out.place.size))
-        columns.append((STATES * out.place[:, None] + np.arange(STATES)).ravel())
-        count += out.place.size
+        data.append(np.tile(observed(model, out.name), out.centre.size))
+        columns.append((STATES * out.centre[:, None] + np.arange(STATES)).ravel())
+        count += out.centre.size
     start = np.arange(count + 1) * STATES
     shape = (count, STATES * record.time.size)
     return csr_array((np.concatenate(data), np.concatenate(columns), start), shape=shape)

@@ -16,7 +16,15 @@ from drivetwin.identify.friction import LAW_PRIOR
 from drivetwin.identify.likelihood.fill import local_mean
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import LATEST, record_of
-from drivetwin.identify.likelihood.unknowns import COMMON, LAW, START, TE_OFFSET, Point, Structure
+from drivetwin.identify.likelihood.unknowns import (
+    AERO,
+    COMMON,
+    LAW,
+    START,
+    TE_OFFSET,
+    Point,
+    Structure,
+)
 from drivetwin.identify.momentum import DELAY_STD_MAX, MomentumSettings, rounding_error
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import (
@@ -42,6 +50,8 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
     "drum": (0.0, SPECS["J_out"].upper),
 }
 """Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
+AERO_SPREAD = 10.0
+"""Plausible air drag at the wheel [N m s^2/rad^2]: of a lorry 1 to 3, of a car 0.1."""
 OFF_GOING_LEVEL = 0.03
 """Spread of the friction level of an element that only lets go, about that of the one coming on."""
 
@@ -64,14 +74,13 @@ def problem_of(
     names = [n for n in every if not _is_known(priors.get(n))]
     if not all(shows_age(s.engine_torque) for s in signals):
         names.remove("te_delay")
-    if TE_OFFSET in priors:
-        names.append(TE_OFFSET)
-    fixed = dict(guess) | {n: p.value for n, p in priors.items() if _is_known(p)}
+    names += [n for n in (TE_OFFSET, AERO) if n in priors]
+    fixed = {AERO: 0.0} | dict(guess) | {n: p.value for n, p in priors.items() if _is_known(p)}
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
         label = f"start{k}"
         record = record_of(s, d, span)
-        structure = Structure(d, loss_law, label, fixed)
+        structure = Structure(d, loss_law, label, fixed, mean_speed_of(signals, d.i_f))
         parts.append(Part.unweighted(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
@@ -84,6 +93,17 @@ def problem_of(
     }
     prior = Prior.independent(len(point.names), entries)
     return Problem(tuple(parts), prior, lower, upper), point
+
+
+def mean_speed_of(signals: Sequence[ShiftSignals], i_f: float) -> float:
+    """Mean wheel speed over the log [rad/s]."""
+    means = [
+        float(np.mean(s.output_speed.values)) / i_f
+        if s.wheel_speed is None
+        else float(np.mean(s.wheel_speed.values))
+        for s in signals
+    ]
+    return float(np.mean(means))
 
 
 def shows_age(torque: Sampled) -> bool:
@@ -143,6 +163,8 @@ def _priors(
     rounding = rounding_error(signals[0].engine_torque, step)
     if rounding > 0.0:
         found[TE_OFFSET] = PriorValue(0.0, rounding)
+    if AERO in guess:
+        found[AERO] = PriorValue(0.0, AERO_SPREAD)
     law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)}
     for name in _laws(drivelines):
         found[name] = law[name.split(".")[-1]]

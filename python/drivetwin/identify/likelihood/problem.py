@@ -124,7 +124,7 @@ class Part:
         model = self.structure.model(point)
         z = self.response(point, run).to(disturbance)
         return np.concatenate(
-            [z[out.place] @ observed(model, out.name) for out in self.record.outputs]
+            [z[out.centre] @ observed(model, out.name) for out in self.record.outputs]
         )
 
     def weighted_by(self, point: Point) -> Part:
@@ -200,6 +200,16 @@ class Problem:
     def size(self) -> int:
         """Number of compared samples."""
         return sum(part.record.size for part in self.parts)
+
+    @property
+    def slow(self) -> bool:
+        """Whether some output is sampled so slowly that it may be a mean over its period."""
+        return any(part.record.slow for part in self.parts)
+
+    def averaged(self) -> Problem:
+        """The problem with its slow outputs taken as means over their period."""
+        parts = [Part.unweighted(p.structure, p.record.averaged()) for p in self.parts]
+        return replace(self, parts=tuple(parts))
 
     def until(self, ends: Sequence[float]) -> Problem:
         """The problem with each part cut at its end [s], weighted by sensor noise."""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,18 +20,56 @@ OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
 """Compared signals, in the order in which residuals are stacked."""
 LATEST = 0.06
 """Greatest age of an engine torque value [s]: so much of the end of a log has no input."""
+SLOW = 4e-3
+"""Sampling time of an output [s] above which its samples may be means over it."""
+GRID = 1e-3
+"""Step of the simulation's grid [s] where all outputs are slow."""
 FLOOR = 1e-5
 """Least noise of a compared signal as a share of its range: what an ideal sensor is given."""
 
 
 @dataclass(frozen=True)
 class Output:
-    """A compared signal: `values` (n,) at the points `place` (n,) of the record's time grid."""
+    """A compared signal: `values` (n,) stamped at the points `place` (n,) of the record's grid.
+
+    With a `window` [s] a sample is the mean over that time before its stamp, as encoders on a bus
+    send it. `centre` (n,) are the points in the middle of what a sample shows.
+    """
 
     name: str
     place: IndexArray
     values: FloatArray
     sigma: float
+    window: float = 0.0
+    centre: IndexArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+
+    def __post_init__(self) -> None:
+        """Without a window the middle is the stamp."""
+        if self.window == 0.0:
+            object.__setattr__(self, "centre", self.place)
+
+    def cut(self, count: int) -> Output:
+        """The samples stamped within the first `count` points of the grid."""
+        keep = int(np.searchsorted(self.place, count))
+        return replace(
+            self, place=self.place[:keep], values=self.values[:keep], centre=self.centre[:keep]
+        )
+
+    def averaged(self, time: FloatArray) -> Output:
+        """The same samples taken as means over the time since the one before."""
+        window = float(np.median(np.diff(time[self.place])))
+        first = int(np.searchsorted(time[self.place], time[0] + window))
+        place = self.place[first:]
+        centre = np.searchsorted(time, time[place] - 0.5 * window)
+        return replace(self, place=place, values=self.values[first:], window=window, centre=centre)
+
+    def seen(self, time: FloatArray, column: FloatArray) -> FloatArray:
+        """What a sensor of this kind shows (n,) of a quantity (N,) over the grid `time` (N,)."""
+        if self.window == 0.0:
+            return column[self.place]
+        total = np.concatenate([[0.0], np.cumsum(0.5 * (column[1:] + column[:-1]) * np.diff(time))])
+        before = np.interp(time[self.place] - self.window, time, total)
+        return np.asarray((total[self.place] - before) / self.window)
 
 
 @dataclass(frozen=True)
@@ -74,7 +112,20 @@ class Record:
             "output_speed": run.output_speed,
             "wheel_speed": run.wheel_speed,
         }
-        return np.concatenate([columns[out.name][out.place] for out in self.outputs])
+        return np.concatenate([out.seen(run.time, columns[out.name]) for out in self.outputs])
+
+    @property
+    def slow(self) -> bool:
+        """Whether some output is sampled so slowly that it may be a mean over its period."""
+        return any(self._slow(out) for out in self.outputs)
+
+    def averaged(self) -> Record:
+        """The record with its slow outputs taken as means over their period."""
+        outputs = [out.averaged(self.time) if self._slow(out) else out for out in self.outputs]
+        return replace(self, outputs=tuple(outputs))
+
+    def _slow(self, out: Output) -> bool:
+        return bool(np.median(np.diff(self.time[out.place])) > SLOW)
 
     def less(self, noise: Mapping[str, FloatArray], age: float) -> Record:
         """The record with expected `noise` (N-1,) per step of the grid taken off its inputs."""
@@ -105,15 +156,12 @@ class Record:
     def until(self, end: float) -> Record:
         """The record cut at `end` [s]."""
         count = int(np.searchsorted(self.time, end, side="right"))
-        outputs = []
-        for out in self.outputs:
-            keep = int(np.searchsorted(out.place, count))
-            outputs.append(Output(out.name, out.place[:keep], out.values[:keep], out.sigma))
+        outputs = tuple(out.cut(count) for out in self.outputs)
         return Record(
             self.time[:count],
             self.engine_torque,
             self.pressures,
-            tuple(outputs),
+            outputs,
             self.steady_torque,
             self.input_sigma,
         )
@@ -135,6 +183,8 @@ def record_of(signals: ShiftSignals, driveline: Driveline, span: Span) -> Record
     end = min(span[1], *(s.time[-1] for s in inputs)) - LATEST
     parts = {name: s.within((start, end)) for name, s in channels.items() if s is not None}
     time = np.unique(np.concatenate([part.time for part in parts.values()]))
+    if time.size > 1 and np.median(np.diff(time)) > SLOW:
+        time = np.union1d(time, np.arange(time[0], time[-1], GRID))
     if time.size < 100:
         raise IdentificationError(
             f"only {time.size} samples between {start:.3f} s and {end:.3f} s to fit a model to",

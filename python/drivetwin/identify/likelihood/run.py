@@ -11,9 +11,9 @@ import numpy as np
 from drivetwin.identify.conclude import Conclusions
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.likelihood.conclude import conclude
-from drivetwin.identify.likelihood.fit import LikelihoodFit, fit
+from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.guess import guess_of
-from drivetwin.identify.likelihood.priors import problem_of
+from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.vehicle.spec import VehicleCard
 
@@ -32,10 +32,9 @@ def likelihood(
     Raises IdentificationError where the fit does not reach a plausible minimum.
     """
     found, shifts = linear
-    problem, start = problem_of(signals, drivelines, card.loss_law, guess_of(shifts, drivelines))
-    best = fit(problem, start, [s.shift for s in signals])
+    best, notes = choose(signals, drivelines, card.loss_law, guess_of(shifts, drivelines))
     told = conclude(best, signals, drivelines, found.friction, card.sensors)
-    warnings = (*told.warnings, *_disagreements(told, found))
+    warnings = (*told.warnings, *notes, *_disagreements(told, found))
     return replace(told, warnings=warnings), best
 
 

@@ -2,7 +2,7 @@
 """The unknowns of the fit and how the simulated model follows from them.
 
     J1 = Je/η, J2e = 0 (THEORY section 3: only Je = J1·η + J2e can be told)
-    load.constant = i_f·(T_v/i_f), mu_s = mu_c + mu_drop, v_s = exp(ln_v_s)
+    load.constant = i_f·(T_v/i_f) - aero·mean speed², mu_s = mu_c + mu_drop, v_s = exp(ln_v_s)
 
 An element that comes on in one of the shifts has its own Stribeck law; of one that only lets go
 no more than the level of its law shows, through the instant at which it breaks away.
@@ -22,6 +22,8 @@ COMMON = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_de
 """Unknowns of the driveline, the same in all shifts."""
 TE_OFFSET = "te_offset"
 """Mean rounding error of the engine torque [N m]: what is read is the truth plus this."""
+AERO = "aero"
+"""Part of the load that grows with the square of the wheel speed [N m s^2/rad^2]."""
 LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
 START = ("speed", "wheel_speed", "twist")
 """Unknowns of the start of each shift's run: ω_out and ω_w [rad/s], shaft twist [rad]."""
@@ -47,13 +49,15 @@ class Structure:
     """What is fixed during a fit: structure of one shift and the laws that are not free.
 
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
-    start unknowns of this shift.
+    start unknowns of this shift. `mean_speed` is that of the wheel over the log [rad/s], at which
+    T_v/i_f holds where the load grows with the speed.
     """
 
     driveline: Driveline
     loss_law: LossLaw
     label: str
     fixed: Mapping[str, float]
+    mean_speed: float
 
     @property
     def elements(self) -> tuple[Coupling, Coupling]:
@@ -78,9 +82,14 @@ class Structure:
             J_v=self.value(point, "J_vehicle"),
             k_o=self.value(point, "k_o"),
             c_o=self.value(point, "c_o"),
-            load=RoadLoad(constant=self.value(point, "Tv_over_if") * self.driveline.i_f),
+            load=self._load(point),
             elements=tuple(self._element(point, one) for one in self.elements),
         )
+
+    def _load(self, point: Point) -> RoadLoad:
+        aero = self.value(point, AERO)
+        mean = self.value(point, "Tv_over_if") * self.driveline.i_f
+        return RoadLoad(constant=mean - aero * self.mean_speed**2, aero=aero)
 
     def _element(self, point: Point, one: Coupling) -> ShiftElement:
         c, drop, v, ln_v_s = (self.value(point, f"{one.name}.{key}") for key in LAW)
@@ -118,6 +127,7 @@ class Structure:
             "J_out": (("J_out", 1.0),),
             "J_vehicle": (("J_v", 1.0),),
             "Tv_over_if": (("load.constant", i_f),),
+            AERO: (("load.aero", 1.0), ("load.constant", -(self.mean_speed**2))),
             "k_o": (("k_o", 1.0),),
             "c_o": (("c_o", 1.0),),
             f"{self.label}.speed": (
