@@ -90,8 +90,7 @@ def _better(
 ) -> tuple[Point | None, float, float]:
     """A point with less Q, by how much less, and the next damping, raised until there is one."""
     while damping < LARGEST:
-        step = step_of(normal.information, normal.gradient, damping)
-        trial = point.moved(np.clip(point.values + step, problem.lower, problem.upper))
+        trial = point.moved(point.values + _step(problem, point, normal, damping))
         fall = normal.cost - problem.cost(trial)
         if fall > 0.0:
             return trial, fall, damping / 10.0
@@ -99,8 +98,17 @@ def _better(
     return None, 0.0, damping
 
 
+def _step(problem: Problem, point: Point, normal: Normal, damping: float) -> FloatArray:
+    """Step (p,) that stays within the bounds; an unknown pressed against its bound rests there."""
+    at_lower = (point.values <= problem.lower) & (normal.gradient > 0.0)
+    at_upper = (point.values >= problem.upper) & (normal.gradient < 0.0)
+    free = np.flatnonzero(~(at_lower | at_upper))
+    step = np.zeros(point.values.size)
+    step[free] = step_of(normal.information[np.ix_(free, free)], normal.gradient[free], damping)
+    return np.asarray(np.clip(point.values + step, problem.lower, problem.upper) - point.values)
+
+
 def _expected(problem: Problem, point: Point, normal: Normal) -> float:
     """Fall of Q that a full step within the bounds promises."""
-    step = step_of(normal.information, normal.gradient)
-    step = np.clip(point.values + step, problem.lower, problem.upper) - point.values
+    step = _step(problem, point, normal, 0.0)
     return -float(2.0 * step @ normal.gradient + step @ normal.information @ step)

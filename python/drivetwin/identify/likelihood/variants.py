@@ -44,8 +44,8 @@ def choose(
     else:
         speed = problem.parts[0].structure.mean_speed
         notes.append(
-            f"the load grows with the square of the speed ({best.point[AERO]:.2g} ± {1.96 * std:.1g} "
-            f"N m s^2/rad^2 at the wheel); T_v/i_f holds at {speed:.3g} rad/s of the wheel"
+            f"the load grows with the square of the speed ({best.point[AERO]:.2g} ± "
+            f"{1.96 * std:.1g} N m s^2/rad^2 at the wheel); T_v/i_f holds at {speed:.3g} rad/s"
         )
     if problem.slow:
         means = fit(problem.averaged(), best.point, shifts)
