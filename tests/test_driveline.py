@@ -109,6 +109,23 @@ def test_agrees_with_the_reference_solver(name: str) -> None:
     assert abs(run.audit.error) < 1e-9 * run.audit.source
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_default_accuracy_holds_over_the_whole_run(name: str) -> None:
+    model, _, rows, start = reference_case(name)
+    time = rows["time_s"]
+    pressures = {"B2": Signal(time, rows["P_2_Pa"]), "B3": Signal(time, rows["P_3_Pa"])}
+    torque = Signal(time, rows["T_e_Nm"])
+    run = simulate(model, torque, pressures, start, time)
+    exact = simulate(model, torque, pressures, start, time, accuracy=Accuracy(exact=True))
+    assert np.abs(run.shaft_torque - rows["T_o_Nm"]).max() < 0.1
+    assert np.abs(run.engine_speed - rows["omega_e_rad_s"]).max() < 1e-5
+    assert np.abs(run.output_speed - rows["omega_out_rad_s"]).max() < 1e-5
+    assert np.abs(run.wheel_speed - rows["omega_w_rad_s"]).max() < 1e-5
+    assert [(e.element, e.kind) for e in run.events] == [(e.element, e.kind) for e in exact.events]
+    for a, b in zip(run.events, exact.events, strict=True):
+        assert abs(a.time - b.time) < 1e-6
+
+
 def test_energy_created_by_the_paper_law_is_reported_and_absent_with_the_dissipative_law() -> None:
     torque, pressures, start = held_second_gear()
     overrun = Signal(torque.time, np.array([1545.0, -800.0]))

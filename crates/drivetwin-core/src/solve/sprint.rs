@@ -20,12 +20,14 @@ pub(super) type Cache<T> = HashMap<(crate::network::ModeKey, u64, u64), Option<A
 const WORTH_WHILE: usize = 8;
 /// What torques may deviate from their chord within a sample, relative to their size.
 const BOW: f64 = 0.05;
-/// Passes over the end of a sample: the first knows the linear part of the channels only.
-const CORRECTIONS: usize = 2;
+/// Most passes over the end of a sample; the first knows the linear part of the channels only.
+const MAX_CORRECTIONS: usize = 4;
+/// Relative change of the cubics within a pass that counts as none.
+const CONVERGED: f64 = 1e-6;
 /// Most channels that a sprint can carry.
 pub(super) const MAX_ACTIVE: usize = 16;
 /// Largest cubic part of a channel over a step, relative to its size.
-const MAX_CUBIC: f64 = 0.02;
+const MAX_CUBIC: f64 = 2e-4;
 
 impl<T: Real> Integrator<'_, T> {
     /// Advance over as many whole samples as possible; `sink` gets time and basis at the start of each.
@@ -174,22 +176,30 @@ impl<T: Real> Integrator<'_, T> {
             let cubic = [value, rate, T::zero_(), T::zero_()];
             sample.y[fixed + CUBIC * i..][..CUBIC].copy_from_slice(&cubic);
         }
-        for _ in 0..CORRECTIONS {
-            self.correct(operators, &mut sample.y[..], fixed);
+        if operators.active.is_empty() {
+            return true;
         }
-        let h = operators.h;
-        sample.y[fixed..].chunks_exact(CUBIC).all(|cubic| {
-            (cubic[3].re() * h * h * h).abs() <= MAX_CUBIC * (cubic[0].re().abs() + 1.0)
-        })
+        for pass in 1..=MAX_CORRECTIONS {
+            let change = self.correct(operators, &mut sample.y[..], fixed);
+            if pass > 1 && change <= CONVERGED {
+                let h = operators.h;
+                return sample.y[fixed..].chunks_exact(CUBIC).all(|cubic| {
+                    (cubic[3].re() * h * h * h).abs() <= MAX_CUBIC * (cubic[0].re().abs() + 1.0)
+                });
+            }
+        }
+        false
     }
 
     /// One pass over the active channels: from the end that the present cubics lead to, new cubics.
-    fn correct(&self, operators: &Operators<T>, y: &mut [T], fixed: usize) {
+    /// Returns their largest change at the end, relative to their size.
+    fn correct(&self, operators: &Operators<T>, y: &mut [T], fixed: usize) -> f64 {
         let network = self.network;
         let (n, inputs) = (network.states(), network.mechanism.inputs.len());
         let h = operators.h;
         let mut ends = [[T::zero_(); 3]; MAX_ACTIVE];
         let mut rates = [T::zero_(); MAX_ACTIVE];
+        let mut change = 0.0_f64;
         for (i, &j) in operators.active.iter().enumerate() {
             let s = form(&operators.argument[i], y);
             rates[i] = form(&operators.rate[i], y);
@@ -207,9 +217,14 @@ impl<T: Real> Integrator<'_, T> {
             let rate = by_argument * ds + by_normal * self.normal_line(j)[1];
             let cubic = &mut y[fixed + CUBIC * i..][..CUBIC];
             let (rise, mean) = ((value - cubic[0]) / h, (cubic[1] + rate) / 2.0);
-            cubic[3] = (mean - rise) * (2.0 / (h * h));
-            cubic[2] = (rise * 3.0 - cubic[1] * 2.0 - rate) / h;
+            let (third, second) =
+                ((mean - rise) * (2.0 / (h * h)), (rise * 3.0 - cubic[1] * 2.0 - rate) / h);
+            let bend = (second - cubic[2]).re().abs() * h * h;
+            let twist = (third - cubic[3]).re().abs() * h * h * h;
+            change = change.max((bend + twist) / (value.re().abs() + 1.0));
+            (cubic[2], cubic[3]) = (second, third);
         }
+        change
     }
 
     /// Normal load of a friction channel at the start of the segment and its rate.
