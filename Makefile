@@ -75,6 +75,10 @@ fuzz: $(venv)/.native ## 20,000 damaged files through each reader, for an hour o
 picture: $(venv)/.native ## draw the README's picture (needs Chromium)
 	$(bin)/python -m tools.picture
 
+.PHONY: accuracy
+accuracy: $(venv)/.native ## Monte Carlo of the estimators against the bound, docs/accuracy.md (an hour)
+	$(bin)/python -m benchmarks.estimation
+
 .PHONY: fmt
 fmt: $(venv)/.dev ## format Rust and Python sources
 	cargo fmt --all
