@@ -16,7 +16,7 @@ def test_phases_are_those_of_the_truth(
 ) -> None:
     assert main(["shifts", str(bench_files.log), "--vehicle", str(bench_files.card), "--json"]) == 0
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
-    truth = json.loads(bench_files.truth.read_text())["shift"]
+    truth = json.loads(bench_files.truth.read_text())["shifts"][0]
     assert (shift["from"], shift["to"]) == ("2", "3")
     assert shift["kind"] == "power-on upshift"
     assert shift["torque_phase"][0] == pytest.approx(truth["torque_start"], abs=0.02)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.dyno.actuators import Actuator, Program, Vibration
+from drivetwin.dyno.actuators import Actuator, Fill, Program, Vibration
 from drivetwin.errors import InputError
 
 TIME = np.arange(2001) / 1000.0
@@ -44,3 +44,23 @@ def test_vibration_is_added_only_in_its_window() -> None:
 def test_a_program_needs_knots_in_order(knots: tuple[tuple[float, float], ...]) -> None:
     with pytest.raises(InputError, match="knots"):
         Program(knots)
+
+
+def test_fill_takes_its_time_at_boost_and_longer_below() -> None:
+    """The stroke goes with the root of the pressure difference: four times less, twice as long."""
+    fill = Fill(spring=7e4, boost=4e5, time=0.06)
+    for level, expected in ((4e5, 0.06), (7e4 + 0.25 * 3.3e5, 0.12)):
+        command = Program(((0.1, 0.0), (0.1 + 1e-6, level)))
+        pressure = Actuator(command, 0.0, 1e-4, fill=fill).pressure(TIME)
+        full = TIME[np.argmax(pressure > 1.01 * fill.spring)]
+        assert full - 0.1 == pytest.approx(expected, abs=2e-3)
+        assert pressure[-1] == pytest.approx(level)
+
+
+def test_a_clutch_that_is_full_follows_its_command() -> None:
+    command = Program(((0.5, 9e5), (1.0, 2e5)))
+    fill = Fill(spring=7e4, boost=4e5, time=0.06)
+    with_fill, without = (
+        Actuator(command, 0.01, 0.02, fill=each).pressure(TIME) for each in (fill, None)
+    )
+    assert np.array_equal(with_fill, without)

@@ -55,4 +55,4 @@ def test_truth_file_names_parameters_with_units_and_the_run(bench: DynoRun) -> N
     assert truth["parameters"]["J_vehicle"] == {"value": 6056.0, "unit": "kg*m^2"}
     assert truth["friction"]["B3"]["mu_c"] == 0.11
     assert truth["run"]["seed"] == 3
-    assert truth["shift"]["lockup"] == bench.truth.lockup
+    assert truth["shifts"][0]["lockup"] == bench.truth.lockup

@@ -3,18 +3,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import SCENARIOS, paper
+from drivetwin.dyno.scenarios import SCENARIOS, paper, scenario_of
 from drivetwin.dyno.truth import lockup_oscillation
+from drivetwin.errors import InputError
+
+DUAL = (ScenarioName.PAPER, ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS)
 
 
-@pytest.fixture(scope="module", params=list(ScenarioName))
+@pytest.fixture(scope="module", params=DUAL)
 def bench(request: pytest.FixtureRequest) -> DynoRun:
     return run(SCENARIOS[request.param](), noise=0.0)
 
@@ -86,10 +87,21 @@ def test_lockup_oscillation_rings_at_its_closed_form_frequency(bench: DynoRun) -
 
 def test_torque_reduction_shortens_the_inertia_phase() -> None:
     whole = paper()
-    reduced = replace(whole, reduction=replace(whole.reduction, fraction=0.4))
+    reduced = whole.with_torque_reduction(0.4)
     plain, cut = (run(scenario, noise=0.0) for scenario in (whole, reduced))
     torque = next(c for c in cut.channels if c.role == "engine_torque")
     assert torque.values.min() == pytest.approx(0.6 * 1545.0)
     assert plain.truth.lockup is not None
     assert cut.truth.lockup is not None
     assert cut.truth.lockup < plain.truth.lockup - 0.02
+
+
+def test_every_name_has_a_scenario_of_that_name() -> None:
+    for name in ScenarioName:
+        assert SCENARIOS[name]().name == name
+
+
+@pytest.mark.parametrize(("name", "drum"), [("paper", 0.05), ("gearbox", -0.1)])
+def test_a_drum_needs_a_gearbox(name: str, drum: float) -> None:
+    with pytest.raises(InputError, match="gearbox, gearbox_chain"):
+        scenario_of(ScenarioName(name), drum)

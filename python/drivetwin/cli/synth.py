@@ -19,7 +19,8 @@ ScenarioOption = Annotated[
     ScenarioName,
     typer.Option(
         help="paper: the paper's numbers at constant engine torque; paper_steps: the same with "
-        "throttle steps; throttle_steps: a long, strongly modulated 2nd gear."
+        "throttle steps; throttle_steps: a long, strongly modulated 2nd gear; gearbox: a whole "
+        "gearbox with drums that have inertia; gearbox_chain: the same from 2nd to 4th gear."
     ),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the sensor noise.")]
@@ -30,7 +31,13 @@ NoiseOption = Annotated[
 
 def synth(
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="NAME.csv", help="The log to write.")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="NAME.csv",
+            help="The log to write; .mf4, .parquet or .mat choose these formats.",
+        ),
     ] = Path("synth.csv"),
     scenario: ScenarioOption = ScenarioName.PAPER_STEPS,
     seed: SeedOption = 0,
@@ -38,23 +45,24 @@ def synth(
     torque_reduction: Annotated[
         float, typer.Option(help="Share of engine torque the TCU takes in the inertia phase.")
     ] = 0.0,
+    drum: Annotated[
+        float | None,
+        typer.Option(
+            metavar="KGM2", help="Inertia of each brake drum in the gearbox scenarios, 0.05 if not."
+        ),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Make a shift log with known truth on the virtual dynamometer.
 
     Beside the log NAME.csv stand NAME.truth.json and the vehicle card NAME.card.toml.
     """
-    from dataclasses import replace
-
     from drivetwin.dyno.dyno import run
-    from drivetwin.dyno.scenarios import SCENARIOS
+    from drivetwin.dyno.scenarios import scenario_of
 
     with step(f"running {scenario}"):
-        setup = SCENARIOS[scenario]()
-        reduction = replace(setup.reduction, fraction=torque_reduction)
-        log, card, truth = write_run(
-            output, run(replace(setup, reduction=reduction), seed, noise=noise)
-        )
+        setup = scenario_of(scenario, drum).with_torque_reduction(torque_reduction)
+        log, card, truth = write_run(output, run(setup, seed, noise=noise))
     if as_json:
         print_json({"log": log, "card": card, "truth": truth})
         return
@@ -63,16 +71,21 @@ def synth(
 
 
 def write_run(output: Path, run: DynoRun) -> tuple[Path, Path, Path]:
-    """Write log, vehicle card and truth of a run, all or none; returns their paths."""
-    from drivetwin.dyno.files import card_text, log_text, truth_text
+    """Write log, vehicle card and truth of a run, all or none; returns their paths.
 
-    texts = {
-        output: log_text(run),
-        output.with_suffix(".card.toml"): card_text(run.scenario),
-        output.with_suffix(".truth.json"): truth_text(run),
-    }
+    A CSV log is one table in which slow channels hold their value, as a data logger writes it; the
+    other formats keep each channel's own time base.
+    """
+    from drivetwin.dyno.files import card_text, log_text, recorded_channels, truth_text
+    from drivetwin.logs.write import write_log
+
+    card, truth = output.with_suffix(".card.toml"), output.with_suffix(".truth.json")
+    texts = {card: card_text(run.scenario), truth: truth_text(run)}
+    if output.suffix.casefold() == ".csv":
+        texts[output] = log_text(run)
     with staged(output.parent) as folder:
         for path, text in texts.items():
             (folder / path.name).write_text(text, encoding="utf-8", newline="\n")
-    log, card, truth = texts
-    return log, card, truth
+        if output not in texts:
+            write_log(folder / output.name, recorded_channels(run))
+    return output, card, truth

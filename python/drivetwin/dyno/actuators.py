@@ -60,17 +60,46 @@ class Vibration:
 
 
 @dataclass(frozen=True)
+class Fill:
+    """The stroke of a clutch piston against its return spring.
+
+    While the piston moves, its pressure is at most `spring` [Pa]. The whole stroke takes `time` [s]
+    at a pressure of `boost` [Pa], in proportion to the root of the pressure difference.
+    """
+
+    spring: float
+    boost: float
+    time: float
+
+    def limit(self, command: FloatArray, step: float) -> FloatArray:
+        """Return what is left of `command` (n,) [Pa], sampled every `step` [s].
+
+        A clutch that is commanded below the spring pressure at first is empty.
+        """
+        over = (command - self.spring) / (self.boost - self.spring)
+        speed = np.sign(over) * np.sqrt(np.abs(over)) / self.time
+        filled = 1.0 if command[0] > self.spring else 0.0
+        allowed = command.copy()
+        for index in range(1, command.size):
+            filled = min(1.0, max(0.0, filled + step * speed[index]))
+            if filled < 1.0:
+                allowed[index] = min(command[index], self.spring)
+        return allowed
+
+
+@dataclass(frozen=True)
 class Actuator:
-    """Valve and clutch volume: a dead time, then a first-order lag (both in s, lag > 0).
+    """Valve and clutch volume: a dead time, the fill, a first-order lag (times in s, lag > 0).
 
     `command` is the pressure asked for [Pa]; `vibration` is the unwanted part, as in the inertia
-    phase of Fig. 4.
+    phase of Fig. 4. Without `fill` the piston is at its stop.
     """
 
     command: Program
     dead_time: float
     lag: float
     vibration: Vibration | None = None
+    fill: Fill | None = None
 
     def pressure(self, time: FloatArray) -> FloatArray:
         """Pressure at evenly spaced `time` (n,) [s], in Pa; at rest before `time[0]`.
@@ -79,6 +108,8 @@ class Actuator:
         """
         command = self.command.at(time - self.dead_time)
         step = float(time[1] - time[0])
+        if self.fill is not None:
+            command = self.fill.limit(command, step)
         decay = np.exp(-step / self.lag)
         mean = self.lag / step * (1.0 - decay)
         b, a = np.array([1.0 - mean, mean - decay]), np.array([1.0, -decay])

@@ -75,7 +75,8 @@ def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[st
         name: Signal(grid, actuator.pressure(grid)) for name, actuator in scenario.actuators.items()
     }
     torque = Signal(grid, scenario.torque(grid))
-    trajectory = driveline.simulate(scenario.model, torque, pressures, scenario.start(), time)
+    run = driveline.simulate if scenario.plant is None else scenario.plant.simulate
+    trajectory = run(scenario.model, torque, pressures, scenario.start(), time)
     if trajectory.status != "completed":
         raise SimulationError(
             f"scenario {scenario.name!r} ended with status {trajectory.status!r}",

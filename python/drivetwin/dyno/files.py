@@ -12,9 +12,11 @@ import tomlkit
 from drivetwin.dyno.dyno import DynoRun
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import UnitError, Where
+from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.shiftlog import Channel, FloatArray
 from drivetwin.logs.units import UNITS, lookup
 from drivetwin.vehicle.schema import BAR
+from drivetwin.vehicle.spec import brake_ratios
 
 _J_OUT_TOLERANCE = 0.1
 """Relative standard deviation of Jo' on a card: what a drawing tells."""
@@ -33,6 +35,16 @@ def log_text(run: DynoRun) -> str:
 
 def _column(channel: Channel, time: FloatArray) -> FloatArray:
     """The channel in its file unit at the rows' times; the last value before them is held."""
+    held = np.searchsorted(channel.time, time + 1e-9, side="right") - 1
+    return _recorded(channel).values[np.clip(held, 0, None)]
+
+
+def recorded_channels(run: DynoRun) -> tuple[RawChannel, ...]:
+    """Return all channels in the units of their file, each on its own time base."""
+    return tuple(_recorded(channel) for channel in run.channels)
+
+
+def _recorded(channel: Channel) -> RawChannel:
     unit = lookup(channel.source_unit)
     if unit is None:
         raise UnitError(
@@ -40,8 +52,8 @@ def _column(channel: Channel, time: FloatArray) -> FloatArray:
             f"give the sensor one of {', '.join(sorted(UNITS))}",
             Where(channel=channel.source_name),
         )
-    held = np.searchsorted(channel.time, time + 1e-9, side="right") - 1
-    return (channel.values[np.clip(held, 0, None)] - unit.offset) / unit.factor
+    values = (channel.values - unit.offset) / unit.factor
+    return RawChannel(channel.source_name, channel.source_unit, channel.time, values)
 
 
 def truth_text(run: DynoRun) -> str:
@@ -50,7 +62,8 @@ def truth_text(run: DynoRun) -> str:
         "scenario": run.scenario.name,
         "seed": run.seed,
         "noise": run.noise,
-        "torque_reduction": run.scenario.reduction.fraction,
+        "torque_reduction": max((each.fraction for each in run.scenario.reductions), default=0.0),
+        "plant": "dual clutch" if run.scenario.plant is None else run.scenario.plant.name,
         "loss_law": run.scenario.model.loss_law,
     }
     return json.dumps({**run.truth.as_dict(), "run": setup}, indent=2, ensure_ascii=False) + "\n"
@@ -60,22 +73,10 @@ def card_text(scenario: Scenario) -> str:
     """A vehicle card (TOML) that knows of the driveline what design would know."""
     model = scenario.model
     gears = tomlkit.aot()
-    for name, element in (
-        (scenario.start_gear, scenario.offgoing),
-        (scenario.end_gear, scenario.oncoming),
-    ):
-        ratio = round(scenario.ratio(element) / model.i_in, 12)
-        gears.append(tomlkit.item({"name": name, "ratio": ratio, "elements": [element]}))
-    elements = {
-        element.name: {
-            "kind": "brake",
-            "gain_m3": element.gain,
-            "P0_bar": element.P0 / BAR,
-            "peak": element.peak,
-            "drum_inertia_kgm2": element.drum_inertia,
-        }
-        for element in model.elements
-    }
+    for gear in scenario.gears:
+        ratio = round(scenario.ratio(gear.element) / model.i_in, 12)
+        gears.append(tomlkit.item({"name": gear.name, "ratio": ratio, "elements": [gear.element]}))
+    elements = {gear.element: _element(scenario, gear.element) for gear in scenario.gears}
     inertia = {
         "J_prime_kgm2": list(scenario.J_prime_range),
         "J_vehicle_kgm2": list(scenario.J_vehicle_range),
@@ -90,3 +91,19 @@ def card_text(scenario: Scenario) -> str:
     card.add("elements", tomlkit.item(elements))
     card.add("inertia", tomlkit.item(inertia))
     return tomlkit.dumps(card)
+
+
+def _element(scenario: Scenario, name: str) -> dict[str, str | float]:
+    """A shift element; its ratios are stated where they are not those of a brake by its gear."""
+    element = scenario.element(name)
+    ratio = scenario.ratio(name) / scenario.model.i_in
+    stated = (element.i_c, element.i_out)
+    is_brake = ratio != 1.0 and np.allclose(stated, brake_ratios(ratio), rtol=1e-12)
+    return {
+        "kind": "brake" if is_brake else "clutch",
+        "gain_m3": element.gain,
+        "P0_bar": element.P0 / BAR,
+        "peak": element.peak,
+        "drum_inertia_kgm2": element.drum_inertia,
+        **({} if is_brake else {"i_c": element.i_c, "i_out": element.i_out}),
+    }

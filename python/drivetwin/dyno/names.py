@@ -12,3 +12,5 @@ class ScenarioName(StrEnum):
     PAPER = "paper"
     PAPER_STEPS = "paper_steps"
     THROTTLE_STEPS = "throttle_steps"
+    GEARBOX = "gearbox"
+    GEARBOX_CHAIN = "gearbox_chain"

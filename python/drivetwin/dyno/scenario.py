@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.driveline import DualClutch, ShiftElement, State
 from drivetwin.dyno.actuators import Actuator, Program
+from drivetwin.dyno.plant import Plant
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.errors import InputError, Where
 
@@ -44,21 +45,27 @@ class TorqueReduction:
 
 
 @dataclass(frozen=True)
-class Scenario:
-    """An upshift from `start_gear` (element `offgoing`) to `end_gear` (element `oncoming`).
+class HeldGear:
+    """A gear and the element that makes it."""
 
+    name: str
+    element: str
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Up-shifts through `gears`, each held by one element of the model.
+
+    Where there is a `plant`, the whole gearbox is simulated, and `model` is its dual-clutch form.
     `engine_speed` [rad/s] is the speed at time 0, where the start gear is in quasi-steady
-    acceleration. `engine_torque` [N m] is the driver's demand, without the TCU's `reduction`.
+    acceleration. `engine_torque` [N m] is the driver's demand, without the TCU's `reductions`.
     `rate` [Hz] is the sampling of the inputs, linear between samples. `drive_range` are plausible
     ranges for the vehicle card: of J' at the engine and of J3 at the wheel [kg m^2].
     """
 
     name: str
     model: DualClutch
-    start_gear: str
-    end_gear: str
-    offgoing: str
-    oncoming: str
+    gears: tuple[HeldGear, ...]
     duration: float
     engine_speed: float
     engine_torque: Program
@@ -66,8 +73,34 @@ class Scenario:
     sensors: tuple[Sensor, ...]
     J_prime_range: tuple[float, float]
     J_vehicle_range: tuple[float, float]
-    reduction: TorqueReduction
+    reductions: tuple[TorqueReduction, ...]
     rate: float = 1000.0
+    plant: Plant | None = None
+
+    @property
+    def start_gear(self) -> str:
+        """Gear before the first shift."""
+        return self.gears[0].name
+
+    @property
+    def end_gear(self) -> str:
+        """Gear after the first shift."""
+        return self.gears[1].name
+
+    @property
+    def offgoing(self) -> str:
+        """Off-going element of the first shift."""
+        return self.gears[0].element
+
+    @property
+    def oncoming(self) -> str:
+        """On-coming element of the first shift."""
+        return self.gears[1].element
+
+    def with_torque_reduction(self, fraction: float) -> Scenario:
+        """Return the scenario with another share of the engine torque taken in every shift."""
+        reductions = tuple(replace(each, fraction=fraction) for each in self.reductions)
+        return replace(self, reductions=reductions)
 
     def element(self, name: str) -> ShiftElement:
         """The shift element called `name`."""
@@ -79,8 +112,11 @@ class Scenario:
         return self.model.i_in * held.i_c * held.i_out
 
     def torque(self, time: FloatArray) -> FloatArray:
-        """Engine torque [N m] at `time` (n,), with the TCU's reduction."""
-        return self.engine_torque.at(time) * self.reduction.factor(time)
+        """Engine torque [N m] at `time` (n,), with the TCU's reductions."""
+        torque = self.engine_torque.at(time)
+        for reduction in self.reductions:
+            torque = torque * reduction.factor(time)
+        return torque
 
     def start(self) -> State:
         """Quasi-steady acceleration in the start gear: eqs. 10 and 11 with equal accelerations."""

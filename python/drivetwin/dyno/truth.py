@@ -4,29 +4,54 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from math import pi, sqrt
+from itertools import pairwise
+from math import inf, pi, sqrt
 from typing import Any
 
 from drivetwin.driveline import DualClutch, FrictionTable, Stribeck, Trajectory
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.parameters import spec_of
 
-SCHEMA = "drivetwin-truth/1"
+SCHEMA = "drivetwin-truth/2"
+
+
+@dataclass(frozen=True)
+class Instants:
+    """When a shift happened [s]; None where that did not happen.
+
+    `torque_start` is where the on-coming element fills, `inertia_start` where the off-going one
+    breaks away, `lockup` where the on-coming one locks.
+    """
+
+    start_gear: str
+    end_gear: str
+    torque_start: float | None
+    inertia_start: float | None
+    lockup: float | None
 
 
 @dataclass(frozen=True)
 class Truth:
-    """Parameters by id (SI), friction law by element, and the instants of the shift [s].
-
-    `torque_start` is where the on-coming element fills, `inertia_start` where the off-going one
-    breaks away, `lockup` where the on-coming one locks; None where that did not happen.
-    """
+    """Parameters by id (SI), friction law by element, and the instants of all shifts."""
 
     parameters: dict[str, float]
     friction: dict[str, Stribeck | FrictionTable]
-    torque_start: float | None
-    inertia_start: float | None
-    lockup: float | None
+    shifts: tuple[Instants, ...]
+
+    @property
+    def torque_start(self) -> float | None:
+        """Begin of the first shift's torque phase [s]."""
+        return self.shifts[0].torque_start
+
+    @property
+    def inertia_start(self) -> float | None:
+        """Begin of the first shift's inertia phase [s]."""
+        return self.shifts[0].inertia_start
+
+    @property
+    def lockup(self) -> float | None:
+        """Lock-up of the first shift [s]."""
+        return self.shifts[0].lockup
 
     def as_dict(self) -> dict[str, Any]:
         """For the side file: `parameters` as id -> {value, unit}, curves as id -> coefficients."""
@@ -37,11 +62,7 @@ class Truth:
                 for key, value in self.parameters.items()
             },
             "friction": {name: asdict(law) for name, law in self.friction.items()},
-            "shift": {
-                "torque_start": self.torque_start,
-                "inertia_start": self.inertia_start,
-                "lockup": self.lockup,
-            },
+            "shifts": [asdict(each) for each in self.shifts],
         }
 
 
@@ -49,9 +70,10 @@ def lockup_oscillation(model: DualClutch, ratio: float) -> tuple[float, float]:
     """Damped frequency [Hz] and damping ratio of the gearbox side against the vehicle (eq. 14).
 
     `ratio` is the overall ratio of the gear that is held; eqs. 12-14 of the paper in the output
-    shaft's frame.
+    shaft's frame, with the drums that turn in that gear.
     """
-    J4 = (model.J1 * model.eta + model.J2e) * ratio**2 + model.J_out
+    drums = sum(each.drum_inertia * (ratio / each.i_c - each.i_out) ** 2 for each in model.elements)
+    J4 = (model.J1 * model.eta + model.J2e) * ratio**2 + model.J_out + drums
     J5 = model.J_v / model.i_f**2
     J = J4 * J5 / (J4 + J5)
     zeta = model.c_o / (2.0 * sqrt(J * model.k_o))
@@ -59,39 +81,53 @@ def lockup_oscillation(model: DualClutch, ratio: float) -> tuple[float, float]:
 
 
 def truth_of(scenario: Scenario, trajectory: Trajectory) -> Truth:
-    """What an identification of this run should return."""
+    """What an identification of this run should return.
+
+    J' and Jo' are without the drums of open elements; a member of the whole gearbox that is no such
+    drum and turns with both shafts counts with its parts on the diagonal (THEORY section 2).
+    """
     model = scenario.model
-    start, end = scenario.start_gear, scenario.end_gear
-    start_ratio, end_ratio = scenario.ratio(scenario.offgoing), scenario.ratio(scenario.oncoming)
     engine_side = model.J1 * model.eta + model.J2e
-    f_d, zeta = lockup_oscillation(model, end_ratio)
     delays = {sensor.role: sensor.delay for sensor in scenario.sensors}
+    ratios = {gear.name: scenario.ratio(gear.element) for gear in scenario.gears}
+    rings = {gear: lockup_oscillation(model, ratios[gear]) for gear in list(ratios)[1:]}
     parameters = {
         "eta": model.eta,
-        f"J_prime_{start}": engine_side + model.J_out / start_ratio**2,
-        f"J_prime_{end}": engine_side + model.J_out / end_ratio**2,
+        **{
+            f"J_prime_{gear}": engine_side + model.J_out / ratio**2
+            for gear, ratio in ratios.items()
+        },
         "J_out": model.J_out,
         "J_vehicle": model.J_v,
         "Tv_over_if": (model.load.constant + model.load.rolling) / model.i_f,
         "k_o": model.k_o,
         "c_o": model.c_o,
-        f"f_d_{end}": f_d,
-        f"zeta_{end}": zeta,
+        **{f"f_d_{gear}": frequency for gear, (frequency, _) in rings.items()},
+        **{f"zeta_{gear}": zeta for gear, (_, zeta) in rings.items()},
         **{f"P0.{element.name}": element.P0 for element in model.elements},
         "te_delay": delays["engine_torque"],
     }
-    return Truth(
-        parameters,
-        {element.name: element.friction for element in model.elements},
-        torque_start=_first(trajectory, scenario.oncoming, "fill"),
-        inertia_start=_first(trajectory, scenario.offgoing, "break_away"),
-        lockup=_first(trajectory, scenario.oncoming, "lock"),
-    )
+    friction = {element.name: element.friction for element in model.elements}
+    return Truth(parameters, friction, _shifts(scenario, trajectory))
 
 
-def _first(trajectory: Trajectory, element: str, kind: str) -> float | None:
-    """Time of the first such event [s], or None."""
-    times = (
-        event.time for event in trajectory.events if (event.element, event.kind) == (element, kind)
-    )
-    return next(times, None)
+def _shifts(scenario: Scenario, trajectory: Trajectory) -> tuple[Instants, ...]:
+    """The instants of each shift; an element's events count from the lock-up before."""
+    found: list[Instants] = []
+    after = -inf
+
+    def first(element: str, kind: str) -> float | None:
+        times = (e.time for e in trajectory.events if (e.element, e.kind) == (element, kind))
+        return next((time for time in times if time > after), None)
+
+    for old, new in pairwise(scenario.gears):
+        instants = Instants(
+            old.name,
+            new.name,
+            torque_start=first(new.element, "fill"),
+            inertia_start=first(old.element, "break_away"),
+            lockup=first(new.element, "lock"),
+        )
+        after = after if instants.lockup is None else instants.lockup
+        found.append(instants)
+    return tuple(found)

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT
+"""The whole gearbox on the virtual dynamometer, and the dual-clutch form that it has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from drivetwin.driveline import (
+    DualClutch,
+    FloatArray,
+    RoadLoad,
+    ShiftElement,
+    Signal,
+    State,
+    Trajectory,
+)
+from drivetwin.gearbox import Gearbox, gear_statics, network_elements, reduce
+from drivetwin.gearbox.reduction import ElementRatios
+from drivetwin.gearbox.spec import GROUND
+from drivetwin.network import Element, Output, Start, simulate
+
+_ENGINE, _AXLE, _WHEEL, _SHAFT = "engine", "axle", "wheel", "output shaft"
+_TORQUE = "engine torque"
+_MAIN = 2e6
+"""Pressure of an element that stays closed throughout, Pa."""
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A gearbox with all its members between engine and output shaft.
+
+    `gears` are shifted through; `losses` of the model act before the gearbox. The `ratios` of each
+    shift element are those of eq. 15; `common` elements stay closed.
+    """
+
+    gearbox: Gearbox
+    gears: tuple[str, ...]
+    ratios: Mapping[str, ElementRatios]
+    common: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the gearbox."""
+        return self.gearbox.name
+
+    def simulate(
+        self,
+        model: DualClutch,
+        engine_torque: Signal,
+        pressures: Mapping[str, Signal],
+        start: State,
+        time: FloatArray,
+    ) -> Trajectory:
+        """Run the gearbox in the driveline of `model`, as `driveline.simulate` runs its form.
+
+        Slip and torque of the shift elements are those of the form (eq. 15).
+        Raises InputError where the description is inconsistent; a run that fails tells its status.
+        """
+        end = np.array([0.0, float(time[-1])])
+        idle = {name: Signal(end, np.zeros(2)) for name in self.gearbox.elements}
+        closed = {name: Signal(end, np.full(2, _MAIN)) for name in self.common}
+        run = simulate(
+            self._elements(model),
+            {**idle, **closed, **pressures, _TORQUE: engine_torque},
+            self._start(start),
+            time,
+            _outputs(self.gearbox, tuple(self.ratios)),
+        )
+        motion = run.columns
+        sense = {name: each.sense for name, each in self.ratios.items()}
+        return Trajectory(
+            time=time,
+            engine_speed=motion["speed", _ENGINE],
+            output_speed=motion["speed", self.gearbox.output],
+            wheel_speed=motion["speed", _WHEEL],
+            twist=motion["twist", _SHAFT],
+            shaft_torque=motion["shaft_torque", _SHAFT],
+            clutch_torque={n: sense[n] * motion["friction_torque", n] for n in sense},
+            slip={n: sense[n] * motion["slip", n] for n in sense},
+            events=run.events,
+            status=run.status,
+            audit=run.audit,
+        )
+
+    def _elements(self, model: DualClutch) -> list[Element]:
+        loss = {"law": model.loss_law, "eta": model.eta}
+        box, shaft = self.gearbox, {"stiffness": model.k_o, "damping": model.c_o}
+
+        def element(kind: str, name: str, **fields: Any) -> Element:
+            return {"type": kind, "name": name, **fields}
+
+        return [
+            element("torque", "engine torque", node=_ENGINE, input=_TORQUE),
+            element("inertia", "J1", node=_ENGINE, inertia=model.J1),
+            element("gear", "losses", a=_ENGINE, b=box.input, ratio=1.0, loss=loss),
+            *network_elements(box),
+            element("spring_damper", _SHAFT, a=box.output, b=_AXLE, **shaft),
+            element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
+            element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
+            element("road_load", "load", node=_WHEEL, **asdict(model.load)),
+        ]
+
+    def _start(self, start: State) -> Start:
+        """The state in the gear that `start` holds; the members turn as that gear makes them."""
+        gear = next(
+            name for name in self.gears if start.locked[0] in self.gearbox.gear(name).elements
+        )
+        members = gear_statics(self.gearbox, gear).speeds
+        speeds = {name: start.engine_speed * (each or 0.0) for name, each in members.items()}
+        return Start(
+            {**speeds, _ENGINE: start.engine_speed, _WHEEL: start.wheel_speed},
+            {_SHAFT: start.twist},
+            (*start.locked, *self.common),
+        )
+
+
+def _outputs(gearbox: Gearbox, elements: tuple[str, ...]) -> list[Output]:
+    return [
+        ("speed", _ENGINE),
+        ("speed", gearbox.output),
+        ("speed", _WHEEL),
+        ("twist", _SHAFT),
+        ("shaft_torque", _SHAFT),
+        *(("slip", name) for name in elements),
+        *(("friction_torque", name) for name in elements),
+    ]
+
+
+def plant_of(gearbox: Gearbox, gears: tuple[str, ...]) -> Plant:
+    """Prepare a gearbox for up-shifts through `gears`, all with the same elements in common.
+
+    Raises ReductionError for a shift that is not one element off and one on.
+    """
+    shifts = [reduce(gearbox, old, new) for old, new in pairwise(gears)]
+    ratios = {each.element: each for s in shifts for each in (s.off_going, s.on_coming)}
+    return Plant(gearbox, gears, ratios, shifts[0].common)
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What is around a gearbox on the dynamometer; fields as of `DualClutch`."""
+
+    J1: float
+    eta: float
+    i_f: float
+    J_v: float
+    k_o: float
+    c_o: float
+    load: RoadLoad
+
+
+def form_of(plant: Plant, around: Surroundings) -> DualClutch:
+    """Return the dual-clutch form of a gearbox in its surroundings.
+
+    A member that is the drum of a shift element runs with its slip and becomes its drum inertia.
+    All others count with their parts on the diagonal; where one of them turns with both shafts the
+    form is not exact (THEORY section 2).
+    """
+    box = plant.gearbox
+    shift = reduce(box, *plant.gears[:2])
+    drums = {box.elements[name].a: name for name in plant.ratios if _is_brake(box, name)}
+    others = [each for each in shift.members if each.member not in drums]
+    return DualClutch(
+        J1=around.J1,
+        J2e=sum(each.inertia * each.a**2 for each in others),
+        eta=around.eta,
+        loss_law="paper",
+        i_in=1.0,
+        J_out=sum(each.inertia * each.b**2 for each in others),
+        i_f=around.i_f,
+        J_v=around.J_v,
+        k_o=around.k_o,
+        c_o=around.c_o,
+        load=around.load,
+        elements=tuple(
+            _element(box, each, _drum(box, each.element)) for each in plant.ratios.values()
+        ),
+    )
+
+
+def _is_brake(gearbox: Gearbox, element: str) -> bool:
+    return gearbox.elements[element].b == GROUND
+
+
+def _drum(gearbox: Gearbox, element: str) -> float:
+    """Inertia of the member that a brake holds; 0 for a clutch."""
+    member = gearbox.elements[element].a
+    drum = gearbox.inertias.get(member, 0.0)
+    return drum if _is_brake(gearbox, element) else 0.0
+
+
+def _element(gearbox: Gearbox, ratios: ElementRatios, drum: float) -> ShiftElement:
+    capacity = gearbox.capacity(ratios.element)
+    return ShiftElement(
+        name=ratios.element,
+        i_c=ratios.i_c,
+        i_out=ratios.i_out,
+        gain=capacity.gain,
+        P0=capacity.P0,
+        friction=capacity.friction,
+        peak=capacity.peak,
+        drum_inertia=drum,
+    )

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+"""The whole gearbox on the dynamometer against its dual-clutch form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin import driveline
+from drivetwin.driveline import FloatArray, Signal, Trajectory
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.plant import Surroundings, form_of, plant_of
+from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.errors import ReductionError
+from drivetwin.gearbox import gear_statics, load_gearbox, reduce
+
+
+def both(scenario: Scenario) -> tuple[Trajectory, Trajectory]:
+    """Whole gearbox and form on the same inputs."""
+    whole = run(scenario, noise=0.0).trajectory
+    form = run(replace(scenario, plant=None), noise=0.0).trajectory
+    return whole, form
+
+
+def difference(a: FloatArray, b: FloatArray) -> float:
+    return float(np.max(np.abs(a - b)) / np.max(np.abs(a)))
+
+
+@pytest.mark.parametrize("name", [ScenarioName.GEARBOX, ScenarioName.GEARBOX_CHAIN])
+@pytest.mark.parametrize("drum", [0.0, 0.2])
+def test_brake_drums_are_the_drums_of_the_form(name: ScenarioName, drum: float) -> None:
+    whole, form = both(scenario_of(name, drum))
+    assert difference(whole.shaft_torque, form.shaft_torque) < 1e-9
+    assert difference(whole.engine_speed, form.engine_speed) < 1e-9
+    for element in form.slip:
+        assert difference(whole.slip[element], form.slip[element]) < 1e-8
+        assert difference(whole.clutch_torque[element], form.clutch_torque[element]) < 1e-8
+    times = [np.array([event.time for event in each.events]) for each in (whole, form)]
+    assert np.abs(times[0] - times[1]).max() < 1e-9
+
+
+def test_the_drum_of_an_open_element_that_is_no_shift_element_breaks_the_form() -> None:
+    """C2 = R3 turns with both shafts; the form keeps its diagonal parts only."""
+    scenario = scenario_of(ScenarioName.GEARBOX)
+    assert scenario.plant is not None
+    box = scenario.plant.gearbox
+    heavy = plant_of(replace(box, inertias={**box.inertias, "R3-C2": 0.2}), scenario.plant.gears)
+    assert "R3-C2" in [each.member for each in reduce(heavy.gearbox, "2", "3").violations]
+    light = scenario.model
+    fields = ("J1", "eta", "i_f", "J_v", "k_o", "c_o", "load")
+    form = form_of(heavy, Surroundings(**{name: getattr(light, name) for name in fields}))
+    assert form.J_out > light.J_out
+    assert form.J2e > light.J2e
+    whole, reduced = both(replace(scenario, model=form, plant=heavy))
+    assert 0.001 < difference(whole.shaft_torque, reduced.shaft_torque) < 0.2
+
+
+def test_inertia_of_a_gear_is_the_kinetic_energy_of_its_members() -> None:
+    """2·E/ω_in² of all members but the open drums, the engine's counted η times."""
+    scenario = scenario_of(ScenarioName.GEARBOX_CHAIN)
+    assert scenario.plant is not None
+    box, model = scenario.plant.gearbox, scenario.model
+    truth = run(scenario, noise=0.0).truth.parameters
+    for gear in ("2", "3", "4"):
+        speeds = gear_statics(box, gear).speeds
+        members = sum(
+            inertia * (speeds[member] or 0.0) ** 2
+            for member, inertia in box.inertias.items()
+            if member not in ("R1", "R2-C1")
+        )
+        expected = members + model.eta * model.J1
+        assert truth[f"J_prime_{gear}"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_what_is_simulated_starts_without_a_jerk() -> None:
+    trajectory = run(scenario_of(ScenarioName.GEARBOX), noise=0.0).trajectory
+    early = trajectory.shaft_torque[trajectory.time < 0.25]
+    assert np.ptp(early) < 5e-3 * early.mean()
+
+
+def test_double_transitions_have_no_plant() -> None:
+    with pytest.raises(ReductionError, match="not one element off and one on"):
+        plant_of(load_gearbox("three-set-4000cr"), ("2", "5"))
+
+
+def test_a_form_is_a_driveline_that_runs() -> None:
+    scenario = scenario_of(ScenarioName.GEARBOX)
+    time = np.linspace(0.0, 0.2, 21)
+    held = {name: Signal(time, np.full(21, 1e6)) for name in ("C4", "C3")}
+    held["C3"] = Signal(time, np.zeros(21))
+    torque = Signal(time, np.full(21, 1545.0))
+    result = driveline.simulate(scenario.model, torque, held, scenario.start(), time)
+    assert result.status == "completed"
