@@ -6,7 +6,7 @@ Result tables, reports, exports and documentation derive from it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drivetwin.errors import InputError
 
@@ -56,11 +56,19 @@ _SPECS = (
 SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}
 
 
+OVER_ETA = "_over_eta"
+"""Suffix of the id of a torque-like quantity divided by η: all that a log without an output
+torque tells of it."""
+
+
 def spec_of(parameter_id: str) -> ParameterSpec:
-    """Return the declaration behind an id such as `J_prime_2`, `P0.B3` or `eta`.
+    """Return the declaration behind an id such as `J_prime_2`, `P0.B3`, `eta` or `k_o_over_eta`.
 
     Raises InputError for an id that no declaration covers.
     """
+    if parameter_id.endswith(OVER_ETA):
+        whole = spec_of(parameter_id.removesuffix(OVER_ETA))
+        return replace(whole, symbol=f"{whole.symbol}/η", meaning=f"{whole.meaning}, over η")
     if parameter_id in SPECS:
         return SPECS[parameter_id]
     for spec in _SPECS:

@@ -129,7 +129,7 @@ def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
     def fail(*_: object) -> None:
         raise IdentificationError("the simulation went astray", "nothing")
 
-    monkeypatch.setattr("drivetwin.identify.likelihood.run.fit", fail)
+    monkeypatch.setattr("drivetwin.identify.likelihood.variants.fit", fail)
     found = identify(*recording("truck_a"), Method.LIKELIHOOD)
     assert found.method is Method.INTEGRAL
     assert any("went astray" in text for text in found.warnings)
@@ -165,4 +165,23 @@ def test_refusals() -> None:
         identify(log, card, FoundShifts((), ()))
     channels = {role: c for role, c in log.channels.items() if role != "output_torque"}
     with pytest.raises(IdentificationError, match="no output torque"):
-        identify(replace(log, channels=channels), card, shifts)
+        identify(replace(log, channels=channels), card, shifts, Method.INTEGRAL)
+
+
+def test_without_an_output_torque_ratios_are_told_and_absolute_values_refused() -> None:
+    log, card, shifts = recording("truck_a")
+    whole = identified("truck_a", Method.LIKELIHOOD)
+    channels = {role: c for role, c in log.channels.items() if role != "output_torque"}
+    found = identify(replace(log, channels=channels), card, shifts, Method.LIKELIHOOD)
+    eta = whole.estimates["eta"].value
+    assert eta is not None
+    for name in ("J_prime_2", "J_vehicle", "Tv_over_if", "k_o", "c_o"):
+        assert found.estimates[name].value is None
+        assert "output torque" in found.estimates[name].reason
+        ratio, absolute = found.estimates[f"{name}_over_eta"], whole.estimates[name].value
+        assert ratio.value is not None
+        assert ratio.std_noise is not None
+        assert absolute is not None
+        assert abs(ratio.value - absolute / eta) < 4.0 * ratio.std_noise, name
+    assert found.estimates["eta"].verdict is Verdict.NOT_IDENTIFIABLE
+    assert found.friction["B3"].method == "likelihood, μ over η"

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.errors import IdentificationError, Where
 from drivetwin.identify.noise import resolution, white_noise
 from drivetwin.identify.signals import Coupling, Driveline, PriorValue, Sampled, ShiftSignals
 from drivetwin.logs.held import fresh_samples
@@ -55,16 +54,8 @@ def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
 def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
     """The signals of a log that the estimators need, around `shift`.
 
-    Raises MissingChannelError for a missing channel, IdentificationError where there is no
-    output-torque sensor: without it nothing torque-like can be told.
+    Raises MissingChannelError for a missing channel. The output torque may be missing.
     """
-    if "output_torque" not in log:
-        raise IdentificationError(
-            "the log has no output torque: inertias, load, shaft and friction share one unknown "
-            "scale without it",
-            "map an output-shaft torque sensor as `output_torque`, or log a run with one",
-            Where(file=log.source),
-        )
     if "engine_speed" in log:
         engine_speed = sampled(log["engine_speed"])
     else:
@@ -73,7 +64,7 @@ def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
     elements = {shift.offgoing, shift.oncoming}
     return ShiftSignals(
         engine_torque=engine_torque,
-        output_torque=sampled(log["output_torque"]),
+        output_torque=sampled(log["output_torque"]) if "output_torque" in log else _NOTHING,
         engine_speed=engine_speed,
         output_speed=sampled(log["output_speed"]),
         wheel_speed=sampled(log["wheel_speed"]) if "wheel_speed" in log else None,
@@ -81,6 +72,10 @@ def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
         shift=shift,
         torque_resolution=resolution(engine_torque.values),
     )
+
+
+_NOTHING = Sampled(np.empty(0), np.empty(0))
+"""What stands for a sensor that the log does not have."""
 
 
 def disturbed(signals: ShiftSignals, role: str, gain: float, offset: float) -> ShiftSignals:

@@ -15,7 +15,7 @@ from drivetwin.identify.conclude import Conclusions, conclude, with_systematic_b
 from drivetwin.identify.friction import FrictionSettings, stribeck_at
 from drivetwin.identify.inputs import driveline_of, signals_of
 from drivetwin.identify.integral import IntegralShift, identify_shift
-from drivetwin.identify.likelihood.run import likelihood
+from drivetwin.identify.likelihood.run import likelihood, likelihood_alone
 from drivetwin.identify.literal import PaperShift, paper_shift
 from drivetwin.identify.literal_result import paper_conclusions
 from drivetwin.identify.method import DEFAULT_METHOD, Method
@@ -60,27 +60,10 @@ def identify(
         )
     signals = [signals_of(log, card, shift) for shift in shifts.shifts]
     drivelines = [driveline_of(card, shift) for shift in shifts.shifts]
-    evidence: dict[str, Any] = {}
-    if method is Method.PAPER:
-        paper = _paper_shifts(signals, drivelines, card)
-        found = paper_conclusions(paper, signals, drivelines)
+    if all(s.scale_known for s in signals):
+        found, method, evidence = _with_torque(signals, drivelines, card, method)
     else:
-        found, evidence["integral"] = _integral(signals, drivelines, card)
-        if method is Method.LIKELIHOOD:
-            try:
-                found, evidence["likelihood"] = likelihood(
-                    signals, drivelines, (found, evidence["integral"]), card
-                )
-            except IdentificationError as error:
-                method = Method.INTEGRAL
-                text = f"likelihood: {error.what}; the values are those of the integral method"
-                found = replace(found, warnings=(text, *found.warnings))
-        try:
-            paper = _paper_shifts(signals, drivelines, card)
-        except IdentificationError as error:
-            paper = ()
-            found = replace(found, warnings=(*found.warnings, f"paper's method: {error.what}"))
-    evidence["paper"] = paper
+        found, evidence = _without_torque(log, signals, drivelines, card, method)
     return Identification(
         estimates=found.estimates,
         friction=found.friction,
@@ -98,6 +81,59 @@ def identify(
         correlation_ids=found.correlation_ids,
         correlation=found.correlation,
     )
+
+
+_Stage = tuple[Conclusions, Method, dict[str, Any]]
+
+
+def _with_torque(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    card: VehicleCard,
+    method: Method,
+) -> _Stage:
+    """Conclusions, the method that they are from, and the evidence."""
+    evidence: dict[str, Any] = {}
+    if method is Method.PAPER:
+        evidence["paper"] = _paper_shifts(signals, drivelines, card)
+        return paper_conclusions(evidence["paper"], signals, drivelines), method, evidence
+    found, evidence["integral"] = _integral(signals, drivelines, card)
+    if method is Method.LIKELIHOOD:
+        try:
+            linear = (found, evidence["integral"])
+            found, evidence["likelihood"] = likelihood(signals, drivelines, linear, card)
+        except IdentificationError as error:
+            method = Method.INTEGRAL
+            text = f"likelihood: {error.what}; the values are those of the integral method"
+            found = replace(found, warnings=(text, *found.warnings))
+    try:
+        evidence["paper"] = _paper_shifts(signals, drivelines, card)
+    except IdentificationError as error:
+        evidence["paper"] = ()
+        found = replace(found, warnings=(*found.warnings, f"paper's method: {error.what}"))
+    return found, method, evidence
+
+
+def _without_torque(
+    log: ShiftLog,
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    card: VehicleCard,
+    method: Method,
+) -> tuple[Conclusions, dict[str, Any]]:
+    """What a log without an output torque tells: only the likelihood method does without it.
+
+    Raises IdentificationError for the other methods.
+    """
+    if method is not Method.LIKELIHOOD:
+        raise IdentificationError(
+            "the log has no output torque: inertias, load, shaft and friction share one unknown "
+            f"scale without it, which the {method} method cannot leave open",
+            "map an output-shaft torque sensor as `output_torque`, or use --method likelihood",
+            Where(file=log.source),
+        )
+    found, best = likelihood_alone(signals, drivelines, card)
+    return found, {"integral": (), "paper": (), "likelihood": best}
 
 
 def _paper_shifts(

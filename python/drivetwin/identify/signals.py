@@ -94,7 +94,8 @@ class ShiftSignals:
     """The measured signals of a log, engine side referred to ω_e, and the shift they show.
 
     `engine_torque` holds fresh values only, at their own raster. `wheel_speed` is None where the
-    log has none. Positive directions as in THEORY section 3.
+    log has none; `output_torque` is empty where it has none. Positive directions as in THEORY
+    section 3.
     """
 
     engine_torque: Sampled
@@ -106,3 +107,8 @@ class ShiftSignals:
     shift: Shift
     torque_resolution: float = field(default=0.0)
     """Rounding step of the engine torque [N m]; 0 where none shows."""
+
+    @property
+    def scale_known(self) -> bool:
+        """Whether an output torque gives all torque-like quantities their common scale."""
+        return self.output_torque.time.size > 0

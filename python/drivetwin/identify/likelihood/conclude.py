@@ -15,16 +15,22 @@ from drivetwin.identify.conclude import (
     low_gear_notes,
 )
 from drivetwin.identify.likelihood.curves import METHOD, curves_of
-from drivetwin.identify.likelihood.derived import parameters, slopes
+from drivetwin.identify.likelihood.derived import absolute_ids, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.null_space import null_directions
+from drivetwin.identify.likelihood.priors import over_eta
 from drivetwin.identify.likelihood.residuals import residual_tests
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
-from drivetwin.identify.result import Estimate, FrictionCurve
+from drivetwin.identify.result import Estimate, FrictionCurve, Verdict
 from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
 from drivetwin.identify.uncertainty import correlation, designed, judge, refused
+from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import SensorTolerance
 
+NO_SCALE = (
+    "without an output torque sensor all torques share one unknown scale; what is told is the "
+    "quantity over η; add an output-shaft torque sensor"
+)
 NO_AGE = "the engine torque moves too little for its age to show"
 WITH_PRIOR = "likelihood with design prior"
 """Method of a parameter whose own design value took part in its estimate."""
@@ -58,6 +64,8 @@ def conclude(
             zip(values, values.values(), np.diag(covariance), strict=True)
         )
     }
+    if not signals[0].scale_known:
+        estimates |= {name: _without_scale(name) for name in absolute_ids(signals)}
     if "te_delay" not in fit.point.names:
         estimates["te_delay"] = refused("te_delay", METHOD, NO_AGE)
     return Conclusions(
@@ -81,10 +89,17 @@ def _estimate(
     return judge(name, value, std, method, systematic, note)
 
 
+def _without_scale(name: str) -> Estimate:
+    """A torque-like parameter of a log without an output torque."""
+    return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
+
+
 def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
     """Design value of a parameter itself, where the card states one."""
     if name == "J_out":
         return drivelines[0].J_out
+    if name == "J_out" + OVER_ETA and drivelines[0].J_out is not None:
+        return over_eta(drivelines[0].J_out)
     if name.startswith("P0."):
         couplings = [c for d in drivelines for c in (d.offgoing, d.oncoming)]
         return next(c.P0 for c in couplings if c.name == name.removeprefix("P0."))

@@ -125,8 +125,9 @@ def _process(
     """Process noise (N, 4, 4) that enters between a grid point and the one before; first: start."""
     sigma = {out.name: out.sigma for out in record.outputs}
     wheel = sigma.get("wheel_speed", sigma["output_speed"] / model.i_f)
+    torque = sigma.get("output_torque", record.input_sigma["engine torque"])
     quiet = QUIET * np.array(
-        [sigma["engine_speed"], sigma["output_speed"], wheel, sigma["output_torque"] / model.k_o]
+        [sigma["engine_speed"], sigma["output_speed"], wheel, torque / model.k_o]
     )
     noise = np.zeros((record.time.size, STATES, STATES)) + np.diag(quiet**2)
     for name, drive in response.drive.items():

@@ -16,6 +16,10 @@ from drivetwin.identify.result import FrictionCurve
 from drivetwin.identify.signals import FloatArray
 
 METHOD = "likelihood"
+OF_RATIO = ", μ over η"
+"""What follows the method of a curve where no output torque gives μ its scale."""
+LOCKED = 1e-6
+"""Slip [rad/s] below which a simulated element is locked."""
 POINTS = 60
 
 
@@ -46,7 +50,7 @@ def curves_of(
             mu_lo=mu - half,
             mu_hi=mu + half,
             stribeck={"mu_c": mu_c, "mu_s": mu_c + drop, "v_s": v_s, "mu_v": mu_v},
-            method=METHOD,
+            method=METHOD if part.scale_known else METHOD + OF_RATIO,
             stribeck_covariance=to_law @ fit.covariance[square] @ to_law.T,
         )
     return found
@@ -57,7 +61,8 @@ def _seen(fit: LikelihoodFit, part: Part) -> FrictionCurve:
     name = part.structure.driveline.oncoming.name
     run = part.run(fit.point)
     assert run is not None
-    slip = np.abs(run.slip[name][np.abs(run.clutch_torque[name]) > 0.0])
+    slip = np.abs(run.slip[name])
+    slip = slip[(np.abs(run.clutch_torque[name]) > 0.0) & (slip > LOCKED)]
     grid = np.linspace(float(slip.min()), float(slip.max()), POINTS)
     nothing, empty = np.zeros(POINTS), np.empty(0)
     return FrictionCurve(grid, nothing, nothing, nothing, empty, empty, None, METHOD)

@@ -15,7 +15,10 @@ import numpy as np
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import Point, Structure
 from drivetwin.identify.signals import FloatArray, ShiftSignals
+from drivetwin.parameters import OVER_ETA, spec_of
 
+TORQUE_LIKE = ("J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+"""Stems of parameters that share the one scale that only an output torque shows."""
 DIRECT = ("J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Unknowns that are parameters themselves."""
 
@@ -36,7 +39,23 @@ def parameters(problem: Problem, point: Point, signals: Sequence[ShiftSignals]) 
         values |= {f"f_d_{s.shift.end_gear}": f_d, f"zeta_{s.shift.end_gear}": zeta}
         for element in structure.elements:
             values[f"P0.{element.name}"] = structure.value(point, f"{element.name}.P0")
-    return values
+    return values if signals[0].scale_known else _over_eta(values)
+
+
+def _over_eta(values: dict[str, float]) -> dict[str, float]:
+    """The same parameters told without an output torque, where the model has η = 1."""
+    return {
+        name + OVER_ETA if spec_of(name).stem in TORQUE_LIKE else name: value
+        for name, value in values.items()
+        if name != "eta"
+    }
+
+
+def absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
+    """Ids that a log without an output torque cannot tell."""
+    gears = dict.fromkeys(g for s in signals for g in (s.shift.start_gear, s.shift.end_gear))
+    others = tuple(stem for stem in TORQUE_LIKE if stem != "J_prime")
+    return ("eta", *(f"J_prime_{gear}" for gear in gears), *others)
 
 
 def oscillation(structure: Structure, point: Point) -> tuple[float, float]:

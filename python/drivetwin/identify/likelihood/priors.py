@@ -51,6 +51,8 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
     "drum": (0.0, SPECS["J_out"].upper),
 }
 """Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
+PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
+"""Efficiency of a gearbox where no output torque shows it."""
 AERO_SPREAD = 10.0
 """Plausible air drag at the wheel [N m s^2/rad^2]: of a lorry 1 to 3, of a car 0.1."""
 OFF_GOING_LEVEL = 0.03
@@ -73,10 +75,12 @@ def problem_of(
     priors = _priors(signals, drivelines, guess)
     every = (*COMMON, *_laws(drivelines), *_fills(drivelines))
     names = [n for n in every if not _is_known(priors.get(n))]
+    if not signals[0].scale_known:
+        names.remove("eta")
     if not all(shows_age(s.engine_torque) for s in signals):
         names.remove("te_delay")
     names += [n for n in (TE_OFFSET, AERO) if n in priors]
-    fixed = {AERO: 0.0} | dict(guess) | {n: p.value for n, p in priors.items() if _is_known(p)}
+    fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_known(p)}
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
         label = f"start{k}"
@@ -85,7 +89,8 @@ def problem_of(
         parts.append(Part.unweighted(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
-        values = (first["output_speed"], wheel, first["output_torque"] / guess["k_o"])
+        torque = first.get("output_torque", guess["Tv_over_if"])
+        values = (first["output_speed"], wheel, torque / guess["k_o"])
         start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
     point = Point(tuple(start), np.array(list(start.values())))
     lower, upper = bounds_of(point.names)
@@ -94,6 +99,13 @@ def problem_of(
     }
     prior = Prior.independent(len(point.names), entries)
     return Problem(tuple(parts), prior, lower, upper), point
+
+
+def over_eta(known: PriorValue) -> PriorValue:
+    """Design value of a torque-like quantity divided by an efficiency that is not known."""
+    value = known.value / PLAUSIBLE_ETA.value
+    spread = value * PLAUSIBLE_ETA.std / PLAUSIBLE_ETA.value
+    return PriorValue(value, float(np.hypot(known.std / PLAUSIBLE_ETA.value, spread)))
 
 
 def mean_speed_of(signals: Sequence[ShiftSignals], i_f: float) -> float:
@@ -159,7 +171,8 @@ def _priors(
     """What is known beforehand, by unknown."""
     found = {"te_delay": MomentumSettings().delay_prior}
     if drivelines[0].J_out is not None:
-        found["J_out"] = drivelines[0].J_out
+        known = drivelines[0].J_out
+        found["J_out"] = known if signals[0].scale_known else over_eta(known)
     step = signals[0].torque_resolution
     rounding = rounding_error(signals[0].engine_torque, step)
     if rounding > 0.0:

@@ -51,6 +51,11 @@ class Part:
         """A part whose residuals count by the sensors' noise alone."""
         return cls(structure, record, sensor_noise(record))
 
+    @property
+    def scale_known(self) -> bool:
+        """Whether an output torque is among the compared signals."""
+        return any(out.name == "output_torque" for out in self.record.outputs)
+
     def run(self, point: Point) -> Trajectory | None:
         """The simulation at `point`; None where it has none or does not reach the end."""
         try:
@@ -123,9 +128,10 @@ class Part:
         """Change (n,) of the simulated samples by disturbances (N-1,) of inputs, by name."""
         model = self.structure.model(point)
         z = self.response(point, run).to(disturbance)
-        return np.concatenate(
-            [z[out.centre] @ observed(model, out.name) for out in self.record.outputs]
-        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.concatenate(
+                [z[out.centre] @ observed(model, out.name) for out in self.record.outputs]
+            )
 
     def weighted_by(self, point: Point) -> Part:
         """The part with the covariance of output and input noise at `point`.
@@ -137,6 +143,8 @@ class Part:
             return self
         model = self.structure.model(point)
         response = response_of(model, run, self.record)
+        if not response.finite:
+            return self
         try:
             return replace(self, weighting=with_input_noise(model, self.record, response))
         except np.linalg.LinAlgError:

@@ -181,7 +181,8 @@ def record_of(signals: ShiftSignals, driveline: Driveline, span: Span) -> Record
     inputs = (signals.engine_torque, *signals.pressures.values())
     start = max(span[0], *(s.time[0] for s in inputs))
     end = min(span[1], *(s.time[-1] for s in inputs)) - LATEST
-    parts = {name: s.within((start, end)) for name, s in channels.items() if s is not None}
+    present = {name: s for name, s in channels.items() if s is not None and s.time.size}
+    parts = {name: s.within((start, end)) for name, s in present.items()}
     time = np.unique(np.concatenate([part.time for part in parts.values()]))
     if time.size > 1 and np.median(np.diff(time)) > SLOW:
         time = np.union1d(time, np.arange(time[0], time[-1], GRID))

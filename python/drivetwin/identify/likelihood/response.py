@@ -41,14 +41,23 @@ class Response:
     drive: dict[str, FloatArray]
 
     def to(self, disturbance: dict[str, FloatArray]) -> FloatArray:
-        """z (N, 4) in answer to disturbances (N-1,) of inputs by name, from z = 0."""
+        """z (N, 4) in answer to disturbances (N-1,) of inputs by name, from z = 0.
+
+        Not finite where the run itself is unstable, as with a law that falls steeply with slip.
+        """
         push = np.zeros_like(next(iter(self.drive.values())))
         for name, values in disturbance.items():
             push += self.drive[name] * values[:, None]
         z = np.zeros((len(push) + 1, STATES))
-        for k, matrix in enumerate(self.transition):
-            z[k + 1] = matrix @ z[k] + push[k]
+        with np.errstate(over="ignore", invalid="ignore"):
+            for k, matrix in enumerate(self.transition):
+                z[k + 1] = matrix @ z[k] + push[k]
         return z
+
+    @property
+    def finite(self) -> bool:
+        """Whether all transitions are finite numbers."""
+        return bool(np.all(np.isfinite(self.transition)))
 
 
 def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
@@ -74,7 +83,8 @@ def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
     inverse = _accelerating(model, locked)
     rate = inverse @ free
     rate[:, 3] = (0.0, 1.0, -model.i_f, 0.0)
-    transition, mean = _exponential(rate * step[:, None, None])
+    with np.errstate(over="ignore", invalid="ignore"):
+        transition, mean = _exponential(rate * step[:, None, None])
     for k, jump in _jumps(model, run):
         transition[k] = jump @ transition[k]
     effect = mean @ inverse * step[:, None, None]

@@ -13,12 +13,28 @@ from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.guess import guess_of
+from drivetwin.identify.likelihood.scale_free import guess_without_torque
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.vehicle.spec import VehicleCard
 
 DISAGREE = 5.0
 """Difference of the two methods in its standard deviations from which a warning is due."""
+
+
+def likelihood_alone(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
+) -> tuple[Conclusions, LikelihoodFit]:
+    """Fit a log without an output torque: ratios over η, and all absolute values refused.
+
+    Raises IdentificationError where the fit does not reach a plausible minimum.
+    """
+    guess: dict[str, float] = {}
+    for s, d in zip(signals, drivelines, strict=True):
+        guess = guess_without_torque(s, d, card) | guess
+    best, notes = choose(signals, drivelines, card.loss_law, guess)
+    told = conclude(best, signals, drivelines, {}, card.sensors)
+    return replace(told, warnings=(*told.warnings, *notes)), best
 
 
 def likelihood(

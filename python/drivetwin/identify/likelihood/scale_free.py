@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Start values without an output torque: everything torque-like is divided by η.
+
+Speeds and engine torque tell ratios only (THEORY section 5). With η = 1 in the model, its
+parameters are those ratios; these are their start values:
+
+    T_e = (Je/η)·ω_e' + (J5/η)·ω_e'/i_g² + (T_v/i_f/η)/i_g     in gear, both gears together
+    T_c/η = (T_e - (Je/η)·ω_e')/a                               in the inertia phase
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.likelihood.guess import TYPICAL_LAW, TYPICAL_MODE
+from drivetwin.identify.momentum import MomentumSettings
+from drivetwin.identify.ringdown import pencil_start
+from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals, Span
+from drivetwin.vehicle.spec import VehicleCard
+
+STEP = 0.1
+"""Time over which speeds are differenced [s]: about a period of the driveline's oscillation."""
+RING = (0.05, 0.8)
+"""Stretch after lock-up in which the shaft's oscillation is looked for [s]."""
+
+
+def guess_without_torque(
+    signals: ShiftSignals, driveline: Driveline, card: VehicleCard
+) -> dict[str, float]:
+    """A value for every unknown, from speeds and engine torque of one shift."""
+    inertia = _inertias(signals, driveline, card)
+    J_e, J_vehicle, load = inertia
+    J_out = 0.0 if driveline.J_out is None else driveline.J_out.value
+    J4, J5 = J_e * driveline.i_after**2 + J_out, J_vehicle / driveline.i_f**2
+    J = J4 * J5 / (J4 + J5)
+    rate, omega = _mode(signals, driveline)
+    found = {
+        "eta": 1.0,
+        "J_e": J_e,
+        "J_out": max(J_out, 0.05 * J_e),
+        "J_vehicle": J_vehicle,
+        "Tv_over_if": load,
+        "te_delay": MomentumSettings().delay_prior.value,
+        "k_o": J * (rate**2 + omega**2),
+        "c_o": 2.0 * rate * J,
+    }
+    law = {**TYPICAL_LAW, "mu_c": _level(signals, driveline, J_e)}
+    for one in (driveline.offgoing, driveline.oncoming):
+        found |= {f"{one.name}.P0": one.P0.value, f"{one.name}.drum": one.drum.value}
+        found |= {f"{one.name}.{key}": value for key, value in law.items()}
+    return found
+
+
+def _inertias(
+    signals: ShiftSignals, driveline: Driveline, card: VehicleCard
+) -> tuple[float, float, float]:
+    """(Je/η, J_v/η, T_v/i_f/η) by least squares over both gears.
+
+    The vehicle outweighs the engine side, so Je is taken from the middle of the card's range.
+    """
+    J_e = float(np.sqrt(card.J_prime_range[0] * card.J_prime_range[1]))
+    rows, torques = [], []
+    shift, age = signals.shift, MomentumSettings().delay_prior.value
+    for span, ratio in ((shift.before, driveline.i_before), (shift.after, driveline.i_after)):
+        time, slope = _slopes(signals, span)
+        mean = np.array([_mean(signals, t - 0.5 * STEP + age) for t in time])
+        rows.append(np.column_stack([slope / ratio**2, np.full(slope.size, 1.0 / ratio)]))
+        torques.append(mean - J_e * slope)
+    found = np.linalg.lstsq(np.vstack(rows), np.concatenate(torques), rcond=None)[0]
+    J_v = float(np.clip(found[0] * driveline.i_f**2, *card.J_vehicle_range))
+    return J_e, J_v, float(found[1])
+
+
+def _slopes(signals: ShiftSignals, span: Span) -> tuple[FloatArray, FloatArray]:
+    """Centres [s] and differences of the engine speed [rad/s^2] over windows of `STEP`."""
+    edges = np.arange(span[0], span[1], STEP)
+    speed = signals.engine_speed
+    means = np.interp(edges, speed.time, speed.values)
+    return 0.5 * (edges[1:] + edges[:-1]), np.diff(means) / STEP
+
+
+def _mean(signals: ShiftSignals, start: float) -> float:
+    """Mean engine torque over `STEP` from `start` [s]."""
+    time = np.linspace(start, start + STEP, 11)
+    return float(np.mean(signals.engine_torque.at(time)))
+
+
+def _mode(signals: ShiftSignals, driveline: Driveline) -> tuple[float, float]:
+    """Decay rate [1/s] and angular frequency [rad/s] of the twist rate after lock-up."""
+    lockup = signals.shift.lockup_time
+    part = signals.output_speed.within((lockup + RING[0], lockup + RING[1]))
+    twist_rate = part.values
+    if signals.wheel_speed is not None:
+        twist_rate = part.values - driveline.i_f * signals.wheel_speed.at(part.time)
+    trend = np.vander(part.time - part.time[0], 3)
+    rest = twist_rate - trend @ np.linalg.lstsq(trend, twist_rate, rcond=None)[0]
+    try:
+        return pencil_start(part.time, rest)
+    except IdentificationError:
+        omega, zeta = TYPICAL_MODE
+        return zeta * omega, omega
+
+
+def _level(signals: ShiftSignals, driveline: Driveline, J_e: float) -> float:
+    """Mean μ/η over the middle half of the inertia phase."""
+    start, end = signals.shift.inertia_phase
+    low, high = start + 0.25 * (end - start), end - 0.25 * (end - start)
+    speed, element = signals.engine_speed, driveline.oncoming
+    slope = float(speed.at(np.array([high]))[0] - speed.at(np.array([low]))[0]) / (high - low)
+    time = np.linspace(low, high, 50)
+    torque = float(np.mean(signals.engine_torque.at(time))) - J_e * slope
+    above = float(np.mean(signals.pressures[element.name].at(time))) - element.P0.value
+    return float(np.clip(abs(torque / element.a) / (element.gain * max(above, 1e3)), 0.02, 0.4))
