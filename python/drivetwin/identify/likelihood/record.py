@@ -24,7 +24,7 @@ SLOW = 4e-3
 """Sampling time of an output [s] above which its samples may be means over it."""
 GRID = 1e-3
 """Step of the simulation's grid [s] where all outputs are slow."""
-FLOOR = 1e-5
+FLOOR = 2e-5
 """Least noise of a compared signal as a share of its range: what an ideal sensor is given."""
 
 
