@@ -2,24 +2,32 @@
 """What the log itself decides about the model: how the load grows, what slow speeds show.
 
 A part of the model that is wrongly left out biases everything (a load that grows with speed moves
-J3 by several per cent), and one that is wrongly left in widens intervals. Each variant is fitted,
-and kept where it leaves less.
+J3 by several per cent), and one that is wrongly left in widens intervals. The growing part is
+added where a score test finds it; what slow speeds show is the variant that leaves less.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from drivetwin.driveline import LossLaw
-from drivetwin.identify.likelihood.fit import LikelihoodFit, fit
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of, fit
+from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.priors import problem_of
+from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
 from drivetwin.identify.signals import Driveline, ShiftSignals
+from drivetwin.shifts.shift import Shift
 
 SIGNIFICANT = 3.0
 """Size of the growing part of the load, in its standard deviations, from which it is kept."""
+
+SMALL = 1e-3
+"""Growing part of the load [N m s^2/rad^2] to start from: one that is zero has no derivative."""
 
 
 def choose(
@@ -33,26 +41,58 @@ def choose(
     Raises IdentificationError where no variant converges.
     """
     shifts = [s.shift for s in signals]
-    problem, start = problem_of(signals, drivelines, loss_law, {**guess, AERO: 0.0})
-    best = fit(problem, start, shifts)
+    problem, start = problem_of(signals, drivelines, loss_law, guess)
+    wide, wide_start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
+    try:
+        best = fit(problem, start, shifts)
+        wide_start = _taken(wide_start, best.point)
+        grows = _grows(best, wide, wide_start)
+    except IdentificationError:
+        grows = True
     notes = []
-    index = best.point.names.index(AERO)
-    std = float(np.sqrt(best.covariance[index, index]))
-    if abs(best.point[AERO]) < SIGNIFICANT * std:
-        problem, start = problem_of(signals, drivelines, loss_law, guess)
-        best = fit(problem, _taken(start, best.point), shifts)
-    else:
-        speed = problem.parts[0].structure.mean_speed
-        notes.append(
-            f"the load grows with the square of the speed ({best.point[AERO]:.2g} ± "
-            f"{1.96 * std:.1g} N m s^2/rad^2 at the wheel); T_v/i_f holds at {speed:.3g} rad/s"
-        )
-    if problem.slow:
-        means = fit(problem.averaged(), best.point, shifts)
-        if means.chi2 < best.chi2:
-            best = means
-            notes.append("slow speeds are taken as means over their period: that fits better")
+    if grows:
+        problem, best = wide, fit(wide, wide_start, shifts)
+        notes.append(_growth(best))
+    means = _with_means(problem, best, shifts) if problem.slow else None
+    if means is not None:
+        best = means
+        notes.append("slow speeds are taken as means over their period: that fits better")
     return best, tuple(notes)
+
+
+def _with_means(
+    problem: Problem, best: LikelihoodFit, shifts: Sequence[Shift]
+) -> LikelihoodFit | None:
+    """The fit with slow speeds as means over their period; None where that leaves more."""
+    try:
+        means = fit(problem.averaged(), best.point, shifts)
+    except IdentificationError:
+        return None
+    return means if means.chi2 < best.chi2 else None
+
+
+def _grows(best: LikelihoodFit, wide: Problem, point: Point) -> bool:
+    """Whether one step from the minimum with a growing part added finds it significant."""
+    pairs = zip(wide.parts, best.problem.parts, strict=True)
+    parts = tuple(replace(found, structure=new.structure) for new, found in pairs)
+    normal = replace(wide, parts=parts).normal(point)
+    if normal is None:
+        return False
+    k = point.names.index(AERO)
+    step = step_of(normal.information, normal.gradient)[k]
+    std = np.sqrt(covariance_of(normal.information)[k, k])
+    return bool(point[AERO] + step > SIGNIFICANT * std)
+
+
+def _growth(best: LikelihoodFit) -> str:
+    """What is said of a load that grows with speed."""
+    k = best.point.names.index(AERO)
+    half = 1.96 * float(np.sqrt(best.covariance[k, k]))
+    speed = best.problem.parts[0].structure.mean_speed
+    return (
+        f"the load grows with the square of the speed ({best.point[AERO]:.2g} ± {half:.1g} "
+        f"N m s^2/rad^2 at the wheel); T_v/i_f holds at {speed:.3g} rad/s of the wheel"
+    )
 
 
 def _taken(start: Point, found: Point) -> Point:
