@@ -14,7 +14,7 @@ from drivetwin.cli import main
 from drivetwin.cli.output import show_error
 from drivetwin.errors import UnitError, Where
 
-COMMANDS = ("demo", "synth", "inspect", "shifts", "identify", "simulate", "report")
+COMMANDS = ("demo", "synth", "inspect", "shifts", "identify", "simulate", "report", "drive")
 
 
 def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:

@@ -145,6 +145,11 @@ def test_a_leg_that_never_ends_is_an_error(gearbox: Gearbox, truck: Powertrain) 
         run(gearbox, truck, plan)
 
 
+def test_a_plan_without_legs_is_refused(gearbox: Gearbox, truck: Powertrain) -> None:
+    with pytest.raises(InputError, match="no legs"):
+        run(gearbox, truck, ())
+
+
 def test_a_double_transition_is_refused(gearbox: Gearbox, truck: Powertrain) -> None:
     plan = (Leg(0.5, Until(Watched.TIME, 1.0), ShiftTo("5")),)
     with pytest.raises(InputError, match="not one element off and one on"):

@@ -30,7 +30,7 @@ class Course(StrEnum):
 def drive(
     card: Annotated[
         str,
-        typer.Argument(metavar="[CARD]", help="Gearbox card (TOML), or the name of a built-in."),
+        typer.Argument(metavar="CARD", help="Gearbox card (TOML), or the name of a built-in."),
     ] = "three-set-4000cr",
     course: Annotated[
         Course,

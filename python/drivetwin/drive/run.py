@@ -30,7 +30,7 @@ from drivetwin.drive.result import Action, DriveRun, observe
 from drivetwin.drive.schedule import Knots, Schedule
 from drivetwin.drive.shift import CLOSE, FILL, OPEN, RAMP, ShiftPlan, pressure
 from drivetwin.driveline import FloatArray
-from drivetwin.errors import SimulationError
+from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, Reduction, reduce
 from drivetwin.network import NetworkRun, Output, simulate
 
@@ -58,8 +58,11 @@ def run(gearbox: Gearbox, powertrain: Powertrain, plan: Plan) -> DriveRun:
     """Drive the plan from standstill in the lowest gear and return the motion.
 
     Raises SimulationError where a leg does not end, a shift does not reach synchronism, or the
-    simulation does not complete; ReductionError for a shift that is not one element off and one on.
+    simulation does not complete; ReductionError for a shift that is not one element off and one on;
+    InputError for a plan without legs or a gearbox that cannot be driven.
     """
+    if not plan:
+        raise InputError("the plan has no legs", "give at least one leg, with pedal and end")
     driver = _Driver(gearbox, powertrain)
     state = driver.begin(plan[0])
     for leg in plan:
