@@ -69,16 +69,44 @@ pub enum SpringLaw<T> {
         /// Damping, N·m·s/rad.
         damping: T,
     },
-    /// No torque within half the gap to either side; beyond it a spring-damper that can only push:
-    /// the damping torque is at most the spring torque and never pulls.
-    Backlash {
-        /// Stiffness, N·m/rad.
-        stiffness: T,
-        /// Damping, N·m·s/rad.
-        damping: T,
-        /// Half the total gap, rad.
-        half_gap: T,
+    /// Piecewise linear in twist and rate of twist.
+    Regions {
+        /// Regions; a run starts in the first that holds.
+        regions: Vec<Region<T>>,
+        /// Stops that store the energy.
+        stops: Vec<Stop<T>>,
     },
+}
+
+/// A stop with stored energy `½ stiffness · max(0, side · (twist - at))²`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop<T> {
+    /// N·m/rad.
+    pub stiffness: T,
+    /// Where it begins, rad.
+    pub at: T,
+    /// Direction in which it is pressed, ±1.
+    pub side: f64,
+}
+
+/// A linear form `constant + per_twist · twist + per_rate · twist'`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TwistForm<T> {
+    /// Constant part.
+    pub constant: T,
+    /// Coefficient of the twist.
+    pub per_twist: T,
+    /// Coefficient of its rate.
+    pub per_rate: T,
+}
+
+/// One region of a piecewise linear compliance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region<T> {
+    /// Torque, N·m.
+    pub torque: TwistForm<T>,
+    /// Forms that stay positive within the region, and the region beyond each.
+    pub borders: Vec<(TwistForm<T>, usize)>,
 }
 
 /// A compliance against `twist' = row · ω`; the twist is a state.
@@ -217,6 +245,19 @@ pub struct Mechanism<T> {
     pub forces: Vec<Force<T>>,
     /// Nodes whose speeds are inputs.
     pub prescribed: Vec<Prescribed>,
+}
+
+impl<T: Real> TwistForm<T> {
+    /// Value at a twist and its rate.
+    pub fn at(&self, twist: T, rate: T) -> T {
+        self.constant + self.per_twist * twist + self.per_rate * rate
+    }
+
+    /// The form with the opposite sign.
+    pub fn negative(&self) -> Self {
+        let Self { constant, per_twist, per_rate } = *self;
+        Self { constant: -constant, per_twist: -per_twist, per_rate: -per_rate }
+    }
 }
 
 impl<T> Default for Mechanism<T> {

@@ -3,21 +3,9 @@
 
 use super::channel::{Channel, ChannelSeries, Law};
 use crate::model::FrictionLaw;
+use crate::model::mechanism::{Region, TwistForm};
 use crate::model::torque_map::span_index;
 use crate::number::{Real, Series};
-
-/// How a backlash is in contact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Contact {
-    /// No torque.
-    Free,
-    /// Spring and damper.
-    Spring,
-    /// The damping torque is limited to the spring torque.
-    Limited,
-    /// Beyond the gap, but parting so fast that the damper would pull: no torque.
-    Parting,
-}
 
 /// The branch that is active.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -49,12 +37,10 @@ pub enum Cell {
         /// Cell of its map.
         index: usize,
     },
-    /// Backlash.
-    Backlash {
-        /// Side of the contact, ±1, or the last one left.
-        side: f64,
-        /// Kind of contact.
-        contact: Contact,
+    /// Region of a piecewise linear compliance.
+    Region {
+        /// Its index.
+        index: usize,
     },
 }
 
@@ -78,20 +64,11 @@ impl<T: Real> Channel<T> {
                 let ratio = if s == 0.0 && r == 0.0 { 0.0 } else { r / s };
                 Cell::Converter { index: map.cell_index(ratio) }
             }
-            Law::Backlash { stiffness, damping, half_gap } => {
-                let side = if s < 0.0 { -1.0 } else { 1.0 };
-                let spring = stiffness.re() * (s.abs() - half_gap.re());
-                let damper = damping.re() * r * side;
-                let contact = if spring <= 0.0 {
-                    Contact::Free
-                } else if spring + damper <= 0.0 {
-                    Contact::Parting
-                } else if damper <= spring {
-                    Contact::Spring
-                } else {
-                    Contact::Limited
+            Law::Regions(regions) => {
+                let inside = |region: &Region<T>| {
+                    region.borders.iter().all(|(b, _)| b.at(T::of(s), T::of(r)).re() >= 0.0)
                 };
-                Cell::Backlash { side, contact }
+                Cell::Region { index: regions.iter().position(inside).unwrap_or(0) }
             }
         }
     }
@@ -136,48 +113,16 @@ impl<T: Real> Channel<T> {
                 };
                 ends.into_iter().filter(|e| e.0.is_finite()).map(border).collect()
             }
-            (Law::Backlash { stiffness, damping, half_gap }, Cell::Backlash { side, contact }) => {
-                let mut depth = scaled(s, side);
-                depth[0] -= *half_gap;
-                let spring = depth.map(|c| c * *stiffness);
-                let damper = r.map(|c| c * *damping * side);
-                backlash_borders((&spring, &damper), contact, side, (s, *half_gap))
+            (Law::Regions(regions), Cell::Region { index }) => {
+                let border = |&(form, next): &(TwistForm<T>, usize)| {
+                    let mut series = weighted(s, form.per_twist, r, form.per_rate);
+                    series[0] += form.constant;
+                    (series, Cell::Region { index: next })
+                };
+                regions[index].borders.iter().map(border).collect()
             }
             _ => Vec::new(),
         }
-    }
-}
-
-/// Where a backlash changes its kind of contact.
-fn backlash_borders<T: Real>(
-    (spring, damper): (&Series<T>, &Series<T>),
-    contact: Contact,
-    side: f64,
-    (twist, half_gap): (&Series<T>, T),
-) -> Vec<Border<T>> {
-    let one = T::of(1.0);
-    let to = |contact: Contact| Cell::Backlash { side, contact };
-    let push = weighted(spring, one, damper, one);
-    let margin = weighted(spring, one, damper, -one);
-    match contact {
-        Contact::Spring => vec![
-            (push, to(Contact::Parting)),
-            (margin, to(Contact::Limited)),
-            (*spring, to(Contact::Free)),
-        ],
-        Contact::Limited => {
-            vec![(*spring, to(Contact::Free)), (scaled(&margin, -1.0), to(Contact::Spring))]
-        }
-        Contact::Parting => {
-            vec![(*spring, to(Contact::Free)), (scaled(&push, -1.0), to(Contact::Spring))]
-        }
-        Contact::Free => [1.0, -1.0]
-            .map(|side| {
-                let mut clearance = scaled(twist, -side);
-                clearance[0] += half_gap;
-                (clearance, Cell::Backlash { side, contact: Contact::Limited })
-            })
-            .to_vec(),
     }
 }
 

@@ -4,11 +4,11 @@
 //! Within a cell (a direction of slip, a piece of a table) each is analytic; the solver watches the
 //! cell's borders.
 
-use super::cell::{Cell, Contact};
+use super::cell::Cell;
 use crate::model::FrictionLaw;
 use crate::model::converter_map::ConverterMap;
 use crate::model::friction::{Piece, Stribeck};
-use crate::model::mechanism::Normal;
+use crate::model::mechanism::{Normal, Region, TwistForm};
 use crate::model::torque_map::TorqueMap;
 use crate::number::{Real, Series, TERMS, product_term};
 
@@ -40,15 +40,8 @@ pub enum Law<T> {
         /// Torque given at the turbine, else taken at the pump.
         at_turbine: bool,
     },
-    /// Backlash over twist and its rate.
-    Backlash {
-        /// N·m/rad.
-        stiffness: T,
-        /// N·m·s/rad.
-        damping: T,
-        /// rad.
-        half_gap: T,
-    },
+    /// Piecewise linear compliance over twist and its rate.
+    Regions(Vec<Region<T>>),
 }
 
 /// A channel: its law and its arguments over the states.
@@ -120,7 +113,7 @@ impl<T: Real> Channel<T> {
         match &self.law {
             Law::Friction { mu, .. } => matches!(mu, FrictionLaw::Stribeck(_)),
             Law::Quadratic(_) => true,
-            Law::Map { .. } | Law::Converter { .. } | Law::Backlash { .. } => false,
+            Law::Map { .. } | Law::Converter { .. } | Law::Regions(_) => false,
         }
     }
 
@@ -192,14 +185,10 @@ impl<T: Real> Channel<T> {
                     + product_term(s, r, k) * q[1]
                     + product_term(r, r, k) * q[2]
             }
-            (Law::Backlash { stiffness, damping, half_gap }, Cell::Backlash { side, contact }) => {
-                let offset = if k == 0 { *half_gap * side } else { T::zero_() };
-                let spring = *stiffness * (s[k] - offset);
-                match contact {
-                    Contact::Free | Contact::Parting => T::zero_(),
-                    Contact::Spring => spring + *damping * r[k],
-                    Contact::Limited => spring * 2.0,
-                }
+            (Law::Regions(regions), Cell::Region { index }) => {
+                let TwistForm { constant, per_twist, per_rate } = regions[index].torque;
+                let linear = per_twist * s[k] + per_rate * r[k];
+                if k == 0 { linear + constant } else { linear }
             }
             (law, cell) => unreachable!("cell {cell:?} does not belong to {law:?}"),
         };

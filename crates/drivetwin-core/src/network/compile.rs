@@ -291,11 +291,11 @@ impl<T: Real> Network<T> {
     fn add_drives(&mut self) {
         for i in 0..self.mechanism.springs.len() {
             let spring = self.mechanism.springs[i].clone();
-            if let SpringLaw::Backlash { stiffness, damping, half_gap } = spring.law {
+            if let SpringLaw::Regions { regions, .. } = spring.law {
                 let mut twist = vec![T::zero_(); self.states()];
                 twist[self.speeds() + i] = T::of(1.0);
                 let arguments = vec![twist, self.over_states(self.twist_rates.row(i))];
-                let law = Law::Backlash { stiffness, damping, half_gap };
+                let law = Law::Regions(regions);
                 let basis = self.add_channel(Channel { law, arguments });
                 let nodes = spring.row.into_iter().map(|(node, c)| (node, -c)).collect();
                 self.drives.push(Drive { basis, nodes, account: None });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Where the energy of a run went.
 
-use crate::model::mechanism::{Account, ForceLaw, Spring, SpringLaw};
+use crate::model::mechanism::{Account, ForceLaw, SpringLaw, Stop};
 use crate::network::channel::form;
 use crate::network::{GearState, Network};
 use crate::number::Real;
@@ -86,10 +86,16 @@ impl Auditor {
         for (i, spring) in network.mechanism.springs.iter().enumerate() {
             let rate = form(network.twist_rates.row(i), basis);
             let twist = basis[network.speeds() + i];
-            audit.shaft += match spring.law {
-                SpringLaw::Linear { damping, .. } => (damping * rate * rate).re() * width,
-                SpringLaw::Backlash { .. } => -(elastic_torque(spring, twist) * rate).re() * width,
-            };
+            audit.shaft += width
+                * match &spring.law {
+                    SpringLaw::Linear { damping, .. } => (*damping * rate * rate).re(),
+                    // The work of the channel less what the stops store.
+                    SpringLaw::Regions { stops, .. } => {
+                        let stored =
+                            |stop: &Stop<T>| depth(stop, twist) * stop.stiffness * stop.side;
+                        -stops.iter().map(|stop| (stored(stop) * rate).re()).sum::<f64>()
+                    }
+                };
         }
         for (i, (speed, _)) in network.prescribed.iter().enumerate() {
             let reaction = form(run.mode.stuck_torque.row(run.mode.stuck.len() + i), basis);
@@ -122,16 +128,10 @@ impl Auditor {
     }
 }
 
-/// Spring torque without damping.
-fn elastic_torque<T: Real>(spring: &Spring<T>, twist: T) -> T {
-    match spring.law {
-        SpringLaw::Linear { stiffness, .. } => stiffness * twist,
-        SpringLaw::Backlash { stiffness, half_gap, .. } => {
-            let side = if twist.re() < 0.0 { -1.0 } else { 1.0 };
-            let depth = twist * side - half_gap;
-            if depth.re() > 0.0 { stiffness * depth * side } else { T::zero_() }
-        }
-    }
+/// How far a stop is pressed, rad.
+fn depth<T: Real>(stop: &Stop<T>, twist: T) -> T {
+    let depth = (twist - stop.at) * stop.side;
+    if depth.re() > 0.0 { depth } else { T::zero_() }
 }
 
 fn stored_energy<T: Real>(network: &Network<T>, x: &[T]) -> f64 {
@@ -139,14 +139,14 @@ fn stored_energy<T: Real>(network: &Network<T>, x: &[T]) -> f64 {
     for i in 0..network.speeds() {
         energy += 0.5 * (x[i] * form(network.mass.row(i), x)).re();
     }
-    for (spring, twist) in network.mechanism.springs.iter().zip(&x[network.speeds()..]) {
-        let torque = elastic_torque(spring, *twist).re();
-        let stiffness = match spring.law {
-            SpringLaw::Linear { stiffness, .. } | SpringLaw::Backlash { stiffness, .. } => {
-                stiffness
+    for (spring, &twist) in network.mechanism.springs.iter().zip(&x[network.speeds()..]) {
+        energy += match &spring.law {
+            SpringLaw::Linear { stiffness, .. } => 0.5 * (*stiffness * twist * twist).re(),
+            SpringLaw::Regions { stops, .. } => {
+                let stored = |stop: &Stop<T>| depth(stop, twist).powi(2) * stop.stiffness * 0.5;
+                stops.iter().map(|stop| stored(stop).re()).sum()
             }
         };
-        energy += if torque == 0.0 { 0.0 } else { 0.5 * torque * torque / stiffness.re() };
     }
     energy
 }

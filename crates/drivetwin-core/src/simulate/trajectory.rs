@@ -165,10 +165,10 @@ fn shaft_torque<T: Real>(network: &Network<T>, i: usize) -> Column<T> {
             row[network.speeds() + i] = stiffness;
             Column::Linear(terms(&row))
         }
-        SpringLaw::Backlash { .. } => {
+        SpringLaw::Regions { .. } => {
             let springs = &network.mechanism.springs[..i];
             let backlashes =
-                springs.iter().filter(|s| matches!(s.law, SpringLaw::Backlash { .. })).count();
+                springs.iter().filter(|s| matches!(s.law, SpringLaw::Regions { .. })).count();
             Column::Linear(vec![(network.drives[backlashes].basis, T::of(1.0))])
         }
     }

@@ -2,7 +2,7 @@
 //! A coupling with play.
 
 use crate::model::error::{ModelError, require, require_apart};
-use crate::model::mechanism::{Mechanism, Spring, SpringLaw};
+use crate::model::mechanism::{Mechanism, Region, Spring, SpringLaw, Stop, TwistForm};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
 
@@ -34,8 +34,53 @@ impl<T: Real> Backlash<T> {
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let row = m.row(&[(&self.a, T::of(1.0)), (&self.b, T::of(-1.0))]);
-        let (stiffness, damping) = (self.stiffness, self.damping);
-        let law = SpringLaw::Backlash { stiffness, damping, half_gap: self.gap * 0.5 };
+        let half_gap = self.gap * 0.5;
+        let stop = |side: f64| Stop { stiffness: self.stiffness, at: half_gap * side, side };
+        let stops = vec![stop(1.0), stop(-1.0)];
+        let law = SpringLaw::Regions { regions: self.regions(), stops };
         m.springs.push(Spring { element: self.name.clone(), row, law });
     }
+
+    /// Free play, then for either side: spring and damper, damping limited to the spring torque while
+    /// closing fast, no torque while parting so fast that the damper would pull.
+    fn regions(&self) -> Vec<Region<T>> {
+        let half_gap = self.gap * 0.5;
+        let form = |constant, per_twist, per_rate| TwistForm { constant, per_twist, per_rate };
+        let (zero, one) = (T::zero_(), T::of(1.0));
+        let nothing = form(zero, zero, zero);
+        let (free, forward, backward) = (0, 1, 4);
+        let mut regions = vec![Region {
+            torque: nothing,
+            borders: vec![
+                (form(half_gap, -one, zero), forward + LIMITED),
+                (form(half_gap, one, zero), backward + LIMITED),
+            ],
+        }];
+        for (side, first) in [(1.0, forward), (-1.0, backward)] {
+            let rest = half_gap * side;
+            // Positive while the side is in contact; the damper's part of the same sign.
+            let depth = form(-half_gap, one * side, zero);
+            let (k, c) = (self.stiffness, self.damping);
+            let push = form(-k * half_gap, k * side, c * side);
+            let margin = form(-k * half_gap, k * side, -c * side);
+            regions.push(Region {
+                torque: form(-k * rest, k, c),
+                borders: vec![(push, first + PARTING), (margin, first + LIMITED), (depth, free)],
+            });
+            regions.push(Region {
+                torque: form(-k * rest * 2.0, k * 2.0, zero),
+                borders: vec![(depth, free), (margin.negative(), first + SPRING)],
+            });
+            regions.push(Region {
+                torque: nothing,
+                borders: vec![(depth, free), (push.negative(), first + SPRING)],
+            });
+        }
+        regions
+    }
 }
+
+/// Order of the regions of one side.
+const SPRING: usize = 0;
+const LIMITED: usize = 1;
+const PARTING: usize = 2;
