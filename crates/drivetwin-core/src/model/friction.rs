@@ -2,7 +2,7 @@
 //! μ over slip: the Stribeck law of a wet clutch (paper Figure 8), or a table.
 
 use super::error::{ModelError, require};
-use crate::number::Real;
+use crate::number::{Real, Series};
 use serde::{Deserialize, Serialize};
 
 /// `μ(s) = μ_c + (μ_s - μ_c) exp(-|s|/v_s) + μ_v |s|`.
@@ -72,11 +72,50 @@ impl<T: Real> FrictionLaw<T> {
 
     /// μ at a slip of magnitude `s` ≥ 0 [rad/s].
     pub fn at(&self, s: T) -> T {
+        self.with_slope(s)[0]
+    }
+
+    /// μ at a slip of magnitude `s` ≥ 0 [rad/s] and its slope [s/rad].
+    pub fn with_slope(&self, s: T) -> [T; 2] {
         match self {
             Self::Stribeck(law) => {
-                law.mu_c + (law.mu_s - law.mu_c) * (-s / law.v_s).exp() + law.mu_v * s
+                let stiction = (law.mu_s - law.mu_c) * (-s / law.v_s).exp();
+                [law.mu_c + stiction + law.mu_v * s, law.mu_v - stiction / law.v_s]
             }
-            Self::Table(table) => table.piece(table.cell(s.re())).0.at(s),
+            Self::Table(table) => {
+                let (piece, _) = table.piece(table.cell(s.re()));
+                [piece.at(s), piece.slope]
+            }
+        }
+    }
+
+    /// Taylor coefficient `k` of μ in time along the coefficients of |slip|, on piece `piece` of a table.
+    /// `exponential` holds those of exp(-|s|/v_s); order by order `E' = -(|s|'/v_s) E`.
+    pub fn series_term(
+        &self,
+        slip: &Series<T>,
+        piece: usize,
+        exponential: &mut Series<T>,
+        k: usize,
+    ) -> T {
+        match self {
+            Self::Table(table) => {
+                let (Piece { from, value, slope }, _) = table.piece(piece);
+                if k == 0 { value + slope * (slip[0] - from) } else { slope * slip[k] }
+            }
+            Self::Stribeck(Stribeck { mu_c, mu_s, v_s, mu_v }) => {
+                exponential[k] = if k == 0 {
+                    (-slip[0] / *v_s).exp()
+                } else {
+                    let mut sum = T::zero_();
+                    for i in 1..=k {
+                        sum += slip[i] * exponential[k - i] * i as f64;
+                    }
+                    -sum / (*v_s * k as f64)
+                };
+                let mu = (*mu_s - *mu_c) * exponential[k] + *mu_v * slip[k];
+                if k == 0 { mu + *mu_c } else { mu }
+            }
         }
     }
 

@@ -7,7 +7,6 @@
 use super::cell::Cell;
 use crate::model::FrictionLaw;
 use crate::model::converter_map::ConverterMap;
-use crate::model::friction::{Piece, Stribeck};
 use crate::model::mechanism::{Normal, Region, TwistForm};
 use crate::model::torque_map::TorqueMap;
 use crate::number::{Real, Series, TERMS, product_term};
@@ -58,6 +57,8 @@ pub struct Channel<T> {
 pub struct ChannelSeries<T> {
     /// The arguments.
     pub arguments: [Series<T>; 2],
+    /// |slip| of a friction law.
+    slip: Series<T>,
     /// exp(-|s|/v_s) of a Stribeck law.
     exponential: Series<T>,
     /// μ of a friction law.
@@ -69,7 +70,7 @@ pub struct ChannelSeries<T> {
 impl<T: Real> Default for ChannelSeries<T> {
     fn default() -> Self {
         let zero = [T::zero_(); TERMS];
-        Self { arguments: [zero, zero], exponential: zero, mu: zero, torque: zero }
+        Self { arguments: [zero, zero], slip: zero, exponential: zero, mu: zero, torque: zero }
     }
 }
 
@@ -121,11 +122,9 @@ impl<T: Real> Channel<T> {
     /// `φ' = φ_s s' + φ_N N'`.
     pub fn partials(&self, cell: Cell, s: T, normal: T) -> [T; 3] {
         match (&self.law, cell) {
-            (Law::Friction { mu: FrictionLaw::Stribeck(law), .. }, Cell::Moving { sign, .. }) => {
-                let slip = s * sign;
-                let stiction = (law.mu_s - law.mu_c) * (-slip / law.v_s).exp();
-                let mu = law.mu_c + stiction + law.mu_v * slip;
-                [mu * normal * sign, (law.mu_v - stiction / law.v_s) * normal, mu * sign]
+            (Law::Friction { mu, .. }, Cell::Moving { sign, .. }) => {
+                let [mu, slope] = mu.with_slope(s * sign);
+                [mu * normal * sign, slope * normal, mu * sign]
             }
             (Law::Quadratic(coefficient), Cell::Moving { sign, .. }) => {
                 let slope = *coefficient * s * sign;
@@ -155,7 +154,8 @@ impl<T: Real> Channel<T> {
                 normal.term(inputs, k) * mu.at(T::zero_()) * *peak * sign
             }
             (Law::Friction { mu, normal, .. }, Cell::Moving { sign, piece }) => {
-                c.mu[k] = mu_term(mu, sign, piece, c, k);
+                c.slip[k] = s[k] * sign;
+                c.mu[k] = mu.series_term(&c.slip, piece, &mut c.exponential, k);
                 let product = (0..=k).fold(T::zero_(), |sum, i| {
                     let normal = normal.term(inputs, i);
                     if normal.re() == 0.0 && i > 1 { sum } else { sum + normal * c.mu[k - i] }
@@ -192,38 +192,6 @@ impl<T: Real> Channel<T> {
             }
             (law, cell) => unreachable!("cell {cell:?} does not belong to {law:?}"),
         };
-    }
-}
-
-/// Coefficient `k` of μ over |slip|, which moves with `sign`.
-fn mu_term<T: Real>(
-    law: &FrictionLaw<T>,
-    sign: f64,
-    piece: usize,
-    c: &mut ChannelSeries<T>,
-    k: usize,
-) -> T {
-    let speed = &c.arguments[0];
-    let slip = speed[k] * sign;
-    match law {
-        FrictionLaw::Table(table) => {
-            let (Piece { from, value, slope }, _) = table.piece(piece);
-            if k == 0 { value + slope * (slip - from) } else { slope * slip }
-        }
-        FrictionLaw::Stribeck(Stribeck { mu_c, mu_s, v_s, mu_v }) => {
-            // E' = -(|s|'/v_s) E, order by order
-            c.exponential[k] = if k == 0 {
-                (-slip / *v_s).exp()
-            } else {
-                let mut sum = T::zero_();
-                for i in 1..=k {
-                    sum += speed[i] * c.exponential[k - i] * i as f64;
-                }
-                -sum * sign / (*v_s * k as f64)
-            };
-            let mu = (*mu_s - *mu_c) * c.exponential[k] + *mu_v * slip;
-            if k == 0 { mu + *mu_c } else { mu }
-        }
     }
 }
 
