@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,18 @@ from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import FloatArray
 from drivetwin.shifts.shift import Shift
 
+NEAR = 50.0
+"""Q per sample at the start below which the direct way is tried first."""
+GOOD = 1.05
+"""Q per sample from which on no other start is tried."""
+RESTARTS: tuple[tuple[float, float], ...] = (
+    (1.0, 1.0),
+    (1.0, 0.7),
+    (1.0, 1.5),
+    (0.6, 1.0),
+    (1.6, 1.0),
+)
+"""Factors on shaft stiffness and friction level: what a wrong minimum hangs on."""
 PLAUSIBLE = 2.0
 """Q per sample above which a minimum is taken for a wrong one."""
 
@@ -37,21 +49,43 @@ class LikelihoodFit:
 
 
 def fit(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:
-    """Fit from `start`, by stages where the direct way does not lead to a plausible minimum.
+    """Fit from `start`: directly where it is near, by stages and from other starts where not.
 
-    Raises IdentificationError where neither does.
+    Raises IdentificationError where no minimum is plausible.
     """
-    found = _likelihood(problem, start)
-    if found is None:
-        near = staged(problem, start, shifts)
-        found = None if near is None else _likelihood(problem, near.point)
-    if found is None:
+    best: LikelihoodFit | None = None
+    for found in _attempts(problem, start, shifts):
+        if found is not None and (best is None or found.chi2 < best.chi2):
+            best = found
+        if best is not None and best.chi2 < GOOD:
+            return best
+    if best is None:
         raise IdentificationError(
             "the simulation could not be brought onto the measurement",
             "check ratios, clutch gains and P0 on the card against the log, or use the integral "
             "method",
         )
-    return found
+    return best
+
+
+def _attempts(
+    problem: Problem, start: Point, shifts: Sequence[Shift]
+) -> Iterator[LikelihoodFit | None]:
+    """Fits from `start` and from points beside it, the most promising first."""
+    restarts = RESTARTS
+    if problem.cost(start) < NEAR * problem.size:
+        direct = _likelihood(problem, start)
+        yield direct
+        restarts = RESTARTS if direct is None else RESTARTS[:1]
+    for shaft, friction in restarts:
+        factor = [
+            shaft if name == "k_o" else friction if name.endswith(".mu_c") else 1.0
+            for name in start.names
+        ]
+        near = staged(problem, start.moved(start.values * np.array(factor)), shifts)
+        found = None if near is None else _likelihood(problem, near.point)
+        # Expected inputs formed far from the minimum hold it back: once more with those measured.
+        yield found and _likelihood(problem, found.point)
 
 
 def _likelihood(problem: Problem, start: Point) -> LikelihoodFit | None:
