@@ -20,6 +20,8 @@ NEAR = 50.0
 """Q per sample at the start below which the direct way is tried first."""
 GOOD = 1.05
 """Q per sample from which on no other start is tried."""
+SAME = 1e-3
+"""Difference of Q per sample below which two starts have led to the same minimum."""
 RESTARTS: tuple[tuple[float, float], ...] = (
     (1.0, 1.0),
     (1.0, 0.7),
@@ -55,9 +57,13 @@ def fit(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFi
     """
     best: LikelihoodFit | None = None
     for found in _attempts(problem, start, shifts):
-        if found is not None and (best is None or found.chi2 < best.chi2):
+        if found is None:
+            continue
+        if best is not None and abs(found.chi2 - best.chi2) < SAME:
+            return min(best, found, key=lambda one: one.chi2)
+        if best is None or found.chi2 < best.chi2:
             best = found
-        if best is not None and best.chi2 < GOOD:
+        if best.chi2 < GOOD:
             return best
     if best is None:
         raise IdentificationError(
