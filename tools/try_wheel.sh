@@ -21,7 +21,7 @@ run_demo() (
     done
     pip install --quiet --disable-pip-version-check "$wheel"
     drivetwin demo -o "$place/out"
-    for file in {integral,paper}/{result.json,twin.toml,report.html}; do
+    for file in {likelihood,paper}/{result.json,twin.toml,report.html}; do
         if [[ ! -s $place/out/$file ]]; then
             printf 'the demo wrote no %s\n' "$file" >&2
             exit 1
