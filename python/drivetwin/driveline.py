@@ -129,7 +129,7 @@ class Accuracy:
     """How exactly a run is integrated.
 
     By default samples without events are passed by exact operators, slipping torques being cubics
-    in time: an error of some 1e-3 N·m on 1 ms samples. `exact` integrates to round-off instead, as
+    in time: an error of a few 1e-3 N·m on 1 ms samples. `exact` integrates to round-off instead, as
     does an energy audit. `tolerance` is the truncation error allowed per step relative to the
     states, `max_step` [s] the longest step, `order` a fixed order in place of one that follows the
     tolerance (it implies `exact`).

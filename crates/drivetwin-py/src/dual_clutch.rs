@@ -29,8 +29,7 @@ pub fn simulate<'py>(
     grid: PyReadonlyArray1<'py, f64>,
     options: Options,
 ) -> PyResult<Run<'py>> {
-    let model: DualClutch<f64> =
-        serde_json::from_str(model).map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let model = model_of(model)?;
     let grid = grid.as_slice()?;
     let signals = signals
         .iter()
@@ -38,8 +37,7 @@ pub fn simulate<'py>(
             Ok((name.as_str(), Signal::samples(times.as_slice()?, values.as_slice()?)))
         })
         .collect::<PyResult<Vec<_>>>()?;
-    let (engine_speed, output_speed, wheel_speed, twist, locked) = start;
-    let start = DualClutchStart { engine_speed, output_speed, wheel_speed, twist, locked };
+    let start = start_of(start);
     let (tolerance, max_step, order, sprint, audit) = options;
     let settings = Settings { tolerance, max_step, order, sprint };
     let run = py
@@ -72,8 +70,7 @@ pub fn sensitivities<'py>(
     grid: PyReadonlyArray1<'py, f64>,
     options: (f64, Vec<String>),
 ) -> PyResult<Sensitive<'py>> {
-    let model: DualClutch<f64> =
-        serde_json::from_str(model).map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let model = model_of(model)?;
     let grid = grid.as_slice()?;
     let signals = signals
         .iter()
@@ -81,8 +78,7 @@ pub fn sensitivities<'py>(
             Ok((name.as_str(), times.as_slice()?, values.as_slice()?, *delay))
         })
         .collect::<PyResult<Vec<_>>>()?;
-    let (engine_speed, output_speed, wheel_speed, twist, locked) = start;
-    let start = DualClutchStart { engine_speed, output_speed, wheel_speed, twist, locked };
+    let start = start_of(start);
     let (tolerance, parameters) = options;
     let names: Vec<&str> = parameters.iter().map(String::as_str).collect();
     let settings = Settings { tolerance, ..Settings::default() };
@@ -96,4 +92,13 @@ pub fn sensitivities<'py>(
         PyArray3::from_vec3(py, &found.columns)?,
         PyArray2::from_vec2(py, &found.events)?,
     ))
+}
+
+fn model_of(json: &str) -> PyResult<DualClutch<f64>> {
+    serde_json::from_str(json).map_err(|e| PyValueError::new_err(e.to_string()))
+}
+
+fn start_of(start: Start) -> DualClutchStart<f64> {
+    let (engine_speed, output_speed, wheel_speed, twist, locked) = start;
+    DualClutchStart { engine_speed, output_speed, wheel_speed, twist, locked }
 }

@@ -66,7 +66,7 @@ pub struct Settings {
     /// Fixed order instead of one that follows the tolerance; for convergence studies.
     pub order: Option<usize>,
     /// Pass samples without events by exact operators, with slipping torques as cubics in time:
-    /// about twenty times faster at an error of some 1e-3 N·m on 1 ms samples.
+    /// several times faster at an error of a few 1e-3 N·m on 1 ms samples.
     pub sprint: bool,
 }
 
