@@ -84,7 +84,7 @@ def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
     rate = inverse @ free
     rate[:, 3] = (0.0, 1.0, -model.i_f, 0.0)
     with np.errstate(over="ignore", invalid="ignore"):
-        transition, mean = _exponential(rate * step[:, None, None])
+        transition, mean = exponential(rate * step[:, None, None])
     for k, jump in _jumps(model, run):
         transition[k] = jump @ transition[k]
     effect = mean @ inverse * step[:, None, None]
@@ -103,13 +103,13 @@ def observed(model: DualClutch, name: str) -> FloatArray:
     return np.array(rows[name])
 
 
-def _exponential(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, 4, 4).
+def exponential(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, m, m).
 
     Taylor's series of an eighth, doubled three times.
     """
     eighth = matrix / 8.0
-    identity = np.eye(STATES)
+    identity = np.eye(matrix.shape[-1])
     result, mean, power = identity + eighth, identity + eighth / 2.0, eighth
     for order in (2, 3, 4):
         power = power @ eighth / order
