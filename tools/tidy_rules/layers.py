@@ -25,7 +25,7 @@ _MAY_NOT_USE = {
 """Folders of the core and what they must not know; the integrator knows no elements either."""
 
 PYTHON_LAYERS = (
-    frozenset({"errors", "parameters", "driveline", "network", "tomlfile", "_native"}),
+    frozenset({"errors", "progress", "parameters", "driveline", "network", "tomlfile", "_native"}),
     frozenset({"logs", "vehicle", "held", "gearbox"}),
     frozenset({"shifts", "dyno", "drive"}),
     frozenset({"identify"}),

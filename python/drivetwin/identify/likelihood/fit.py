@@ -14,6 +14,7 @@ from drivetwin.identify.likelihood.output_error import staged
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import FloatArray
+from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
 NEAR = 50.0
@@ -56,7 +57,7 @@ def fit(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFi
     Raises IdentificationError where no minimum is plausible.
     """
     best: LikelihoodFit | None = None
-    for found in _attempts(problem, start, shifts):
+    for found in _told(_attempts(problem, start, shifts)):
         if found is None:
             continue
         if best is not None and abs(found.chi2 - best.chi2) < SAME:
@@ -72,6 +73,19 @@ def fit(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFi
             "method",
         )
     return best
+
+
+def _told(attempts: Iterator[LikelihoodFit | None]) -> Iterator[LikelihoodFit | None]:
+    """The same fits; each counts as half of what is left, for how many it takes is not known."""
+    done = 0.0
+    while True:
+        with part(done, 0.5 + 0.5 * done):
+            try:
+                found = next(attempts)
+            except StopIteration:
+                return
+        done = 0.5 + 0.5 * done
+        yield found
 
 
 def _attempts(

@@ -16,6 +16,7 @@ import numpy as np
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import FloatArray
+from drivetwin.progress import tell
 
 ENOUGH = 1e-2
 """Expected fall of Q at which the search ends: 0.1 standard deviations."""
@@ -66,7 +67,7 @@ def minimise(problem: Problem, start: Point, refresh: Refresh = unchanged) -> Fo
     Not converged after `MAX_STEPS` says so; the values are then no estimate.
     """
     point = start.moved(np.clip(start.values, problem.lower, problem.upper))
-    damping = DAMPING
+    damping, first = DAMPING, None
     for iteration in range(MAX_STEPS):
         if iteration < REFRESHES:
             problem = refresh(problem, point)
@@ -74,6 +75,8 @@ def minimise(problem: Problem, start: Point, refresh: Refresh = unchanged) -> Fo
         if normal is None:
             return None
         expected = _expected(problem, point, normal)
+        first = first or expected
+        tell(_done(first, expected))
         settled = iteration + 1 >= REFRESHES or refresh is unchanged
         if expected < ENOUGH and settled:
             return Found(problem, point, normal, True, iteration)
@@ -83,6 +86,13 @@ def minimise(problem: Problem, start: Point, refresh: Refresh = unchanged) -> Fo
         point = trial
     last = problem.normal(point)
     return None if last is None else Found(problem, point, last, False, MAX_STEPS)
+
+
+def _done(first: float, expected: float) -> float:
+    """Share of the way, in powers of ten, from the first expected fall of Q to `ENOUGH`."""
+    if min(first, expected) <= ENOUGH:
+        return 1.0
+    return float(np.log(first / expected) / np.log(first / ENOUGH))
 
 
 def _better(

@@ -21,6 +21,7 @@ from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
 from drivetwin.identify.signals import Driveline, ShiftSignals
+from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
 SIGNIFICANT = 3.0
@@ -44,16 +45,19 @@ def choose(
     problem, start = problem_of(signals, drivelines, loss_law, guess)
     wide, wide_start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
     try:
-        best = fit(problem, start, shifts)
+        with part(0.0, 0.5):
+            best = fit(problem, start, shifts)
         wide_start = _taken(wide_start, best.point)
         grows = _grows(best, wide, wide_start)
     except IdentificationError:
         grows = True
     notes = []
     if grows:
-        problem, best = wide, fit(wide, wide_start, shifts)
+        with part(0.5, 0.8):
+            problem, best = wide, fit(wide, wide_start, shifts)
         notes.append(_growth(best))
-    means = _with_means(problem, best, shifts) if problem.slow else None
+    with part(0.8, 1.0):
+        means = _with_means(problem, best, shifts) if problem.slow else None
     if means is not None:
         best = means
         notes.append("slow speeds are taken as means over their period: that fits better")
