@@ -8,7 +8,13 @@ from io import StringIO
 import numpy as np
 
 from drivetwin.drive.result import DriveRun
-from drivetwin.report.figures.drive import energy_figure, motion_figure, shift_figure
+from drivetwin.report.figures.drive import (
+    energy_figure,
+    maneuver_panels,
+    motion_figure,
+    motion_panels,
+    shift_figure,
+)
 from drivetwin.report.html import render_page
 from drivetwin.report.sections.blocks import Cell, FigureBlock, Section, TableBlock, cells
 
@@ -18,9 +24,15 @@ _TRACE_STEP = 10
 
 def render_drive(run: DriveRun, title: str) -> str:
     """HTML text of the page; equal drives give equal text."""
-    motion = FigureBlock(motion_figure(run), "Speeds, torques, converter and pressures.")
+    motion = FigureBlock(
+        motion_figure(run), "Speeds, torques, converter and pressures.", motion_panels(run)
+    )
     shifts = [
-        FigureBlock(shift_figure(run, each), f"{each.action.label}, {each.action.kind}.")
+        FigureBlock(
+            shift_figure(run, each),
+            f"{each.action.label}, {each.action.kind}.",
+            maneuver_panels(run, each),
+        )
         for each in run.maneuvers
         if each.action.off_going and each.action.on_coming
     ]

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from drivetwin.report.figures.shift_phases import shift_phases, shift_spans
-from drivetwin.report.figures.stack import Curve, Panel, stacked
+from drivetwin.report.figures.stack import Curve, Panel, over_time, stacked, y_ranges
 from drivetwin.report.figures.validation import validation_figure
 from drivetwin.report.style import MEASURED, SIMULATED
-from drivetwin.report.units import BAR, RPM
+from drivetwin.report.units import BAR, NM, RPM
 from tests.report.sample import SHIFT, TIME, log, validation
 
 
@@ -63,5 +63,32 @@ def test_measured_and_simulated_keep_their_colours() -> None:
 
 def test_residual_is_measured_minus_simulated() -> None:
     figure = validation_figure(validation())
-    residual = next(trace for trace in figure.data if trace.name.startswith("measured -"))
+    residual = next(trace for trace in figure.data if trace.name.startswith("measured −"))
     assert np.mean(residual.y) == pytest.approx(-20.0, abs=1.0)
+
+
+def test_axes_show_what_is_in_view() -> None:
+    values = np.where(TIME < 1.0, 5e5, 9e5)
+    panels = [Panel("pressure", BAR, [Curve("P", TIME, values, MEASURED)])]
+    (low, high) = y_ranges(panels, (0.0, 0.9))["yaxis"]
+    assert low < 5.0 < high < 9.0
+    assert y_ranges(panels, (0.0, 2.0))["yaxis"] == pytest.approx((4.76, 9.24))
+
+
+def test_what_hardly_moves_is_not_blown_up() -> None:
+    noise = 100.0 + 1e-3 * np.random.default_rng(1).standard_normal(TIME.size)
+    panels = [Panel("torque", NM, [Curve("T", TIME, noise, MEASURED)])]
+    low, high = y_ranges(panels, (0.0, 2.0))["yaxis"]
+    assert high - low > 4.0
+
+
+def test_an_empty_view_has_no_range() -> None:
+    panels = [Panel("torque", NM, [Curve("T", TIME, np.full_like(TIME, np.nan), MEASURED)])]
+    assert y_ranges(panels, (0.0, 2.0)) == {}
+    assert "range" not in over_time(panels, (0.0, 2.0), 300).layout.yaxis.to_plotly_json()
+
+
+def test_a_held_value_counts_until_the_next() -> None:
+    curve = Curve("T", np.array([0.0, 1.0]), np.array([5.0, 9.0]), MEASURED, step=True)
+    low, high = y_ranges([Panel("torque", NM, [curve])], (0.4, 0.6))["yaxis"]
+    assert low < 5.0 < high < 9.0

@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 
 from drivetwin.drive.result import DriveRun, Maneuver
 from drivetwin.driveline import FloatArray
-from drivetwin.report.figures.stack import Curve, Panel, over_time
+from drivetwin.report.figures.stack import Curve, Panel, over_time, whole
 from drivetwin.report.style import (
     ACCENT,
     COMPARED,
@@ -31,44 +31,48 @@ _BEFORE, _AFTER = 0.1, 0.6
 
 def motion_figure(run: DriveRun) -> go.Figure:
     """Speeds, torques, converter and pressures over the whole drive."""
+    panels = motion_panels(run)
+    return over_time(panels, whole(panels), 760)
+
+
+def motion_panels(run: DriveRun) -> list[Panel]:
+    """What `motion_figure` shows, from top to bottom."""
     time = run.time
-    return over_time(
-        [
-            Panel("speed", RPM, _speeds(run, slice(None)), weight=1.3),
-            Panel("torque", NM, _torques(run, slice(None)), weight=1.3),
-            Panel(
-                "converter",
-                _RATIO,
-                [
-                    Curve("speed ratio", time, run.speed_ratio, MEASURED),
-                    Curve("torque ratio", time, run.torque_ratio, SIMULATED),
-                    Curve("pedal", time, run.pedal, MUTED, dash="dot"),
-                ],
-            ),
-            Panel("pressure", BAR, _by_element(run.pressure, time, slice(None), run.pressure)),
-        ],
-        (float(time[0]), float(time[-1])),
-        760,
-    )
+    return [
+        Panel("speed", RPM, _speeds(run, slice(None)), weight=1.3),
+        Panel("torque", NM, _torques(run, slice(None)), weight=1.3),
+        Panel(
+            "converter",
+            _RATIO,
+            [
+                Curve("speed ratio", time, run.speed_ratio, MEASURED),
+                Curve("torque ratio", time, run.torque_ratio, SIMULATED),
+                Curve("pedal", time, run.pedal, MUTED, dash="dot"),
+            ],
+        ),
+        Panel("pressure", BAR, _by_element(run.pressure, time, slice(None), run.pressure)),
+    ]
 
 
 def shift_figure(run: DriveRun, maneuver: Maneuver) -> go.Figure:
     """One shift: input speed, output torque, pressures and friction power of both elements."""
+    panels = maneuver_panels(run, maneuver)
+    return over_time(panels, whole(panels), 560)
+
+
+def maneuver_panels(run: DriveRun, maneuver: Maneuver) -> list[Panel]:
+    """What `shift_figure` shows, from top to bottom."""
     action = maneuver.action
     first, last = np.searchsorted(run.time, (action.start - _BEFORE, action.end + _AFTER))
     inside = slice(int(first), int(last))
     time = run.time[inside]
     power = {name: run.slip[name] * run.torque[name] for name in action.elements}
-    return over_time(
-        [
-            Panel("speed", RPM, _speeds(run, inside)[:2]),
-            Panel("torque", NM, _torques(run, inside)),
-            Panel("pressure", BAR, _by_element(run.pressure, time, inside, action.elements)),
-            Panel("power", Display("kW", 1e-3), _by_element(power, time, inside, power)),
-        ],
-        (float(time[0]), float(time[-1])),
-        560,
-    )
+    return [
+        Panel("speed", RPM, _speeds(run, inside)[:2]),
+        Panel("torque", NM, _torques(run, inside)),
+        Panel("pressure", BAR, _by_element(run.pressure, time, inside, action.elements)),
+        Panel("power", Display("kW", 1e-3), _by_element(power, time, inside, power)),
+    ]
 
 
 def energy_figure(run: DriveRun) -> go.Figure:

@@ -21,32 +21,26 @@ _SPEEDS = {
 
 def shift_phases(log: ShiftLog, shift: Shift) -> go.Figure:
     """Engine torque, pressures, output torque and speeds over time, as measured."""
-    torque = log["engine_torque"]
+    return stacked(shift_panels(log, shift), shift_spans(shift), height=760)
+
+
+def shift_panels(log: ShiftLog, shift: Shift) -> list[Panel]:
+    """What `shift_phases` shows, from top to bottom."""
+    pressures = [
+        _curve(f"{shift.offgoing} (off-going)", log.pressure(shift.offgoing), COMPARED),
+        _curve(f"{shift.oncoming} (on-coming)", log.pressure(shift.oncoming), SECOND),
+    ]
     panels = [
-        Panel(
-            "engine torque",
-            NM,
-            [Curve("T_e", torque.time, torque.values, MEASURED, step=torque.held)],
-            0.8,
-        ),
-        Panel(
-            "pressure",
-            BAR,
-            [
-                _curve(f"{shift.offgoing} (off-going)", log.pressure(shift.offgoing), COMPARED),
-                _curve(f"{shift.oncoming} (on-coming)", log.pressure(shift.oncoming), SECOND),
-            ],
-        ),
+        Panel("engine torque", NM, [_curve("T_e", log["engine_torque"], MEASURED)], 0.8),
+        Panel("pressure", BAR, pressures),
     ]
     if "output_torque" in log:
-        panels.append(
-            Panel("output torque", NM, [_curve("T_o", log["output_torque"], MEASURED)], 1.3)
-        )
+        curve = _curve("T_o", log["output_torque"], MEASURED)
+        panels.append(Panel("output torque", NM, [curve], 1.3))
     speeds = [
         _curve(name, log[role], colour) for role, (name, colour) in _SPEEDS.items() if role in log
     ]
-    panels.append(Panel("speed", RPM, speeds, 1.2))
-    return stacked(panels, shift_spans(shift), height=760)
+    return [*panels, Panel("speed", RPM, speeds, 1.2)]
 
 
 def shift_spans(shift: Shift) -> dict[str, tuple[float, float]]:

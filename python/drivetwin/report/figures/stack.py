@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Panels over one time axis, with phase bands, a cursor through all panels and zoom by phase."""
+"""Panels over one time axis, with phase bands, a cursor through all panels and zoom by phase.
+
+A figure made here holds at most some 4000 points per curve, so that any browser draws it at once.
+The report replaces them on zoom by all samples in view, which is why sections hand over the panels
+beside the figure.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
 
 from drivetwin.identify.result import FloatArray
@@ -17,6 +23,10 @@ from drivetwin.report.units import Display
 Phases = Mapping[str, tuple[float, float]]
 
 _GAP = 0.035
+_MARGIN = 0.06
+"""Room above and below the curves, in shares of their span."""
+_LEAST_SPAN = 0.04
+"""Smallest span of a y axis in shares of its largest value: what hardly moves stays quiet."""
 _ZOOMS = {"torque": "torque phase", "inertia": "inertia phase", "after": "lock-up"}
 
 
@@ -52,9 +62,9 @@ def stacked(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
     """
     view = _view(phases)
     figure = over_time(panels, view, height)
-    figure.update_layout(updatemenus=[_zoom_buttons(panels, phases, view)])
+    figure.update_layout(updatemenus=[zoom_buttons(panels, _zooms(panels, phases, view))])
     figure.update_layout(margin={"t": 64})
-    _mark_phases(figure, phases)
+    mark_phases(figure, phases)
     return figure
 
 
@@ -65,9 +75,7 @@ def over_time(panels: Sequence[Panel], view: tuple[float, float], height: int) -
     options: dict[str, Any] = {}
     for number, (panel, domain) in enumerate(zip(panels, domains, strict=True), start=1):
         suffix = "" if number == 1 else str(number)
-        title = f"{panel.quantity}<br>[{panel.display.label}]"
-        ticks = 3 + round(12 * (domain[1] - domain[0]))
-        options[f"yaxis{suffix}"] = axis(title, domain=domain, anchor="x", nticks=ticks)
+        options[f"yaxis{suffix}"] = _y_axis(panel, domain)
         options[f"legend{suffix}"] = {
             "x": 1.01,
             "y": domain[1],
@@ -88,11 +96,41 @@ def over_time(panels: Sequence[Panel], view: tuple[float, float], height: int) -
     )
     figure.update_layout(layout(height, **options))
     figure.update_layout(
+        {f"{name}.range": span for name, span in y_ranges(panels, view).items()},
         margin={"r": 150},
         hovermode="x unified",
         hoversubplots="axis",
     )
     return figure
+
+
+def y_ranges(panels: Sequence[Panel], view: tuple[float, float]) -> dict[str, tuple[float, float]]:
+    """Range in display units by y axis (`yaxis`, `yaxis2`, ...) that shows what is in `view` [s].
+
+    A panel without a sample in view has none.
+    """
+    found = {}
+    for number, panel in enumerate(panels, start=1):
+        parts = [panel.display.of(_inside(curve, view)) for curve in panel.curves]
+        values = np.concatenate([part[np.isfinite(part)] for part in parts] or [np.empty(0)])
+        if values.size:
+            low, high = float(values.min()), float(values.max())
+            span = max(high - low, _LEAST_SPAN * max(abs(low), abs(high)), 1e-12)
+            middle, half = 0.5 * (low + high), (0.5 + _MARGIN) * span
+            found["yaxis" if number == 1 else f"yaxis{number}"] = (middle - half, middle + half)
+    return found
+
+
+def _inside(curve: Curve, view: tuple[float, float]) -> FloatArray:
+    """Samples in view, with the one before it of a value that is held."""
+    first, last = np.searchsorted(curve.time, view, side="left")
+    return curve.values[max(0, first - 1) if curve.step else first : last + 1]
+
+
+def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
+    ticks = 3 + round(12 * (domain[1] - domain[0]))
+    title = f"{panel.quantity}<br>[{panel.display.label}]"
+    return axis(title, domain=domain, anchor="x", nticks=ticks)
 
 
 def _domains(weights: Sequence[float]) -> list[tuple[float, float]]:
@@ -133,17 +171,34 @@ def _view(phases: Phases) -> tuple[float, float]:
     return max(phases["before"][0], start - 0.5), min(phases["after"][1], end + 1.0)
 
 
-def _zoom_buttons(
+def _zooms(
     panels: Sequence[Panel], phases: Phases, view: tuple[float, float]
-) -> dict[str, Any]:
-    spans = [curve.time for panel in panels for curve in panel.curves if curve.time.size]
-    whole = (float(min(t[0] for t in spans)), float(max(t[-1] for t in spans)))
-    ranges = {"shift": view, "whole": whole}
+) -> dict[str, tuple[float, float]]:
+    """Views to choose from, by label."""
+    zooms = {"shift": view, "whole": whole(panels)}
     for phase, label in _ZOOMS.items():
         start, end = phases[phase]
         end = min(end, start + 1.0)
         margin = 0.1 * (end - start)
-        ranges[label] = (start - margin, end + margin)
+        zooms[label] = (start - margin, end + margin)
+    return zooms
+
+
+def whole(panels: Sequence[Panel]) -> tuple[float, float]:
+    """Time that the curves cover together [s]."""
+    times = [curve.time for panel in panels for curve in panel.curves if curve.time.size]
+    return float(min(time[0] for time in times)), float(max(time[-1] for time in times))
+
+
+def zoom_buttons(
+    panels: Sequence[Panel], zooms: Mapping[str, tuple[float, float]]
+) -> dict[str, Any]:
+    """Buttons above the panels, one for each labelled view [s]; each fits the y axes too."""
+    buttons = []
+    for label, span in zooms.items():
+        fitted = {f"{name}.range": list(two) for name, two in y_ranges(panels, span).items()}
+        change = {"xaxis.range": list(span), **fitted}
+        buttons.append({"label": label, "method": "relayout", "args": [change]})
     return {
         "type": "buttons",
         "direction": "right",
@@ -154,14 +209,12 @@ def _zoom_buttons(
         "yanchor": "bottom",
         "pad": {"b": 22, "t": 0},
         "font": {"size": 11},
-        "buttons": [
-            {"label": label, "method": "relayout", "args": [{"xaxis.range": list(span)}]}
-            for label, span in ranges.items()
-        ],
+        "buttons": buttons,
     }
 
 
-def _mark_phases(figure: go.Figure, phases: Phases) -> None:
+def mark_phases(figure: go.Figure, phases: Phases) -> None:
+    """Shade torque and inertia phase and number all four phases above the top panel."""
     for phase, (start, end) in phases.items():
         if phase in ("torque", "inertia"):
             figure.add_shape(

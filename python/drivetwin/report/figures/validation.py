@@ -21,32 +21,27 @@ _OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
 
 def validation_figure(validation: Validation) -> go.Figure:
     """Inputs that drove the model, then each output as measured and as simulated."""
+    return stacked(validation_panels(validation), validation.phases, height=1180)
+
+
+def validation_panels(validation: Validation) -> list[Panel]:
+    """What `validation_figure` shows, from top to bottom."""
     shift = validation.shift
     torque = validation.engine_torque
+    pressures = [
+        Curve(name, validation.pressures[name].time, validation.pressures[name].values, colour)
+        for name, colour in ((shift.offgoing, COMPARED), (shift.oncoming, SECOND))
+    ]
     panels = [
         Panel("engine torque", NM, [Curve("T_e", torque.time, torque.values, MEASURED)], 0.7),
-        Panel(
-            "pressure",
-            BAR,
-            [
-                Curve(name, signal.time, signal.values, colour)
-                for (name, signal), colour in zip(
-                    sorted(
-                        validation.pressures.items(), key=lambda item: item[0] == shift.oncoming
-                    ),
-                    (COMPARED, SECOND),
-                    strict=True,
-                )
-            ],
-            0.7,
-        ),
+        Panel("pressure", BAR, pressures, 0.7),
     ]
     for name, (title, display, weight) in _OUTPUTS.items():
         if name in validation.traces:
             trace = validation.traces[name]
             panels.append(Panel(title, display, _pair(trace), weight))
             panels.append(Panel("residual", display, [_residual(trace)], 0.5))
-    return stacked(panels, validation.phases, height=1180)
+    return panels
 
 
 def _pair(trace: SignalTrace) -> list[Curve]:
@@ -57,4 +52,4 @@ def _pair(trace: SignalTrace) -> list[Curve]:
 
 
 def _residual(trace: SignalTrace) -> Curve:
-    return Curve("measured - simulated", trace.time, trace.measured - trace.simulated, MUTED, 1.0)
+    return Curve("measured − simulated", trace.time, trace.measured - trace.simulated, MUTED, 1.0)

@@ -9,6 +9,8 @@ from enum import StrEnum
 
 import plotly.graph_objects as go
 
+from drivetwin.report.figures.stack import Panel
+
 
 class Tone(StrEnum):
     """How a cell, tile or note is coloured."""
@@ -35,10 +37,16 @@ class Cell:
 
 @dataclass(frozen=True)
 class FigureBlock:
-    """A figure with its caption."""
+    """A figure with its caption.
+
+    Of a figure over time `panels` hold all samples, in the order of its traces; the page draws
+    from them. `link` names the figures that zoom together.
+    """
 
     figure: go.Figure
     caption: str
+    panels: Sequence[Panel] = ()
+    link: str = ""
     kind: str = field(default="figure", init=False)
 
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 from drivetwin.identify.result import Identification
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.figures.friction import friction_figure
-from drivetwin.report.figures.shift_phases import shift_phases
-from drivetwin.report.figures.validation import validation_figure
+from drivetwin.report.figures.shift_phases import shift_panels, shift_phases
+from drivetwin.report.figures.validation import validation_figure, validation_panels
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -34,7 +34,14 @@ def shift_section(found: Identification, log: ShiftLog) -> Section:
     blocks: list[Block] = []
     for shift in found.shifts:
         title = f"Shift {shift.start_gear}→{shift.end_gear}, {shift.kind.value}. "
-        blocks.append(FigureBlock(shift_phases(log, shift), title + PHASE_KEY))
+        blocks.append(
+            FigureBlock(
+                shift_phases(log, shift),
+                title + PHASE_KEY,
+                shift_panels(log, shift),
+                _link(shift),
+            )
+        )
         blocks.append(_phase_table(shift))
         if shift.warnings:
             blocks.append(NotesBlock("About this shift", shift.warnings, Tone.DOUBTFUL))
@@ -47,6 +54,11 @@ def shift_section(found: Identification, log: ShiftLog) -> Section:
         "What was measured, and where the shift was found in it.",
         blocks,
     )
+
+
+def _link(shift: Shift) -> str:
+    """Figures of one shift zoom together."""
+    return f"{shift.start_gear}→{shift.end_gear} at {shift.lockup_time:.3f} s"
 
 
 def _phase_table(shift: Shift) -> TableBlock:
@@ -123,7 +135,9 @@ def validation_section(validations: tuple[Validation, ...]) -> Section:
             "stands what is left, measured minus simulated. While the on-coming element slips, the "
             "noise of its pressure sensor passes into the simulated torque and output speed."
         )
-        blocks.append(FigureBlock(validation_figure(one), text))
+        blocks.append(
+            FigureBlock(validation_figure(one), text, validation_panels(one), _link(shift))
+        )
         blocks.append(_event_table(one))
     return Section(
         "validation",
