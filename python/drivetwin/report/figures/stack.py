@@ -122,9 +122,9 @@ def y_ranges(panels: Sequence[Panel], view: tuple[float, float]) -> dict[str, tu
 
 
 def _inside(curve: Curve, view: tuple[float, float]) -> FloatArray:
-    """Samples in view, with the one before it of a value that is held."""
-    first, last = np.searchsorted(curve.time, view, side="left")
-    return curve.values[max(0, first - 1) if curve.step else first : last + 1]
+    """Samples in view: of held values with the one before it, of others with the one after."""
+    first, last = np.searchsorted(curve.time, view)
+    return curve.values[max(0, first - 1) : last] if curve.step else curve.values[first : last + 1]
 
 
 def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
