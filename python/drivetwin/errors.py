@@ -106,3 +106,23 @@ class SimulationError(DrivetwinError):
 
 class MissingExtraError(DrivetwinError):
     """An optional dependency is not installed; the text names the install command."""
+
+
+class RulesError(InputError):
+    """The rules of a fleet are wrong, or none of them takes a log."""
+
+
+class StoreError(DrivetwinError):
+    """A fleet store cannot be opened, read or written: in use, full, read-only, of another kind."""
+
+
+class SchedulerError(DrivetwinError):
+    """The scheduler of a cluster cannot be reached, or stayed away for too long."""
+
+
+class QueryError(InputError):
+    """A question to a fleet store that its database does not understand."""
+
+
+class RefusedError(InputError):
+    """A path, upload or request that the workbench does not accept."""

@@ -50,6 +50,7 @@ _SPECS = (
     ParameterSpec("f_d", "f_d", "Hz", "frequency of the lock-up oscillation", 0.0, 1e3, "gear"),
     ParameterSpec("zeta", "ζ", "1", "damping ratio of the lock-up oscillation", 0.0, 1.0, "gear"),
     ParameterSpec("P0", "P0", "Pa", "pressure at which the clutch fill ends", 0.0, 1e7, "element"),
+    ParameterSpec("mu", "μ", "1", "friction at the slip where a fleet compares", 0, 1, "element"),
     ParameterSpec("te_delay", "τ_e", "s", "age of a fresh engine torque value", -1.0, 1.0),
 )
 

@@ -30,7 +30,9 @@ PYTHON_LAYERS = (
     frozenset({"shifts", "dyno", "drive"}),
     frozenset({"identify"}),
     frozenset({"twin", "results", "start_state", "validate"}),
+    frozenset({"observer"}),
     frozenset({"report"}),
+    frozenset({"fleet"}),
     frozenset({"cli", "__main__"}),
 )
 """From the bottom up: a module may import from its own layer and those below."""

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,13 +10,11 @@ from typing import TYPE_CHECKING
 from drivetwin.cli.arguments import load
 from drivetwin.cli.output import step
 from drivetwin.cli.staging import staged
-from drivetwin.errors import NoShiftError, Where
 
 if TYPE_CHECKING:
     from drivetwin.identify.method import Method
     from drivetwin.identify.result import Identification
     from drivetwin.logs.shiftlog import ShiftLog
-    from drivetwin.shifts.shift import RejectedShift
     from drivetwin.twin import Twin
     from drivetwin.vehicle.card import VehicleCard
 
@@ -40,15 +37,13 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
     from drivetwin.identify.pipeline import identify
-    from drivetwin.shifts.find import find_shifts
+    from drivetwin.shifts.usable import usable_shifts
     from drivetwin.twin import Twin
     from drivetwin.validate import validated
 
     with step(f"reading {log.name}"):
         recording, card = load(log, vehicle, channels)
-        shifts = find_shifts(recording, card)
-        if not shifts.shifts:
-            raise no_shift(recording, shifts.rejected)
+        shifts = usable_shifts(recording, card)
     with step(f"identifying by the {method} method"):
         found = identify(recording, card, shifts, method)
         found = replace(found, inputs={**found.inputs, **_digests(vehicle, channels)})
@@ -79,16 +74,3 @@ def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
         outcome.twin.save(beside / TWIN)
         save_report(beside / REPORT, outcome.found, outcome.log)
     return tuple(folder / name for name in (RESULT, TWIN, REPORT))
-
-
-def no_shift(log: ShiftLog, rejected: Sequence[RejectedShift]) -> NoShiftError:
-    """The error for a log without a usable shift, with the candidates and why they were refused."""
-    reasons = "; ".join(
-        f"{one.time[0]:.3f} s to {one.time[1]:.3f} s: {one.reason}" for one in rejected
-    )
-    return NoShiftError(
-        f"no usable gear shift; {reasons}" if reasons else "no gear shift: one gear throughout",
-        "record from a second before the torque phase to a second after lock-up; "
-        "check the ratios on the card and the speed channels with `drivetwin inspect`",
-        Where(file=log.source),
-    )

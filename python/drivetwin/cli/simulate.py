@@ -34,11 +34,10 @@ def simulate(
     Measured engine torque and pressures drive the model; the log may be another than the twin's.
     Ratios and shift elements are the twin's own, so no vehicle card is needed.
     """
-    from drivetwin.cli.pipeline import no_shift
     from drivetwin.cli.tables import fit_table
     from drivetwin.logs.read import read_log
     from drivetwin.results.atomic import write_text
-    from drivetwin.shifts.find import find_shifts
+    from drivetwin.shifts.usable import usable_shifts
     from drivetwin.twin import Twin
     from drivetwin.validate import validate
     from drivetwin.vehicle.card import load_card
@@ -47,9 +46,7 @@ def simulate(
     with step(f"simulating {log.name}"):
         card = model.card() if vehicle is None else load_card(vehicle)
         recording = read_log(log, card, channels)
-        shifts = find_shifts(recording, card)
-        if not shifts.shifts:
-            raise no_shift(recording, shifts.rejected)
+        shifts = usable_shifts(recording, card)
         runs = [validate(model, recording, shift) for shift in shifts.shifts]
     if output is not None:
         write_text(output, traces_text(runs))

@@ -28,6 +28,7 @@ _EXPERIMENT = {
     "f_d": "hold the pedal still for a second after a firm lock-up",
     "zeta": "hold the pedal still for a second after a firm lock-up",
     "P0": "record a shift with a slower pressure ramp, or shifts at two torque levels",
+    "mu": "record shifts whose inertia phase passes the slip asked for",
     "te_delay": "step the pedal in gear: a constant torque has no visible age",
 }
 
