@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: MIT */
+/* The ranges of the parameters. */
+
+#include "dt_internal.h"
+
+static int at_least(dt_real value, dt_real least) { return value >= least && value - value >= 0; }
+
+static int more_than(dt_real value, dt_real least) { return value > least && value - value >= 0; }
+
+static int finite(dt_real value) { return value - value >= 0; }
+
+static int not_zero(dt_real value) { return finite(value) && dt_abs(value) > DT_C(0); }
+
+static const char *check_friction(const dt_friction *law) {
+    if (law->points < 0 || law->points > DT_POINTS) {
+        return "friction.points";
+    }
+    if (law->points == 0) {
+        return !at_least(law->mu_c, 0)  ? "friction.mu_c"
+               : !at_least(law->mu_s, 0) ? "friction.mu_s"
+               : !more_than(law->v_s, 0) ? "friction.v_s"
+               : !finite(law->mu_v)      ? "friction.mu_v"
+                                         : 0;
+    }
+    if (law->slip[0] < 0 || law->slip[0] > 0) {
+        return "friction.slip";
+    }
+    for (int i = 0; i < law->points; ++i) {
+        if (!at_least(law->mu[i], 0)) {
+            return "friction.mu";
+        }
+        if (i > 0 && !more_than(law->slip[i], law->slip[i - 1])) {
+            return "friction.slip";
+        }
+    }
+    return 0;
+}
+
+static const char *check_clutch(const dt_clutch *clutch) {
+    return !not_zero(clutch->i_c)                ? "i_c"
+           : !not_zero(clutch->i_out)            ? "i_out"
+           : !at_least(clutch->gain, 0)          ? "gain"
+           : !finite(clutch->P0)                 ? "P0"
+           : !at_least(clutch->peak, 1)          ? "peak"
+           : !at_least(clutch->drum_inertia, 0)  ? "drum_inertia"
+                                                 : check_friction(&clutch->friction);
+}
+
+const char *dt_check(const dt_params *p) {
+    const char *fault = !at_least(p->J1, 0)                               ? "J1"
+                        : !at_least(p->J2e, 0)                            ? "J2e"
+                        : !more_than(p->J1 + p->J2e, 0)                   ? "J1 + J2e"
+                        : !more_than(p->eta, 0) || p->eta > DT_C(1.5)     ? "eta"
+                        : !not_zero(p->i_in)                              ? "i_in"
+                        : !more_than(p->J_out, 0)                         ? "J_out"
+                        : !not_zero(p->i_f)                               ? "i_f"
+                        : !more_than(p->J_v, 0)                           ? "J_v"
+                        : !at_least(p->k_o, 0)                            ? "k_o"
+                        : !at_least(p->c_o, 0)                            ? "c_o"
+                        : !finite(p->load_constant)                       ? "load.constant"
+                        : !at_least(p->load_rolling, 0)                   ? "load.rolling"
+                        : !at_least(p->load_aero, 0)                      ? "load.aero"
+                        : p->loss_law != DT_PAPER && p->loss_law != DT_DISSIPATIVE ? "loss_law"
+                                                                          : 0;
+    for (int j = 0; j < DT_CLUTCHES && fault == 0; ++j) {
+        fault = check_clutch(&p->clutch[j]);
+    }
+    if (fault == 0) {
+        const dt_real first = p->clutch[0].i_c * p->clutch[0].i_out;
+        const dt_real second = p->clutch[1].i_c * p->clutch[1].i_out;
+        fault = dt_abs(first - second) > DT_C(1e-3) * dt_abs(first) ? 0 : "i_c * i_out";
+    }
+    return fault;
+}

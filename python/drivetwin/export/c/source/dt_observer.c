@@ -1,0 +1,1 @@
+#include "dt_model.h"

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""Writes the C sources of a twin: the model as it stands in `source/`, and `dt_twin.c`."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+from drivetwin.export.checks import check_exportable
+from drivetwin.export.entries import Entry, entries_of, locked_index, start_entries
+from drivetwin.export.subject import Subject
+from drivetwin.results.atomic import write_bytes
+
+_LOSS_LAWS = {"paper": "DT_PAPER", "dissipative": "DT_DISSIPATIVE"}
+
+
+def model_sources() -> dict[str, bytes]:
+    """The files of the model by name, without the twin's parameters."""
+    folder = resources.files("drivetwin.export.c") / "source"
+    names = sorted(entry.name for entry in folder.iterdir())
+    return {name: (folder / name).read_bytes() for name in names}
+
+
+def twin_source(subject: Subject) -> str:
+    """`dt_twin.c`: parameters and start as initialisers with unit and meaning.
+
+    Raises InputError for a model that the C sources cannot hold.
+    """
+    model, start = subject.model, subject.start
+    check_exportable(model, start)
+    names = ", ".join(c_string(element.name) for element in model.elements)
+    points = {f"clutch[{i}].friction.points": n for i, n in table_points(subject).items()}
+    return "\n".join(
+        (
+            "/* SPDX-License-Identifier: MIT */",
+            f"/* {_comment(subject.name)}: {_comment(subject.note or 'parameters')}; written by"
+            " drivetwin. */",
+            "",
+            '#include "dt_twin.h"',
+            "",
+            f"const char dt_twin_name[] = {c_string(subject.name)};",
+            f"const char *const dt_twin_clutch_names[DT_CLUTCHES] = {{{names}}};",
+            "",
+            "const dt_params dt_twin_params = {",
+            *map(_initialiser, entries_of(model)),
+            f"    .loss_law = {_LOSS_LAWS[model.loss_law]},",
+            *(f"    .{field} = {count}," for field, count in points.items() if count),
+            "};",
+            "",
+            "const dt_start dt_twin_start = {",
+            *map(_initialiser, start_entries(start)),
+            f"    .locked = {locked_index(model, start)},",
+            "};",
+            "",
+        )
+    )
+
+
+def table_points(subject: Subject) -> dict[int, int]:
+    """Element index -> points of its friction table, 0 for a Stribeck law."""
+    laws = (element.friction for element in subject.model.elements)
+    return {i: len(getattr(law, "slip", ())) for i, law in enumerate(laws)}
+
+
+def write_c(subject: Subject, folder: Path) -> tuple[Path, ...]:
+    """Write the sources of a twin into `folder`; returns their paths. Raises InputError, OSError."""
+    generated = {"dt_twin.c": twin_source(subject).encode()}
+    files = {**model_sources(), **generated}
+    for name, data in files.items():
+        write_bytes(folder / name, data)
+    return tuple(folder / name for name in files)
+
+
+def c_string(text: str) -> str:
+    """A C string literal; what is not printable ASCII becomes octal escapes of its UTF-8 bytes."""
+
+    def literal(byte: int) -> str:
+        return chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f"\\{byte:03o}"
+
+    return '"' + "".join(map(literal, text.encode())) + '"'
+
+
+def _comment(text: str) -> str:
+    """Text that cannot end a comment or break its line."""
+    return " ".join(text.replace("*/", "* /").split())
+
+
+def _initialiser(entry: Entry) -> str:
+    return f"    .{entry.field} = DT_C({entry.value!r}), /* {entry.unit}: {entry.meaning} */"

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+"""What the exported C model cannot represent, refused before anything is written."""
+
+from __future__ import annotations
+
+from drivetwin.driveline import DualClutch, FrictionTable, State, as_json
+from drivetwin.errors import InputError
+
+MAX_POINTS = 64
+"""DT_POINTS of `dt_model.h`."""
+
+
+def check_exportable(model: DualClutch, start: State) -> None:
+    """Raises InputError for a model that is not two shift elements with laws that C can hold."""
+    from dataclasses import asdict
+
+    as_json(asdict(model))  # names every number that is not finite
+    if len(model.elements) != 2:
+        raise InputError(
+            f"the model has {len(model.elements)} shift elements",
+            "export one shift: an off-going and an on-coming element",
+        )
+    if len(start.locked) > 1:
+        raise InputError("more than one element starts locked", "name one or none")
+    for element in model.elements:
+        law = element.friction
+        if isinstance(law, FrictionTable) and len(law.slip) > MAX_POINTS:
+            raise InputError(
+                f"the friction table of {element.name} has {len(law.slip)} points",
+                f"thin it out to at most {MAX_POINTS}, or fit a Stribeck law",
+            )

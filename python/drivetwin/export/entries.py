@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""The numbers of an exported model, by name: one table behind C, FMU and their documents."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from drivetwin.driveline import DualClutch, FrictionTable, State
+
+INF = math.inf
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One number of the model.
+
+    `name` is structured (`B2.P0`, `load.constant`), `field` its place in `dt_params` of
+    `dt_model.h`; `unit` is SI, ASCII; `least` and `most` bound what `dt_check` accepts.
+    """
+
+    name: str
+    field: str
+    value: float
+    unit: str
+    meaning: str
+    least: float = -INF
+    most: float = INF
+
+
+def entries_of(model: DualClutch) -> tuple[Entry, ...]:
+    """All numbers of a model, in the order of `dt_params`."""
+    load = model.load
+    return (
+        Entry("J1", "J1", model.J1, "kg*m^2", "inertia before the input gear", 0.0),
+        Entry("J2e", "J2e", model.J2e, "kg*m^2", "inertia behind it, at the engine", 0.0),
+        Entry("eta", "eta", model.eta, "1", "lumped gear efficiency", 0.0, 1.5),
+        Entry("i_in", "i_in", model.i_in, "1", "input gear ratio"),
+        Entry("J_out", "J_out", model.J_out, "kg*m^2", "output side before the shaft", 0.0),
+        Entry("i_f", "i_f", model.i_f, "1", "final drive ratio"),
+        Entry("J_v", "J_v", model.J_v, "kg*m^2", "vehicle inertia at the wheel", 0.0),
+        Entry("k_o", "k_o", model.k_o, "N*m/rad", "output shaft stiffness", 0.0),
+        Entry("c_o", "c_o", model.c_o, "N*m*s/rad", "output shaft damping", 0.0),
+        Entry("load.constant", "load_constant", load.constant, "N*m", "load at the wheel"),
+        Entry("load.rolling", "load_rolling", load.rolling, "N*m", "rolling resistance", 0.0),
+        Entry("load.aero", "load_aero", load.aero, "N*m*s^2/rad^2", "load over speed squared", 0.0),
+        *(entry for index in range(2) for entry in _element_entries(model, index)),
+    )
+
+
+def _element_entries(model: DualClutch, index: int) -> tuple[Entry, ...]:
+    element = model.elements[index]
+
+    def entry(field: str, value: float, unit: str, meaning: str, least: float = -INF) -> Entry:
+        inner = field if field in _OWN_FIELDS else f"friction.{field}"
+        name = f"{element.name}.{field}"
+        return Entry(name, f"clutch[{index}].{inner}", value, unit, meaning, least)
+
+    own = (
+        entry("i_c", element.i_c, "1", "ratio between input gear and clutch"),
+        entry("i_out", element.i_out, "1", "ratio between clutch and output"),
+        entry("gain", element.gain, "m^3", "surfaces, de-rating, area, effective radius", 0.0),
+        entry("P0", element.P0, "Pa", "pressure at which the fill ends"),
+        entry("peak", element.peak, "1", "static over kinetic capacity at zero slip", 1.0),
+        entry("drum_inertia", element.drum_inertia, "kg*m^2", "inertia that runs with the slip", 0),
+    )
+    law = element.friction
+    if isinstance(law, FrictionTable):
+        points = range(len(law.slip))
+        # The first slip is zero by definition, not a parameter.
+        slips = (
+            entry(f"slip[{i}]", law.slip[i], "rad/s", "slip of the friction table", 0.0)
+            for i in points
+            if i > 0
+        )
+        values = (entry(f"mu[{i}]", law.mu[i], "1", "friction at that slip", 0.0) for i in points)
+        return (*own, *slips, *values)
+    return (
+        *own,
+        entry("mu_c", law.mu_c, "1", "friction after the exponential has died out", 0.0),
+        entry("mu_s", law.mu_s, "1", "friction at zero slip", 0.0),
+        entry("v_s", law.v_s, "rad/s", "slip over which the exponential falls by e", 0.0),
+        entry("mu_v", law.mu_v, "s/rad", "viscous slope"),
+    )
+
+
+_OWN_FIELDS = ("i_c", "i_out", "gain", "P0", "peak", "drum_inertia")
+
+
+def start_entries(start: State) -> tuple[Entry, ...]:
+    """The numbers a run starts from; `field` is the place in `dt_start`."""
+    return (
+        Entry("start.engine_speed", "engine_speed", start.engine_speed, "rad/s", "engine speed"),
+        Entry("start.output_speed", "output_speed", start.output_speed, "rad/s", "output speed"),
+        Entry("start.wheel_speed", "wheel_speed", start.wheel_speed, "rad/s", "wheel speed"),
+        Entry("start.twist", "twist", start.twist, "rad", "twist of the output shaft"),
+    )
+
+
+def locked_index(model: DualClutch, start: State) -> int:
+    """0: nothing is locked at the start; k: the k-th element is."""
+    names = [element.name for element in model.elements]
+    return names.index(start.locked[0]) + 1 if start.locked else 0

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""What a parameter file holds: named numbers and curves with units, whatever the format.
+
+A format writes a `ParameterSet` and reads it back unchanged, once `legal` has respelled what the
+format cannot hold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from drivetwin.errors import FileFormatError, InputError, Where
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """One number. `unit` is SI in ASCII, `1` without dimension; `text` is one line about it."""
+
+    name: str
+    value: float
+    unit: str = "1"
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Breakpoints of a curve, increasing, at least one; `name` says of which quantity."""
+
+    name: str
+    points: tuple[float, ...]
+    unit: str = "1"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Numbers over one axis, as many as the axis has points."""
+
+    name: str
+    axis: Axis
+    values: tuple[float, ...]
+    unit: str = "1"
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """Contents of a parameter file.
+
+    `notes` are lines for people (provenance, what the log could not tell); they are written as
+    comments and not read back. `skipped` names what a file holds beyond numbers and curves.
+    """
+
+    name: str
+    scalars: tuple[Scalar, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    notes: tuple[str, ...] = field(default=(), compare=False)
+    skipped: tuple[str, ...] = field(default=(), compare=False)
+
+    def __getitem__(self, name: str) -> Scalar | Curve:
+        """Number or curve by its name. Raises KeyError."""
+        for entry in (*self.scalars, *self.curves):
+            if entry.name == name:
+                return entry
+        raise KeyError(name)
+
+
+def legal(
+    parameters: ParameterSet,
+    spell: Callable[[str], str],
+    line: Callable[[str], str] = lambda text: text,
+) -> ParameterSet:
+    """Return the set with names put through `spell` and texts through `line`.
+
+    A name that changes is kept in the text. Raises InputError where two names become one.
+    """
+
+    def respelled(entry: Scalar | Curve) -> str:
+        kept = "" if spell(entry.name) == entry.name else f" ({entry.name})"
+        return line(entry.text + kept).strip()
+
+    changed = ParameterSet(
+        name=line(parameters.name),
+        scalars=tuple(
+            replace(one, name=spell(one.name), text=respelled(one), unit=line(one.unit))
+            for one in parameters.scalars
+        ),
+        curves=tuple(
+            replace(
+                one,
+                name=spell(one.name),
+                text=respelled(one),
+                unit=line(one.unit),
+                axis=replace(one.axis, name=spell(one.axis.name), unit=line(one.axis.unit)),
+            )
+            for one in parameters.curves
+        ),
+        notes=tuple(line(note) for note in parameters.notes),
+    )
+    _refuse_twins(parameters, changed)
+    return changed
+
+
+def _refuse_twins(before: ParameterSet, after: ParameterSet) -> None:
+    origin: dict[str, str] = {}
+    old = [one.name for one in (*before.scalars, *before.curves)]
+    new = [one.name for one in (*after.scalars, *after.curves)]
+    for name, respelled in zip(old, new, strict=True):
+        if respelled in origin:
+            raise InputError(
+                f"{origin[respelled]!r} and {name!r} are both written as {respelled!r}",
+                "name the elements and gears of the vehicle card with letters and digits",
+            )
+        origin[respelled] = name
+
+
+def number(value: float) -> str:
+    """Shortest decimal that reads back as the same double, always with a decimal point."""
+    text = repr(float(value))
+    mantissa, e, exponent = text.partition("e")
+    return text if "." in mantissa or not e else f"{mantissa}.0e{exponent}"
+
+
+def finite(text: str, source: str, key: str) -> float:
+    """Number behind a text. Raises FileFormatError, naming `source` and `key`."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise FileFormatError(
+            f"{text.strip()!r} is no finite number",
+            "correct the value, with a point as decimal separator",
+            Where(file=source, key=key),
+        )
+    return value
+
+
+def curve_of(
+    name: str, axis: Axis, values: Iterable[float], labels: tuple[str, str], source: str
+) -> Curve:
+    """Curve from what a file holds; `labels` are its unit and text.
+
+    Raises FileFormatError where points and values do not match or the points do not increase.
+    """
+    unit, text = labels
+    made = Curve(name, axis, tuple(values), unit, text)
+    if not made.values or len(made.values) != len(axis.points):
+        fault = f"{len(axis.points)} axis points for {len(made.values)} values"
+    elif any(a >= b for a, b in zip(axis.points, axis.points[1:], strict=False)):
+        fault = "the axis points do not increase"
+    else:
+        return made
+    raise FileFormatError(fault, "correct the curve", Where(file=source, key=name))
+
+
+def read_file(path: Path) -> str:
+    """Text of a parameter file in UTF-8 or, as older tools write, Latin-1.
+
+    Raises FileFormatError for a file with null bytes, and OSError.
+    """
+    data = path.read_bytes()
+    if b"\0" in data:
+        raise FileFormatError(
+            "the file is binary", "hand in a parameter file", Where(file=path.name)
+        )
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""The parameters of a twin, as its files name them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.spelling import one_line
+from drivetwin.parameters import spec_of
+from drivetwin.twin import friction_law
+
+if TYPE_CHECKING:
+    from drivetwin.drive.powertrain import Converter
+    from drivetwin.driveline import FloatArray, FrictionTable, Stribeck
+    from drivetwin.identify.result import Estimate
+    from drivetwin.twin import Twin, TwinElement
+
+POINTS = 33
+"""Points of a curve drawn from a law, denser towards zero slip where it bends: with the linings
+seen, linear interpolation between them stays within 0.1 % of μ."""
+
+_DESIGN = {
+    "i_c": ("1", "ratio between input gear and clutch (eq. 15)"),
+    "i_out": ("1", "ratio between clutch and output (eq. 15)"),
+    "gain": ("m^3", "friction surfaces x de-rating x area x effective radius (eq. 5)"),
+    "P0": ("Pa", "pressure at which the clutch fill ends"),
+    "peak": ("1", "static over kinetic capacity at zero slip"),
+    "drum_inertia": ("kg*m^2", "inertia that turns with the slip"),
+}
+_LAW = {
+    "mu_c": ("1", "friction coefficient at large slip"),
+    "mu_s": ("1", "friction coefficient at zero slip"),
+    "v_s": ("rad/s", "slip over which the difference decays"),
+    "mu_v": ("s/rad", "rise of the friction coefficient with slip"),
+}
+
+
+class Names(StrEnum):
+    """Whose names a parameter file uses: drivetwin's own or those of Simscape Driveline blocks."""
+
+    DRIVETWIN = "drivetwin"
+    SIMSCAPE = "simscape"
+
+
+def parameters_of(
+    twin: Twin, names: Names = Names.DRIVETWIN, converter: Converter | None = None
+) -> ParameterSet:
+    """All numbers of a twin that are known, and μ over slip of its elements.
+
+    What the log could not tell is named in the notes and has no entry. A `converter` map, which no
+    shift with the lock-up clutch engaged tells, comes from a powertrain file.
+    """
+    from drivetwin.export.parameters.simscape import simscape
+
+    own = ParameterSet(
+        name=one_line(twin.name),
+        scalars=(*_estimates(twin), *_gearing(twin), *_elements(twin), *_laws(twin)),
+        curves=(*_friction(twin), *(() if converter is None else converter_curves(converter))),
+        notes=tuple(one_line(note) for note in _notes(twin)),
+    )
+    return simscape(own, tuple(twin.elements)) if names is Names.SIMSCAPE else own
+
+
+def converter_curves(converter: Converter) -> tuple[Curve, Curve]:
+    """Torque ratio and capacity over the speed ratio."""
+    axis = Axis("speed_ratio", converter.speed_ratio)
+    return (
+        Curve(
+            "converter.torque_ratio",
+            axis,
+            converter.torque_ratio,
+            text="turbine torque over pump torque",
+        ),
+        Curve(
+            "converter.capacity",
+            axis,
+            converter.capacity,
+            "N*m*s^2/rad^2",
+            "pump torque over pump speed squared",
+        ),
+    )
+
+
+def _estimates(twin: Twin) -> Iterator[Scalar]:
+    for estimate in twin.parameters.values():
+        if estimate.value is not None:
+            yield Scalar(estimate.id, estimate.value, estimate.unit, one_line(_told(estimate)))
+
+
+def _told(estimate: Estimate) -> str:
+    """Meaning, verdict and interval."""
+    text = f"{spec_of(estimate.id).meaning}; {estimate.verdict.value}"
+    interval = estimate.ci95_total
+    return text if interval is None else f"{text}, 95 %: {interval[0]:.5g} .. {interval[1]:.5g}"
+
+
+def _gearing(twin: Twin) -> Iterator[Scalar]:
+    yield Scalar("i_in", twin.i_in, text="input gear")
+    yield Scalar("i_f", twin.final_drive, text="final drive")
+    for name, gear in twin.gears.items():
+        text = one_line(f"overall ratio of gear {name}, held by {gear.element}")
+        yield Scalar(f"ratio_{name}", gear.ratio, text=text)
+
+
+def _elements(twin: Twin) -> Iterator[Scalar]:
+    for name, element in twin.elements.items():
+        yield from _design(name, element, twin)
+
+
+def _design(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
+    for field, (unit, text) in _DESIGN.items():
+        key = f"{field}.{name}"
+        told = twin.parameters.get(key)
+        if told is None or told.value is None:
+            yield Scalar(key, getattr(element, field), unit, f"{text}; design value")
+
+
+def _laws(twin: Twin) -> Iterator[Scalar]:
+    for name, curve in twin.friction.items():
+        for field, value in (curve.stribeck or {}).items():
+            unit, text = _LAW[field]
+            yield Scalar(f"{field}.{name}", value, unit, text)
+
+
+def _friction(twin: Twin) -> Iterator[Curve]:
+    for name, curve in twin.friction.items():
+        law = friction_law(curve)
+        points = _breakpoints(law, float(curve.slip[-1]))
+        yield Curve(
+            f"mu.{name}",
+            Axis("slip", tuple(points.tolist()), "rad/s"),
+            tuple(law.at(points).tolist()),
+            text=one_line(f"friction coefficient of {name} over slip, {curve.method}"),
+        )
+
+
+def _breakpoints(law: Stribeck | FrictionTable, last: float) -> FloatArray:
+    """Slips (n,) [rad/s] at which a curve gives the law: those of a table, or from 0 to `last`."""
+    if hasattr(law, "slip"):
+        return np.asarray(law.slip, dtype=np.float64)
+    return np.asarray(last * np.linspace(0.0, 1.0, POINTS) ** 2, dtype=np.float64)
+
+
+def _notes(twin: Twin) -> Iterator[str]:
+    yield f"drivetwin {twin.version}, method {twin.method.value}, loss law {twin.loss_law}"
+    for name, digest in twin.inputs.items():
+        yield f"from {name}, SHA-256 {digest}"
+    for estimate in twin.parameters.values():
+        if estimate.value is None:
+            yield f"no value of {estimate.id}: {estimate.reason or estimate.verdict.value}"
+    yield from twin.assumptions

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""Names and texts as the formats allow them."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+_GREEK = {
+    "α": "alpha",
+    "δ": "delta",
+    "ζ": "zeta",
+    "η": "eta",
+    "μ": "mu",
+    "µ": "mu",
+    "ν": "nu",
+    "τ": "tau",
+    "φ": "phi",
+    "ω": "omega",
+}
+_SIGNS = {"′": "'", "·": "*", "→": "->", "–": "-", "—": "-", "−": "-", "²": "^2", "³": "^3"}
+_REPLACED = str.maketrans({**_GREEK, **_SIGNS})
+
+_MATLAB_NAME_LENGTH = 63
+_MATLAB_KEYWORDS = frozenset(
+    "break case catch classdef continue else elseif end for function global if otherwise parfor "
+    "persistent return spmd switch try while".split()
+)
+
+
+def one_line(text: str) -> str:
+    """The text with white space as single blanks, without control characters."""
+    words = " ".join(text.split())
+    return "".join(char for char in words if unicodedata.category(char) not in _UNPRINTABLE)
+
+
+_UNPRINTABLE = frozenset({"Cc", "Cf", "Cn", "Co", "Cs"})
+"""Unicode categories that an XML file may not hold or that nobody sees."""
+
+
+def ascii_line(text: str) -> str:
+    """One line in 7 bits, without the double quote and the backslash that would end or escape it.
+
+    Greek letters are spelled, accents dropped; what has no counterpart becomes a question mark.
+    """
+    plain = unicodedata.normalize("NFKD", one_line(text).translate(_REPLACED))
+    bare = "".join(char for char in plain if not unicodedata.combining(char))
+    return one_line(bare.encode("ascii", "replace").decode().replace('"', "'").replace("\\", "/"))
+
+
+def dotted_name(name: str) -> str:
+    """Identifier of calibration tools: letters, digits, `_` and `.`, no digit or dot in front."""
+    return re.sub(r"^(?=[0-9.])|^$", "_", re.sub(r"[^A-Za-z0-9_.]", "_", ascii_line(name)))
+
+
+def flat_name(name: str) -> str:
+    """Identifier of MATLAB: letters, digits and `_`, a letter in front, at most 63 characters."""
+    flat = re.sub(r"[^A-Za-z0-9_]", "_", ascii_line(name))
+    if not flat[:1].isalpha() or flat in _MATLAB_KEYWORDS:
+        flat = f"p_{flat}"
+    return flat[:_MATLAB_NAME_LENGTH]
+
+
+def shown_unit(unit: str) -> str:
+    """Unit as calibration tools show it: `-` without dimension."""
+    return "-" if unit == "1" else unit
+
+
+def unit_of(shown: str) -> str:
+    """Inverse of `shown_unit`; nothing at all also means without dimension."""
+    return "1" if shown.strip() in ("", "-") else shown.strip()

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""What is exported: the dual-clutch model of one shift of a twin, and where its runs start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+from drivetwin.driveline import DualClutch, State
+from drivetwin.errors import InputError
+from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.twin import Twin
+
+DEFAULT_ENGINE_SPEED = 150.0
+"""Engine speed [rad/s] of a start that nothing else tells, where the twin has seen no speeds."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A model with a name and a start; `elements` of the model are off-going, on-coming."""
+
+    name: str
+    model: DualClutch
+    start: State
+    note: str = ""
+    """Where the numbers come from, one line."""
+
+
+def subject_of(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
+    """The model of the shift between two gears of a twin; by default its first upshift.
+
+    It starts in the old gear at the mean engine speed that the twin has seen, without
+    acceleration. Raises InputError for a shift that the twin does not know and
+    MissingParameterError where the log could not tell what a simulation needs.
+    """
+    shift = nominal_shift(twin, gears)
+    model = twin.dual_clutch(shift)
+    return Subject(
+        name=f"{twin.name} {shift.start_gear}-{shift.end_gear}",
+        model=model,
+        start=steady_start(model, shift.offgoing, _usual_speed(twin)),
+        note=f"identified by the {twin.method} method, loss law {model.loss_law}",
+    )
+
+
+def nominal_shift(twin: Twin, gears: tuple[str, str] | None) -> Shift:
+    """The shift between two gears without times, as far as a model needs it."""
+    start, end = gears or _first_shift(twin)
+    elements = twin.gear(start).element, twin.gear(end).element
+    if elements[0] == elements[1]:
+        raise InputError(
+            f"gears {start!r} and {end!r} of {twin.name!r} are held by the same element",
+            "choose two neighbouring gears",
+        )
+    never = (0.0, 0.0)
+    kind = ShiftKind.POWER_ON_UP
+    return Shift(start, end, *elements, kind, never, never, never, never, 0.0)
+
+
+def steady_start(model: DualClutch, locked: str, engine_speed: float) -> State:
+    """Constant speed with one element locked: the shaft carries the load, nothing slips."""
+    element = next(one for one in model.elements if one.name == locked)
+    output_speed = engine_speed / (model.i_in * element.i_c * element.i_out)
+    wheel_speed = output_speed / model.i_f
+    load = model.load
+    torque = load.constant + load.rolling + load.aero * wheel_speed * abs(wheel_speed)
+    return State(engine_speed, output_speed, wheel_speed, torque / model.i_f / model.k_o, (locked,))
+
+
+def _first_shift(twin: Twin) -> tuple[str, str]:
+    """First pair of neighbouring gears with a friction curve."""
+    for old, new in pairwise(twin.gears):
+        held = (twin.gears[old].element, twin.gears[new].element)
+        if held[0] != held[1] and any(name in twin.friction for name in held):
+            return old, new
+    raise InputError(
+        f"the twin {twin.name!r} has no pair of neighbouring gears with a known friction curve",
+        "name the shift with --shift, such as --shift 2-3",
+    )
+
+
+def _usual_speed(twin: Twin) -> float:
+    low, high = twin.validity.get("speed", (DEFAULT_ENGINE_SPEED, DEFAULT_ENGINE_SPEED))
+    return 0.5 * (low + high)
