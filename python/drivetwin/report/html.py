@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
+import json
 from importlib.resources import files
 from pathlib import Path
 
@@ -14,12 +13,16 @@ from plotly.offline import get_plotlyjs
 
 from drivetwin.identify.result import Identification
 from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.report.packing import Store, packed
 from drivetwin.report.sections.blocks import FigureBlock, Section
 from drivetwin.report.sections.evidence import evidence_sections
 from drivetwin.report.sections.provenance import limits_section, provenance_section
 from drivetwin.report.sections.story import friction_section, shift_section, validation_section
 from drivetwin.report.sections.trust import trust_section
 from drivetwin.results.atomic import write_text
+
+_BELOW_BUTTONS = 30
+"""Room above the panels [px] where the page has the zoom buttons outside the figure."""
 
 
 def save_report(path: Path, found: Identification, log: ShiftLog) -> None:
@@ -53,7 +56,10 @@ def report_sections(found: Identification, log: ShiftLog) -> list[Section]:
 
 
 def render_page(title: str, subtitle: str, sections: list[Section]) -> str:
-    """Fill the page template; figures become JSON that the page's script draws."""
+    """Fill the page template; figures become JSON that the page's script draws.
+
+    The samples of figures over time stand once, packed, at the end of the page.
+    """
     environment = Environment(
         loader=PackageLoader("drivetwin.report"),
         autoescape=True,
@@ -61,25 +67,48 @@ def render_page(title: str, subtitle: str, sections: list[Section]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["figure_json"] = figure_json
+    store = Store()
+    environment.filters["figure_json"] = lambda block: figure_json(block, store)
     return environment.get_template("report.html.j2").render(
         title=title,
         subtitle=subtitle,
         sections=sections,
         style=_resource("report.css"),
         script=_resource("report.js"),
-        plotly_js=packed(get_plotlyjs()),
+        samples_index=lambda: _json(store.index),
+        samples=lambda: Markup(store.packed()),
+        plotly_js=Markup(packed(get_plotlyjs().encode())),
     )
 
 
-def figure_json(block: FigureBlock) -> Markup:
-    """JSON of a figure, safe inside a script element."""
-    return Markup(block.figure.to_json().replace("<", "\\u003c"))
+def figure_json(block: FigureBlock, store: Store) -> Markup:
+    """JSON of a figure, safe inside a script element: traces, layout, zooms, and of a figure over
+    time the numbers of each curve's times and values in `store`."""
+    figure = json.loads(block.figure.to_json())
+    menus = figure["layout"].pop("updatemenus", [])
+    buttons = [button for menu in menus for button in menu["buttons"]]
+    curves = [
+        (store.add_time(curve.time), store.add_values(panel.display.of(curve.values)))
+        for panel in block.panels
+        for curve in panel.curves
+    ]
+    for trace in figure["data"] if curves else ():
+        del trace["x"], trace["y"]
+    if buttons:
+        figure["layout"]["margin"]["t"] = _BELOW_BUTTONS
+    return _json(
+        {
+            "data": figure["data"],
+            "layout": figure["layout"],
+            "zooms": [{"label": one["label"], "change": one["args"][0]} for one in buttons],
+            "curves": curves,
+            "link": block.link,
+        }
+    )
 
 
-def packed(text: str) -> Markup:
-    """`text` as base64 of gzip, which the page's script unpacks; equal texts give equal results."""
-    return Markup(base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii"))
+def _json(value: object) -> Markup:
+    return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))
 
 
 def _resource(name: str) -> Markup:

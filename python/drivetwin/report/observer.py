@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""Observed torques as one HTML page that opens offline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.observer.observed import Observation
+from drivetwin.report.figures.observer import observer_panels
+from drivetwin.report.figures.stack import stacked
+from drivetwin.report.html import render_page
+from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, Section
+from drivetwin.validate import phases_of
+
+
+def render_observations(found: Sequence[Observation], log: ShiftLog) -> str:
+    """HTML text of the page; equal observations give equal text."""
+    sections = [_section(number, one, log) for number, one in enumerate(found, start=1)]
+    title = f"Torques observed in {Path(log.source).name}"
+    return render_page(title, f"by {found[0].observer}, with 95 % bands", sections)
+
+
+def _section(number: int, one: Observation, log: ShiftLog) -> Section:
+    panels = observer_panels(one, log)
+    phases = phases_of(one.shift, (float(one.time[0]), float(one.time[-1])))
+    figure = stacked(panels, phases, height=280 * len(panels))
+    blocks: list[FigureBlock | NotesBlock] = [
+        FigureBlock(figure, "Each torque with its 95 % band.", panels)
+    ]
+    if one.notes:
+        blocks.append(NotesBlock("What the log does not have", one.notes))
+    name = f"Shift {one.shift.start_gear}→{one.shift.end_gear}"
+    return Section(f"shift{number}", name, f"A {one.shift.kind}.", blocks)
