@@ -16,6 +16,8 @@ from drivetwin.shifts.shift import Shift
 
 _SPAN = 0.08
 """Length of the local fit [s]: well under a period of the shaft oscillation."""
+_SHOWN = ("output_torque", "input_speed", "output_speed", "wheel_speed")
+"""Channels that show the state."""
 _CURVED_FROM = 6
 """Number of samples from which a parabola is fitted, a straight line below."""
 
@@ -37,14 +39,16 @@ class _Local:
 
 
 def calm_moment(log: ShiftLog, span: tuple[float, float]) -> float:
-    """First time in `span` [s] at which a local fit describes the output torque.
+    """First time in `span` [s] at which a local fit describes the output torque, clear of gaps.
 
     In the lock-up oscillation of the shift before, or in a throttle step, the shaft's state cannot
     be read off a few samples. Without an output-torque channel: the start of the span.
     """
     times = np.arange(span[0], span[1] - _SPAN, _SPAN)
+    for low, high in (gap for role in _SHOWN if role in log for gap in log[role].gaps):
+        times = times[(times + _SPAN <= low) | (times >= high)]
     if "output_torque" not in log or times.size == 0:
-        return span[0]
+        return float(times[0]) if times.size else span[0]
     torque = log["output_torque"]
     scatter = np.array([_local(torque, float(time)).scatter for time in times])
     calm = scatter <= _CALM * np.median(scatter) + _RIPPLE * float(np.abs(torque.values).max())

@@ -13,9 +13,11 @@ from drivetwin.errors import MissingParameterError
 from drivetwin.identify.result import FloatArray, Identification, SignalFit
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import Shift
 from drivetwin.start_state import calm_moment, start_state
 from drivetwin.twin import Twin
+from drivetwin.vehicle.spec import Prior
 
 SIGNALS = ("output_torque", "input_speed", "output_speed")
 _GRID = 1e-3
@@ -60,9 +62,11 @@ def validate(
 
     The engine torque is moved by the twin's `te_delay`; the start state comes from the first
     measured moments. `model` replaces the twin's own (e.g. the other loss law).
-    Raises MissingChannelError, MissingParameterError; a run that fails returns its status.
+    Raises MissingChannelError, MissingParameterError, DamagedChannelError where an input has a gap
+    in the shift; a run that fails returns its status.
     """
     model = model or twin.dual_clutch(shift)
+    shift = recorded(log, shift, {one.name: Prior(one.P0) for one in model.elements})
     window = _window(log, shift)
     engine_torque = _moved(log["engine_torque"], -twin.value("te_delay", 0.0))
     pressures = {element.name: _signal(log.pressure(element.name)) for element in model.elements}

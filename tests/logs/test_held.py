@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -92,3 +94,13 @@ def test_constants_and_states_are_not_held() -> None:
 def test_a_channel_that_is_not_held_stays_as_it_is() -> None:
     every = channel(np.random.default_rng(2).normal(size=100))
     assert fresh_samples(every) is every
+
+
+def test_a_hole_brings_no_update_and_hides_none() -> None:
+    """Samples missing from the table: what changed in the hole has no stamp."""
+    whole = channel(hold(wave(150, 1.0), 10))
+    keep = (whole.time < 0.4535) | (whole.time > 0.5365)
+    fresh = fresh_samples(replace(whole, time=whole.time[keep], values=whole.values[keep]))
+    expected = np.arange(150) * 0.01
+    assert fresh.time == pytest.approx(expected[(expected < 0.4535) | (expected > 0.5365)])
+    assert find_raster(whole) is not None

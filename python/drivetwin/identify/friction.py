@@ -20,7 +20,8 @@ from drivetwin.identify.momentum import FIRST_DRUM, MomentumFit, known
 from drivetwin.identify.regression import Fit, Prior, Term, solve
 from drivetwin.identify.result import FrictionCurve
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
-from drivetwin.identify.wlse import window_edges, window_means
+from drivetwin.identify.wlse import whole, window_edges, window_means
+from drivetwin.shifts.recorded import parts_between
 
 MU_C, MU_DROP, MU_V, LOG_V, P0 = range(5)
 NUISANCE = 5
@@ -114,6 +115,12 @@ def _spans(
     return torque, (max(free, shift.inertia_phase[0] + clear), lockup)
 
 
+def _windows(signals: ShiftSignals, span: Span, settings: FrictionSettings) -> Windows:
+    """Windows in a span that touch no gap of the outputs."""
+    parts = parts_between(span, signals.output_gaps)
+    return join([windows_in(part, settings.width, settings.step) for part in parts])
+
+
 class _Equations:
     """Rows in T_c [N m·s]: windows of the torque phase first, then of the inertia phase."""
 
@@ -125,7 +132,7 @@ class _Equations:
         spans: tuple[Span, Span],
         settings: FrictionSettings,
     ) -> None:
-        parts = [windows_in(span, settings.width, settings.step) for span in spans]
+        parts = [_windows(signals, span, settings) for span in spans]
         if parts[1].count < 5:
             raise IdentificationError(
                 f"the inertia phase leaves {parts[1].count} windows of {settings.width:g} s",
@@ -317,7 +324,7 @@ def paper_friction(signals: ShiftSignals, driveline: Driveline, points: int = 40
     edges = window_edges((span[0] + 0.01, span[1] - 0.005))
     torque = window_means(signals.output_torque, edges)
     pressure = window_means(signals.pressures[element.name], edges)
-    time = 0.5 * (edges[1:] + edges[:-1])
+    time, torque, pressure = whole(0.5 * (edges[1:] + edges[:-1]), torque, pressure)
     slip = np.abs(slip_of(signals, driveline, time))
     turns = np.flatnonzero(np.diff(np.sign(np.diff(torque))) != 0) + 1
     picked = turns if turns.size >= 8 else np.arange(time.size)

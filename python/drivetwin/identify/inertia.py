@@ -17,6 +17,7 @@ from drivetwin.identify.wlse import (
     Weighting,
     central_difference,
     weighted_inertia,
+    whole,
     window_edges,
     window_means,
 )
@@ -45,6 +46,7 @@ def paper_inertia(
     acceleration = central_difference(window_means(signals.engine_speed, edges))
     engine_torque = window_means(signals.engine_torque, edges)[1:-1]
     output_torque = window_means(signals.output_torque, edges)[1:-1]
+    acceleration, engine_torque, output_torque = whole(acceleration, engine_torque, output_torque)
 
     def excess(eta: float) -> FloatArray:
         return eta * engine_torque - output_torque / ratio

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
+from drivetwin.errors import IdentificationError
 from drivetwin.identify.modulating import Quadrature, hann_kernels, join, windows_in
 from drivetwin.identify.regression import Fit, Prior, Term, solve
 from drivetwin.identify.signals import FloatArray, ShiftSignals, Span
@@ -20,9 +21,11 @@ from drivetwin.identify.wlse import (
     Weighting,
     central_difference,
     weighted_inertia,
+    whole,
     window_edges,
     window_means,
 )
+from drivetwin.shifts.recorded import parts_between
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ def paper_load(
         speed = window_means(signals.output_speed, edges) / i_f
     acceleration = central_difference(speed)
     output_torque = window_means(signals.output_torque, edges)[1:-1]
+    acceleration, output_torque = whole(acceleration, output_torque)
 
     def row(load: float) -> GridRow:
         torque = output_torque - load
@@ -108,9 +112,16 @@ def momentum_load(
     Eq. 11 knows no gear, so `spans` may cover the whole log where the wheel speed is measured.
     Raises IdentificationError where torque and speed do not determine both.
     """
-    windows = join([windows_in(span, width, width / 16.0) for span in spans])
     wheel = signals.wheel_speed
     speed = signals.output_speed if wheel is None else wheel
+    gaps = (*speed.gaps, *signals.output_torque.gaps)
+    parts = [part for span in spans for part in parts_between(span, gaps)]
+    windows = join([windows_in(part, width, width / 16.0) for part in parts])
+    if not windows.count:
+        raise IdentificationError(
+            f"no {width:g} s of held gear without a gap for the balance of the vehicle",
+            "record at least a second before and after the shift",
+        )
     scale = i_f**-2 if wheel is None else 1.0 / i_f
     torque = signals.output_torque
     psi = hann_kernels(torque.time, windows).psi

@@ -47,8 +47,10 @@ def windows_in(span: Span, width: float, step: float) -> Windows:
 
 def join(parts: list[Windows]) -> Windows:
     """All windows of `parts`, one after the other."""
+    nothing = np.empty(0)
     return Windows(
-        np.concatenate([p.start for p in parts]), np.concatenate([p.width for p in parts])
+        np.concatenate([nothing, *(p.start for p in parts)]),
+        np.concatenate([nothing, *(p.width for p in parts)]),
     )
 
 

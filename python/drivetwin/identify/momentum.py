@@ -39,6 +39,7 @@ from drivetwin.identify.signals import (
     ShiftSignals,
     Span,
 )
+from drivetwin.shifts.recorded import parts_between
 from drivetwin.shifts.shift import Shift
 
 
@@ -77,6 +78,8 @@ class Stretch:
     windows: Windows
 
 
+LEAST_SPAN = 0.05
+"""A shorter stretch [s] holds no window that says anything."""
 DELAY_STD_MAX = 0.005
 """Standard error [s] above which the age of the engine torque is taken as not shown."""
 DELAY_Q_MIN = 30.0
@@ -192,24 +195,29 @@ def stretches(
     )
     found = []
     for name, span, tied in spans:
-        length = span[1] - span[0]
-        if length < 0.05:
-            continue
-        short = length < 2.0 * settings.width
-        width = settings.share * length if short else settings.width
-        step = settings.step * width / settings.width
         ratio = driveline.i_before if name == "before" else driveline.i_after
-        windows = windows_in(span, width, step)
-        if driveline.loss_law == "dissipative":
-            windows = _driving(signals.output_torque, windows)
-        if windows.count:
-            found.append(Stretch(name, span, ratio, tied, windows))
+        for part in parts_between(span, signals.output_gaps):
+            windows = _windows(part, settings)
+            if driveline.loss_law == "dissipative":
+                windows = _driving(signals.output_torque, windows)
+            if windows.count:
+                found.append(Stretch(name, part, ratio, tied, windows))
     if not found:
         raise IdentificationError(
             "no stretch of the log is long enough for the momentum balance",
             "record at least 0.5 s before and after the shift",
         )
     return tuple(found)
+
+
+def _windows(span: Span, settings: MomentumSettings) -> Windows:
+    """Windows over a span, narrower ones where it is short; none below LEAST_SPAN."""
+    length = span[1] - span[0]
+    if length < LEAST_SPAN:
+        return windows_in(span, np.inf, settings.step)
+    short = length < 2.0 * settings.width
+    width = settings.share * length if short else settings.width
+    return windows_in(span, width, settings.step * width / settings.width)
 
 
 ROUNDING = 4

@@ -10,7 +10,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from drivetwin.errors import IdentificationError, NoShiftError, Where
+from drivetwin.errors import (
+    DamagedChannelError,
+    IdentificationError,
+    NoShiftError,
+    Where,
+)
 from drivetwin.identify.conclude import Conclusions, conclude, with_systematic_band
 from drivetwin.identify.friction import FrictionSettings, stribeck_at
 from drivetwin.identify.inputs import driveline_of, signals_of
@@ -24,6 +29,9 @@ from drivetwin.identify.result import FloatArray, Identification
 from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.identify.uncertainty import systematic_std
 from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.parameters import spec_of
+from drivetwin.progress import part
+from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.spec import VehicleCard
 
@@ -50,7 +58,8 @@ def identify(
     from the integral one, adds `evidence["likelihood"]` (a LikelihoodFit), and leaves the integral
     result with a warning where it does not converge.
     Raises NoShiftError without a shift, IdentificationError where the data cannot carry it,
-    MissingChannelError for a missing channel.
+    MissingChannelError for a missing channel, DamagedChannelError where the inputs of the only
+    shift have gaps; of several such shifts are refused and the others used.
     """
     if not shifts.shifts:
         raise NoShiftError(
@@ -58,8 +67,9 @@ def identify(
             "record from a second before the torque phase to a second after lock-up",
             Where(file=log.source),
         )
-    signals = [signals_of(log, card, shift) for shift in shifts.shifts]
-    drivelines = [driveline_of(card, shift) for shift in shifts.shifts]
+    usable, refused = _recorded(log, card, shifts.shifts)
+    signals = [signals_of(log, card, shift) for shift in usable]
+    drivelines = [driveline_of(card, shift) for shift in usable]
     if all(s.scale_known for s in signals):
         found, method, evidence = _with_torque(signals, drivelines, card, method)
     else:
@@ -67,8 +77,8 @@ def identify(
     return Identification(
         estimates=found.estimates,
         friction=found.friction,
-        shifts=shifts.shifts,
-        rejected=shifts.rejected,
+        shifts=usable,
+        rejected=(*shifts.rejected, *refused),
         fit={},
         method=method,
         loss_law=card.loss_law,
@@ -81,6 +91,27 @@ def identify(
         correlation_ids=found.correlation_ids,
         correlation=found.correlation,
     )
+
+
+def _recorded(
+    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
+) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
+    """The shifts, cut to where their inputs were recorded, and those refused for a gap.
+
+    Raises DamagedChannelError where none is left.
+    """
+    usable: list[Shift] = []
+    refused: list[RejectedShift] = []
+    for shift in shifts:
+        fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
+        try:
+            usable.append(recorded(log, shift, fills))
+        except DamagedChannelError as gap:
+            if len(shifts) == len(refused) + 1:
+                raise
+            span = (shift.before[1], shift.lockup_time)
+            refused.append(RejectedShift(span, gap.what))
+    return tuple(usable), tuple(refused)
 
 
 _Stage = tuple[Conclusions, Method, dict[str, Any]]
@@ -97,11 +128,13 @@ def _with_torque(
     if method is Method.PAPER:
         evidence["paper"] = _paper_shifts(signals, drivelines, card)
         return paper_conclusions(evidence["paper"], signals, drivelines), method, evidence
-    found, evidence["integral"] = _integral(signals, drivelines, card)
+    with part(0.0, 0.3, "linear method"):
+        found, evidence["integral"] = _integral(signals, drivelines, card)
     if method is Method.LIKELIHOOD:
         try:
             linear = (found, evidence["integral"])
-            found, evidence["likelihood"] = likelihood(signals, drivelines, linear, card)
+            with part(0.3, 0.95, "likelihood"):
+                found, evidence["likelihood"] = likelihood(signals, drivelines, linear, card)
         except IdentificationError as error:
             method = Method.INTEGRAL
             text = f"likelihood: {error.what}; the values are those of the integral method"
@@ -236,6 +269,12 @@ def _assumptions(card: VehicleCard, method: Method) -> tuple[str, ...]:
         texts.append("sensor noise is white, at the level found in the log")
     if not card.sensors:
         texts.append("no sensor gain or offset tolerance is stated: intervals cover noise only")
+    texts += [
+        f"known beforehand: {name} = {prior.value:g} {spec_of(name).unit}"
+        + (f" ± {prior.std:g} (1 sigma)" if prior.std > 0.0 else ", fixed")
+        for name, prior in card.known.items()
+        if method is not Method.PAPER
+    ]
     if card.J_out is not None:
         texts.append(
             f"design prior of J_out: {card.J_out.value:g} ± {card.J_out.std:g} kg m^2 (1 sigma)"

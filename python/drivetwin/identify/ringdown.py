@@ -17,9 +17,12 @@ from scipy.signal import cont2discrete, lfilter
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.signals import FloatArray, Sampled
 from drivetwin.identify.wlse import window_edges, window_means
+from drivetwin.shifts.recorded import parts_between
 
 START_AFTER_LOCKUP = 0.05
 """Start of the fit after lock-up [s]."""
+SHORTEST = 0.15
+"""Shortest stretch fitted [s]."""
 LONGEST = 1.6
 """Longest stretch fitted [s]: by then a drivetrain oscillation has died away."""
 BAND = (2.0, 60.0)
@@ -82,10 +85,12 @@ def _refuse(what: str) -> IdentificationError:
 
 
 def _stretch(torque: Sampled, lockup: float, end: float) -> Sampled:
-    part = torque.within((lockup + START_AFTER_LOCKUP, min(end, lockup + LONGEST)))
-    if part.time.size < 20 or part.time[-1] - part.time[0] < 0.15:
-        raise _refuse("less than 0.15 s of the new gear are left after lock-up")
-    return part
+    span = (lockup + START_AFTER_LOCKUP, min(end, lockup + LONGEST))
+    for whole in parts_between(span, torque.gaps):
+        part = torque.within(whole)
+        if part.time.size >= 20 and part.time[-1] - part.time[0] >= SHORTEST:
+            return part
+    raise _refuse(f"less than {SHORTEST:g} s of the new gear are left after lock-up")
 
 
 def _quadratic(time: FloatArray) -> FloatArray:

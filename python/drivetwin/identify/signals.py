@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin.logs.shiftlog import pauses
 from drivetwin.shifts.shift import Shift
 
 FloatArray = NDArray[np.float64]
@@ -23,9 +25,17 @@ class Sampled:
     values: FloatArray
     sigma: float = 0.0
 
+    @cached_property
+    def gaps(self) -> tuple[Span, ...]:
+        """Spans [s] without a sample, across which nothing is interpolated."""
+        return pauses(self.time)
+
     def at(self, time: FloatArray) -> FloatArray:
-        """Values at `time` (m,), linear between samples."""
-        return np.interp(time, self.time, self.values)
+        """Values at `time` (m,), linear between samples; NaN inside a gap."""
+        values = np.interp(time, self.time, self.values)
+        for start, end in self.gaps:
+            values[(time > start) & (time < end)] = np.nan
+        return values
 
     def within(self, span: Span) -> Sampled:
         """The samples inside `span` [s], both ends included."""
@@ -64,7 +74,10 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Driveline:
-    """Known structure during one shift. `couplings` holds every shift element by name."""
+    """Known structure during one shift. `couplings` holds every shift element by name.
+
+    `known` is what is known beforehand, by parameter id, beside Jo′, P0 and drums.
+    """
 
     i_f: float
     offgoing: Coupling
@@ -72,6 +85,7 @@ class Driveline:
     couplings: Mapping[str, Coupling]
     J_out: PriorValue | None
     loss_law: str = "paper"
+    known: Mapping[str, PriorValue] = field(default_factory=dict)
 
     @property
     def i_before(self) -> float:
@@ -107,6 +121,12 @@ class ShiftSignals:
     shift: Shift
     torque_resolution: float = field(default=0.0)
     """Rounding step of the engine torque [N m]; 0 where none shows."""
+
+    @property
+    def output_gaps(self) -> tuple[Span, ...]:
+        """Gaps of what is compared with the equations: output torque and the gearbox speeds."""
+        compared = (self.output_torque, self.engine_speed, self.output_speed)
+        return tuple(gap for signal in compared for gap in signal.gaps)
 
     @property
     def scale_known(self) -> bool:

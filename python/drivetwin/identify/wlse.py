@@ -57,13 +57,27 @@ class GridFit:
 def window_means(signal: Sampled, edges: FloatArray) -> FloatArray:
     """Mean of the samples in each half-open window between `edges` (m+1,); shape (m,).
 
-    A window without a sample takes the value interpolated at its start.
+    A window without a sample takes the value interpolated at its start, NaN inside a gap.
     """
     index = np.searchsorted(edges, signal.time + 1e-9, side="right") - 1
     inside = (index >= 0) & (index < edges.size - 1)
     count = np.bincount(index[inside], minlength=edges.size - 1)
     total = np.bincount(index[inside], weights=signal.values[inside], minlength=edges.size - 1)
     return np.where(count > 0, total / np.maximum(count, 1), signal.at(edges[:-1]))
+
+
+def whole(*columns: FloatArray) -> tuple[FloatArray, ...]:
+    """The columns (n,) without the rows in which one of them is NaN; shape (m,) each.
+
+    Raises IdentificationError where fewer than three rows remain.
+    """
+    known = np.isfinite(np.vstack(columns)).all(axis=0)
+    if np.count_nonzero(known) < 3:
+        raise IdentificationError(
+            "the signals share next to no time of the held gear: their gaps cover it",
+            "record the shift again, or map another sensor to the channel that drops out",
+        )
+    return tuple(column[known] for column in columns)
 
 
 def window_edges(span: Span, width: float = WINDOW) -> FloatArray:

@@ -27,6 +27,9 @@ _JITTER = 0.2
 _JITTER_SAMPLES = 1.5
 """... and in samples of the logger."""
 
+_PAUSE = 1.5
+"""After more than so many steps without a sample nobody knows when the value arrived."""
+
 
 @dataclass(frozen=True)
 class Raster:
@@ -44,7 +47,7 @@ def find_raster(channel: Channel) -> Raster | None:
     """
     if channel.quantity is Quantity.STATE:
         return None
-    changes = channel.time[1:][np.diff(channel.values) != 0.0]
+    changes = channel.time[1:][_changed(channel)]
     if changes.size < MIN_CHANGES:
         return None
     longest = min(float(np.diff(changes).min()) * (1.0 + _JITTER), MAX_PERIOD)
@@ -53,6 +56,12 @@ def find_raster(channel: Channel) -> Raster | None:
         if raster is not None:
             return raster
     return None
+
+
+def _changed(channel: Channel) -> NDArray[np.bool_]:
+    """Whether each sample but the first brings a new value (n-1,); after a pause none can tell."""
+    pause = np.diff(channel.time) > _PAUSE * channel.step
+    return np.asarray((np.diff(channel.values) != 0.0) & ~pause)
 
 
 def _fit(changes: FloatArray, period: float, step: float) -> Raster | None:
@@ -68,17 +77,22 @@ def _fit(changes: FloatArray, period: float, step: float) -> Raster | None:
 
 
 def _update_indices(channel: Channel, raster: Raster) -> NDArray[np.intp]:
-    """Samples at which an update arrives: the change near each raster instant, else the instant."""
+    """Samples at which an update arrives: the change near each raster instant, else the instant.
+
+    An instant at which the channel has no sample brings none.
+    """
     margin = 0.5 * channel.step
     first = np.ceil((channel.time[0] - margin - raster.start) / raster.period)
     last = np.floor((channel.time[-1] + margin - raster.start) / raster.period)
     instants = raster.start + raster.period * np.arange(first, last + 1.0)
     nearest = np.minimum(np.searchsorted(channel.time, instants - margin), channel.time.size - 1)
-    changed = np.flatnonzero(np.diff(channel.values) != 0.0) + 1
+    there = np.abs(channel.time[nearest] - instants) <= _PAUSE * channel.step
+    changed = np.flatnonzero(_changed(channel)) + 1
     slot = np.round((channel.time[changed] - instants[0]) / raster.period).astype(np.intp)
     inside = (slot >= 0) & (slot < instants.size)
     nearest[slot[inside]] = changed[inside]
-    return np.unique(nearest)
+    there[slot[inside]] = True
+    return np.unique(nearest[there])
 
 
 def fresh_samples(channel: Channel) -> Channel:

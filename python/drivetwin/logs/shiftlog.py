@@ -25,6 +25,12 @@ def gap_limit(time: FloatArray) -> float:
     return GAP_STEPS * float(np.median(np.diff(time)))
 
 
+def pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Gaps between samples at `time` (n,): from the last sample before to the first one after."""
+    wide = np.flatnonzero(np.diff(time) > gap_limit(time))
+    return tuple((float(time[i]), float(time[i + 1])) for i in wide)
+
+
 class Quantity(StrEnum):
     """What a channel measures; decides its SI unit and how it may be interpolated."""
 
@@ -79,10 +85,7 @@ class Channel:
     @property
     def gaps(self) -> tuple[tuple[float, float], ...]:
         """Spans [s] in which `at` knows nothing, from the sample before to the one after."""
-        if self.quantity is Quantity.STATE:
-            return ()
-        wide = np.flatnonzero(np.diff(self.time) > gap_limit(self.time))
-        return tuple((float(self.time[i]), float(self.time[i + 1])) for i in wide)
+        return () if self.quantity is Quantity.STATE else pauses(self.time)
 
 
 @dataclass(frozen=True)

@@ -149,8 +149,9 @@ def _locate(
             break
     if np.isnan(time):
         return None
-    # Clocks of the two speeds are read to the sample: a uniform error of one step.
-    step = float(np.median(np.diff(slip.time)))
+    # Between two samples, further apart across a gap, the time is known to a uniform error only.
+    after = int(np.clip(np.searchsorted(slip.time, time), 1, len(slip.time) - 1))
+    step = float(slip.time[after] - slip.time[after - 1])
     return Boundary(time, float(np.hypot(sigma, step / np.sqrt(12.0))))
 
 

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.errors import MissingChannelError, TimeError, Where
+from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.vehicle.spec import VehicleCard
 
@@ -53,6 +54,8 @@ def gear_ratios(card: VehicleCard) -> dict[str, float]:
 def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
     """Bring both speeds to the time base of the input speed (linear between output samples).
 
+    Input samples inside a gap of the output speed are left out.
+
     Without an input speed the engine speed over i_in stands in (exact with lock-up engaged);
     without an output speed the wheel speed times the final drive, which the twisting shaft
     separates from the true one. Both are told in `warnings`. Raises MissingChannelError, and
@@ -66,7 +69,7 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
         warnings.append("input speed taken from the engine speed: right with lock-up engaged only")
     else:
         raise _missing("input_speed", "engine_speed", log)
-    time, inlet = _finite(source)
+    inlet = _finite(source)
     if "output_speed" in log:
         sink, factor = log["output_speed"], 1.0
     elif "wheel_speed" in log:
@@ -74,32 +77,32 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
         warnings.append("output speed taken from the wheel speed: shaft twist adds to the slip")
     else:
         raise _missing("output_speed", "wheel_speed", log)
-    sink_time, outlet = _finite(sink)
-    inside = (time >= sink_time[0]) & (time <= sink_time[-1])
-    time = time[inside]
-    if len(time) < _LEAST:
+    outlet = _finite(sink).at(inlet.time)
+    known = np.isfinite(outlet)
+    count = int(np.count_nonzero(known))
+    if count < _LEAST:
         raise TimeError(
-            f"{source.source_name!r} and {sink.source_name!r} have {len(time)} samples at common "
+            f"{source.source_name!r} and {sink.source_name!r} have {count} samples at common "
             f"times, at least {_LEAST} are needed",
             "record both speeds together, or correct time_shift in the channel mapping",
             Where(file=log.source),
         )
-    output = factor * np.interp(time, sink_time, outlet)
-    return GearboxSpeeds(time, scale * inlet[inside], output, tuple(warnings))
+    return GearboxSpeeds(
+        inlet.time[known], scale * inlet.values[known], factor * outlet[known], tuple(warnings)
+    )
 
 
-def _finite(channel: Channel) -> tuple[FloatArray, FloatArray]:
-    """Time and value of the numbers in a channel, of a held one its fresh values only."""
+def _finite(channel: Channel) -> Channel:
+    """The numbers of a channel, of a held one its fresh values only."""
+    channel = fresh_samples(channel)
     keep = np.isfinite(channel.values)
-    if channel.held:
-        keep[1:] &= np.diff(channel.values) != 0.0
     if np.count_nonzero(keep) < 2:
         raise MissingChannelError(
             f"channel for {channel.role!r} holds fewer than two numbers",
             "map another channel to it or record it again",
             Where(channel=channel.source_name),
         )
-    return channel.time[keep], channel.values[keep]
+    return replace(channel, time=channel.time[keep], values=channel.values[keep])
 
 
 def _missing(wanted: str, substitute: str, log: ShiftLog) -> MissingChannelError:

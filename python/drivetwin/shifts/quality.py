@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.logs.shiftlog import Channel, ShiftLog, gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, gear_ratios, gearbox_speeds
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.vehicle.spec import VehicleCard
@@ -100,10 +100,10 @@ def _low_pass(values: FloatArray, step: float, cutoff: float) -> FloatArray:
 
 
 def _uniform(channel: Channel, span: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Finite samples within `span` on an even grid of the channel's own step."""
+    """Finite samples within `span` on an even grid of the channel's own step; none with a gap."""
     keep = np.isfinite(channel.values) & (channel.time >= span[0]) & (channel.time <= span[1])
     time, values = channel.time[keep], channel.values[keep]
-    if len(time) < 16 or np.diff(time).max() > 20.0 * channel.step:
+    if len(time) < 16 or np.diff(time).max() > gap_limit(channel.time):
         return np.empty(0), np.empty(0)
     grid = np.arange(time[0], time[-1], channel.step)
     return grid, np.interp(grid, time, values)

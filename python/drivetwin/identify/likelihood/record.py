@@ -183,9 +183,7 @@ def record_of(signals: ShiftSignals, driveline: Driveline, span: Span) -> Record
     end = min(span[1], *(s.time[-1] for s in inputs)) - LATEST
     present = {name: s for name, s in channels.items() if s is not None and s.time.size}
     parts = {name: s.within((start, end)) for name, s in present.items()}
-    time = np.unique(np.concatenate([part.time for part in parts.values()]))
-    if time.size > 1 and np.median(np.diff(time)) > SLOW:
-        time = np.union1d(time, np.arange(time[0], time[-1], GRID))
+    time = _filled(np.unique(np.concatenate([part.time for part in parts.values()])))
     if time.size < 100:
         raise IdentificationError(
             f"only {time.size} samples between {start:.3f} s and {end:.3f} s to fit a model to",
@@ -212,6 +210,13 @@ def record_of(signals: ShiftSignals, driveline: Driveline, span: Span) -> Record
         _held(replace(torque, values=local_mean(torque))),
         {"engine torque": torque.sigma} | {n: p.sigma for n, p in signals.pressures.items()},
     )
+
+
+def _filled(time: FloatArray) -> FloatArray:
+    """Stamps of the outputs with grid points where they lie further apart than SLOW."""
+    wide = np.flatnonzero(np.diff(time) > SLOW)
+    steps = [np.arange(time[k] + GRID, time[k + 1] - 0.5 * GRID, GRID) for k in wide]
+    return np.sort(np.concatenate([time, *steps]))
 
 
 def _at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:

@@ -17,6 +17,7 @@ from drivetwin.identify.likelihood.guess import TYPICAL_LAW, TYPICAL_MODE
 from drivetwin.identify.momentum import MomentumSettings
 from drivetwin.identify.ringdown import pencil_start
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals, Span
+from drivetwin.identify.wlse import whole
 from drivetwin.vehicle.spec import VehicleCard
 
 STEP = 0.1
@@ -76,8 +77,9 @@ def _slopes(signals: ShiftSignals, span: Span) -> tuple[FloatArray, FloatArray]:
     """Centres [s] and differences of the engine speed [rad/s^2] over windows of `STEP`."""
     edges = np.arange(span[0], span[1], STEP)
     speed = signals.engine_speed
-    means = np.interp(edges, speed.time, speed.values)
-    return 0.5 * (edges[1:] + edges[:-1]), np.diff(means) / STEP
+    means = speed.at(edges)
+    known, slope = whole(0.5 * (edges[1:] + edges[:-1]), np.diff(means) / STEP)
+    return known, slope
 
 
 def _mean(signals: ShiftSignals, start: float) -> float:
@@ -90,13 +92,14 @@ def _mode(signals: ShiftSignals, driveline: Driveline) -> tuple[float, float]:
     """Decay rate [1/s] and angular frequency [rad/s] of the twist rate after lock-up."""
     lockup = signals.shift.lockup_time
     part = signals.output_speed.within((lockup + RING[0], lockup + RING[1]))
-    twist_rate = part.values
+    time, twist_rate = part.time, part.values
     if signals.wheel_speed is not None:
         twist_rate = part.values - driveline.i_f * signals.wheel_speed.at(part.time)
-    trend = np.vander(part.time - part.time[0], 3)
-    rest = twist_rate - trend @ np.linalg.lstsq(trend, twist_rate, rcond=None)[0]
     try:
-        return pencil_start(part.time, rest)
+        time, twist_rate = whole(time, twist_rate)
+        trend = np.vander(time - time[0], 3)
+        rest = twist_rate - trend @ np.linalg.lstsq(trend, twist_rate, rcond=None)[0]
+        return pencil_start(time, rest)
     except IdentificationError:
         omega, zeta = TYPICAL_MODE
         return zeta * omega, omega
@@ -107,7 +110,8 @@ def _level(signals: ShiftSignals, driveline: Driveline, J_e: float) -> float:
     start, end = signals.shift.inertia_phase
     low, high = start + 0.25 * (end - start), end - 0.25 * (end - start)
     speed, element = signals.engine_speed, driveline.oncoming
-    slope = float(speed.at(np.array([high]))[0] - speed.at(np.array([low]))[0]) / (high - low)
+    ends = np.interp([low, high], speed.time, speed.values)
+    slope = float(ends[1] - ends[0]) / (high - low)
     time = np.linspace(low, high, 50)
     torque = float(np.mean(signals.engine_torque.at(time))) - J_e * slope
     above = float(np.mean(signals.pressures[element.name].at(time))) - element.P0.value

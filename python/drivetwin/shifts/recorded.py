@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""The part of a shift over which all that drives it was recorded.
+
+A gap in the engine torque or in a pressure is no input that a model could be driven by, so the
+gears held before and after the shift are cut at it, and a shift with a gap inside is refused. A
+pressure counts only while an element may slip: one that stays above or below P0 on both sides of
+its gap, while the speeds show a held gear, decides nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.errors import DamagedChannelError, Where
+from drivetwin.logs.held import fresh_samples
+from drivetwin.logs.roles import PRESSURE
+from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import Prior
+
+Span = tuple[float, float]
+
+OLDEST, YOUNGEST = 0.08, 0.02
+"""A stamp of the engine torque shows an instant so much earlier at most, or so much later [s]."""
+
+LEAST = 0.15
+"""Shortest time [s] of a held gear before and after the shift that anything is told from."""
+
+
+def parts_between(span: Span, gaps: tuple[Span, ...]) -> tuple[Span, ...]:
+    """The parts of `span` [s] that no gap touches, in order of time."""
+    parts, start = [], span[0]
+    for low, high in sorted(gaps):
+        if high <= start or low >= span[1]:
+            continue
+        if low > start:
+            parts.append((start, low))
+        start = max(start, high)
+    if start < span[1]:
+        parts.append((start, span[1]))
+    return tuple(parts)
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """A gap [s] of one channel, and the `reach` of what it leaves unknown."""
+
+    channel: Channel
+    span: Span
+    reach: Span
+
+    def __str__(self) -> str:
+        low, high = self.span
+        return f"{self.channel.source_name!r} has no samples from {low:.3f} s to {high:.3f} s"
+
+
+def recorded(log: ShiftLog, shift: Shift, fills: Mapping[str, Prior]) -> Shift:
+    """Return `shift` with `before` and `after` cut to what its inputs were recorded for.
+
+    `fills` is P0 [Pa] of both elements by name. A cut is told in the warnings of the shift. Raises
+    DamagedChannelError where a gap lies in the shift itself or leaves less than LEAST of a gear.
+    """
+    gaps = _gaps(log, shift, fills)
+    start, end = shift.before[1], shift.lockup_time
+    inside = [gap for gap in gaps if gap.reach[0] < end and gap.reach[1] > start]
+    if inside:
+        raise _refused(log, inside[0], "during the shift")
+    earlier = [gap for gap in gaps if shift.before[0] < gap.reach[1] <= start]
+    if earlier:
+        last = max(earlier, key=lambda gap: gap.reach[1])
+        if start - last.reach[1] < LEAST:
+            raise _refused(log, last, f"less than {LEAST:g} s before the shift")
+        text = f"{last}: gear {shift.start_gear} counts from there on"
+        shift = replace(shift, before=(last.reach[1], start), warnings=(*shift.warnings, text))
+    later = [gap for gap in gaps if end <= gap.reach[0] < shift.after[1]]
+    if later:
+        first = min(later, key=lambda gap: gap.reach[0])
+        if first.reach[0] - end < LEAST:
+            raise _refused(log, first, f"less than {LEAST:g} s after the shift")
+        text = f"{first}: gear {shift.end_gear} counts up to there"
+        shift = replace(
+            shift, after=(shift.after[0], first.reach[0]), warnings=(*shift.warnings, text)
+        )
+    return shift
+
+
+def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, Prior]) -> list[_Gap]:
+    """Gaps of the inputs that matter to the shift."""
+    found = []
+    if "engine_torque" in log:
+        torque = fresh_samples(log["engine_torque"])
+        found += [_Gap(torque, gap, (gap[0] - OLDEST, gap[1] + YOUNGEST)) for gap in torque.gaps]
+    for name, fill in fills.items():
+        if PRESSURE + name in log:
+            pressure = log.pressure(name)
+            gaps = [gap for gap in pressure.gaps if _decides(pressure, gap, shift, fill)]
+            found += [_Gap(pressure, gap, gap) for gap in gaps]
+    return found
+
+
+def _decides(pressure: Channel, gap: Span, shift: Shift, fill: Prior) -> bool:
+    """Whether an element might have begun to carry torque, or to slip, within a gap."""
+    if gap[1] > shift.before[1] and gap[0] < shift.lockup_time:
+        return True
+    beside = np.interp(gap, pressure.time, pressure.values) - fill.value
+    return bool(np.sign(beside[0]) != np.sign(beside[1]) or np.abs(beside).min() < fill.std)
+
+
+def _refused(log: ShiftLog, gap: _Gap, where: str) -> DamagedChannelError:
+    return DamagedChannelError(
+        f"{gap}, {where}",
+        "record the shift again: what drives a model must be there throughout",
+        Where(file=log.source, channel=gap.channel.source_name, time=gap.span[0]),
+    )

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Gaps of the inputs cut the gears held around a shift, or refuse it; no sample is invented."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivetwin.errors import DamagedChannelError
+from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.shifts.recorded import LEAST, OLDEST, YOUNGEST, parts_between, recorded
+from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.vehicle.spec import Prior
+
+FILLS = {"B2": Prior(8e4, 5e3), "B3": Prior(8e4, 5e3)}
+SHIFT = Shift(
+    start_gear="2",
+    end_gear="3",
+    offgoing="B2",
+    oncoming="B3",
+    kind=ShiftKind.POWER_ON_UP,
+    before=(0.0, 2.0),
+    torque_phase=(2.0, 2.2),
+    inertia_phase=(2.2, 2.5),
+    after=(2.5, 5.0),
+    lockup_time=2.5,
+)
+
+seconds = st.floats(0.0, 5.0, allow_nan=False)
+gap_lists = st.lists(st.tuples(seconds, seconds).map(sorted).map(tuple), max_size=6)
+
+
+def log(gap: tuple[float, float] | None = None, role: str = "") -> ShiftLog:
+    """5 s at 1 kHz: B2 lets go at 2.2 s and B3 takes hold at 2.0 s; `role` lacks the gap."""
+    time = np.linspace(0.0, 5.0, 5001)
+    values = {
+        "engine_torque": 1000.0 + 200.0 * np.sin(9.0 * time),
+        "pressure.B2": np.where(time < 2.2, 1e6, 0.0),
+        "pressure.B3": np.where(time < 2.0, 0.0, 1e6),
+    }
+    channels = {}
+    for name, column in values.items():
+        quantity = Quantity.TORQUE if name == "engine_torque" else Quantity.PRESSURE
+        keep = np.ones(time.size, np.bool_)
+        if gap is not None and name == role:
+            keep = (time < gap[0]) | (time > gap[1])
+        channels[name] = Channel(name, quantity, time[keep], column[keep], name, "")
+    return ShiftLog(channels, "made", "")
+
+
+@given(span=st.tuples(seconds, seconds).map(sorted).map(tuple), gaps=gap_lists)
+def test_parts_and_gaps_make_up_the_span(
+    span: tuple[float, float], gaps: list[tuple[float, float]]
+) -> None:
+    parts = parts_between(span, tuple(gaps))
+    for time in np.linspace(*span, 97):
+        inside = sum(low < time < high for low, high in parts)
+        blocked = any(low < time < high for low, high in gaps)
+        border = any(time in pair for pair in (span, *gaps))
+        assert border or inside == (0 if blocked else 1)
+
+
+def test_a_whole_log_leaves_the_shift_as_it_is() -> None:
+    assert recorded(log(), SHIFT, FILLS) is SHIFT
+
+
+def test_gap_of_the_engine_torque_cuts_the_gear_before() -> None:
+    cut = recorded(log((1.0, 1.2), "engine_torque"), SHIFT, FILLS)
+    assert cut.before == pytest.approx((1.2 + YOUNGEST, 2.0), abs=2e-3)
+    assert cut.after == SHIFT.after
+    assert "no samples from 0.999 s to 1.201 s" in cut.warnings[0]
+    assert recorded(log((1.0, 1.2), "engine_torque"), cut, FILLS) is cut
+
+
+def test_gap_of_the_engine_torque_cuts_the_gear_after() -> None:
+    cut = recorded(log((4.0, 4.5), "engine_torque"), SHIFT, FILLS)
+    assert cut.after == pytest.approx((2.5, 4.0 - OLDEST), abs=2e-3)
+    assert cut.before == SHIFT.before
+
+
+@pytest.mark.parametrize("role", ["engine_torque", "pressure.B2", "pressure.B3"])
+def test_gap_in_the_shift_refuses_it(role: str) -> None:
+    with pytest.raises(DamagedChannelError, match="during the shift"):
+        recorded(log((2.3, 2.4), role), SHIFT, FILLS)
+
+
+@pytest.mark.parametrize("gap", [(2.0 - LEAST, 1.95), (2.51 + OLDEST, 2.7)])
+def test_too_short_a_rest_refuses_it(gap: tuple[float, float]) -> None:
+    with pytest.raises(DamagedChannelError, match="less than"):
+        recorded(log(gap, "engine_torque"), SHIFT, FILLS)
+
+
+@pytest.mark.parametrize("role", ["pressure.B2", "pressure.B3"])
+@pytest.mark.parametrize("gap", [(0.5, 1.5), (3.0, 4.0)])
+def test_pressure_of_an_element_that_stays_locked_or_open_decides_nothing(
+    role: str, gap: tuple[float, float]
+) -> None:
+    assert recorded(log(gap, role), SHIFT, FILLS) is SHIFT
+
+
+def test_pressure_that_crosses_the_fill_point_in_its_gap_cuts() -> None:
+    whole = log((3.0, 4.0), "pressure.B2")
+    channel = whole.pressure("B2")
+    risen = replace(channel, values=np.where(channel.time > 3.5, 1e6, channel.values))
+    cut = recorded(ShiftLog({**whole.channels, "pressure.B2": risen}, "made", ""), SHIFT, FILLS)
+    assert cut.after == pytest.approx((2.5, 3.0), abs=2e-3)
