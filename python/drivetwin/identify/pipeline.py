@@ -56,7 +56,7 @@ def identify(
     `evidence["paper"]` holds a PaperShift and `evidence["integral"]` an IntegralShift per shift;
     the paper's stages run beside the other methods for comparison. The likelihood method starts
     from the integral one, adds `evidence["likelihood"]` (a LikelihoodFit), and leaves the integral
-    result with a warning where it does not converge.
+    result with a warning where it does not converge. `evidence["signals"]` are the ShiftSignals.
     Raises NoShiftError without a shift, IdentificationError where the data cannot carry it,
     MissingChannelError for a missing channel, DamagedChannelError where the inputs of the only
     shift have gaps; of several such shifts are refused and the others used.
@@ -85,7 +85,7 @@ def identify(
         validity=_validity(signals, found),
         inputs={Path(log.source).name: log.sha256},
         settings=_settings(card, method),
-        evidence=evidence,
+        evidence={**evidence, "signals": tuple(signals)},
         warnings=(*log.warnings, *found.warnings),
         assumptions=_assumptions(card, method),
         correlation_ids=found.correlation_ids,

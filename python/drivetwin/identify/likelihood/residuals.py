@@ -51,30 +51,49 @@ class ResidualTest:
         return tuple(texts)
 
 
-def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
-    """Tests of every output by label of the shift; input noise is taken out of residuals first."""
-    found = {}
+def white_residuals(fit: LikelihoodFit) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
+    """Times (n,) and residuals (n,) over their noise, input noise taken out, by shift and output.
+
+    Of a right model they are white with variance one.
+    """
+    found: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
     for part, residual in zip(fit.problem.parts, fit.normal.residuals, strict=True):
         white = (residual - part.weighting.driven(residual)) / part.record.sigma
-        inputs = {"engine torque": part.record.engine_torque} | {
-            f"pressure of {name}": signal for name, signal in part.record.pressures.items()
-        }
-        first, tests = 0, []
+        first, outputs = 0, {}
         for out in part.record.outputs:
             e = white[first : first + out.values.size]
             first += out.values.size
-            tests.append(_test(out.name, part.record.time[out.place], e, inputs))
-        found[part.structure.label] = tuple(tests)
+            outputs[out.name] = (part.record.time[out.place], e)
+        found[part.structure.label] = outputs
+    return found
+
+
+def block_means(time: FloatArray, white: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Middle times and means over blocks of `BLOCK`, scaled: white noise gives variance one."""
+    size = max(2, round(BLOCK / float(np.median(np.diff(time)))))
+    count = white.size // size
+    means = white[: count * size].reshape(count, size).mean(axis=1)
+    return time[: count * size].reshape(count, size).mean(axis=1), np.sqrt(size) * means
+
+
+def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
+    """Tests of every output by label of the shift."""
+    found = {}
+    for part, outputs in zip(fit.problem.parts, white_residuals(fit).values(), strict=True):
+        inputs = {"engine torque": part.record.engine_torque} | {
+            f"pressure of {name}": signal for name, signal in part.record.pressures.items()
+        }
+        found[part.structure.label] = tuple(
+            _test(name, time, white, inputs) for name, (time, white) in outputs.items()
+        )
     return found
 
 
 def _test(
     name: str, time: FloatArray, white: FloatArray, inputs: dict[str, Signal]
 ) -> ResidualTest:
-    size = max(2, round(BLOCK / float(np.median(np.diff(time)))))
-    count = white.size // size
-    means = white[: count * size].reshape(count, size).mean(axis=1)
-    excess = float(size * np.mean(means**2) / np.mean(white**2))
+    _, means = block_means(time, white)
+    excess = float(np.mean(means**2) / np.mean(white**2))
     correlation = {}
     for source, signal in inputs.items():
         x = np.interp(time, signal.time, signal.values)
