@@ -31,9 +31,14 @@ def inspect(
     as_json: JsonFlag = False,
 ) -> None:
     """List the columns of a log: unit, rate, range, gaps, and the role each would play."""
-    from drivetwin.cli.survey import survey
+    from drivetwin.logs.mapping import Mapped
+    from drivetwin.logs.profile import read_mapping
+    from drivetwin.logs.survey import survey
+    from drivetwin.vehicle.card import load_card
 
-    found = survey(log, vehicle, channels)
+    card = None if vehicle is None else load_card(vehicle)
+    stated = Mapped({}) if channels is None else read_mapping(channels)
+    found = survey(log, card, stated)
     if write_mapping is not None:
         from drivetwin.logs import profile
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from drivetwin.identify.combine import combine
 from drivetwin.identify.integral import IntegralShift
+from drivetwin.identify.known import with_known
 from drivetwin.identify.result import Estimate, FrictionCurve
 from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
 from drivetwin.identify.uncertainty import correlation, designed, judge, refused
@@ -60,11 +61,13 @@ def conclude(
     """
     J_out = drivelines[0].J_out
     ids, values, covariance = combine(shifts, J_out)
+    beforehand = drivelines[0].known
+    values, covariance, doubts = with_known(ids, values, covariance, beforehand)
     std = np.sqrt(np.diag(covariance))
     notes = low_gear_notes(signals)
     estimates = {}
     for name, value, noise in zip(ids, values, std, strict=True):
-        prior = J_out if name == "J_out" else _fill_prior(name, drivelines)
+        prior = beforehand.get(name, J_out if name == "J_out" else _fill_prior(name, drivelines))
         if prior is not None and noise >= PRIOR_SHARE * prior.std:
             known = prior.std == 0.0
             estimates[name] = designed(
@@ -81,7 +84,7 @@ def conclude(
         _curves(shifts),
         ids,
         correlation(covariance),
-        _warnings(shifts, signals, notes),
+        (*doubts, *_warnings(shifts, signals, notes)),
     )
 
 
@@ -107,7 +110,11 @@ def _card_values(
     known: dict[str, Estimate], drivelines: Sequence[Driveline]
 ) -> dict[str, Estimate]:
     """Design values of what no shift could tell: P0 of elements that never came on."""
-    found = {}
+    found = {
+        name: designed(name, prior.value, prior.std, KNOWN)
+        for name, prior in drivelines[0].known.items()
+        if name not in known
+    }
     for driveline in drivelines:
         for element in (driveline.offgoing, driveline.oncoming):
             name = f"P0.{element.name}"

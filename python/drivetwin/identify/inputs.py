@@ -39,6 +39,7 @@ def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
         couplings=couplings,
         J_out=None if card.J_out is None else _prior(card.J_out),
         loss_law=card.loss_law,
+        known={name: _prior(prior) for name, prior in card.known.items()},
     )
 
 

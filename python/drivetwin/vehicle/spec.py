@@ -75,7 +75,7 @@ class VehicleCard:
     `gears` run from low to high. `final_drive` is i_f. `J_prime_range` [kg m^2] bounds J' at the
     engine, `J_vehicle_range` [kg m^2] bounds J3 at the wheel; `J_out` [kg m^2] is the inertia of
     the output side before the shaft (Jo' without drums), None if unknown. `sensors` and `channels`
-    go by channel role.
+    go by channel role. `known` is what else is known, by parameter id (see parameters.py).
     """
 
     name: str
@@ -90,6 +90,7 @@ class VehicleCard:
     sensors: Mapping[str, SensorTolerance] = field(default_factory=dict)
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
     source: str = ""
+    known: Mapping[str, Prior] = field(default_factory=dict)
 
     def gear(self, name: str) -> Gear:
         """Return the gear of this name; raises CardError if the card has none."""

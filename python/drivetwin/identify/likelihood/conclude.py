@@ -66,7 +66,7 @@ def conclude(
     }
     if not signals[0].scale_known:
         estimates |= {name: _without_scale(name) for name in absolute_ids(signals)}
-    if "te_delay" not in fit.point.names:
+    if "te_delay" not in fit.point.names and "te_delay" not in drivelines[0].known:
         estimates["te_delay"] = refused("te_delay", METHOD, NO_AGE)
     return Conclusions(
         estimates,
@@ -95,7 +95,9 @@ def _without_scale(name: str) -> Estimate:
 
 
 def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
-    """Design value of a parameter itself, where the card states one."""
+    """What is known beforehand of a parameter itself, where anything is."""
+    if name in drivelines[0].known:
+        return drivelines[0].known[name]
     if name == "J_out":
         return drivelines[0].J_out
     if name == "J_out" + OVER_ETA and drivelines[0].J_out is not None:

@@ -14,6 +14,12 @@ import numpy as np
 from drivetwin.driveline import LossLaw
 from drivetwin.identify.friction import LAW_PRIOR
 from drivetwin.identify.likelihood.fill import local_mean
+from drivetwin.identify.likelihood.known import (
+    gear_inertias,
+    known_unknowns,
+    tie_of,
+    with_gear_inertias,
+)
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import LATEST, record_of
 from drivetwin.identify.likelihood.unknowns import (
@@ -75,17 +81,21 @@ def problem_of(
     priors = _priors(signals, drivelines, guess)
     every = (*COMMON, *_laws(drivelines), *_fills(drivelines))
     names = [n for n in every if not _is_known(priors.get(n))]
-    if not signals[0].scale_known:
-        names.remove("eta")
-    if not all(shows_age(s.engine_torque) for s in signals):
-        names.remove("te_delay")
+    inertias = gear_inertias(signals, drivelines)
+    tie = tie_of(inertias)
+    untold = {
+        "eta": not signals[0].scale_known,
+        "te_delay": not all(shows_age(s.engine_torque) for s in signals),
+        "J_e": tie is not None,
+    }
+    names = [n for n in names if not untold.get(n, False)]
     names += [n for n in (TE_OFFSET, AERO) if n in priors]
     fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_known(p)}
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
         label = f"start{k}"
         record = record_of(s, d, span)
-        structure = Structure(d, loss_law, label, fixed, mean_speed_of(signals, d.i_f))
+        structure = Structure(d, loss_law, label, fixed, mean_speed_of(signals, d.i_f), tie)
         parts.append(Part.unweighted(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
@@ -98,6 +108,7 @@ def problem_of(
         k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
     }
     prior = Prior.independent(len(point.names), entries)
+    prior = with_gear_inertias(prior, point, fixed, inertias)
     return Problem(tuple(parts), prior, lower, upper), point
 
 
@@ -173,6 +184,7 @@ def _priors(
     if drivelines[0].J_out is not None:
         known = drivelines[0].J_out
         found["J_out"] = known if signals[0].scale_known else over_eta(known)
+    found |= known_unknowns(drivelines[0], signals[0].scale_known)
     step = signals[0].torque_resolution
     rounding = rounding_error(signals[0].engine_torque, step)
     if rounding > 0.0:

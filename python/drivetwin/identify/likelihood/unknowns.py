@@ -45,12 +45,20 @@ class Point:
 
 
 @dataclass(frozen=True)
+class Tie:
+    """A known `inertia` J′ [kg m^2] of the gear of `ratio` i: Je = J′ - Jo′/i²."""
+
+    inertia: float
+    ratio: float
+
+
+@dataclass(frozen=True)
 class Structure:
     """What is fixed during a fit: structure of one shift and the laws that are not free.
 
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
     start unknowns of this shift. `mean_speed` is that of the wheel over the log [rad/s], at which
-    T_v/i_f holds where the load grows with the speed.
+    T_v/i_f holds where the load grows with the speed. A `tie` takes the place of the unknown J_e.
     """
 
     driveline: Driveline
@@ -58,6 +66,7 @@ class Structure:
     label: str
     fixed: Mapping[str, float]
     mean_speed: float
+    tie: Tie | None = None
 
     @property
     def elements(self) -> tuple[Coupling, Coupling]:
@@ -65,7 +74,9 @@ class Structure:
         return (self.driveline.offgoing, self.driveline.oncoming)
 
     def value(self, point: Point, name: str) -> float:
-        """Value of an unknown, free or fixed."""
+        """Value of an unknown, free, fixed or tied."""
+        if name == "J_e" and self.tie is not None:
+            return self.tie.inertia - self.value(point, "J_out") / self.tie.ratio**2
         return point[name] if name in point.names else self.fixed[name]
 
     def model(self, point: Point) -> DualClutch:
@@ -121,10 +132,11 @@ class Structure:
     def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
         """(name in the core, unknown, derivative) of one unknown; nothing for foreign ones."""
         i_f, eta, J_e = self.driveline.i_f, self.value(point, "eta"), self.value(point, "J_e")
+        by_tie = 0.0 if self.tie is None else -1.0 / (self.tie.ratio**2 * eta)
         table: dict[str, Sequence[tuple[str, float]]] = {
             "eta": (("eta", 1.0), ("J1", -J_e / eta**2)),
             "J_e": (("J1", 1.0 / eta),),
-            "J_out": (("J_out", 1.0),),
+            "J_out": (("J_out", 1.0), ("J1", by_tie)),
             "J_vehicle": (("J_v", 1.0),),
             "Tv_over_if": (("load.constant", i_f),),
             AERO: (("load.aero", 1.0), ("load.constant", -(self.mean_speed**2))),

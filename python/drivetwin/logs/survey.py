@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin.logs.mapping import ChannelSpec, Mapped, guess, spec_of
-from drivetwin.logs.profile import read_mapping
 from drivetwin.logs.raw import Column as LogColumn
 from drivetwin.logs.raw import ReadOptions
 from drivetwin.logs.roles import NEEDED, PRESSURE
 from drivetwin.logs.summary import ColumnSummary, summarise
-from drivetwin.vehicle.card import VehicleCard, load_card
+from drivetwin.vehicle.spec import VehicleCard
 
 
 @dataclass(frozen=True)
@@ -57,14 +56,12 @@ class Survey:
         }
 
 
-def survey(log: Path, vehicle: Path | None, channels: Path | None) -> Survey:
-    """Look at a log; the card names the pressures, the mapping file overrides guesses.
+def survey(log: Path, card: VehicleCard | None, stated: Mapped) -> Survey:
+    """Look at a log; the card names the pressures, what is `stated` overrides guesses.
 
     Raises the typed errors of the readers, but none for channels that are missing or ambiguous:
     these become notes.
     """
-    card = None if vehicle is None else load_card(vehicle)
-    stated = Mapped({}) if channels is None else read_mapping(channels)
     summary = summarise(log, stated.options)
     columns = [one.column for one in summary.columns]
     specs = {**({} if card is None else card.channels), **stated.channels}
