@@ -67,7 +67,22 @@ def validate(
     """
     model = model or twin.dual_clutch(shift)
     shift = recorded(log, shift, {one.name: Prior(one.P0) for one in model.elements})
-    window = _window(log, shift)
+    return _simulated(twin, log, shift, model, _window(log, shift))
+
+
+def simulated_again(before: Validation, twin: Twin, log: ShiftLog, model: DualClutch) -> Validation:
+    """The shift of `before` with another `model`, over the same window of the same log.
+
+    For what follows a slider: the search for the window takes longer than the simulation.
+    """
+    window = (before.phases["before"][0], before.phases["after"][1])
+    return _simulated(twin, log, before.shift, model, window)
+
+
+def _simulated(
+    twin: Twin, log: ShiftLog, shift: Shift, model: DualClutch, window: tuple[float, float]
+) -> Validation:
+    """Run and comparison over `window` [s]."""
     engine_torque = _moved(log["engine_torque"], -twin.value("te_delay", 0.0))
     pressures = {element.name: _signal(log.pressure(element.name)) for element in model.elements}
     count = int((window[1] - window[0]) / _GRID + 1e-6)

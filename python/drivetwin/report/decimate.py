@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin.identify.result import FloatArray
 
@@ -26,9 +25,7 @@ def envelope(
     if time.size <= max_points:
         return time, values
     bins = np.linspace(0, time.size, max_points // 4 + 1).astype(np.intp)
-    kept = [
-        start + offset for start, end in pairwise(bins) for offset in _picked(values[start:end])
-    ]
+    kept = _picked(values, bins[:-1], bins[1:])
     return time[kept], values[kept]
 
 
@@ -50,8 +47,14 @@ def focused(
     return np.concatenate([t for t, _ in parts]), np.concatenate([v for _, v in parts])
 
 
-def _picked(values: FloatArray) -> list[int]:
-    if np.isnan(values).all():
-        return [0]
-    chosen = {0, int(np.nanargmin(values)), int(np.nanargmax(values)), values.size - 1}
-    return sorted(chosen)
+def _picked(
+    values: FloatArray, starts: NDArray[np.intp], ends: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Indices of what is kept of each bin; a bin without a number keeps its first sample."""
+    inside = starts[:, None] + np.arange(int(np.max(ends - starts)))
+    binned = values[np.minimum(inside, values.size - 1)]
+    known = (inside < ends[:, None]) & ~np.isnan(binned)
+    lowest = np.argmin(np.where(known, binned, np.inf), axis=1)
+    highest = np.argmax(np.where(known, binned, -np.inf), axis=1)
+    last = np.where(known.any(axis=1), ends - 1, starts)
+    return np.unique(np.concatenate((starts, starts + lowest, starts + highest, last)))

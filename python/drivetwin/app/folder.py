@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""The one folder whose files the workbench reads and writes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivetwin.errors import RefusedError, Where
+
+MAX_LISTED = 300
+"""Names offered for completion; any other file of the folder can still be typed."""
+MAX_DEPTH = 3
+"""Levels of folders that are looked into for names to offer."""
+
+
+@dataclass(frozen=True)
+class Folder:
+    """A folder by its `root`, absolute and with all links resolved."""
+
+    root: Path
+
+    @classmethod
+    def at(cls, path: Path) -> Folder:
+        """The folder at `path`; raises RefusedError where there is none."""
+        root = path.resolve()
+        if not root.is_dir():
+            raise RefusedError("this is no folder", "start in a folder", Where(file=str(path)))
+        return cls(root)
+
+    def file(self, name: str) -> Path:
+        """A regular file inside the folder by its path in it; links are followed, then checked.
+
+        Raises RefusedError for a path that leads outside, to nothing, or to no regular file.
+        """
+        path = self._inside(name)
+        if not path.is_file():
+            raise RefusedError(
+                "there is no such file in the folder of the workbench",
+                f"give a path inside {self.root}, or upload the file",
+                Where(file=name),
+            )
+        return path
+
+    def new_file(self, name: str, suffix: str) -> Path:
+        """Where a file called `name` is to be written; the ending `suffix` is added if missing.
+
+        Raises RefusedError for a path that leads outside or into a folder that does not exist.
+        """
+        path = self._inside(name if name.endswith(suffix) else name + suffix)
+        if path.name == suffix or not path.parent.is_dir() or path.is_dir():
+            raise RefusedError(
+                "no file can be written there",
+                f"give a name in an existing folder inside {self.root}",
+                Where(file=name),
+            )
+        return path
+
+    def name_of(self, path: Path) -> str:
+        """Path of a file of the folder as it is typed and stored, with forward slashes."""
+        return path.relative_to(self.root).as_posix()
+
+    def names(self, endings: Collection[str]) -> list[str]:
+        """Names of files with one of the `endings`, for completion; hidden ones are left out."""
+        found = sorted(name for name in self._walk() if name.lower().endswith(tuple(endings)))
+        return found[:MAX_LISTED]
+
+    def _inside(self, name: str) -> Path:
+        try:
+            path = (self.root / name.strip()).resolve()
+        except (OSError, ValueError, RuntimeError):
+            path = None
+        if not name.strip() or path is None or not path.is_relative_to(self.root):
+            raise RefusedError(
+                "this path leads outside the folder of the workbench" if name.strip()
+                else "no file is named",
+                f"give a path inside {self.root}, or upload the file",
+                Where(file=name[:200] or None),
+            )  # fmt: skip
+        return path
+
+    def _walk(self) -> Iterator[str]:
+        for folder, inner, files in os.walk(self.root):
+            place = Path(folder).relative_to(self.root)
+            deep = len(place.parts) >= MAX_DEPTH
+            inner[:] = [] if deep else sorted(one for one in inner if not one.startswith("."))
+            yield from ((place / one).as_posix() for one in files if not one.startswith("."))

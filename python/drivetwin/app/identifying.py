@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""The identification as a job: one method after the other, each result told when it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drivetwin.app.jobs import Emit
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.method import Method
+from drivetwin.identify.pipeline import identify
+from drivetwin.identify.result import Identification
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.progress import part
+from drivetwin.shifts.find import FoundShifts
+from drivetwin.shifts.shift import Shift
+from drivetwin.twin import Twin
+from drivetwin.validate import validated
+from drivetwin.vehicle.card import VehicleCard
+
+_WEIGHTS = {Method.PAPER: 1.0, Method.INTEGRAL: 30.0, Method.LIKELIHOOD: 70.0}
+"""How long the methods take, relative to each other."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What to identify from; `card` is as the locks have it, `shifts` as moved by hand."""
+
+    log: ShiftLog
+    card: VehicleCard
+    shifts: tuple[Shift, ...]
+    methods: Sequence[Method]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one method found, with its twin; `found` holds the validation."""
+
+    method: Method
+    found: Identification
+    twin: Twin
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why one method found nothing."""
+
+    method: Method
+    text: str
+
+
+def identify_all(emit: Emit, task: Task) -> None:
+    """Run every method of the task and validate its twin; emits an Outcome or Refusal for each.
+
+    Raises the errors that concern all methods: a missing channel, no shift.
+    """
+    whole, start = sum(_WEIGHTS[method] for method in task.methods), 0.0
+    shifts = FoundShifts(task.shifts, ())
+    for method in task.methods:
+        end = start + _WEIGHTS[method] / whole
+        with part(start, end, f"{method.value} method"):
+            try:
+                emit(_outcome(task, shifts, method))
+            except IdentificationError as error:
+                emit(Refusal(method, error.what))
+        start = end
+
+
+def _outcome(task: Task, shifts: FoundShifts, method: Method) -> Outcome:
+    found = identify(task.log, task.card, shifts, method)
+    twin = Twin.from_identification(found, task.card)
+    return Outcome(method, validated(found, twin, task.log), twin)
+
+
+def report_of(emit: Emit, outcome: Outcome, log: ShiftLog) -> None:
+    """The report of an outcome as HTML text; emits it."""
+    from drivetwin.report.html import render_report
+
+    emit(render_report(outcome.found, log))

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: MIT
+"""Files of a user are parsed here, in a child process with a bound on its memory.
+
+A compressed file of a few kilobytes may claim gigabytes: then the child fails, not the program.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from drivetwin.app.jobs import Emit
+from drivetwin.errors import DrivetwinError
+from drivetwin.logs.mapping import ChannelSpec, Mapped
+from drivetwin.logs.profile import read_mapping, write_mapping
+from drivetwin.logs.raw import ReadOptions
+from drivetwin.logs.read import read_log
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.logs.survey import Survey, survey
+from drivetwin.shifts.find import FoundShifts, find_shifts
+from drivetwin.vehicle.card import VehicleCard, load_card
+
+MEMORY = 2 * 2**30
+"""Bytes that reading a file may take beyond what the libraries hold."""
+LONGEST = 60.0
+"""Time [s] after which reading is given up."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What a log holds and how it is read.
+
+    `log` and `found` are None where it cannot be read as mapped, `fault` then says why.
+    """
+
+    survey: Survey
+    card: VehicleCard
+    log: ShiftLog | None = None
+    found: FoundShifts | None = None
+    fault: str = ""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to open: files, and the channels as the user has corrected them.
+
+    `label` is the name that the log is called by in messages and results.
+    """
+
+    log: Path
+    label: str
+    card: Path
+    mapping: Path | None = None
+    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+
+
+def open_log(emit: Emit, request: Request, scratch: Path) -> None:
+    """Read card, columns and log, and find the shifts; emits one Opened.
+
+    `scratch` is a file of our own for the corrected mapping. Raises the errors of card and file;
+    those of the mapping become `fault`, so that it can be corrected.
+    """
+    bound_memory()
+    card = load_card(request.card)
+    stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
+    stated = replace(stated, channels={**stated.channels, **request.channels})
+    looked = survey(request.log, card, stated)
+    try:
+        log = read_log(request.log, card, _written(scratch, stated.channels, stated.options))
+        log = replace(log, source=request.label)
+        found = find_shifts(log, card)
+    except DrivetwinError as error:
+        text = str(error).replace(str(request.log), request.label)
+        emit(Opened(looked, card, fault=text))
+        return
+    emit(Opened(looked, card, log, found))
+
+
+def open_card(emit: Emit, path: Path) -> None:
+    """Read a vehicle card; emits it. Raises CardError."""
+    bound_memory()
+    emit(load_card(path))
+
+
+def bound_memory() -> None:
+    """Let this process take `MEMORY` more than it has; where the system cannot, nothing happens."""
+    status = Path("/proc/self/statm")
+    if sys.platform == "win32" or not status.exists():
+        return
+    import resource
+
+    held = int(status.read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (held + MEMORY, held + MEMORY))
+
+
+def _written(path: Path, channels: Mapping[str, ChannelSpec], options: ReadOptions) -> Path:
+    write_mapping(path, channels, options)
+    return path

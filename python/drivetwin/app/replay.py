@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT
+"""Sliders: parameters changed by hand, and the simulation that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import plotly.graph_objects as go
+
+from drivetwin.driveline import DualClutch, FrictionTable, ShiftElement, Stribeck
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.parameters import spec_of
+from drivetwin.report.decimate import focused
+from drivetwin.report.figures.stack import Curve, Panel, stacked
+from drivetwin.report.figures.validation import validation_panels
+from drivetwin.report.labels import parameter_label
+from drivetwin.report.style import MUTED
+from drivetwin.report.units import Display, display_of
+from drivetwin.shifts.shift import Shift
+from drivetwin.twin import Twin
+from drivetwin.validate import Validation, simulated_again, validate
+
+FRICTION = "mu."
+"""Prefix of the slider that scales the friction of an element; 1 as identified."""
+_SPAN, _SIGMAS = 0.4, 6.0
+"""A slider reaches so far to either side: a share of the value, or standard deviations."""
+_DELAY_SPAN = 0.03
+_STEPS = 400
+_FOLLOWING = ("simulated", "measured − simulated")
+"""Names of the curves that a slider moves."""
+_HEIGHT = 980
+
+
+@dataclass(frozen=True)
+class Slider:
+    """One parameter to be moved: `value` as identified, the range and the display unit.
+
+    Numbers are in the display unit.
+    """
+
+    id: str
+    label: str
+    unit: str
+    value: float
+    low: float
+    high: float
+
+    @property
+    def step(self) -> float:
+        """Distance of two positions."""
+        return (self.high - self.low) / _STEPS
+
+
+def sliders_of(twin: Twin, shift: Shift) -> list[Slider]:
+    """What the simulation of a shift can be told, as far as the log could tell it."""
+    names = ("eta", _told_inertia(twin, shift), "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+    elements = (shift.offgoing, shift.oncoming)
+    ids = (*names, "te_delay", *(f"P0.{element}" for element in elements))
+    told = [_slider(twin, name) for name in ids if name is not None]
+    laws = [
+        Slider(FRICTION + element, f"μ of {element}", "× identified", 1.0, 0.5, 1.5)
+        for element in elements
+    ]
+    return [one for one in told if one is not None] + laws
+
+
+def display_for(slider_id: str) -> Display:
+    """How the number of a slider is shown; friction factors as they are."""
+    if slider_id.startswith(FRICTION):
+        return Display("× identified")
+    return display_of(spec_of(slider_id).unit)
+
+
+def model_of(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClutch:
+    """The model of a shift with some parameters changed (SI, by slider id).
+
+    Raises MissingParameterError where the log could not tell a parameter and nothing replaces it.
+    """
+    overrides = {name: v for name, v in changes.items() if not name.startswith(FRICTION)}
+    model = twin.dual_clutch(shift, overrides=overrides)
+    elements = tuple(
+        _scaled(element, changes.get(FRICTION + element.name, 1.0)) for element in model.elements
+    )
+    return replace(model, elements=elements)
+
+
+def first_run(twin: Twin, log: ShiftLog, shift: Shift) -> Validation:
+    """The shift with the parameters as identified. Raises as `model_of` and `validate` do."""
+    return validate(twin, log, shift)
+
+
+def replay(
+    before: Validation, twin: Twin, log: ShiftLog, changes: Mapping[str, float]
+) -> Validation:
+    """The shift of `before` with parameters changed."""
+    model = model_of(twin, before.shift, changes)
+    return simulated_again(before, _delayed(twin, changes), log, model)
+
+
+def figure_of(identified: Validation, present: Validation) -> go.Figure:
+    """Simulation over measurement; where parameters are changed also the one as identified."""
+    panels = [_with_identified(panel, identified) for panel in validation_panels(present)]
+    figure = stacked(panels, present.phases, height=_HEIGHT)
+    figure.update_layout(uirevision="kept")
+    return figure
+
+
+def moved_curves(figure: go.Figure, present: Validation) -> dict[int, dict[str, Any]]:
+    """New x and y of the traces of `figure_of` that follow the sliders, by their number."""
+    view = figure.layout.xaxis.range
+    curves = [
+        (panel.display, curve) for panel in validation_panels(present) for curve in panel.curves
+    ]
+    following = [pair for pair in curves if pair[1].name in _FOLLOWING]
+    places = [k for k, trace in enumerate(figure.data) if trace.name in _FOLLOWING]
+    found = {}
+    for place, (display, curve) in zip(places, following, strict=True):
+        time, values = focused(curve.time, curve.values, (view[0], view[1]))
+        found[place] = {"x": time.astype("float32"), "y": display.of(values).astype("float32")}
+    return found
+
+
+def _told_inertia(twin: Twin, shift: Shift) -> str | None:
+    """The J′ that the model is made from: of the two gears the one told more narrowly."""
+    told = [
+        (estimate.std_total or 0.0, name)
+        for gear in (shift.start_gear, shift.end_gear)
+        if (estimate := twin.parameters.get(name := f"J_prime_{gear}")) is not None
+        and estimate.value is not None
+    ]
+    return min(told)[1] if told else None
+
+
+def _slider(twin: Twin, name: str) -> Slider | None:
+    estimate = twin.parameters.get(name)
+    if estimate is None or estimate.value is None:
+        return None
+    spec, display, value = spec_of(name), display_of(estimate.unit), estimate.value
+    span = max(_SPAN * abs(value), _SIGMAS * (estimate.std_total or 0.0))
+    if spec.stem == "te_delay":
+        span = _DELAY_SPAN
+    low, high = max(value - span, spec.lower), min(value + span, spec.upper)
+    return Slider(
+        name,
+        parameter_label(name),
+        display.label,
+        value * display.factor,
+        low * display.factor,
+        high * display.factor,
+    )
+
+
+def _scaled(element: ShiftElement, factor: float) -> ShiftElement:
+    law = element.friction
+    if isinstance(law, FrictionTable):
+        scaled = FrictionTable(law.slip, tuple(factor * mu for mu in law.mu))
+        return replace(element, friction=scaled)
+    return replace(
+        element,
+        friction=Stribeck(factor * law.mu_c, factor * law.mu_s, law.v_s, factor * law.mu_v),
+    )
+
+
+def _delayed(twin: Twin, changes: Mapping[str, float]) -> Twin:
+    """The twin with the age of the engine torque that the sliders say."""
+    if "te_delay" not in changes or "te_delay" not in twin.parameters:
+        return twin
+    estimate = replace(twin.parameters["te_delay"], value=changes["te_delay"])
+    return replace(twin, parameters={**twin.parameters, "te_delay": estimate})
+
+
+def _with_identified(panel: Panel, identified: Validation) -> Panel:
+    """A panel of measured and simulated with the run as identified behind the present one."""
+    if not any(curve.name == "simulated" for curve in panel.curves):
+        return panel
+    name = panel.quantity.replace(" ", "_")
+    trace = identified.traces[name]
+    behind = Curve("as identified", trace.time, trace.simulated, MUTED, 1.0, "dot")
+    measured, simulated = panel.curves
+    return replace(panel, curves=[measured, behind, simulated])

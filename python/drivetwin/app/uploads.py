@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""Files handed over by the browser: streamed to disk, counted, and looked at, never executed.
+
+An upload is bytes under a name of our own; the name that the browser gives is a label. Its
+content is parsed in a process of its own (see `reading.py`).
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from drivetwin.errors import RefusedError, Where
+
+MAX_UPLOAD = 200 * 2**20
+"""Bytes; ten minutes of 40 channels at 1 kHz in an MDF file. Larger logs are opened by path."""
+MAX_TEXT = 2 * 2**20
+"""Bytes of a card or workspace file."""
+_CHUNK = 2**18
+_LONGEST_NAME = 200
+_FORMULA = re.compile(rb"""(?:^|[,;\t])[ ]*"?'?(?:[=@]|[+-](?=[A-Za-z(]|[^,;\t\r\n"]*[|!(]))""")
+"""A cell that a spreadsheet would compute: it begins with =, @, or a sign before no number."""
+_SIGNED_WORD = re.compile(rb"[+-](?:nan|inf|infinity)\b", re.IGNORECASE)
+_BINARY = re.compile(rb"\x00")
+_HEAD = 4096
+
+
+@dataclass(frozen=True)
+class Upload:
+    """A file that was received: the label it came under, and where it stands."""
+
+    name: str
+    path: Path
+
+
+def label_of(name: str) -> str:
+    """The name that an upload is shown under. Raises RefusedError for one that is a path or none.
+
+    Names are compared after NFKC: a full-width slash is a slash.
+    """
+    plain = unicodedata.normalize("NFKC", name)
+    bad = any(unicodedata.category(one).startswith("C") for one in plain)
+    if bad or len(name) > _LONGEST_NAME or re.search(r"[/\\:*?\"<>|]|^\.|^\s*$", plain):
+        raise RefusedError(
+            "this is no plain file name", "rename the file and upload it again",
+            Where(file=repr(name[:80])),
+        )  # fmt: skip
+    return name
+
+
+def receive(stream: IO[bytes], name: str, claimed: int | None, target: Path, limit: int) -> Upload:
+    """Write `stream` to `target`, at most `limit` bytes of it; nothing stays where it is refused.
+
+    `claimed` is the length that the browser states, None where it states none.
+    Raises RefusedError for a bad name, too many bytes, claimed or sent, and none at all.
+    """
+    label = label_of(name)
+    if claimed is not None and claimed > limit:
+        raise _too_large(label, f"{claimed / 1e6:.0f} MB", limit)
+    try:
+        with target.open("xb") as file:
+            size = _copy(stream, file, limit)
+        if size > limit:
+            raise _too_large(label, "more", limit)
+        if size == 0:
+            raise RefusedError("the file is empty", "upload a file", Where(file=label))
+        if claimed is not None and size != claimed:
+            raise RefusedError(
+                f"{size} of {claimed} bytes arrived", "upload the file again", Where(file=label)
+            )
+        refuse_formulas(target, label)
+    except BaseException:
+        target.unlink(missing_ok=True)
+        raise
+    return Upload(label, target)
+
+
+def refuse_formulas(path: Path, label: str) -> None:
+    """Refuse a text file with cells that a spreadsheet would compute: no logger writes them.
+
+    They would run where a name or a value of the log is later opened as a table.
+    """
+    with path.open("rb") as file:
+        if _BINARY.search(file.read(_HEAD)):
+            return
+        file.seek(0)
+        for number, line in enumerate(file, start=1):
+            for match in _FORMULA.finditer(line):
+                if _SIGNED_WORD.match(line, match.end() - 1):
+                    continue
+                raise RefusedError(
+                    f"line {number} holds a cell that is a formula",
+                    "export the log as plain numbers, without formulas",
+                    Where(file=label),
+                )
+
+
+def _copy(stream: IO[bytes], file: IO[bytes], limit: int) -> int:
+    """Copy until the end or the first chunk beyond `limit`; returns the bytes seen."""
+    size = 0
+    while chunk := stream.read(_CHUNK):
+        size += len(chunk)
+        if size > limit:
+            break
+        file.write(chunk)
+    return size
+
+
+def _too_large(label: str, size: str, limit: int) -> RefusedError:
+    return RefusedError(
+        f"the file has {size}, uploads may have {limit / 1e6:.0f} MB",
+        "copy it into the folder of the workbench and open it by its path, or cut the log",
+        Where(file=label),
+    )
