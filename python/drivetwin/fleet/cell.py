@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: MIT
+"""One worker process under guard: it is given a log, watched, and ended where it goes astray."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import monotonic
+from typing import IO
+
+from drivetwin.fleet.task import (
+    GO_ON,
+    Finished,
+    Limits,
+    Lost,
+    Outcome,
+    Reply,
+    State,
+    Stopped,
+    Task,
+    WorkerSpec,
+    memory_exceeded,
+)
+
+_LOOK = 0.1
+"""Time [s] between two looks at a worker's memory."""
+_START = 120.0
+"""Time [s] that a worker may take to import what it needs; a cold network drive is slow."""
+_THREADS = ("OPENBLAS", "OMP", "MKL", "VECLIB", "NUMEXPR", "RAYON")
+"""Libraries with threads of their own: one each, since the logs are what runs side by side."""
+
+
+_GRACE = 2.0
+"""Time [s] for a worker to end that has closed its output."""
+_STARTS = 3
+
+
+class _GoneError(Exception):
+    """The worker ended without an answer."""
+
+
+class Cell:
+    """A worker process that is made when needed and made anew when it is gone.
+
+    For use by one thread; `close` may be called from another one and ends a log in progress.
+    """
+
+    def __init__(self, spec: WorkerSpec) -> None:
+        self._spec = spec
+        self._process: subprocess.Popen[bytes] | None = None
+        self._stderr: IO[bytes] | None = None
+        self._pending = b""
+        self._closed = False
+
+    def run(self, task: Task) -> Reply:
+        """Do a task within the limits. Never raises for what the log or the worker does."""
+        limits = self._spec.limits
+        if fault := self._start():
+            return fault
+        try:
+            self._send(task)
+            reply = self._line(monotonic() + limits.seconds, limits.memory)
+        except _GoneError:
+            return Lost(self._end(_GRACE))
+        if isinstance(reply, Outcome):
+            self._end()
+            return Finished(reply, limits.seconds)
+        tree = json.loads(reply)
+        if "store" in tree:
+            return Stopped(f"a worker cannot write: {tree['store']}", GO_ON)
+        return Finished(Outcome.of(tree["outcome"]), tree["seconds"])
+
+    def close(self) -> None:
+        """End the worker; a task in progress is lost."""
+        self._closed = True
+        if self._process is not None:
+            self._process.kill()
+
+    @property
+    def pid(self) -> int | None:
+        """Of the worker process, where there is one."""
+        return None if self._process is None else self._process.pid
+
+    def _start(self) -> Lost | Stopped | None:
+        """Have a worker that is ready; where none will start, it is no fault of the log."""
+        for _ in range(_STARTS):
+            if self._closed:
+                return Lost("the run was ended", blame=False)
+            if self._process is not None:
+                return None
+            try:
+                self._spawn()
+                if not isinstance(self._line(monotonic() + _START, sys.maxsize), Outcome):
+                    return None
+                why = self._end()
+            except _GoneError:
+                why = self._end(_GRACE)
+            except OSError as fault:
+                why = str(fault.strerror)
+        return Stopped(
+            f"no worker starts: it {why}", "see whether `drivetwin identify` runs on this machine"
+        )
+
+    def _spawn(self) -> None:
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the worker
+        self._pending = b""
+        one_thread = {f"{name}_NUM_THREADS": "1" for name in _THREADS}
+        arguments = (self._spec.function, str(self._spec.limits.memory))
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "drivetwin.fleet.worker", *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._stderr,
+            env={**os.environ, **one_thread},
+            start_new_session=True,  # an interrupt at the keyboard is the coordinator's alone
+        )
+
+    def _send(self, task: Task) -> None:
+        assert self._process is not None
+        assert self._process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):  # the answer's end tells
+            self._process.stdin.write(task.to_json().encode() + b"\n")
+            self._process.stdin.flush()
+
+    def _line(self, deadline: float, memory: int) -> bytes | Outcome:
+        """The worker's next line, or what it went beyond. Raises _GoneError at its end."""
+        assert self._process is not None
+        assert self._process.stdout is not None
+        handle = self._process.stdout.fileno()
+        while b"\n" not in self._pending:
+            ready, _, _ = select.select([handle], [], [], _LOOK)
+            if ready:
+                data = os.read(handle, 1 << 16)
+                if not data:
+                    raise _GoneError
+                self._pending += data
+            elif monotonic() > deadline:
+                return time_exceeded(self._spec.limits)
+            elif _resident(self._process.pid) > memory:
+                return memory_exceeded(memory)
+        line, _, self._pending = self._pending.partition(b"\n")
+        return line
+
+    def _end(self, grace: float = 0.0) -> str:
+        """End the worker for good, after `grace` [s] to end by itself; how it ended."""
+        process, self._process = self._process, None
+        assert process is not None
+        try:
+            code = process.wait(grace)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            code = process.wait()
+        for pipe in (process.stdin, process.stdout):
+            assert pipe is not None
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
+        last = self._last_words()
+        if code < 0:
+            return f"was killed by {signal.Signals(-code).name}{last}"
+        return f"ended with code {code}{last}"
+
+    def _last_words(self) -> str:
+        assert self._stderr is not None
+        with self._stderr as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - 2000))
+            lines = file.read().decode("utf-8", "replace").strip().splitlines()
+        return f": {lines[-1][:300]}" if lines else ""
+
+
+def time_exceeded(limits: Limits) -> Outcome:
+    """The outcome of a log that hung."""
+    return Outcome(
+        State.QUARANTINED,
+        error="TimeLimit",
+        what=f"it was not done after {limits.seconds:g} s",
+        remedy="look at the log with `drivetwin inspect`; "
+        "run again with --retry and a larger --time-limit if it is only long",
+    )
+
+
+def _resident(pid: int) -> int:
+    """Memory [bytes] that a process holds; 0 where the system does not tell."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    except (OSError, IndexError, ValueError):
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")

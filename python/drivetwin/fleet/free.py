@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""What the log alone says of friction and fill pressure, without the card's design value.
+
+An estimate that leans on a design prior leans the same way in every log: averaged over a fleet the
+prior would count as often as there are logs and hide ageing. For joint estimates it is taken out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.identify.friction import P0, stribeck
+from drivetwin.identify.likelihood.unknowns import LAW
+from drivetwin.identify.result import FloatArray, Identification
+from drivetwin.vehicle.spec import Prior, VehicleCard
+
+_LAW_SIZE = P0
+_LEAST = 0.02
+"""Share of the information on P0 below which nothing of it is the log's own."""
+
+
+@dataclass(frozen=True)
+class FreeFriction:
+    """μ at a slip, and P0 [Pa], with their standard deviations, of the log alone."""
+
+    mu: float
+    mu_std: float
+    P0: float
+    P0_std: float
+
+
+def free_friction(
+    found: Identification, card: VehicleCard, element: str, slip: float
+) -> FreeFriction | None:
+    """Friction at `slip` [rad/s] and P0 of an element without the card's prior of P0.
+
+    None where the method leaves no covariance of the two, or the log says nothing of P0 itself.
+    """
+    posterior = _posterior(found, element)
+    if posterior is None:
+        return None
+    theta, covariance = posterior
+    mu, slopes = stribeck(theta, np.array([slip]))
+    to_pair = np.zeros((2, _LAW_SIZE + 1))
+    to_pair[0, :_LAW_SIZE] = slopes[:, 0]
+    to_pair[1, P0] = 1.0
+    pair = np.array([float(mu[0]), theta[P0]])
+    freed = without_prior(pair, to_pair @ covariance @ to_pair.T, card.elements[element].P0)
+    if freed is None:
+        return None
+    values, spread = freed
+    stds = np.sqrt(np.diag(spread))
+    return FreeFriction(float(values[0]), float(stds[0]), float(values[1]), float(stds[1]))
+
+
+def without_prior(
+    values: FloatArray, covariance: FloatArray, prior: Prior
+) -> tuple[FloatArray, FloatArray] | None:
+    """Values (p,) and covariance (p, p) with the Gaussian `prior` of the last one taken out.
+
+    None where the prior is exact or what is left would be next to nothing.
+    """
+    if prior.std <= 0.0 or not np.isfinite(covariance).all() or covariance[-1, -1] <= 0.0:
+        return None
+    own = 1.0 - covariance[-1, -1] / prior.std**2
+    if own < _LEAST:
+        return None
+    information = np.linalg.inv(covariance)
+    pull = information @ values
+    information[-1, -1] -= prior.std**-2
+    pull[-1] -= prior.value * prior.std**-2
+    freed = np.linalg.inv(information)
+    return freed @ pull, freed
+
+
+def _posterior(found: Identification, element: str) -> tuple[FloatArray, FloatArray] | None:
+    """Friction law and P0 (5,) of an element, and their covariance, by either linear method."""
+    fit = found.evidence.get("likelihood")
+    if fit is not None:
+        wanted = [f"{element}.{key}" for key in (*LAW, "P0")]
+        if not set(wanted) <= set(fit.point.names):
+            return None
+        place = [fit.point.names.index(name) for name in wanted]
+        return fit.point.values[place], fit.covariance[np.ix_(place, place)]
+    for shift in found.evidence.get("integral", ()):
+        if shift.friction is not None and shift.friction.element == element:
+            size = _LAW_SIZE + 1
+            return shift.friction.fit.theta[:size], shift.friction.fit.covariance[:size, :size]
+    return None

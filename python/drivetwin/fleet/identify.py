@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+"""One log of a fleet: what `drivetwin identify` does, down to the rows of the store."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from drivetwin.errors import MissingChannelError, TimeError, Where
+from drivetwin.fleet.free import free_friction
+from drivetwin.fleet.rows import MU, Found, Row, RowKind
+from drivetwin.fleet.task import Recipe, ShiftRow, Task
+from drivetwin.identify.pipeline import identify
+from drivetwin.identify.result import Estimate, FrictionCurve, Identification, Verdict
+from drivetwin.identify.uncertainty import judge
+from drivetwin.logs.formats import open_recording
+from drivetwin.logs.profile import read_mapping
+from drivetwin.logs.raw import ReadOptions
+from drivetwin.logs.read import read_log
+from drivetwin.parameters import spec_of
+from drivetwin.shifts.find import FoundShifts
+from drivetwin.shifts.usable import usable_shifts
+from drivetwin.twin import Twin
+from drivetwin.validate import validated
+from drivetwin.vehicle.card import VehicleCard, load_card
+
+if TYPE_CHECKING:
+    from drivetwin.logs.shiftlog import ShiftLog
+
+_Z95 = 1.959963984540054
+_CARDS = 64
+"""Cards that a worker keeps at hand."""
+
+
+def identify_log(task: Task) -> Found:
+    """Identify one log. Raises the typed errors of each stage for a log that cannot be used."""
+    recipe = task.recipe
+    card = _card(recipe)
+    mapping = None if recipe.channels is None else Path(recipe.channels)
+    log = read_log(Path(task.path), card, mapping)
+    if log.sha256 != task.content:
+        raise TimeError(
+            "the file changed while the fleet was at work",
+            "run the same command again when it is complete",
+            Where(file=task.path),
+        )
+    found_shifts = usable_shifts(log, card)
+    found = identify(log, card, found_shifts, recipe.method)
+    twin = Twin.from_identification(found, card)
+    found = validated(found, twin, log)
+    _artefacts(task, found, log)
+    rows = [*_means(task, mapping), *result_rows(found, card, recipe.mu_slip)]
+    return Found(rows, shift_rows(found_shifts))
+
+
+@lru_cache(_CARDS)
+def _card(recipe: Recipe) -> VehicleCard:
+    """The card of a recipe, which holds the file's hash: a changed card is another recipe."""
+    return load_card(Path(recipe.vehicle))
+
+
+def _artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
+    """Write the report and the traces that are wanted besides."""
+    if task.report is not None:
+        from drivetwin.fleet.pages import save_single
+
+        save_single(Path(task.report), found, log)
+    if task.traces is not None:
+        from drivetwin.fleet.traces import save_traces
+
+        save_traces(Path(task.traces), found)
+
+
+def _means(task: Task, mapping: Path | None) -> Iterator[Row]:
+    """Mean of each channel that is a field of the log, in the file's unit."""
+    if not task.recipe.means:
+        return
+    options = ReadOptions() if mapping is None else read_mapping(mapping).options
+    with open_recording(Path(task.path), options) as recording:
+        names = [column.name for column in recording.columns]
+        for field, channel in task.recipe.means:
+            if channel not in names:
+                raise MissingChannelError(
+                    f"no channel {channel!r}, whose mean is the field {field!r}",
+                    "correct [fields] of the rules, or leave such logs to another rule",
+                    Where(file=task.path),
+                )
+            column = names.index(channel)
+            values = recording.load(column).values
+            mean = float(np.mean(values[np.isfinite(values)]))
+            yield Row(RowKind.FIELD, field, mean, si_unit=recording.columns[column].unit or "")
+
+
+def shift_rows(found: FoundShifts) -> list[ShiftRow]:
+    """Used shifts, then refused ones."""
+    used = [
+        ShiftRow(
+            used=True,
+            start=shift.torque_phase[0],
+            end=shift.lockup_time,
+            start_gear=shift.start_gear,
+            end_gear=shift.end_gear,
+            kind=shift.kind.value,
+            offgoing=shift.offgoing,
+            oncoming=shift.oncoming,
+        )
+        for shift in found.shifts
+    ]
+    refused = [ShiftRow(False, *one.time, reason=one.reason) for one in found.rejected]
+    return [*used, *refused]
+
+
+def result_rows(found: Identification, card: VehicleCard, mu_slip: float) -> list[Row]:
+    """All rows of an identification; `mu_slip` [rad/s] is where friction is compared."""
+    return [
+        *_parameter_rows(found, card, mu_slip),
+        *(row for name, curve in found.friction.items() for row in _friction_rows(name, curve)),
+        *_fit_rows(found),
+        *(
+            Row(RowKind.QUALITY, name, float(value), shift=number)
+            for number, shift in enumerate(found.shifts)
+            for name, value in shift.quality.items()
+        ),
+        *(Row(RowKind.WARNING, "", reason=text) for text in found.warnings),
+    ]
+
+
+def _parameter_rows(found: Identification, card: VehicleCard, slip: float) -> list[Row]:
+    """All estimates, with μ at one slip of every element whose curve reaches it."""
+    rows = {one.id: _estimate_row(one) for one in found.estimates.values()}
+    for element, curve in found.friction.items():
+        mu, fill = MU + element, f"P0.{element}"
+        free = free_friction(found, card, element, slip)
+        if curve.slip[0] <= slip <= curve.slip[-1]:
+            rows[mu] = _mu_row(mu, curve, slip)
+            if free is not None:
+                rows[mu] = replace(rows[mu], free_value=free.mu, free_std=free.mu_std)
+        if free is not None and fill in rows:
+            rows[fill] = replace(rows[fill], free_value=free.P0, free_std=free.P0_std)
+    return list(rows.values())
+
+
+def _estimate_row(one: Estimate) -> Row:
+    low, high = one.ci95_total or (None, None)
+    return Row(
+        RowKind.PARAMETER, one.id, one.value, one.std_noise, one.std_total, low, high,
+        one.unit, one.verdict.value, one.method, one.reason,
+    )  # fmt: skip
+
+
+def _mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
+    """μ at one slip of a curve, judged like any estimate by the width of its band."""
+    spec = spec_of(name)
+    mu, low, high = (
+        float(np.interp(slip, curve.slip, values))
+        for values in (curve.mu, curve.mu_lo, curve.mu_hi)
+    )
+    if not np.isfinite([low, high]).all():
+        verdict = Verdict.WEAK.value
+        return Row(
+            RowKind.PARAMETER, name, mu, si_unit=spec.unit, verdict=verdict, method=curve.method,
+            at=slip,
+        )  # fmt: skip
+    std = (high - low) / (2.0 * _Z95)
+    one = judge(name, mu, std, curve.method)
+    return replace(_estimate_row(one), at=slip)
+
+
+def _friction_rows(element: str, curve: FrictionCurve) -> Iterator[Row]:
+    bands = zip(curve.slip, curve.mu, curve.mu_lo, curve.mu_hi, strict=True)
+    for slip, mu, low, high in bands:
+        ends = (float(low), float(high)) if np.isfinite([low, high]).all() else (None, None)
+        yield Row(
+            RowKind.FRICTION, element, float(mu), ci95_lo=ends[0], ci95_hi=ends[1],
+            si_unit="1", method=curve.method, at=float(slip),
+        )  # fmt: skip
+
+
+def _fit_rows(found: Identification) -> Iterator[Row]:
+    for signal, phases in found.fit.items():
+        for phase, fit in phases.items():
+            for figure, value in vars(fit).items():
+                number = float(value) if np.isfinite(value) else None
+                yield Row(RowKind.FIT, f"{signal}.{phase}.{figure}", number)

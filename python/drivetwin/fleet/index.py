@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: MIT
+"""The index of a store: one SQLite file with a row for each file, log and shift.
+
+Only the coordinator writes it. It uses SQLite's rollback journal and not its write-ahead log: that
+one keeps its own index in memory shared by the readers, which does not exist between the machines
+of a network file system (https://sqlite.org/wal.html, section 1), and a single writer that commits
+once a second gains nothing from it.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drivetwin.errors import StoreError, Where
+from drivetwin.fleet.task import Outcome, ShiftRow, State
+
+INDEX = "index.sqlite"
+_FORMAT = 1
+_AFTER_HEX = "g"
+"""Sorts behind every key that goes on with a hexadecimal digit."""
+_SCHEMA = """
+CREATE TABLE settings (
+    settings TEXT PRIMARY KEY, version TEXT NOT NULL, document TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE TABLE logs (
+    log TEXT PRIMARY KEY, content TEXT NOT NULL, settings TEXT NOT NULL, version TEXT NOT NULL,
+    state TEXT NOT NULL, error TEXT NOT NULL DEFAULT '', what TEXT NOT NULL DEFAULT '',
+    remedy TEXT NOT NULL DEFAULT '', part TEXT NOT NULL DEFAULT '',
+    attempts INTEGER NOT NULL DEFAULT 0, seconds REAL
+) WITHOUT ROWID;
+CREATE TABLE shifts (
+    log TEXT NOT NULL, shift INTEGER NOT NULL, content TEXT NOT NULL, settings TEXT NOT NULL,
+    version TEXT NOT NULL, state TEXT NOT NULL, reason TEXT NOT NULL, begin REAL, "end" REAL,
+    start_gear TEXT, end_gear TEXT, kind TEXT, offgoing TEXT, oncoming TEXT,
+    PRIMARY KEY (log, shift)
+) WITHOUT ROWID;
+CREATE TABLE files (
+    path TEXT PRIMARY KEY, log TEXT NOT NULL, content TEXT NOT NULL, size INTEGER NOT NULL,
+    modified INTEGER NOT NULL, rule TEXT NOT NULL, unit TEXT NOT NULL, fields TEXT NOT NULL,
+    run INTEGER NOT NULL
+) WITHOUT ROWID;
+CREATE INDEX files_of_log ON files (log);
+"""
+"""`logs.state` is a State; that of a shift is `used` or `refused`. `logs.part` is the large part
+that holds a log's rows, empty while it has one of its own. `files.log` is the log that a file was
+when it was last looked at; `files.run` counts the calls of `fleet`.
+"""
+
+RUN_COLUMNS = frozenset({"attempts", "seconds", "modified", "run"})
+"""What tells of the runs rather than of the logs: it differs where all else is equal."""
+
+
+@dataclass(frozen=True)
+class FileRow:
+    """A log file as it was last seen: size [bytes], time of change [ns], where it belongs."""
+
+    path: str
+    log: str
+    content: str
+    size: int
+    modified: int
+    rule: str
+    unit: str
+    fields: Mapping[str, float]
+
+
+class Index:
+    """The index, open for one coordinator or for readers; see the module's text."""
+
+    def __init__(self, path: Path, *, write: bool) -> None:
+        self._path = path
+        mode = "rwc" if write else "ro"
+        with self._told():
+            uri = f"{path.absolute().as_uri()}?mode={mode}"
+            self._db = sqlite3.connect(uri, uri=True, timeout=30.0, isolation_level=None)
+            if write:
+                self._prepare()
+            self._check_format()
+        self.run = self._one("SELECT coalesce(max(run), 0) FROM files") + 1
+
+    def _prepare(self) -> None:
+        self._db.execute("PRAGMA journal_mode = DELETE")
+        self._db.execute("PRAGMA synchronous = FULL")
+        if not self._one("SELECT count(*) FROM sqlite_schema"):
+            self._db.executescript(f"BEGIN; {_SCHEMA} PRAGMA user_version = {_FORMAT}; COMMIT;")
+
+    def _check_format(self) -> None:
+        version = self._one("PRAGMA user_version")
+        if version != _FORMAT:
+            raise StoreError(
+                f"the index has format {version}, this program knows {_FORMAT}",
+                "give another folder, or use the program's version that made the store",
+                Where(file=str(self._path)),
+            )
+
+    def close(self) -> None:
+        """Commit and close."""
+        with self._told():
+            try:
+                self.commit()
+            finally:
+                self._db.close()
+
+    def commit(self) -> None:
+        """Make all that was written last."""
+        with self._told():
+            if self._db.in_transaction:
+                self._db.execute("COMMIT")
+
+    def select(self, sql: str, *values: object) -> Iterator[tuple[Any, ...]]:
+        """Rows of a query."""
+        with self._told():
+            yield from self._db.execute(sql, values)
+
+    def columns(self, table: str) -> list[str]:
+        """Names of a table's columns."""
+        return [row[1] for row in self.select(f"PRAGMA table_info({table})")]
+
+    def file(self, path: str) -> FileRow | None:
+        """The file as last seen, None for a new one."""
+        sql = "SELECT path, log, content, size, modified, rule, unit, fields FROM files"
+        for row in self.select(f"{sql} WHERE path = ?", path):
+            return FileRow(*row[:-1], json.loads(row[-1]))
+        return None
+
+    def seen_in_this_run(self, path: str) -> bool:
+        """Whether `put_file` was called for the path since this index was opened."""
+        return bool(
+            self._one("SELECT count(*) FROM files WHERE path = ? AND run = ?", path, self.run)
+        )
+
+    def put_file(self, file: FileRow) -> None:
+        """Remember a file; replaces what was known of its path."""
+        fields = json.dumps(dict(file.fields), sort_keys=True)
+        values = (file.path, file.log, file.content, file.size, file.modified, file.rule, file.unit)
+        self._write(
+            "INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            [(*values, fields, self.run)],
+        )
+
+    def state(self, log: str) -> State | None:
+        """Where a log stands; None where it is not known yet."""
+        for (state,) in self.select("SELECT state FROM logs WHERE log = ?", log):
+            return State(state)
+        return None
+
+    def outcome(self, log: str) -> Outcome:
+        """What became of a log, without its shifts."""
+        (row,) = self.select("SELECT state, error, what, remedy FROM logs WHERE log = ?", log)
+        return Outcome(State(row[0]), (), *row[1:])
+
+    def put_settings(self, settings: str, version: str, document: str) -> None:
+        """Remember what a settings hash stands for."""
+        row = (settings, version, document)
+        self._write("INSERT OR IGNORE INTO settings VALUES (?, ?, ?)", [row])
+
+    def put_waiting(self, log: str, content: str, settings: str, version: str) -> None:
+        """Add a log that is to be done; one that is there already stays as it is."""
+        sql = "INSERT OR IGNORE INTO logs (log, content, settings, version, state)"
+        values = (log, content, settings, version, State.WAITING.value)
+        self._write(f"{sql} VALUES (?, ?, ?, ?, ?)", [values])
+
+    def put_attempts(self, log: str, attempts: int) -> None:
+        """Remember how often a log was tried."""
+        self._write("UPDATE logs SET attempts = ? WHERE log = ?", [(attempts, log)])
+
+    def put_outcome(self, log: str, outcome: Outcome, seconds: float) -> None:
+        """Write what became of a log, and its shifts."""
+        self._write(
+            "UPDATE logs SET state = ?, error = ?, what = ?, remedy = ?, seconds = ? WHERE log = ?",
+            [(outcome.state, outcome.error, outcome.what, outcome.remedy, seconds, log)],
+        )
+        self._write("DELETE FROM shifts WHERE log = ?", [(log,)])
+        self._write(
+            "INSERT INTO shifts SELECT log, ?, content, settings, version, "
+            "?, ?, ?, ?, ?, ?, ?, ?, ? FROM logs WHERE log = ?",
+            [(number, *_shift(row), log) for number, row in enumerate(outcome.shifts)],
+        )
+
+    def reset(self, logs: Iterable[str]) -> None:
+        """Let logs wait again."""
+        sql = "UPDATE logs SET state = ?, error = '', what = '', remedy = '', part = ''"
+        values = [(State.WAITING.value, log) for log in logs]
+        self._write(f"{sql} WHERE log = ?", values)
+
+    def done(self, prefix: str = "") -> Iterator[tuple[str, str]]:
+        """Key and large part of the logs that are done and whose keys begin so, by key."""
+        sql = "SELECT log, part FROM logs WHERE state = ? AND log >= ? AND log < ? ORDER BY log"
+        yield from self.select(sql, State.DONE.value, prefix, prefix + _AFTER_HEX)
+
+    def put_part(self, prefix: str, part: str) -> None:
+        """Let `part` hold the rows of all logs that are done and whose keys begin so."""
+        sql = "UPDATE logs SET part = ? WHERE state = ? AND log >= ? AND log < ?"
+        self._write(sql, [(part, State.DONE.value, prefix, prefix + _AFTER_HEX)])
+
+    def large_parts(self) -> set[str]:
+        """Names of the large parts."""
+        return {part for (part,) in self.select("SELECT DISTINCT part FROM logs WHERE part != ''")}
+
+    def count(self, state: State) -> int:
+        """How many logs stand so."""
+        return int(self._one("SELECT count(*) FROM logs WHERE state = ?", state.value))
+
+    def _write(self, sql: str, values: list[tuple[Any, ...]]) -> None:
+        with self._told():
+            if not self._db.in_transaction:
+                self._db.execute("BEGIN IMMEDIATE")
+            self._db.executemany(sql, values)
+
+    def _one(self, sql: str, *values: object) -> Any:
+        (row,) = self.select(sql, *values)
+        return row[0]
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """SQLite's errors as ours."""
+        try:
+            yield
+        except sqlite3.Error as fault:
+            raise StoreError(
+                f"the index cannot be used: {fault}",
+                "check free space, permissions and that the file is an index of drivetwin; "
+                "what was committed is safe, the same command goes on from there",
+                Where(file=str(self._path)),
+            ) from None
+
+
+def _shift(row: ShiftRow) -> tuple[object, ...]:
+    state = "used" if row.used else "refused"
+    gears = (row.start_gear, row.end_gear, row.kind, row.offgoing, row.oncoming)
+    return (state, row.reason, row.start, row.end, *gears)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+"""Parquet parts: one for each log at first, a few large ones in the end.
+
+A part is named after the key of its log and holds its outcome too, so that it says by itself what
+became of the log. Writing one twice gives the same bytes under the same name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from drivetwin.errors import StoreError, Where
+from drivetwin.fleet.rows import Row, RowKind, schema, table
+from drivetwin.fleet.task import Outcome
+from drivetwin.results.atomic import write_bytes
+
+INBOX, ROWS = "inbox", "rows"
+"""Folders of a store: parts of single logs, and the large parts that take their place."""
+
+_OUTCOME = b"drivetwin.outcome"
+_LOGS_PER_PART = 512
+"""Logs that a large part holds on average, at most: it is written and read in one piece."""
+_HEX = "0123456789abcdef"
+
+
+def part_of(log: str) -> str:
+    """Name of a log's own part below the store; a folder holds 1/256 of them."""
+    return f"{INBOX}/{log[:2]}/{log}.parquet"
+
+
+def write_part(path: Path, log: str, outcome: Outcome, rows: Sequence[Row]) -> None:
+    """Write a log's own part; it appears whole or not at all. Raises OSError."""
+    made = table(log, rows).replace_schema_metadata(
+        {_OUTCOME: json.dumps(outcome.tree(), sort_keys=True)}
+    )
+    write_bytes(path, _bytes(made))
+
+
+def read_outcome(path: Path) -> Outcome | None:
+    """What a part says of its log; None where it does not exist or is no whole part."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        metadata = pq.read_schema(path).metadata or {}
+        return Outcome.of(json.loads(metadata[_OUTCOME]))
+    except (OSError, KeyError, ValueError, TypeError, pa.ArrowException):
+        return None
+
+
+def read_rows(path: Path, kinds: Sequence[RowKind] = ()) -> Any:
+    """Arrow table of a part's rows of these kinds, or all. Raises StoreError where damaged."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        wanted = [("kind", "in", [kind.value for kind in kinds])] if kinds else None
+        rows = pq.read_table(path, schema=schema(), partitioning=None, filters=wanted)
+        return rows.replace_schema_metadata()
+    except (OSError, pa.ArrowException) as fault:
+        raise StoreError(
+            f"a part cannot be read: {str(fault).splitlines()[0]}",
+            "remove the file and run `drivetwin fleet` again: its logs are then done anew",
+            Where(file=str(path)),
+        ) from None
+
+
+def prefixes(count: int) -> list[str]:
+    """How the keys of `count` logs are divided into large parts: by their first digits.
+
+    Depends on the number alone, so that the same logs end in the same parts, however they came.
+    """
+    found = [""]
+    while count > _LOGS_PER_PART * len(found):
+        found = [prefix + digit for prefix in found for digit in _HEX]
+    return found
+
+
+def merge(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path]) -> str:
+    """Write the large part of `logs` (sorted keys) from the parts that hold them; its name.
+
+    The name tells its logs, so that a part of the same logs is never written twice.
+    Raises OSError and StoreError.
+    """
+    import pyarrow as pa
+
+    digest = hashlib.sha256("\n".join(logs).encode()).hexdigest()[:16]
+    name = f"{ROWS}/{prefix or 'all'}-{digest}.parquet"
+    if not (folder / name).is_file():
+        wanted = pa.array(logs, pa.string())
+        whole = pa.concat_tables(list(_picked(sources, wanted)))
+        order = pa.compute.sort_indices(whole.column("log"))
+        write_bytes(folder / name, _bytes(whole.take(order)))
+        sync_folder(folder / ROWS)
+    return name
+
+
+def _picked(sources: Sequence[Path], wanted: Any) -> Iterator[Any]:
+    import pyarrow.compute as pc
+
+    yield schema().empty_table()
+    for source in sources:
+        rows = read_rows(source)
+        yield rows.filter(pc.is_in(rows.column("log"), wanted))
+
+
+def _bytes(whole: Any) -> bytes:
+    import pyarrow.parquet as pq
+
+    buffer = BytesIO()
+    pq.write_table(whole, buffer, compression="zstd")
+    return buffer.getvalue()
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in a folder last through a power cut, where the system can."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""Where tasks are done: what the coordinator asks of it, and the processes of this machine."""
+
+from __future__ import annotations
+
+import os
+import threading
+from queue import Empty, SimpleQueue
+from typing import Protocol
+
+from drivetwin.fleet.cell import Cell
+from drivetwin.fleet.task import Reply, Task, WorkerSpec
+
+AHEAD = 2
+"""Tasks given out for each worker: one at work, one at hand. More would only fill memory."""
+
+
+class Pool(Protocol):
+    """Takes tasks and answers them in any order."""
+
+    @property
+    def capacity(self) -> int:
+        """How many tasks may be given out and unanswered."""
+
+    @property
+    def address(self) -> str | None:
+        """Where people can watch it, if anywhere."""
+
+    def submit(self, task: Task) -> None:
+        """Give out a task."""
+
+    def next(self, timeout: float) -> tuple[Task, Reply] | None:
+        """The next answer, None where none comes within `timeout` [s]."""
+
+    def close(self) -> None:
+        """End all work at once."""
+
+
+def usable_cores() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class LocalPool:
+    """Worker processes of this machine, each watched by a thread of its own."""
+
+    address = None
+
+    def __init__(self, workers: int, spec: WorkerSpec) -> None:
+        self.capacity = AHEAD * workers
+        self._tasks: SimpleQueue[Task | None] = SimpleQueue()
+        self._replies: SimpleQueue[tuple[Task, Reply]] = SimpleQueue()
+        self._cells = [Cell(spec) for _ in range(workers)]
+        self._threads = [
+            threading.Thread(target=self._serve, args=(cell,), daemon=True) for cell in self._cells
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def _serve(self, cell: Cell) -> None:
+        while (task := self._tasks.get()) is not None:
+            self._replies.put((task, cell.run(task)))
+
+    def submit(self, task: Task) -> None:
+        """Give out a task."""
+        self._tasks.put(task)
+
+    def next(self, timeout: float) -> tuple[Task, Reply] | None:
+        """The next answer, None where none comes within `timeout` [s]."""
+        try:
+            return self._replies.get(timeout=timeout)
+        except Empty:
+            return None
+
+    def close(self) -> None:
+        """End all workers at once."""
+        for _ in self._threads:
+            self._tasks.put(None)
+        for cell in self._cells:
+            cell.close()
+        for thread in self._threads:
+            thread.join()

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""The rows that a log leaves: one schema for parameters, friction, fits, quality and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from functools import cache
+from typing import Any
+
+from drivetwin.fleet.task import ShiftRow
+
+MU = "mu."
+"""Id of the friction coefficient at the recipe's reference slip, before the element's name."""
+
+
+class RowKind(StrEnum):
+    """What a row tells, and what its `name` is."""
+
+    PARAMETER = "parameter"
+    """Parameter id; `mu.<element>` is μ at slip `at`."""
+    FRICTION = "friction"
+    """Element; μ at slip `at`."""
+    FIT = "fit"
+    """`<signal>.<phase>.rmse` or `.fit_percent` of simulation over measurement."""
+    QUALITY = "quality"
+    """Quality figure of shift number `shift`."""
+    FIELD = "field"
+    """Mean of a channel that the rules made a field."""
+    WARNING = "warning"
+    """Empty; the text is the `reason`."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number of a log, SI; `at` is a slip [rad/s].
+
+    `free_value`, `free_std` are what the log alone says where the value leans on a design value of
+    the card as well.
+    """
+
+    kind: RowKind
+    name: str
+    value: float | None = None
+    std_noise: float | None = None
+    std_total: float | None = None
+    ci95_lo: float | None = None
+    ci95_hi: float | None = None
+    si_unit: str = ""
+    verdict: str = ""
+    method: str = ""
+    reason: str = ""
+    shift: int | None = None
+    at: float | None = None
+    free_value: float | None = None
+    free_std: float | None = None
+
+
+@dataclass(frozen=True)
+class Found:
+    """What identifying a log gave: its rows and its shifts."""
+
+    rows: Sequence[Row]
+    shifts: Sequence[ShiftRow]
+
+
+@cache
+def schema() -> Any:
+    """Arrow schema of all parts; `log` is the key of the log's row in the index."""
+    import pyarrow as pa
+
+    texts = ("si_unit", "verdict", "method", "reason")
+    numbers = ("value", "std_noise", "std_total", "ci95_lo", "ci95_hi")
+    return pa.schema(
+        [
+            ("log", pa.string()),
+            ("kind", pa.string()),
+            ("name", pa.string()),
+            *((name, pa.float64()) for name in numbers),
+            *((name, pa.string()) for name in texts),
+            ("shift", pa.int16()),
+            ("at", pa.float64()),
+            ("free_value", pa.float64()),
+            ("free_std", pa.float64()),
+        ]
+    )
+
+
+def table(log: str, rows: Sequence[Row]) -> Any:
+    """Arrow table of a log's rows, in their order."""
+    import pyarrow as pa
+
+    return pa.Table.from_pylist([{"log": log, **asdict(row)} for row in rows], schema=schema())

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT
+"""Rules: which card and mapping a log is read with, whose it is, and when it was recorded."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from datetime import UTC, datetime
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, model_validator
+
+from drivetwin.errors import RulesError, Where
+from drivetwin.fleet.sources import Source
+from drivetwin.tomlfile import StrictModel, raise_faults, read_toml, schema_faults
+
+UNIT = "unit"
+
+
+def _one_group(pattern: str) -> str:
+    try:
+        groups = re.compile(pattern).groups
+    except re.error as fault:
+        raise ValueError(f"no regular expression: {fault}") from None
+    if groups != 1:
+        raise ValueError(f"a pattern has one group in parentheses, not {groups}")
+    return pattern
+
+
+Pattern = Annotated[str, AfterValidator(_one_group)]
+
+
+class RuleTable(StrictModel):
+    """`[[rules]]`: the first that fits decides. A condition that is not stated always holds.
+
+    `path` is a glob over the whole path (`*` crosses folders), `units` are unit ids, `contains`
+    channel names that the file must have. `skip` leaves such files out.
+    """
+
+    name: str = ""
+    path: str | None = None
+    units: list[str] | None = None
+    contains: list[str] = Field(default_factory=list)
+    vehicle: str | None = None
+    channels: str | None = None
+    skip: bool = False
+
+    @model_validator(mode="after")
+    def _card_or_skip(self) -> RuleTable:
+        if (self.vehicle is None) != self.skip:
+            raise ValueError("a rule names a vehicle card, or says skip = true")
+        return self
+
+    def fits(self, path: str, unit: str, channels: frozenset[str]) -> bool:
+        """Whether a log with this path, unit and names of channels is of this rule."""
+        if self.path is not None and not fnmatchcase(path, self.path):
+            return False
+        if self.units is not None and unit not in self.units:
+            return False
+        return channels.issuperset(self.contains)
+
+
+class FieldTable(StrictModel):
+    """`[fields.<name>]`: where a number that belongs to a log stands; one of the three.
+
+    `pattern` finds it in the path, `column` is a column of the list, `channel` a channel whose mean
+    it is. Fields called `date` or `…_date` are ISO dates, kept as seconds since 1970 (UTC).
+    """
+
+    pattern: Pattern | None = None
+    column: str | None = None
+    channel: str | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> FieldTable:
+        if sum(each is not None for each in (self.pattern, self.column, self.channel)) != 1:
+            raise ValueError("a field has exactly one of pattern, column and channel")
+        return self
+
+
+class RulesFile(StrictModel):
+    """A file of rules. `unit` finds the unit's id in the path; without it, it is the folder."""
+
+    unit: Pattern | None = None
+    mu_slip_rad_s: float = Field(default=50.0, gt=0)
+    rules: list[RuleTable] = Field(min_length=1)
+    fields: dict[str, FieldTable] = Field(default_factory=dict)
+
+    def unit_of(self, source: Source) -> str:
+        """Id of the unit: the list's column `unit`, else the pattern's find, else the folder."""
+        if UNIT in source.told:
+            return source.told[UNIT]
+        if self.unit is None:
+            return source.path.parent.name
+        found = re.search(self.unit, source.path.as_posix())
+        if found is None:
+            raise RulesError(
+                f"the path does not hold a unit's id as {self.unit!r} finds it",
+                "correct `unit` in the rules, or rename the file",
+            )
+        return str(found[1])
+
+    def fields_of(self, source: Source) -> dict[str, float]:
+        """The fields that path and list tell, in the order of the rules."""
+        found = {}
+        for name, table in self.fields.items():
+            text = None
+            if table.pattern is not None:
+                match = re.search(table.pattern, source.path.as_posix())
+                text = None if match is None else match[1]
+            elif table.column is not None:
+                text = source.told.get(table.column)
+            if text is not None:
+                found[name] = field_value(name, text)
+        return found
+
+    def means(self) -> tuple[tuple[str, str], ...]:
+        """Field and channel of the fields that are means of channels."""
+        pairs = ((name, table.channel) for name, table in self.fields.items())
+        return tuple((name, channel) for name, channel in pairs if channel is not None)
+
+
+def is_date(field: str) -> bool:
+    """Whether a field holds dates."""
+    return field == "date" or field.endswith("_date")
+
+
+def field_value(field: str, text: str) -> float:
+    """A field's text as a number; a date in seconds since 1970. Raises RulesError."""
+    try:
+        if not is_date(field):
+            return float(text)
+        moment = datetime.fromisoformat(text)
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    except ValueError:
+        kind = "date (ISO, such as 2025-03-31)" if is_date(field) else "number"
+        raise RulesError(
+            f"field {field!r}: {text!r} is no {kind}",
+            f"correct [fields.{field}] of the rules, or the list",
+        ) from None
+
+
+def read_rules(path: Path) -> RulesFile:
+    """Rules from a file; a vehicle card stands for one rule that takes every log.
+
+    Raises RulesError that lists all faults by key.
+    """
+    document = read_toml(path, RulesError)
+    if "rules" not in document and "gears" in document:
+        return RulesFile(rules=[RuleTable(name=path.stem, vehicle=str(path.absolute()))])
+    remedy = "correct these keys of the rules; docs/howto/fleet.md shows a complete file"
+    raise_faults(schema_faults(document, RulesFile), RulesError, str(path), remedy)
+    rules = RulesFile.model_validate(document)
+    return rules.model_copy(update={"rules": [_placed(each, path) for each in rules.rules]})
+
+
+def _placed(rule: RuleTable, file: Path) -> RuleTable:
+    """The rule with paths from the rules file's folder; a card that is missing is told at once."""
+    changed: dict[str, str] = {}
+    for key in ("vehicle", "channels"):
+        if (name := getattr(rule, key)) is not None:
+            target = (file.parent / name).absolute()
+            if not target.is_file():
+                raise RulesError(
+                    f"there is no file {name!r}", "paths count from the folder of the rules",
+                    Where(file=str(file), key=f"rules.{key}"),
+                )  # fmt: skip
+            changed[key] = str(target)
+    return rule.model_copy(update=changed)
+
+
+def rule_for(
+    rules: RulesFile, source: Source, unit: str, channels: Callable[[], frozenset[str]]
+) -> RuleTable:
+    """The first rule that fits; `channels` reads the log's, which only some rules need.
+
+    Raises RulesError where there is none, and what `channels` raises.
+    """
+    path = source.path.as_posix()
+    for rule in rules.rules:
+        if rule.fits(path, unit, channels() if rule.contains else frozenset()):
+            return rule
+    raise RulesError(
+        f"no rule takes this log of unit {unit!r}",
+        "add a rule for it, or one with skip = true that leaves such files out",
+    )

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""From files to tasks: content, rule, key. Only what is needed next is looked at."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import deque
+from collections.abc import Callable, Generator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from drivetwin.errors import DrivetwinError, FileFormatError, Where
+from drivetwin.fleet.index import FileRow
+from drivetwin.fleet.rules import RulesFile, rule_for
+from drivetwin.fleet.sources import Source, Sources
+from drivetwin.fleet.task import Outcome, Recipe, State
+from drivetwin.identify.method import Method
+from drivetwin.logs.formats import open_recording
+from drivetwin.logs.profile import read_mapping
+from drivetwin.results.version import program_version
+
+ROWS_FORMAT = 1
+"""Counts up when the same identification leaves other rows."""
+
+_READERS = 4
+"""Threads that hash files; a disk or network drive answers several at once."""
+_LOOKAHEAD = 4 * _READERS
+_KEY = 40
+"""Hexadecimal digits of a log's key."""
+
+
+@dataclass(frozen=True)
+class Scanned:
+    """A file that was looked at. `recipe` is None where `fault` says why it cannot be used."""
+
+    file: FileRow
+    settings: str
+    recipe: Recipe | None
+    fault: Outcome | None = None
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A file that the rules leave out."""
+
+    path: str
+
+
+Known = Callable[[str], FileRow | None]
+"""Finds what the index knows of a path."""
+
+
+@dataclass(frozen=True)
+class _Content:
+    """A file's SHA-256, size [bytes] and time of change [ns]."""
+
+    digest: str
+    size: int
+    modified: int
+
+
+class Scan:
+    """Looks at the files of a fleet by its rules, with one method; see `scanned`."""
+
+    def __init__(self, rules: RulesFile, method: Method) -> None:
+        self._rules = rules
+        self._method = method
+        self._recipe = lru_cache(self._read_recipe)
+
+    def scanned(self, sources: Sources, known: Known) -> Generator[Scanned | Skipped]:
+        """Every file of `sources` in their order, read a little ahead.
+
+        `known` finds what is known of a path: a file of the same size and time of change is not
+        read again.
+        """
+        waiting: deque[tuple[Source, Future[_Content]]] = deque()
+        with ThreadPoolExecutor(_READERS) as readers:
+            for source in sources:
+                waiting.append(
+                    (source, readers.submit(_content, source.path, known(str(source.path))))
+                )
+                if len(waiting) >= _LOOKAHEAD:
+                    yield self._look(*waiting.popleft())
+            while waiting:
+                yield self._look(*waiting.popleft())
+
+    def _look(self, source: Source, reading: Future[_Content]) -> Scanned | Skipped:
+        path = str(source.path)
+        unit, content = "", _Content("", 0, 0)
+        try:
+            content = reading.result()
+            unit = self._rules.unit_of(source)
+            fields = self._rules.fields_of(source)
+            rule = rule_for(self._rules, source, unit, lambda: _channels(source.path))
+            if rule.vehicle is None:
+                return Skipped(path)
+            recipe = self._recipe(rule.vehicle, rule.channels)
+        except (OSError, DrivetwinError) as fault:
+            error = _unreadable(fault, path) if isinstance(fault, OSError) else fault
+            return _refused(path, unit, content, error)
+        settings = settings_of(recipe)
+        log = _key(content.digest, settings)
+        file = FileRow(
+            path, log, content.digest, content.size, content.modified, rule.name, unit, fields
+        )
+        return Scanned(file, settings, recipe)
+
+    def _read_recipe(self, vehicle: str, channels: str | None) -> Recipe:
+        """The recipe of a rule; its files are read once."""
+        inputs = [("vehicle", _digest(Path(vehicle)))]
+        if channels is not None:
+            inputs.append(("channels", _digest(Path(channels))))
+            databases = read_mapping(Path(channels)).options.bus.databases
+            inputs += [("database", _digest(each)) for each in databases]
+        return Recipe(
+            vehicle=vehicle,
+            channels=channels,
+            method=self._method,
+            inputs=tuple(inputs),
+            version=program_version(),
+            means=self._rules.means(),
+            mu_slip=self._rules.mu_slip_rad_s,
+        )
+
+
+def settings_document(recipe: Recipe) -> str:
+    """What decides the rows of a log besides its content, as JSON; paths do not count."""
+    tree = {k: v for k, v in asdict(recipe).items() if k not in ("vehicle", "channels")}
+    return json.dumps({**tree, "rows": ROWS_FORMAT}, sort_keys=True)
+
+
+@lru_cache(64)
+def settings_of(recipe: Recipe) -> str:
+    """Hash of `settings_document`."""
+    return hashlib.sha256(settings_document(recipe).encode()).hexdigest()
+
+
+def _key(*parts: str) -> str:
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:_KEY]
+
+
+def _content(path: Path, known: FileRow | None) -> _Content:
+    status = path.stat()
+    size, modified = status.st_size, status.st_mtime_ns
+    if known is not None and (known.size, known.modified) == (size, modified) and known.content:
+        return _Content(known.content, size, modified)
+    return _Content(_digest(path), size, modified)
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _channels(path: Path) -> frozenset[str]:
+    with open_recording(path) as recording:
+        return frozenset(column.name for column in recording.columns)
+
+
+def _unreadable(fault: OSError, path: str) -> DrivetwinError:
+    what = f"cannot read the file: {fault.strerror or fault}"
+    return FileFormatError(what, "check that it is there and may be read", Where(file=path))
+
+
+def _refused(path: str, unit: str, content: _Content, error: DrivetwinError) -> Scanned:
+    """A file that no task can be made of; it is looked at anew in the next run."""
+    outcome = Outcome(State.BAD, (), type(error).__name__, error.what, error.remedy)
+    log = _key("refused", content.digest or path, unit, error.what)
+    file = FileRow(path, log, content.digest, content.size, content.modified, "", unit, {})
+    return Scanned(file, "", None, outcome)

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT
+"""Which files belong to a fleet: files, folders, globs and lists, one after the other."""
+
+from __future__ import annotations
+
+import csv
+import glob
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from drivetwin.errors import InputError, Where
+
+SUFFIXES = frozenset(
+    (".csv", ".txt", ".tsv", ".dat", ".mf4", ".mdf", ".mat", ".parquet", ".asc", ".blf", ".log")
+)
+"""What counts as a log in a folder; a file that is named by itself may be called anything."""
+_PATH = "path"
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file, and what the list says of it by column."""
+
+    path: Path
+    told: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What the user named: `given` are files, folders and globs, `listed` is a list of files.
+
+    The list is a CSV table with a column `path` (from the list's folder) and any others, or one
+    path a line. Iterating yields absolute paths in an order that depends on the files alone; it
+    may be done again. A file that is named twice is yielded twice.
+    """
+
+    given: Sequence[str]
+    listed: Path | None = None
+
+    def __iter__(self) -> Iterator[Source]:
+        if self.listed is not None:
+            yield from _from_list(self.listed)
+        for name in self.given:
+            yield from map(Source, _below(name))
+
+    def count(self) -> int:
+        """How many files there are. Raises InputError where a name stands for none."""
+        return sum(1 for _ in self)
+
+
+def _below(name: str) -> Iterator[Path]:
+    path = Path(name)
+    if path.is_dir():
+        yield from _walk(path.absolute())
+    elif path.exists():
+        yield path.absolute()
+    else:
+        found = sorted(glob.glob(name, recursive=True))  # noqa: PTH207 - also absolute patterns
+        if not found:
+            raise InputError(
+                "no such file or folder, and no file fits it as a pattern",
+                "check the name; quote a pattern such as 'logs/**/*.mf4'",
+                Where(file=name),
+            )
+        for one in found:
+            if Path(one).is_file():
+                yield Path(one).absolute()
+
+
+def _walk(folder: Path) -> Iterator[Path]:
+    for place, folders, files in os.walk(folder):
+        folders[:] = sorted(each for each in folders if not each.startswith("."))
+        for name in sorted(files):
+            if not name.startswith(".") and Path(name).suffix.casefold() in SUFFIXES:
+                yield Path(place, name)
+
+
+def _from_list(path: Path) -> Iterator[Source]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            head = file.readline()
+            columns = next(csv.reader([head]), [])
+            if _PATH not in columns:
+                file.seek(0)
+                for line in file:
+                    if line.strip():
+                        yield Source((path.parent / line.strip()).absolute())
+                return
+            for row in csv.DictReader(file, columns):
+                told = {k: v for k, v in row.items() if k and v and k != _PATH}
+                yield Source((path.parent / row[_PATH]).absolute(), told)
+    except (OSError, UnicodeDecodeError, csv.Error) as fault:
+        raise InputError(
+            f"the list cannot be read: {fault}",
+            "give a CSV table with a column `path`, or one path a line, in UTF-8",
+            Where(file=str(path)),
+        ) from None

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: MIT
+"""A store of a fleet: the index, the parts, and who may write to them."""
+
+from __future__ import annotations
+
+import platform
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from drivetwin.errors import StoreError, Where
+from drivetwin.fleet import parts
+from drivetwin.fleet.index import INDEX, RUN_COLUMNS, Index
+from drivetwin.fleet.rows import RowKind
+from drivetwin.fleet.task import GO_ON, Outcome, State, Task
+
+_LOCK = "coordinator.lock"
+REPORTS, TRACES = "reports", "traces"
+
+
+class Store:
+    """A store, open for the one coordinator (`write`) or for any number of readers.
+
+    Raises StoreError where it is in use, not writable, no store, or of a newer format.
+    """
+
+    def __init__(self, folder: Path, *, write: bool = False) -> None:
+        self.folder = folder.absolute()
+        self._lock: sqlite3.Connection | None = None
+        if write:
+            self._claim()
+        elif not (folder / INDEX).is_file():
+            raise StoreError(
+                "this is no store of a fleet", "make one with `drivetwin fleet LOGS -o STORE`",
+                Where(file=str(folder)),
+            )  # fmt: skip
+        self.index = Index(self.folder / INDEX, write=write)
+        if write:
+            self._repair()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        fault: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            self.index.close()
+        finally:
+            if self._lock is not None:
+                self._lock.close()
+
+    def _claim(self) -> None:
+        """Become the only writer. The lock is SQLite's: it ends with the process, however it ends,
+        and holds on whatever file system the index itself is safe on.
+        """
+        place = Where(file=str(self.folder))
+        try:
+            for name in (parts.INBOX, parts.ROWS):
+                (self.folder / name).mkdir(parents=True, exist_ok=True)
+            self._lock = sqlite3.connect(self.folder / _LOCK, timeout=0.0, isolation_level=None)
+            self._lock.execute("BEGIN EXCLUSIVE")
+        except OSError as fault:
+            what = f"the store cannot be written: {fault.strerror}"
+            raise StoreError(what, "check its permissions and the free space", place) from None
+        except sqlite3.Error as fault:
+            if "locked" in str(fault):
+                raise StoreError(
+                    "another `drivetwin fleet` is writing this store",
+                    "wait until it is through, or give another -o",
+                    place,
+                ) from None
+            what = f"the store cannot be written: {fault}"
+            raise StoreError(what, "check its permissions and the free space", place) from None
+
+    def _repair(self) -> None:
+        """Let the logs wait again whose rows are gone, and drop what no run finished."""
+        for part in self.index.large_parts():
+            if not (self.folder / part).is_file():
+                logs = self.index.select("SELECT log FROM logs WHERE part = ?", part)
+                self.index.reset([log for (log,) in logs])
+        single = [log for log, part in self.index.done() if not part]
+        self.index.reset([log for log in single if not self.part(log).is_file()])
+        self.index.commit()
+        self._drop_rows()
+        for leftover in (self.folder / parts.INBOX).glob("*/*.partial"):
+            leftover.unlink(missing_ok=True)
+
+    def _drop_rows(self) -> None:
+        """Remove large parts that the index does not name."""
+        known = self.index.large_parts()
+        for file in (self.folder / parts.ROWS).iterdir():
+            if f"{parts.ROWS}/{file.name}" not in known:
+                file.unlink()
+
+    def part(self, log: str) -> Path:
+        """Where a log's own part stands."""
+        return self.folder / parts.part_of(log)
+
+    def report(self, log: str) -> Path:
+        """Where the report of a single log stands."""
+        return self.folder / REPORTS / f"{log}.html"
+
+    def traces(self, log: str) -> Path:
+        """Where the traces of a single log stand."""
+        return self.folder / TRACES / f"{log}.parquet"
+
+    def misses(self, task: Task) -> bool:
+        """Whether a report or traces that are wanted are not there."""
+        return any(
+            one is not None and not Path(one).is_file() for one in (task.report, task.traces)
+        )
+
+    def written(self, log: str) -> Outcome | None:
+        """The outcome that a worker wrote, though the index may not know of it yet."""
+        return parts.read_outcome(self.part(log))
+
+    def compact(self) -> None:
+        """Bring the parts of single logs together into a few large ones.
+
+        What they are depends on the logs that are done, not on the order in which they came. The
+        old parts go when the index has the new ones, so that no row is ever missing or double.
+        """
+        with self._space():
+            self.index.commit()
+            for prefix in parts.prefixes(self.index.count(State.DONE)):
+                if held := dict(self.index.done(prefix)):
+                    files = {self._holder(log, part) for log, part in held.items()}
+                    name = parts.merge(self.folder, prefix, list(held), sorted(files))
+                    self.index.put_part(prefix, name)
+            self.index.commit()
+            self._drop_rows()
+            for file in (self.folder / parts.INBOX).glob("*/*.parquet"):
+                if self.index.state(file.stem) is not State.WAITING:
+                    file.unlink()
+
+    def _holder(self, log: str, part: str) -> Path:
+        """The file with a log's rows."""
+        return self.folder / part if part else self.part(log)
+
+    def parts(self) -> list[Path]:
+        """The files that hold all rows of logs that are done, each row once."""
+        return sorted({self._holder(log, part) for log, part in self.index.done()})
+
+    def rows(self, *kinds: RowKind) -> Any:
+        """Arrow table of the rows of logs that are done, sorted by log; of these kinds, or all."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        from drivetwin.fleet.rows import schema
+
+        tables = [parts.read_rows(path, kinds) for path in self.parts()]
+        whole = pa.concat_tables([schema().empty_table(), *tables])
+        return whole.take(pc.sort_indices(whole.column("log")))
+
+    def table(self, name: str) -> list[dict[str, Any]]:
+        """Rows of a table of the index by its key, without what tells of the runs only."""
+        columns = [column for column in self.index.columns(name) if column not in RUN_COLUMNS]
+        listed = ", ".join(f'"{column}"' for column in columns)
+        rows = self.index.select(f"SELECT {listed} FROM {name} ORDER BY 1, 2")
+        return [dict(zip(columns, row, strict=True)) for row in rows]
+
+    @contextmanager
+    def _space(self) -> Iterator[None]:
+        """A full or read-only disk as a StoreError."""
+        try:
+            yield
+        except OSError as fault:
+            raise StoreError(
+                f"the store cannot be written: {fault.strerror} (on {platform.node()})",
+                GO_ON,
+                Where(file=str(self.folder)),
+            ) from None

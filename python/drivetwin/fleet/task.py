@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""What a worker is asked and what comes back, as plain data that crosses a pipe or a network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from drivetwin.identify.method import Method
+
+GO_ON = (
+    "make room or give write permission, then run the same command again: what is done stays done"
+)
+"""What to do where a store cannot be written."""
+
+
+class State(StrEnum):
+    """Where a log stands. The last three are final for its content and settings."""
+
+    WAITING = "waiting"
+    DONE = "done"
+    BAD = "bad"
+    """The log itself cannot be used; trying again would end the same way."""
+    QUARANTINED = "quarantined"
+    """It hung, ate memory, or killed its worker again and again."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything but the log's content that decides its rows; equal recipes give equal rows.
+
+    `vehicle` and `channels` are absolute paths, `inputs` the SHA-256 of these files and of the DBC
+    files behind them, `means` channels by field name whose mean the rows hold, `mu_slip` [rad/s]
+    where friction is compared.
+    """
+
+    vehicle: str
+    channels: str | None
+    method: Method
+    inputs: tuple[tuple[str, str], ...]
+    version: str
+    means: tuple[tuple[str, str], ...] = ()
+    mu_slip: float = 50.0
+
+
+@dataclass(frozen=True)
+class Task:
+    """One log to identify. `log` is the key of its rows, `content` the SHA-256 of the file.
+
+    `part` is the Parquet file to write, `report` the HTML page and `traces` the Parquet file of
+    simulation over measurement that are wanted besides; all absolute paths.
+    """
+
+    log: str
+    path: str
+    content: str
+    recipe: Recipe
+    part: str
+    report: str | None = None
+    traces: str | None = None
+
+    def to_json(self) -> str:
+        """One line of JSON."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Task:
+        """Back from `to_json`."""
+        tree = json.loads(text)
+        recipe = tree["recipe"]
+        recipe |= {name: tuple(map(tuple, recipe[name])) for name in ("inputs", "means")}
+        return cls(**{**tree, "recipe": Recipe(**{**recipe, "method": Method(recipe["method"])})})
+
+
+@dataclass(frozen=True)
+class ShiftRow:
+    """One shift of a log, used or refused; times on the log's clock [s]."""
+
+    used: bool
+    start: float
+    end: float
+    start_gear: str = ""
+    end_gear: str = ""
+    kind: str = ""
+    offgoing: str = ""
+    oncoming: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a log: final, and the same whenever it is done with the same recipe.
+
+    `error`, `what` and `remedy` are those of the typed error of a log that is not done.
+    """
+
+    state: State
+    shifts: tuple[ShiftRow, ...] = ()
+    error: str = ""
+    what: str = ""
+    remedy: str = ""
+
+    def tree(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+    @classmethod
+    def of(cls, tree: Mapping[str, Any]) -> Outcome:
+        """Back from `tree`."""
+        shifts = tuple(ShiftRow(**row) for row in tree["shifts"])
+        return cls(**{**tree, "state": State(tree["state"]), "shifts": shifts})
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A worker's answer: the outcome and the time [s] that it took."""
+
+    outcome: Outcome
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Lost:
+    """The worker went away before it answered; the log may or may not be to blame.
+
+    `blame`: whether the loss counts against the log, as that of its own worker does; the loss of
+    a scheduler does not.
+    """
+
+    reason: str
+    blame: bool = True
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """Nothing can go on, by no fault of the log: no worker starts, or none can write its part."""
+
+    what: str
+    remedy: str
+
+
+Reply = Finished | Lost | Stopped
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one log may take: time [s] and memory [bytes] of its worker."""
+
+    seconds: float = 600.0
+    memory: int = 4 * 2**30
+
+
+@dataclass(frozen=True)
+class WorkerSpec:
+    """How a worker is made: its function as `module:name`, and the limits of one log."""
+
+    function: str = "drivetwin.fleet.identify:identify_log"
+    limits: Limits = field(default_factory=Limits)
+
+
+def memory_exceeded(memory: int) -> Outcome:
+    """The outcome of a log whose worker needed more than so many bytes."""
+    return Outcome(
+        State.QUARANTINED,
+        error="MemoryLimit",
+        what=f"it needed more than {memory / 2**20:g} MiB of memory",
+        remedy="look at the log with `drivetwin inspect`; "
+        "run again with --retry and a larger --memory-limit if it is only long",
+    )

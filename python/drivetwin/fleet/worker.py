@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""A worker process: `python -m drivetwin.fleet.worker MODULE:FUNCTION BYTES`.
+
+It reads one task a line from standard input and answers one line on standard output. It ends when
+its input does, even in the middle of a log: a worker without a coordinator is of no use.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from queue import SimpleQueue
+from time import perf_counter
+from typing import Any
+
+from drivetwin.errors import DrivetwinError
+from drivetwin.fleet.parts import write_part
+from drivetwin.fleet.rows import Found
+from drivetwin.fleet.task import Outcome, State, Task, memory_exceeded
+
+Work = Callable[[Task], Found]
+
+_ROOM = 1.25
+"""The wall of the system stands this much above the limit, which is watched from outside: it is
+for what grows too fast to be seen there."""
+
+
+def answer(work: Work, task: Task, memory: int) -> dict[str, Any]:
+    """Do a task, write its part, and say what became of it; see `Cell` for the keys."""
+    started = perf_counter()
+    try:
+        found = work(task)
+        outcome, rows = Outcome(State.DONE, tuple(found.shifts)), found.rows
+    except MemoryError:
+        return {"outcome": memory_exceeded(memory).tree(), "seconds": perf_counter() - started}
+    except DrivetwinError as error:
+        outcome, rows = _bad(error), ()
+    except OSError as fault:
+        return {"store": f"{fault.strerror or fault} ({fault.filename})"}
+    except Exception as fault:
+        # Whatever a log brings about must not end the run; it is named and the others go on.
+        outcome, rows = _unexpected(fault), ()
+    try:
+        write_part(Path(task.part), task.log, outcome, rows)
+    except OSError as fault:
+        return {"store": f"{fault.strerror or fault} ({fault.filename})"}
+    return {"outcome": outcome.tree(), "seconds": perf_counter() - started}
+
+
+def _bad(error: DrivetwinError) -> Outcome:
+    """What a typed error says, without the path: the same content may stand at several."""
+    place = str(replace(error.where, file=None))
+    what = f"{place}: {error.what}" if place else error.what
+    return Outcome(State.BAD, error=type(error).__name__, what=what, remedy=error.remedy)
+
+
+def _unexpected(fault: Exception) -> Outcome:
+    remedy = "try `drivetwin identify` on the log; please report what it shows"
+    return Outcome(State.BAD, error=type(fault).__name__, what=str(fault), remedy=remedy)
+
+
+def limit_memory(memory: int) -> None:
+    """Let allocations beyond the limit fail [bytes]; where the system cannot, do nothing."""
+    try:
+        import resource
+    except ImportError:
+        return
+    held = 0
+    status = Path("/proc/self/status")
+    if status.exists():
+        lines = dict(line.split(":", 1) for line in status.read_text().splitlines())
+        held = 1024 * int(lines["VmData"].split()[0])
+    wall = held + int(_ROOM * memory)
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if hard == resource.RLIM_INFINITY or wall < hard:
+        resource.setrlimit(resource.RLIMIT_DATA, (wall, hard))
+
+
+def _listen(tasks: SimpleQueue[str]) -> None:
+    for line in sys.stdin:
+        tasks.put(line)
+    os._exit(0)
+
+
+def main() -> None:
+    """Answer tasks until the input ends."""
+    replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what a library prints must not stand between the answers
+    module, name = sys.argv[1].split(":")
+    memory = int(sys.argv[2])
+    work: Work = getattr(import_module(module), name)
+    limit_memory(memory)
+    tasks: SimpleQueue[str] = SimpleQueue()
+    threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
+    reply: dict[str, Any] = {"ready": os.getpid()}
+    while True:
+        replies.write(json.dumps(reply) + "\n")
+        replies.flush()
+        reply = answer(work, Task.from_json(tasks.get()), memory)
+
+
+if __name__ == "__main__":
+    main()
