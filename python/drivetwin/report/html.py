@@ -16,7 +16,9 @@ from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.packing import Store, packed
 from drivetwin.report.sections.blocks import FigureBlock, Section
 from drivetwin.report.sections.evidence import evidence_sections
-from drivetwin.report.sections.provenance import limits_section, provenance_section
+from drivetwin.report.sections.likelihood import likelihood_sections
+from drivetwin.report.sections.limits import limits_section
+from drivetwin.report.sections.provenance import provenance_section
 from drivetwin.report.sections.story import friction_section, shift_section, validation_section
 from drivetwin.report.sections.trust import trust_section
 from drivetwin.results.atomic import write_text
@@ -46,9 +48,10 @@ def report_sections(found: Identification, log: ShiftLog) -> list[Section]:
     sections = [
         trust_section(found),
         shift_section(found, log),
+        validation_section(validations),
         *evidence_sections(found),
         friction_section(found),
-        validation_section(validations),
+        *likelihood_sections(found),
         limits_section(found),
         provenance_section(found),
     ]

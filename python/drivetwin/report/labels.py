@@ -1,13 +1,40 @@
 # SPDX-License-Identifier: MIT
-"""How parameters are called in tables and figures."""
+"""How parameters and channels are called in tables and figures."""
 
 from __future__ import annotations
 
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import OVER_ETA, spec_of
 
 
 def parameter_label(parameter_id: str) -> str:
     """Symbol with the gear or element it belongs to, e.g. `J′ (2)`."""
     spec = spec_of(parameter_id)
-    suffix = parameter_id.removeprefix(spec.stem).lstrip("_.")
+    suffix = parameter_id.removeprefix(spec.stem).removesuffix(OVER_ETA).lstrip("_.")
     return f"{spec.symbol} ({suffix})" if suffix else spec.symbol
+
+
+def channel_label(role: str) -> str:
+    """Role of a channel in words, e.g. `output torque` or `pressure B2`."""
+    return role.replace("_", " ").replace(".", " ")
+
+
+_SYMBOLS = {
+    "engine_torque": "T_e",
+    "output_torque": "T_o",
+    "input_speed": "n_in",
+    "engine_speed": "n_e",
+    "output_speed": "n_out",
+    "wheel_speed": "n_w",
+}
+
+
+def channel_symbol(role: str) -> str:
+    """Role of a channel as a symbol, e.g. `T_o` or `P B2`; the role itself where it has none."""
+    return _SYMBOLS.get(role, role.replace("pressure.", "P "))
+
+
+def channel_unit(role: str) -> str:
+    """SI unit of a channel by its role."""
+    if role.startswith("pressure."):
+        return "Pa"
+    return "N*m" if role.endswith("torque") else "rad/s"

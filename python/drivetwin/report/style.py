@@ -27,6 +27,9 @@ VERDICT_COLOURS = {
     Verdict.DESIGN: MUTED,
 }
 
+DIVERGING = [[0.0, "#D55E00"], [0.5, "#f4f4f4"], [1.0, "#0072B2"]]
+"""From vermilion over white to blue, told apart in every kind of colour vision."""
+
 PHASE_FILL = {
     "before": "rgba(0,0,0,0)",
     "torque": "rgba(230,159,0,0.16)",

@@ -34,6 +34,7 @@ _BY_SI = {
     "N*m*s/rad": Display("Nm·s/rad"),
     "Hz": Display("Hz"),
     "Pa": BAR,
+    "rad/s": RPM,
     "s": Display("ms", 1e3),
 }
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""End of the report: remarks, assumptions, settings, hashes."""
+"""End of the report: assumptions, settings, hashes."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from drivetwin.report.sections.blocks import TableBlock
-from drivetwin.report.sections.provenance import limits_section, provenance_section
+from drivetwin.report.sections.provenance import provenance_section
 from tests.report.sample import identification
 
 
@@ -14,14 +14,6 @@ def _rows(blocks: object, caption: str) -> dict[str, str]:
     assert isinstance(blocks, list)
     table = next(b for b in blocks if isinstance(b, TableBlock) and b.caption.startswith(caption))
     return {row[0].text: row[-1].text for row in table.rows}
-
-
-def test_remarks_name_the_experiment_that_would_help() -> None:
-    rows = _rows(limits_section(identification()).blocks, "Parameters that call")
-    assert rows == {
-        "c_o": "the oscillation is short",
-        "τ_e": "the engine torque is constant; record throttle steps",
-    }
 
 
 def test_settings_are_flat_and_short() -> None:

@@ -67,7 +67,7 @@ def _add_scan(figure: go.Figure, fit: MomentumFit) -> None:
     if scan.best is not None:
         shown = np.abs(scan.delay - scan.best) <= _SCAN_VIEW
     figure.update_layout(
-        xaxis2=axis("assumed age of the engine torque [ms]"),
+        xaxis2=axis("assumed age of T_e [ms]"),
         yaxis2=axis("misfit Q − min Q [–]", rangemode="tozero"),
     )
     figure.add_scatter(

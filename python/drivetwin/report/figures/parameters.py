@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from drivetwin.identify.result import Estimate, FloatArray, Verdict
 from drivetwin.report.labels import parameter_label
-from drivetwin.report.style import MUTED, VERDICT_COLOURS, axis, layout
+from drivetwin.report.style import DIVERGING, MUTED, VERDICT_COLOURS, axis, layout
 
 _TICKS = [scale * 10.0**power for power in range(-4, 4) for scale in (1.0, 2.0, 5.0)]
 """Labelled values of the logarithmic axis [%]."""
@@ -23,13 +23,14 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     shown = [
         one
         for one in estimates.values()
-        if one.verdict is not Verdict.DESIGN and _percent(one.value, one.std_total) is not None
+        if one.verdict is not Verdict.DESIGN
+        and half_width_percent(one.value, one.std_total) is not None
     ]
     figure = go.Figure()
     names = [parameter_label(one.id) for one in shown]
     figure.add_scatter(
         y=names,
-        x=[_percent(one.value, one.std_total) for one in shown],
+        x=[half_width_percent(one.value, one.std_total) for one in shown],
         mode="markers",
         name="total: noise and sensor tolerances",
         marker={"color": [VERDICT_COLOURS[one.verdict] for one in shown], "size": 11},
@@ -37,7 +38,7 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     )
     figure.add_scatter(
         y=names,
-        x=[_percent(one.value, one.std_noise) for one in shown],
+        x=[half_width_percent(one.value, one.std_noise) for one in shown],
         mode="markers",
         name="noise alone",
         marker={"color": MUTED, "symbol": "line-ns-open", "size": 12, "line": {"width": 2.5}},
@@ -58,7 +59,8 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     return figure
 
 
-def _percent(value: float | None, std: float | None) -> float | None:
+def half_width_percent(value: float | None, std: float | None) -> float | None:
+    """Half width of the 95 % interval in per cent of the value; None where it has none."""
     return 196.0 * abs(std / value) if value and std else None
 
 
@@ -72,8 +74,8 @@ def correlation_figure(ids: tuple[str, ...], correlation: FloatArray) -> go.Figu
             z=correlation,
             zmin=-1,
             zmax=1,
-            colorscale=[[0, "#D55E00"], [0.5, "#f4f4f4"], [1, "#0072B2"]],
-            colorbar={"title": {"text": "correlation"}, "thickness": 12},
+            colorscale=DIVERGING,
+            showscale=False,
             texttemplate="%{z:.2f}",
         )
     )

@@ -42,6 +42,8 @@ class Curve:
     dash: str = "solid"
     step: bool = False
     """Drawn as a staircase: a value that is held until the next."""
+    listed: bool = True
+    """Named in the legend."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ def _trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -
         xaxis="x",
         yaxis=f"y{suffix}",
         legend=f"legend{suffix}",
-        showlegend=len(panel.curves) > 1,
+        showlegend=curve.listed and len(panel.curves) > 1,
         hovertemplate=f"%{{y:.5~g}} {panel.display.label}",
     )
 

@@ -10,6 +10,7 @@ from enum import StrEnum
 import plotly.graph_objects as go
 
 from drivetwin.report.figures.stack import Panel
+from drivetwin.shifts.shift import Shift
 
 
 class Tone(StrEnum):
@@ -31,6 +32,8 @@ class Cell:
     tone: Tone = Tone.PLAIN
     note: str = ""
     """Smaller text under the cell's own."""
+    secondary: bool = False
+    """Left out on paper, where the page is narrow."""
     remark: str = ""
     """What limits the row, under the note."""
 
@@ -99,6 +102,16 @@ class Section:
     title: str
     intro: str
     blocks: Sequence[Block]
+
+    @property
+    def short(self) -> bool:
+        """Whether it holds no figure over time, and on paper may share a page."""
+        return not any(isinstance(one, FigureBlock) for one in self.blocks)
+
+
+def link_of(shift: Shift) -> str:
+    """The `link` of all figures of one shift."""
+    return f"{shift.start_gear}→{shift.end_gear} at {shift.lockup_time:.3f} s"
 
 
 def cells(*texts: str, number: bool = False) -> tuple[Cell, ...]:

@@ -1,23 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""The end of the report: what cannot be told, what was assumed, where it all came from."""
+"""The end of the report: what was assumed, where it all came from."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivetwin.identify.result import Identification, Verdict
-from drivetwin.report.figures.parameters import correlation_figure
-from drivetwin.report.labels import parameter_label
+from drivetwin.identify.result import Identification
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
-    FigureBlock,
     NotesBlock,
     Section,
     TableBlock,
     cells,
 )
-from drivetwin.report.sections.trust import TONES
 from drivetwin.report.units import BAR, NM, RAD_PER_S, RPM, Display, significant
 from drivetwin.results.result_file import plain
 from drivetwin.results.version import program_version
@@ -28,52 +24,6 @@ _RANGES: dict[str, tuple[str, Display]] = {
     "torque": ("engine torque", NM),
     "speed": ("engine speed", RPM),
 }
-_INSEPARABLE = (
-    "μ and the clutch geometry N·D·A·r: only their product acts.",
-    "η and a gain error of the engine torque: only their product acts.",
-    "The common scale of all torques rests on the output-torque sensor's gain: an error of it "
-    "scales J′, J3, T_v/i_f, k_o, c_o and μ alike.",
-    "J1·η + J2: the inertias before and behind the input gear act as one number.",
-)
-
-
-def limits_section(found: Identification) -> Section:
-    """What the log cannot tell, and which experiment would help."""
-    blocks: list[Block] = []
-    remarked: dict[tuple[Verdict, str], list[str]] = {}
-    for one in found.estimates.values():
-        if one.reason:
-            remarked.setdefault((one.verdict, one.reason), []).append(parameter_label(one.id))
-    if remarked:
-        rows = [
-            (
-                Cell(", ".join(labels)),
-                Cell(verdict.value, badge=True, tone=TONES[verdict]),
-                Cell(reason),
-            )
-            for (verdict, reason), labels in remarked.items()
-        ]
-        blocks.append(
-            TableBlock(
-                "Parameters that call for a remark.",
-                cells("parameter", "verdict", "remark: why, and which experiment would help"),
-                rows,
-            )
-        )
-    blocks.append(NotesBlock("Not separable from any one shift", _INSEPARABLE))
-    if found.correlation is not None:
-        blocks.append(
-            FigureBlock(
-                correlation_figure(found.correlation_ids, found.correlation),
-                "Correlation of the estimates. A pair near ±1 is known together better than apart.",
-            )
-        )
-    return Section(
-        "limits",
-        "What this log cannot tell",
-        "Limits of the data, not of the computation.",
-        blocks,
-    )
 
 
 def provenance_section(found: Identification) -> Section:

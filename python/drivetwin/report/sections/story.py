@@ -17,6 +17,7 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     Tone,
     cells,
+    link_of,
 )
 from drivetwin.report.units import significant
 from drivetwin.shifts.shift import Shift
@@ -39,7 +40,7 @@ def shift_section(found: Identification, log: ShiftLog) -> Section:
                 shift_phases(log, shift),
                 title + PHASE_KEY,
                 shift_panels(log, shift),
-                _link(shift),
+                link_of(shift),
             )
         )
         blocks.append(_phase_table(shift))
@@ -54,11 +55,6 @@ def shift_section(found: Identification, log: ShiftLog) -> Section:
         "What was measured, and where the shift was found in it.",
         blocks,
     )
-
-
-def _link(shift: Shift) -> str:
-    """Figures of one shift zoom together."""
-    return f"{shift.start_gear}→{shift.end_gear} at {shift.lockup_time:.3f} s"
 
 
 def _phase_table(shift: Shift) -> TableBlock:
@@ -136,7 +132,7 @@ def validation_section(validations: tuple[Validation, ...]) -> Section:
             "noise of its pressure sensor passes into the simulated torque and output speed."
         )
         blocks.append(
-            FigureBlock(validation_figure(one), text, validation_panels(one), _link(shift))
+            FigureBlock(validation_figure(one), text, validation_panels(one), link_of(shift))
         )
         blocks.append(_event_table(one))
     return Section(

@@ -115,7 +115,7 @@ def parameter_table(found: Identification) -> TableBlock:
         Cell("± 95 %", number=True, note="noise alone"),
         Cell("unit"),
         Cell("verdict"),
-        Cell("method"),
+        Cell("method", secondary=True),
     )
     caption = "Parameters."
     if not any(one.std_systematic for one in found.estimates.values()):
@@ -141,7 +141,7 @@ def _parameter_row(estimate: Estimate) -> tuple[Cell, ...]:
         Cell(noise, number=True),
         Cell(display.label),
         Cell(estimate.verdict.value, badge=True, tone=TONES[estimate.verdict]),
-        Cell(estimate.method),
+        Cell(estimate.method, secondary=True),
     )
 
 

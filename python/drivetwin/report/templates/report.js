@@ -7,7 +7,7 @@
     modeBarButtons: [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
   };
   /* Paper is narrower than the screen and always light. */
-  const paper = { width: 690, tallest: 900 };
+  const paper = { width: 690, shrink: 0.8, tallest: 820 };
   /* Points drawn of one curve: more than a screen has columns. */
   const mostPoints = 4000;
   const plots = [];
@@ -244,7 +244,7 @@
     window.addEventListener("beforeprint", () => {
       paint(false);
       plots.forEach((plot, index) => {
-        const height = Math.min(heights[index], paper.tallest);
+        const height = Math.min(heights[index] * paper.shrink, paper.tallest);
         Plotly.relayout(plot, { width: paper.width, height });
       });
     });

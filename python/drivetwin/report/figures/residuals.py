@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""What the fit leaves over, in standard deviations of what noise would leave, over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import plotly.graph_objects as go
+
+from drivetwin.identify.likelihood.residuals import block_means
+from drivetwin.identify.result import FloatArray
+from drivetwin.report.figures.stack import Curve, Panel, Phases, stacked
+from drivetwin.report.labels import channel_label
+from drivetwin.report.style import FITTED, MEASURED
+from drivetwin.report.units import Display
+
+_SIGMA = Display("σ")
+_BOUND = 1.96
+
+
+def residual_figure(
+    residuals: Mapping[str, tuple[FloatArray, FloatArray]], phases: Phases
+) -> go.Figure:
+    """Means of each output's residual over 20 ms blocks; of a right model 95 % lie in ±1.96 σ.
+
+    `residuals` are those of one shift, as `white_residuals` gives them.
+    """
+    panels = residual_panels(residuals)
+    return stacked(panels, phases, height=110 + 130 * len(panels))
+
+
+def residual_panels(residuals: Mapping[str, tuple[FloatArray, FloatArray]]) -> list[Panel]:
+    """What `residual_figure` shows, from top to bottom."""
+    panels = []
+    for name, (time, white) in residuals.items():
+        middle, means = block_means(time, white)
+        ends = middle[[0, -1]]
+        bounds = [
+            Curve("95 % of noise", ends, np.full(2, bound), FITTED, 1.0, "dash", listed=bound > 0.0)
+            for bound in (-_BOUND, _BOUND)
+        ]
+        panels.append(
+            Panel(channel_label(name), _SIGMA, [Curve("mean", middle, means, MEASURED), *bounds])
+        )
+    return panels

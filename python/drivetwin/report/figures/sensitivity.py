@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""What one per cent of gain or offset error of each sensor does to each result."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from drivetwin.identify.likelihood.sensitivity import FRICTION, SIZE, Sensitivity
+from drivetwin.identify.result import FloatArray
+from drivetwin.report.labels import channel_symbol, channel_unit, parameter_label
+from drivetwin.report.style import DIVERGING, axis, layout
+from drivetwin.report.units import display_of, significant
+
+_FULL_COLOUR = 3.0
+"""Change [% of the value] at which the colour is full; the number stands in the cell."""
+_DOT = 0.05
+"""Change below which a dot stands in place of a number."""
+_TIMES = ("te_delay",)
+"""Results whose value may be zero: their change is told in ms, not in per cent."""
+
+
+def sensitivity_figure(found: Sensitivity) -> go.Figure:
+    """Change of each result [%] by sensor: gain errors on the left, offsets on the right."""
+    names = [_label(one, found) for one in found.ids]
+    change = _shown(found)
+    figure = make_subplots(cols=2, shared_yaxes=True, horizontal_spacing=0.02)
+    for column, kind in enumerate(("gain", "offset"), start=1):
+        chosen = [k for k, error in enumerate(found.errors) if error.endswith(kind)]
+        figure.add_trace(
+            go.Heatmap(
+                x=[_sensor(found, k) for k in chosen],
+                y=names,
+                z=np.sign(change[:, chosen]) * np.sqrt(np.abs(change[:, chosen])),
+                text=[[_number(value) for value in row] for row in change[:, chosen]],
+                texttemplate="%{text}",
+                zmin=-np.sqrt(_FULL_COLOUR),
+                zmax=np.sqrt(_FULL_COLOUR),
+                colorscale=DIVERGING,
+                showscale=False,
+                hovertemplate="%{y} by %{x}: %{text} %<extra></extra>",
+            ),
+            row=1,
+            col=column,
+        )
+    figure.update_layout(layout(170 + 27 * len(names)))
+    figure.update_layout(
+        xaxis=axis(f"gain + {100 * SIZE:g} %", side="top", tickangle=0, ticks=""),
+        xaxis2=axis(
+            f"offset of {100 * SIZE:g} % of the largest reading",
+            side="top",
+            tickangle=0,
+            ticks="",
+        ),
+        yaxis=axis("", autorange="reversed", ticks=""),
+        yaxis2={"autorange": "reversed", "ticks": ""},
+        margin={"t": 80, "b": 20},
+    )
+    return figure
+
+
+def _shown(found: Sensitivity) -> FloatArray:
+    """Change (q, e) in per cent of the value; of times in ms."""
+    scale = [
+        1e3 if one in _TIMES else 100.0 / value
+        for one, value in zip(found.ids, found.values, strict=True)
+    ]
+    return np.asarray(found.change * np.abs(np.array(scale))[:, None])
+
+
+def _label(result_id: str, found: Sensitivity) -> str:
+    if result_id in _TIMES:
+        return f"{parameter_label(result_id)} [ms]"
+    if result_id.startswith(FRICTION):
+        element = result_id.removeprefix(FRICTION)
+        return f"μ ({element}) at {found.slips[element]:.0f} rad/s [%]"
+    return f"{parameter_label(result_id)} [%]"
+
+
+def _sensor(found: Sensitivity, k: int) -> str:
+    """Name of the sensor, and the size of its offset below it."""
+    role, kind = found.errors[k].rsplit(" ", 1)
+    if kind == "gain":
+        return channel_symbol(role)
+    display = display_of(channel_unit(role))
+    size = significant(found.sizes[k] * display.factor, 2)
+    return f"{channel_symbol(role)}<br>{size}<br>{display.label}"
+
+
+def _number(value: float) -> str:
+    if abs(value) < _DOT:
+        return "·"
+    return f"{value:+.{0 if abs(value) >= 9.95 else 1}f}".replace("-", "−")

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""Evidence of the likelihood method: what the fit leaves over, and what sensor errors would do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.residuals import (
+    BLOCK,
+    EXCESS,
+    SIGNIFICANT,
+    ResidualTest,
+    residual_tests,
+    white_residuals,
+)
+from drivetwin.identify.likelihood.sensitivity import sensitivity
+from drivetwin.identify.result import Identification
+from drivetwin.report.figures.residuals import residual_figure, residual_panels
+from drivetwin.report.figures.sensitivity import sensitivity_figure
+from drivetwin.report.figures.shift_phases import shift_spans
+from drivetwin.report.labels import channel_label
+from drivetwin.report.sections.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    Section,
+    TableBlock,
+    Tone,
+    link_of,
+)
+from drivetwin.report.units import significant
+
+
+def likelihood_sections(found: Identification) -> list[Section]:
+    """How well the fit explains the log, and its sensitivity to each sensor; empty without one."""
+    fit = found.evidence.get("likelihood")
+    if not isinstance(fit, LikelihoodFit):
+        return []
+    return [_fit_section(found, fit), _sensor_section(found, fit)]
+
+
+def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
+    labels = [f"{shift.start_gear}→{shift.end_gear}" for shift in found.shifts]
+    tests = residual_tests(fit).values()
+    blocks: list[Block] = [_test_table(list(zip(labels, tests, strict=True)))]
+    for shift, residuals in zip(found.shifts, white_residuals(fit).values(), strict=True):
+        phases = shift_spans(shift)
+        text = (
+            f"Shift {shift.start_gear}→{shift.end_gear}: residual of each output, averaged over "
+            f"{1e3 * BLOCK:.0f} ms and divided by what noise alone would leave. A stretch outside "
+            "the dashed lines is where the vehicle does something that the model does not know."
+        )
+        blocks.append(
+            FigureBlock(
+                residual_figure(residuals, phases), text, residual_panels(residuals), link_of(shift)
+            )
+        )
+    return Section(
+        "fit",
+        "The likelihood fit",
+        f"All shifts together: {fit.problem.size:,} samples, {len(fit.point.names)} unknowns, "
+        f"misfit per sample {fit.chi2:.2f} (1 where noise explains everything; above 1 all "
+        "intervals are widened). Noise of the inputs is part of the model.",
+        blocks,
+    )
+
+
+def _test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> TableBlock:
+    """Excess power and correlation with the inputs, by shift and output."""
+    sources = dict.fromkeys(
+        source for _, group in tests for test in group for source in test.correlation
+    )
+    head = (
+        Cell("shift"),
+        Cell("residual of"),
+        Cell("power of slow part", number=True, note="1 for noise"),
+        *(Cell(f"goes with {source}", number=True, note="σ") for source in sources),
+    )
+    rows = [
+        (
+            Cell(label),
+            Cell(channel_label(test.output)),
+            _judged(significant(test.excess, 2), good=test.excess <= EXCESS),
+            *(_correlation(test.correlation.get(source)) for source in sources),
+        )
+        for label, group in tests
+        for test in group
+    ]
+    return TableBlock(
+        f"Tests of what is left. Slow part: power of means over {1e3 * BLOCK:.0f} ms against that "
+        f"of white noise, doubtful above {EXCESS:g}. Correlation with an input in standard "
+        f"deviations of chance, doubtful beyond ±{SIGNIFICANT:g}.",
+        head,
+        rows,
+    )
+
+
+def _correlation(size: float | None) -> Cell:
+    """Correlation with one input; a dash where the shift does not have that input."""
+    if size is None:
+        return Cell("–", number=True)
+    return _judged(f"{size:+.1f}".replace("-", "−"), good=abs(size) <= SIGNIFICANT)
+
+
+def _judged(text: str, *, good: bool) -> Cell:
+    return Cell(text, number=True, badge=True, tone=Tone.GOOD if good else Tone.DOUBTFUL)
+
+
+def _sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
+    change = sensitivity(fit, found.evidence["signals"], found.friction)
+    text = (
+        "Change of each result, in per cent of its value, by an error of one sensor: on the left "
+        "a gain error of 1 %, on the right an offset of 1 % of the sensor's largest reading. "
+        "Engine torque T_e, pressures P, output torque T_o, speeds n of gearbox input, output and "
+        "wheel; a dot is less than 0.05. Scale a column to the data sheet of your sensor; with the "
+        "tolerances on the vehicle card all columns are part of the total intervals."
+    )
+    return Section(
+        "sensors",
+        "What a sensor error would do",
+        "Noise averages out over a log; a gain or offset error of a sensor does not.",
+        [FigureBlock(sensitivity_figure(change), text)],
+    )

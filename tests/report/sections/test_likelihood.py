@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""The likelihood's evidence: tests of what is left, and the sensors' sensitivity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from drivetwin.identify.likelihood.curves import curves_of
+from drivetwin.identify.result import Identification
+from drivetwin.report.html import render_report
+from drivetwin.report.sections.blocks import FigureBlock, TableBlock, Tone
+from drivetwin.report.sections.likelihood import likelihood_sections
+from tests.identify.likelihood.made import bench, fitted
+from tests.report.sample import identification, log
+
+
+@cache
+def found() -> Identification:
+    fit, signals = fitted(), bench().signals
+    return replace(
+        identification(),
+        shifts=(signals.shift,),
+        friction=curves_of(fit, {}, np.zeros_like(fit.covariance)),
+        evidence={"likelihood": fit, "signals": (signals,)},
+    )
+
+
+def test_other_methods_have_no_such_sections() -> None:
+    assert likelihood_sections(identification()) == []
+
+
+def test_what_is_left_of_a_right_model_is_judged_good() -> None:
+    fit, _ = likelihood_sections(found())
+    table = fit.blocks[0]
+    assert isinstance(table, TableBlock)
+    assert {row[0].text for row in table.rows} == {"2→3"}
+    assert "output torque" in {row[1].text for row in table.rows}
+    assert {cell.tone for row in table.rows for cell in row[2:]} == {Tone.GOOD}
+
+
+def test_residuals_of_a_right_model_lie_in_the_band() -> None:
+    block = likelihood_sections(found())[0].blocks[1]
+    assert isinstance(block, FigureBlock)
+    means = [np.asarray(trace.y) for trace in block.figure.data if trace.name == "mean"]
+    assert len(means) == len(block.panels)
+    outside = np.mean(np.abs(np.concatenate(means)) > 1.96)
+    assert outside < 0.08
+
+
+def test_every_sensor_stands_over_the_columns() -> None:
+    block = likelihood_sections(found())[1].blocks[0]
+    assert isinstance(block, FigureBlock)
+    gain, offset = block.figure.data
+    assert {"T_e", "T_o", "n_in", "P B3"} <= set(gain.x)
+    assert len(gain.x) == len(offset.x)
+    row = list(gain.y).index("η [%]")
+    assert gain.text[row][list(gain.x).index("T_e")] == "−1.0"
+    assert gain.text[row][list(gain.x).index("T_o")] == "+1.0"
+
+
+def test_the_page_holds_them() -> None:
+    page = render_report(found(), log())
+    assert 'id="fit"' in page
+    assert 'id="sensors"' in page
