@@ -31,7 +31,7 @@ PYTHON_LAYERS = (
     frozenset({"identify"}),
     frozenset({"twin", "results", "start_state", "validate"}),
     frozenset({"observer"}),
-    frozenset({"report"}),
+    frozenset({"report", "export"}),
     frozenset({"fleet"}),
     frozenset({"cli", "__main__"}),
 )

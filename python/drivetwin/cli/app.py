@@ -14,6 +14,7 @@ from drivetwin.cli.drive import drive
 from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
 from drivetwin.cli.inspect import inspect
+from drivetwin.cli.observe import observe
 from drivetwin.cli.output import show_error
 from drivetwin.cli.reduce import reduce
 from drivetwin.cli.report import report
@@ -28,7 +29,19 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for command in (demo, synth, inspect, shifts, identify, simulate, report, gearbox, reduce, drive):
+for command in (
+    demo,
+    synth,
+    inspect,
+    shifts,
+    identify,
+    simulate,
+    observe,
+    report,
+    gearbox,
+    reduce,
+    drive,
+):
     app.command()(command)
 
 

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin observe TWIN LOG`: torques that no sensor of the log shows, with bands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
+from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step, table_of
+from drivetwin.observer.kind import Observer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from drivetwin.logs.raw import RawChannel
+    from drivetwin.observer.observed import Observation
+
+
+def observe(
+    twin: Annotated[Path, typer.Argument(metavar="TWIN", help="Identified model (twin.toml).")],
+    log: LogFile,
+    vehicle: OptionalVehicleFile = None,
+    channels: ChannelsFile = None,
+    by: Annotated[
+        Observer,
+        typer.Option(
+            help="smoother: follows the speeds, with or without pressures; simulation: driven by "
+            "engine torque and pressures alone."
+        ),
+    ] = Observer.SMOOTHER,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Where torques go: .csv, .parquet, .mf4, .mat."
+        ),
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option("--figure", metavar="FILE.html", help="Where the figures go."),
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Tell the torques of output shaft and clutches through the shifts of a log, with 95 % bands.
+
+    For logs without torque sensors. An output torque in the log is not used.
+    """
+    from drivetwin.logs.read import read_log
+    from drivetwin.observer.observe import observed
+    from drivetwin.report.observer import render_observations
+    from drivetwin.results.atomic import write_text
+    from drivetwin.shifts.usable import usable_shifts
+    from drivetwin.twin import Twin
+    from drivetwin.vehicle.card import load_card
+
+    model = Twin.load(twin)
+    with step(f"reading {log.name}"):
+        card = model.card() if vehicle is None else load_card(vehicle)
+        recording = read_log(log, card, channels)
+        shifts = usable_shifts(recording, card)
+    found = []
+    for shift in shifts.shifts:
+        with step(f"observing shift {shift.start_gear}-{shift.end_gear} by {by}"):
+            found.append(observed(model, recording, shift, by))
+    if output is not None:
+        _write(output, found)
+    if figure is not None:
+        write_text(figure, render_observations(found, recording))
+    if as_json:
+        print_json({"observer": by, "shifts": [_document(one) for one in found]})
+        return
+    for one in found:
+        show(_table(one))
+        for text in one.notes:
+            note(text)
+    for file in (output, figure):
+        if file is not None:
+            say(f"wrote {file}")
+
+
+def _write(path: Path, found: Sequence[Observation]) -> None:
+    from drivetwin.cli.staging import staged
+    from drivetwin.logs.write import write_log
+
+    with staged(path.parent) as folder:
+        write_log(folder / path.name, observed_channels(found))
+
+
+def observed_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
+    """Each torque with its standard deviation, N·m, one shift after the other."""
+    import numpy as np
+
+    from drivetwin.logs.raw import RawChannel
+
+    parts: dict[str, list[tuple[Any, Any]]] = {}
+    for one in found:
+        for name, band in one.bands.items():
+            parts.setdefault(name, []).append((one.time, band.value))
+            parts.setdefault(f"{name}_std", []).append((one.time, band.std))
+    return tuple(
+        RawChannel(
+            name,
+            "Nm",
+            np.concatenate([time for time, _ in pieces]),
+            np.concatenate([values for _, values in pieces]),
+        )
+        for name, pieces in parts.items()
+    )
+
+
+def _table(one: Observation) -> Table:
+    numbers = ("lowest Nm", "highest Nm", "± Nm (mean)", "± Nm (largest)")
+    shift = one.shift
+    table = table_of(
+        f"Shift {shift.start_gear}→{shift.end_gear} by {one.observer}", "torque", *numbers,
+        right=numbers,
+    )  # fmt: skip
+    for name, band in one.bands.items():
+        half = band.upper - band.value
+        table.add_row(
+            name,
+            f"{band.value.min():.0f}",
+            f"{band.value.max():.0f}",
+            f"{half.mean():.1f}",
+            f"{half.max():.1f}",
+        )
+    return table
+
+
+def _document(one: Observation) -> dict[str, Any]:
+    return {
+        "from": one.shift.start_gear,
+        "to": one.shift.end_gear,
+        "time": [float(one.time[0]), float(one.time[-1])],
+        "torques": {
+            name: {
+                "lowest": float(band.value.min()),
+                "highest": float(band.value.max()),
+                "std_mean": float(band.std.mean()),
+                "std_largest": float(band.std.max()),
+            }
+            for name, band in one.bands.items()
+        },
+        "notes": list(one.notes),
+    }

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Simulation as an observer: the twin driven by engine torque and pressures, with its spread.
+
+The band comes from runs whose parameters, friction, inputs and start are drawn from what is known
+of them; each run goes through its own lock and break-away, so nothing is linearised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin.driveline import DualClutch, Signal, State, Trajectory, simulate
+from drivetwin.errors import InputError, SimulationError
+from drivetwin.identify.inputs import sampled
+from drivetwin.identify.signals import Sampled
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.observer.observed import Band, FloatArray, Observation, Observer
+from drivetwin.observer.uncertain import uncertain, with_drawn_friction
+from drivetwin.shifts.shift import Shift
+from drivetwin.twin import Twin
+from drivetwin.validate import validate
+
+STEMS = ("eta", "J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
+RUNS = 100
+"""Runs of the ensemble: a band's width is then told to 7 %."""
+SPEED = 0.1
+"""Spread of the output speed at the start [rad/s]."""
+TWIST = 0.05
+"""Relative spread of the shaft's torque at the start, besides the unrest of the drive torque."""
+UNREST = 0.4
+"""Time about the start over which the engine torque is looked at: a shaft that was moved swings."""
+
+
+def simulate_observed(
+    twin: Twin, log: ShiftLog, shift: Shift, *, runs: int = RUNS, seed: int = 0
+) -> Observation:
+    """Torques of one shift from engine torque and pressures alone; speeds tell the start.
+
+    Raises MissingParameterError, MissingChannelError, and SimulationError where the twin's own run
+    does not complete.
+    """
+    quiet = ShiftLog(
+        {role: c for role, c in log.channels.items() if role != "output_torque"},
+        log.source,
+        log.sha256,
+        log.warnings,
+    )
+    base = validate(twin, quiet, shift)
+    if base.status != "completed":
+        raise SimulationError(
+            f"the simulation of shift {shift.start_gear}-{shift.end_gear} ended with {base.status}",
+            "use the smoother, which needs no friction law",
+        )
+    run = base.trajectory
+    ids = (*STEMS, *(f"P0.{one.name}" for one in base.model.elements))
+    known = uncertain(twin, shift, ids)
+    generators = np.random.SeedSequence(seed).spawn(runs)
+    noise = {name: sampled(quiet.pressure(name)) for name in base.pressures}
+    torque = sampled(quiet["engine_torque"])
+    near = torque.within((float(run.time[0]) - UNREST, float(run.time[0]) + UNREST)).values
+    unrest = float(np.std(near)) if near.size else 0.0
+    found: list[Trajectory] = []
+    for generator in generators:
+        rng = np.random.default_rng(generator)
+        values = known.values + known.directions @ rng.standard_normal(known.directions.shape[1])
+        model = known.model(values)
+        model = replace(model, elements=with_drawn_friction(model, twin, rng))
+        one = _run(
+            model,
+            _drawn(torque, known.named(values)["te_delay"], rng),
+            {name: _drawn(signal, 0.0, rng) for name, signal in noise.items()},
+            _start(model, run, (shift, unrest), rng),
+            run.time,
+        )
+        if one is not None:
+            found.append(one)
+    notes = () if len(found) == runs else (f"{runs - len(found)} of {runs} runs did not complete",)
+    bands = {
+        name: _band(column, [_torques(one)[name] for one in found])
+        for name, column in _torques(run).items()
+    }
+    return Observation(
+        shift, Observer.SIMULATION, run.time, bands.pop("output_torque"), bands, notes
+    )
+
+
+def _torques(run: Trajectory) -> dict[str, FloatArray]:
+    return {"output_torque": run.shaft_torque, **run.clutch_torque}
+
+
+def _band(column: FloatArray, others: list[FloatArray]) -> Band:
+    spread = np.sqrt(np.mean((np.array(others) - column) ** 2, axis=0))
+    return Band(column, np.asarray(spread))
+
+
+def _drawn(signal: Sampled, delay: float, rng: np.random.Generator) -> Signal:
+    """The signal with other noise of its level, moved back by its age [s]; ends are held."""
+    values = signal.values + signal.sigma * rng.standard_normal(signal.values.size)
+    time = np.concatenate([[signal.time[0] - 1.0], signal.time, [signal.time[-1] + 1.0]])
+    return Signal(time, np.concatenate([values[:1], values, values[-1:]]), -delay)
+
+
+def _start(
+    model: DualClutch, run: Trajectory, about: tuple[Shift, float], rng: np.random.Generator
+) -> State:
+    """A start about that of `run`: the off-going element of the shift stays locked.
+
+    `about` holds the shift and the unrest of the engine torque [N m].
+    """
+    shift, unrest = about
+    held = next(one for one in model.elements if one.name == shift.offgoing)
+    ratio = model.i_in * held.i_c * held.i_out
+    speed = float(run.output_speed[0]) + SPEED * rng.standard_normal()
+    rate = float(run.output_speed[0]) - model.i_f * float(run.wheel_speed[0])
+    swing = np.hypot(unrest * model.eta * ratio / model.k_o, TWIST * float(run.twist[0]))
+    twist = float(run.twist[0]) + float(swing) * rng.standard_normal()
+    return State(ratio * speed, speed, (speed - rate) / model.i_f, twist, (shift.offgoing,))
+
+
+def _run(
+    model: DualClutch,
+    torque: Signal,
+    pressures: Mapping[str, Signal],
+    start: State,
+    time: FloatArray,
+) -> Trajectory | None:
+    """A run of the ensemble; None where drawn values make none."""
+    try:
+        found = simulate(model, torque, pressures, start, time)
+    except InputError:
+        return None
+    return found if found.status == "completed" else None

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: MIT
+"""The kinds of observer, by the names used on the command line."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Observer(StrEnum):
+    """How torques are told: by simulation alone, or by a smoother that follows the speeds."""
+
+    SIMULATION = "simulation"
+    SMOOTHER = "smoother"

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: MIT
+"""The smoother as an observer: all speeds of a shift, before and after, tell its torques.
+
+The twin's parameters are unknown constants of the state, with the covariance of the twin; a first
+pass gives the motion about which they act linearly, the second tells all together. The load of the
+drive at hand is unknown and may drift with the road. How fast the friction may depart from its law
+is taken from the log, by likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.driveline import DualClutch
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.observer.course import Recorded, course_of, recorded, slip_of
+from drivetwin.observer.mechanics import (
+    CARRIED,
+    LOAD,
+    SPEEDS,
+    STATES,
+    TORQUE_ERROR,
+    Linear,
+    answer,
+    linear,
+)
+from drivetwin.observer.observed import Band, FloatArray, Observation, Observer
+from drivetwin.observer.smoother import Measurement, Process, filtered, smoothed
+from drivetwin.observer.uncertain import Uncertain, uncertain
+from drivetwin.shifts.shift import Shift
+from drivetwin.twin import Twin
+
+STEMS = ("eta", "J_prime", "J_out", "J_vehicle", "k_o", "c_o", "te_delay")
+"""Parameters that count as unknown within the twin's covariance; the friction has its own state."""
+READ = 0.3
+"""What is left of the noise of a pressure after its smoothing: it acts as an error of P0."""
+LOAD_WALK = 0.05
+"""Drift of the load within a second, as a share of the greatest drive torque: grades change."""
+FRICTION_ERROR = 0.1
+"""Relative standard deviation of an element's torque by its law at the start of its slip."""
+WALKS = (0.05, 0.2, 0.8)
+"""Drift [1/sqrt(s)] of the relative error of the friction law: what the log decides."""
+FREE_WALKS = (0.3, 1.0, 3.0)
+"""The same where no pressure tells what an element carries."""
+LEVEL_ERROR = {True: 1.0, False: 0.05}
+"""Spread about zero of what an element carries at first, pressures unknown: an off-going element,
+which lets go under load, and an on-coming one."""
+TIGHT = 1e-3
+"""Slip [rad/s] allowed where an element is locked."""
+RATE_SPAN = 0.01
+"""Time before lock-up over which the rate of the slip is taken [s]."""
+SMALL = 1e-3
+"""Part of a standard deviation over which parameters are differenced."""
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """A shift with its model parameters, grid and inputs."""
+
+    seen: Recorded
+    known: Uncertain
+    directions: FloatArray
+
+    def linear(self, values: FloatArray) -> tuple[DualClutch, Linear]:
+        """The linear model at parameters `values` (p,)."""
+        model = self.known.model(values)
+        delay = self.known.named(values)["te_delay"]
+        return model, linear(model, course_of(model, self.seen, delay))
+
+
+def smooth(twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
+    """Torques of one shift from speeds and engine torque; an output torque is not looked at.
+
+    Raises MissingParameterError where the twin is incomplete, MissingChannelError and InputError
+    where the log is.
+    """
+    seen = recorded(log, shift, twin.i_in)
+    fills = {f"P0.{name}": READ * p.sigma for name, p in seen.pressures.items()}
+    known = uncertain(twin, shift, (*STEMS, *fills), fills)
+    setting = _Setting(seen, known, known.directions)
+    model, base = setting.linear(known.values)
+    none = np.zeros((base.transition.shape[0], STATES, 0))
+    walks = WALKS if setting.seen.pressures else FREE_WALKS
+    rough = _process(setting, model, base, none, walks[1])
+    motion, _ = smoothed(rough)
+    slopes, by_parameter = _slopes(setting, base, motion)
+    trials = [_process(setting, model, base, slopes, walk) for walk in walks]
+    best = min(trials, key=lambda process: filtered(process).surprise)
+    means, covariances = smoothed(best)
+    bands = _bands(base, by_parameter, means, covariances)
+    time = 0.5 * (setting.seen.time[1:] + setting.seen.time[:-1])
+    return Observation(
+        shift,
+        Observer.SMOOTHER,
+        time,
+        bands.pop("output_torque"),
+        bands,
+        _notes(setting.seen),
+    )
+
+
+def _notes(seen: Recorded) -> tuple[str, ...]:
+    texts = []
+    if not seen.pressures:
+        texts.append("no pressures: clutch torques follow from the speeds alone")
+    if "wheel_speed" not in seen.speeds:
+        texts.append("no wheel speed: what lies behind the shaft follows from the model")
+    return tuple(texts)
+
+
+def _slopes(
+    setting: _Setting, base: Linear, motion: FloatArray
+) -> tuple[FloatArray, Mapping[str, FloatArray]]:
+    """Effect of one standard deviation along each direction about `motion` (N, 8).
+
+    On a step's end state (N-1, 8, r), and on the observed torques (N-1, r) by name.
+    """
+    before = motion[:-1]
+    middle = 0.5 * (motion[1:] + motion[:-1])
+    pushes, torques = [], []
+    for column in setting.directions.T:
+        _, moved = setting.linear(setting.known.values + SMALL * column)
+        change = np.einsum("kij,kj->ki", moved.transition - base.transition, before)
+        pushes.append((change + moved.push - base.push) / SMALL)
+        torques.append(
+            {
+                name: (
+                    np.einsum("kj,kj->k", moved.rows[name] - base.rows[name], middle)
+                    + moved.constants[name]
+                    - base.constants[name]
+                )
+                / SMALL
+                for name in base.rows
+            }
+        )
+    if not pushes:
+        return np.zeros((*before.shape, 0)), {n: np.zeros((len(before), 0)) for n in base.rows}
+    by_name = {name: np.column_stack([one[name] for one in torques]) for name in base.rows}
+    return np.stack(pushes, axis=2), by_name
+
+
+def _process(
+    setting: _Setting, model: DualClutch, base: Linear, slopes: FloatArray, walk: float
+) -> Process:
+    """The estimation problem with parameter directions as constant states behind the eight."""
+    count, _, extra = slopes.shape
+    size = STATES + extra
+    transition = np.zeros((count, size, size)) + np.eye(size)
+    transition[:, :STATES, :STATES] = base.transition
+    transition[:, :STATES, STATES:] = slopes
+    push, noise = np.zeros((count, size)), np.zeros((count, size))
+    push[:, :STATES] = base.push
+    step = np.diff(setting.seen.time)
+    drive = _drive(setting.seen, model)
+    torque = setting.seen.engine_torque
+    noise[:, TORQUE_ERROR] = torque.sigma**2 * (
+        1.0 - base.transition[:, TORQUE_ERROR, TORQUE_ERROR] ** 2
+    )
+    for place, one in enumerate(model.elements):
+        drift = np.maximum(base.drift[one.name], walk)
+        noise[:, CARRIED + place] = np.nan_to_num(drift**2 * step)
+    noise[:, LOAD] = (LOAD_WALK * drive) ** 2 * step
+    mean, spread = _start(setting, model, drive)
+    covariance = np.diag(np.concatenate([spread**2, np.ones(extra)]))
+    mean = np.concatenate([mean, np.zeros(extra)])
+    measured = _measurements(setting.seen, model, size)
+    return Process(
+        transition, push, noise, mean, covariance, measured, _lock_up(setting.seen, model, size)
+    )
+
+
+def _drive(seen: Recorded, model: DualClutch) -> float:
+    """Greatest torque at the wheel that the engine torque of the log makes [N m]."""
+    ratio = max(abs(model.i_in * one.i_c * one.i_out) for one in model.elements)
+    return float(np.max(np.abs(seen.engine_torque.values))) * ratio * model.i_f
+
+
+def _start(setting: _Setting, model: DualClutch, drive: float) -> tuple[FloatArray, FloatArray]:
+    """Mean and standard deviation (8,) of the state at the first grid point."""
+    seen = setting.seen
+    first = seen.time[:1]
+    engine = float(seen.speed("engine_speed", first)[0])
+    output = float(seen.speed("output_speed", first)[0])
+    torque = model.load.constant / model.i_f
+    mean = np.array([engine, output, output / model.i_f, torque / model.k_o, 0, 0, 0, 0.0])
+    mean[LOAD] = model.load.constant
+    spread = np.array([1.0, 1.0, 1.0, drive / model.i_f / model.k_o, 0, 0, 0, 0.0])
+    spread[TORQUE_ERROR], spread[LOAD] = seen.engine_torque.sigma, drive
+    spread[CARRIED:LOAD] = FRICTION_ERROR
+    if not seen.pressures:
+        mean[CARRIED:LOAD] = -1.0
+        for place, one in enumerate(model.elements):
+            spread[CARRIED + place] = LEVEL_ERROR[one.name == seen.shift.offgoing]
+    return mean, spread
+
+
+def _measurements(seen: Recorded, model: DualClutch, size: int) -> list[list[Measurement]]:
+    """Speeds at their stamps; no slip where a gear begins to be held."""
+    found: list[list[Measurement]] = [[] for _ in seen.time]
+    for place, name in enumerate(("engine_speed", "output_speed", "wheel_speed")):
+        if name not in seen.speeds:
+            continue
+        signal = seen.speeds[name]
+        row = np.zeros(size)
+        row[place] = 1.0
+        points = np.searchsorted(seen.time, np.round(signal.time, 7))
+        for k, value in zip(points.tolist(), signal.values.tolist(), strict=True):
+            found[k].append((row, value, signal.sigma**2))
+    held = {seen.shift.offgoing: 0, seen.shift.oncoming: _point(seen, seen.shift.lockup_time)}
+    for one in model.elements:
+        row = np.zeros(size)
+        row[:2] = 1.0 / (model.i_in * one.i_c), -one.i_out
+        found[held[one.name]].append((row, 0.0, TIGHT**2))
+    return found
+
+
+def _lock_up(seen: Recorded, model: DualClutch, size: int) -> dict[int, FloatArray]:
+    """Impulse of the on-coming element by which its lock-up may be early or late.
+
+    Locking δt late, the element has slipped on for that time: its slip ends all the same, and
+    engine and output share the difference by their inertias.
+    """
+    shift = seen.shift
+    one = next(e for e in model.elements if e.name == shift.oncoming)
+    k = _point(seen, shift.lockup_time)
+    before = np.array([seen.time[k] - RATE_SPAN, seen.time[k]])
+    rate = float(np.diff(slip_of(model, one, seen, before))[0]) / RATE_SPAN
+    step = float(seen.time[k] - seen.time[k - 1])
+    jump = rate * float(np.hypot(shift.sigma.get("lockup", 0.0), 0.5 * step))
+    along, g = answer(model, one)
+    column = np.zeros(size)
+    column[:SPEEDS] = along / (along @ g) * jump
+    return {k: np.outer(column, column)}
+
+
+def _point(seen: Recorded, time: float) -> int:
+    return min(int(np.searchsorted(seen.time, time)), seen.time.size - 1)
+
+
+def _bands(
+    base: Linear,
+    by_parameter: Mapping[str, FloatArray],
+    means: FloatArray,
+    covariances: FloatArray,
+) -> dict[str, Band]:
+    """Observed torques in the middle of the steps, with all that is not known of them."""
+    middle = 0.5 * (means[1:] + means[:-1])
+    found = {}
+    for name, row in base.rows.items():
+        whole = np.concatenate([row, by_parameter[name]], axis=1)
+        value = np.einsum("kj,kj->k", whole, middle) + base.constants[name]
+        variance = np.einsum("ki,kij,kj->k", whole, covariances[1:], whole)
+        found[name] = Band(value, np.sqrt(np.maximum(variance, 0.0)))
+    return found

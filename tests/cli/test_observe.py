@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin observe` writes what it tells, in every table format."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.cli import main
+from drivetwin.logs.formats import open_recording
+from drivetwin.observer.kind import Observer
+from tests.observer.conftest import Bench, bench
+
+__all__ = ["bench"]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "by", "rmse"),
+    [(".csv", Observer.SIMULATION, 80.0), (".parquet", Observer.SMOOTHER, 20.0)],
+)
+def test_writes_torques_with_their_deviation(
+    bench: Bench, tmp_path: Path, suffix: str, by: Observer, rmse: float
+) -> None:
+    twin, log = map(str, bench.files)
+    file = tmp_path / f"torques{suffix}"
+    assert main(["observe", twin, log, "--by", by, "-o", str(file)]) == 0
+    with open_recording(file) as recording:
+        columns = {c.name: recording.load(k) for k, c in enumerate(recording.columns)}
+    assert set(columns) == {
+        name + end for name in ("output_torque", "torque.B2", "torque.B3") for end in ("", "_std")
+    }
+    torque = columns["output_torque"]
+    exact = np.interp(torque.time, bench.motion.time, bench.motion.shaft_torque)
+    assert np.sqrt(np.mean((torque.values - exact) ** 2)) < rmse
+    assert (columns["output_torque_std"].values > 0.0).all()
+
+
+def test_json_and_figure(bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    twin, log = map(str, bench.files)
+    page = tmp_path / "o.html"
+    assert main(["observe", twin, log, "--by", "simulation", "--figure", str(page), "--json"]) == 0
+    (shift,) = json.loads(capsys.readouterr().out)["shifts"]
+    assert shift["torques"]["output_torque"]["highest"] > 4000.0
+    assert "95 % low" in page.read_text(encoding="utf-8")

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""Both observers on a log whose torques are known: the bands hold the truth and are narrow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import MissingChannelError, MissingParameterError
+from drivetwin.identify.result import Verdict
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.observer.kind import Observer
+from drivetwin.observer.observe import observed
+from drivetwin.observer.observed import Band, FloatArray
+from tests.observer.conftest import Bench, brief
+
+
+def _without(log: ShiftLog, *roles: str) -> ShiftLog:
+    kept = {k: v for k, v in log.channels.items() if not k.startswith(roles)}
+    return replace(log, channels=kept)
+
+
+def _deviates(band: Band, truth: FloatArray) -> float:
+    """Root mean square of the error in standard deviations, where the band has a width."""
+    wide = band.std > 0.1
+    return float(np.sqrt(np.mean(((band.value - truth)[wide] / band.std[wide]) ** 2)))
+
+
+@pytest.mark.parametrize(
+    ("by", "rmse"), [(Observer.SMOOTHER, 20.0), (Observer.SIMULATION, 200.0)], ids=str
+)
+def test_bands_hold_the_truth(bench: Bench, by: Observer, rmse: float) -> None:
+    """T_o reaches 5 kN·m. Errors of a log go together, since they share the twin's: they are about
+    one draw, of which all samples may lie beyond a standard deviation but not far beyond two. The
+    simulation begins in the swing of a throttle step, which engine torque alone does not show.
+    """
+    one = observed(bench.twin, _without(bench.log, "output_torque"), bench.shift, by)
+    for name, truth in bench.truth(one).items():
+        band = one.bands[name]
+        assert _deviates(band, truth) < 2.0, name
+        assert np.sqrt(np.mean((band.value - truth) ** 2)) < rmse, name
+        assert band.std.mean() < rmse, name
+
+
+def test_a_measured_output_torque_changes_nothing(bench: Bench) -> None:
+    blind = _without(bench.log, "output_torque")
+    for by in Observer:
+        seen = observed(bench.twin, bench.log, bench.shift, by)
+        told = observed(bench.twin, blind, bench.shift, by)
+        assert np.array_equal(seen.output_torque.value, told.output_torque.value)
+
+
+def test_without_pressures_the_bands_widen_and_hold(bench: Bench) -> None:
+    log = _without(bench.log, "output_torque", "pressure.")
+    shift = brief(log, bench.twin.card())
+    one = observed(bench.twin, log, shift)
+    full = observed(bench.twin, bench.log, bench.shift)
+    truth = bench.truth(one)
+    assert _deviates(one.output_torque, truth["output_torque"]) < 2.0
+    assert _deviates(one.clutch_torque["B3"], truth["torque.B3"]) < 2.0
+    slipping = (one.time > shift.inertia_phase[0]) & (one.time < shift.lockup_time)
+    assert one.clutch_torque["B3"].std[slipping].mean() > full.clutch_torque["B3"].std.mean()
+    assert "no pressures" in one.notes[0]
+
+
+def test_a_twin_without_scale_is_refused(bench: Bench) -> None:
+    """A twin from a log without output torque has ratios over η only."""
+    eta = bench.twin.parameters["eta"]
+    unknown = replace(eta, value=None, std_noise=None, verdict=Verdict.NOT_IDENTIFIABLE)
+    twin = replace(bench.twin, parameters={**bench.twin.parameters, "eta": unknown})
+    with pytest.raises(MissingParameterError, match="eta"):
+        observed(twin, bench.log, bench.shift)
+
+
+def test_a_log_without_engine_torque_is_refused(bench: Bench) -> None:
+    with pytest.raises(MissingChannelError, match="engine_torque"):
+        observed(bench.twin, _without(bench.log, "engine_torque"), bench.shift)
+
+
+def test_simulation_repeats_with_its_seed(bench: Bench) -> None:
+    once, again = (
+        observed(bench.twin, bench.log, bench.shift, Observer.SIMULATION) for _ in range(2)
+    )
+    assert np.array_equal(once.output_torque.std, again.output_torque.std)
