@@ -63,7 +63,10 @@ def table_points(subject: Subject) -> dict[int, int]:
 
 
 def write_c(subject: Subject, folder: Path) -> tuple[Path, ...]:
-    """Write the sources of a twin into `folder`; returns their paths. Raises InputError, OSError."""
+    """Write the sources of a twin into `folder`; returns their paths.
+
+    Raises InputError for a model that the C sources cannot hold, and OSError.
+    """
     generated = {"dt_twin.c": twin_source(subject).encode()}
     files = {**model_sources(), **generated}
     for name, data in files.items():

@@ -147,14 +147,13 @@ static void look_ahead(dt_state *trial, const dt_mechanism *m, const dt_params *
 }
 
 /* Make a trial the state of the run. */
-static void adopt(dt_state *s, const dt_state *trial, const dt_mechanism *m, const dt_params *p,
-                  const int candidate[DT_ROWS]) {
+static void adopt(dt_state *s, const dt_state *trial, const int candidate[DT_ROWS]) {
     s->power_backward = trial->power_backward;
     for (int j = 0; j < DT_ROWS; ++j) {
         s->mode[j] = trial->mode[j];
         s->released[j] = candidate[j] && dt_slips(trial->mode[j]);
         if (j < DT_CLUTCHES) {
-            s->cell[j] = dt_cell_at(&p->clutch[j].friction, dt_abs(dt_slip(m, j, s->x)));
+            s->cell[j] = trial->cell[j];
         }
     }
 }
@@ -165,6 +164,9 @@ dt_status dt_decide(dt_state *s, const dt_params *p, dt_expansion *e, dt_event o
     dt_mechanism_of(&m, p, s->power_backward);
     dt_state trial = *s;
     int candidate[DT_ROWS];
+    for (int j = 0; j < DT_CLUTCHES; ++j) {
+        trial.cell[j] = dt_cell_at(&p->clutch[j].friction, dt_abs(dt_slip(&m, j, s->x)));
+    }
     look_ahead(&trial, &m, p, e, remaining);
     for (int j = 0; j < DT_ROWS; ++j) {
         candidate[j] = s->mode[j] == DT_STUCK || (s->mode[j] != DT_OPEN && at_rest(&m, s->x, j));
@@ -180,7 +182,7 @@ dt_status dt_decide(dt_state *s, const dt_params *p, dt_expansion *e, dt_event o
         const fault found = find_fault(&m, p, e, &trial, candidate);
         switch (found.kind) {
         case NO_FAULT:
-            adopt(s, &trial, &m, p, candidate);
+            adopt(s, &trial, candidate);
             return DT_OK;
         case OVERLOADED:
             trial.mode[found.row] = found.sign > 0 ? DT_FORWARD : DT_BACKWARD;

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""The FMU archive: description, sources, binaries, parameter set and experiment."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+import tempfile
+import uuid
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from drivetwin.export.c.write import model_sources, twin_source
+from drivetwin.export.compiler import Platform, compile_library, native_platform
+from drivetwin.export.entries import entries_of
+from drivetwin.export.fmu.describe import Header, description
+from drivetwin.export.fmu.experiment import Experiment, reference_files
+from drivetwin.export.fmu.variables import FmiVersion, variables_of
+from drivetwin.export.parameters.xml_text import document
+from drivetwin.export.subject import Subject
+from drivetwin.results.atomic import write_bytes
+
+STEP = 1e-3
+"""Communication step [s] that the description proposes."""
+_FOLDERS = {
+    FmiVersion.FMI2: {
+        Platform.LINUX: "linux64",
+        Platform.WINDOWS: "win64",
+        Platform.MACOS: "darwin64",
+    },
+    FmiVersion.FMI3: {
+        Platform.LINUX: "x86_64-linux",
+        Platform.WINDOWS: "x86_64-windows",
+        Platform.MACOS: "x86_64-darwin",
+        Platform.MACOS_ARM: "aarch64-darwin",
+    },
+}
+_NOT_IN_FMU = ("Makefile", "dt_observer.c", "dt_observer.h", "dt_run.c")
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """How an FMU is built; `platforms` empty: the one this program runs on, by its own compiler."""
+
+    version: FmiVersion = FmiVersion.FMI2
+    platforms: tuple[Platform, ...] = ()
+    experiment: Experiment | None = None
+
+
+def build_fmu(subject: Subject, path: Path, options: BuildOptions | None = None) -> None:
+    """Write the FMU of a twin to `path`; the same twin gives the same bytes.
+
+    Raises InputError for a model that C cannot hold, CompilerError, MissingExtraError, OSError.
+    """
+    options = options or BuildOptions()
+    header, sources = _sources(subject, options)
+    files = {
+        "modelDescription.xml": description(options.version, header, variables_of(subject)),
+        **{f"sources/{name}": data for name, data in sources.items()},
+        **_binaries(header.identifier, sources, options),
+        **reference_files(subject, options.experiment, options.version),
+    }
+    if options.version is FmiVersion.FMI3:
+        files["sources/buildDescription.xml"] = _build_description(header)
+    write_bytes(path, _archive(files))
+
+
+def identifier(name: str) -> str:
+    """A C identifier from a name."""
+    text = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "twin"
+    return text if text[0].isalpha() else f"twin_{text}"
+
+
+def _sources(subject: Subject, options: BuildOptions) -> tuple[Header, dict[str, bytes]]:
+    """Header of the description and all sources; the token marks both."""
+    digit = options.version.value[0]
+    fixed = {name: data for name, data in model_sources().items() if name not in _NOT_IN_FMU}
+    for folder, pattern in (("source", rf"dt_fm(u\.|i{digit})"), ("headers", f"fmi{digit}")):
+        place = resources.files("drivetwin.export.fmu") / folder
+        for entry in place.iterdir():
+            if re.match(pattern, entry.name):
+                fixed[entry.name] = entry.read_bytes()
+    fixed["dt_twin.c"] = twin_source(subject).encode()
+    token = _token(fixed, options.experiment)
+    places = " ".join(f"X({entry.field})" for entry in entries_of(subject.model))
+    fixed["dt_fmu_twin.h"] = _TWIN_HEADER.format(token=token, places=places).encode()
+    files = dict(sorted(fixed.items()))
+    experiment = options.experiment
+    header = Header(
+        name=subject.name,
+        identifier=identifier(subject.name),
+        token=token,
+        note=subject.note,
+        start_time=0.0 if experiment is None else float(experiment.time[0]),
+        stop_time=1.0 if experiment is None else float(experiment.time[-1]),
+        step=STEP if experiment is None else experiment.step,
+        sources=tuple(name for name in files if name.endswith(".c")),
+    )
+    return header, files
+
+
+_TWIN_HEADER = """/* SPDX-License-Identifier: MIT */
+/* What marks this FMU, and its parameters in the order of their value references. */
+#define DT_FMU_TOKEN "{token}"
+#define DT_FMU_PARAMETERS(X) {places}
+"""
+
+
+def _token(files: Mapping[str, bytes], experiment: Experiment | None) -> str:
+    digest = hashlib.sha256(b"" if experiment is None else experiment.digest())
+    for name, data in sorted(files.items()):
+        digest.update(name.encode() + b"\0" + data)
+    return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
+
+
+def _binaries(name: str, sources: Mapping[str, bytes], options: BuildOptions) -> dict[str, bytes]:
+    folders = _FOLDERS[options.version]
+    here = native_platform()
+    wanted: Sequence[tuple[Platform, Platform | None]]
+    if options.platforms:
+        wanted = [(each, each) for each in options.platforms if each in folders]
+    else:
+        wanted = [(here, None)] if here in folders else []
+    built = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        for file, data in sources.items():
+            (folder / file).write_bytes(data)
+        paths = [folder / file for file in sources if file.endswith(".c")]
+        for platform, target in wanted:
+            library = folder / f"{name}{platform.suffix}"
+            compile_library(paths, library, target)
+            built[f"binaries/{folders[platform]}/{library.name}"] = library.read_bytes()
+    return built
+
+
+def _build_description(header: Header) -> bytes:
+    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=header.identifier)
+    files = ET.SubElement(configuration, "SourceFileSet", language="C99")
+    for name in header.sources:
+        ET.SubElement(files, "SourceFile", name=name)
+    return document(root).encode()
+
+
+def _archive(files: Mapping[str, bytes]) -> bytes:
+    """Zip without times, so that the same contents are the same bytes."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in sorted(files.items()):
+            info = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = 0o644 << 16
+            archive.writestr(info, data)
+    return buffer.getvalue()

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: MIT
+"""`modelDescription.xml` for FMI 2.0 and 3.0."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drivetwin.export.fmu.units import display_unit, fmi_unit, unit_definitions
+from drivetwin.export.fmu.variables import ENUMERATIONS, FmiVersion, Kind, Role, Variable
+from drivetwin.export.parameters.xml_text import document
+from drivetwin.results.version import program_version
+
+
+@dataclass(frozen=True)
+class Header:
+    """What the description says of the FMU as a whole; times in s."""
+
+    name: str
+    identifier: str
+    token: str
+    note: str
+    start_time: float
+    stop_time: float
+    step: float
+    sources: tuple[str, ...]
+
+
+def description(version: FmiVersion, header: Header, variables: Sequence[Variable]) -> bytes:
+    """Contents of `modelDescription.xml`."""
+    root = _fmi2(header, variables) if version is FmiVersion.FMI2 else _fmi3(header, variables)
+    return document(root).encode()
+
+
+def _root(version: FmiVersion, header: Header, token: str) -> ET.Element:
+    return ET.Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": version.value,
+            "modelName": header.name,
+            token: header.token,
+            "description": header.note,
+            "generationTool": f"drivetwin {program_version()}",
+            "variableNamingConvention": "structured",
+        },
+    )
+
+
+_ABILITIES = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canSerializeFMUState": "true",
+    "canGetAndSetFMUState": "true",
+}
+
+
+def _fmi2(header: Header, variables: Sequence[Variable]) -> ET.Element:
+    root = _root(FmiVersion.FMI2, header, "guid")
+    abilities = {
+        **_ABILITIES,
+        "canInterpolateInputs": "true",
+        "maxOutputDerivativeOrder": "0",
+        "canNotUseMemoryManagementFunctions": "true",
+    }
+    fmi2_names = {name.replace("FMUState", "FMUstate"): value for name, value in abilities.items()}
+    simulation = ET.SubElement(
+        root, "CoSimulation", {"modelIdentifier": header.identifier, **fmi2_names}
+    )
+    files = ET.SubElement(simulation, "SourceFiles")
+    for name in header.sources:
+        ET.SubElement(files, "File", name=name)
+    root.append(_units(variables))
+    types = ET.SubElement(root, "TypeDefinitions")
+    for kind, names in ENUMERATIONS.items():
+        items = ET.SubElement(ET.SubElement(types, "SimpleType", name=kind.value), "Enumeration")
+        _items(items, names)
+    _log_categories(root)
+    _experiment(root, header)
+    listed = ET.SubElement(root, "ModelVariables")
+    for variable in variables:
+        _scalar_variable(listed, variable)
+    structure = ET.SubElement(root, "ModelStructure")
+    for part in ("Outputs", "InitialUnknowns"):
+        unknowns = ET.SubElement(structure, part)
+        for index, variable in enumerate(variables, 1):
+            if variable.role is Role.OUTPUT:
+                ET.SubElement(unknowns, "Unknown", index=str(index))
+    return root
+
+
+def _scalar_variable(parent: ET.Element, variable: Variable) -> None:
+    about = {
+        "name": variable.name,
+        "valueReference": str(variable.reference),
+        "description": variable.meaning,
+        "causality": variable.role.causality,
+        "variability": variable.role.variability(variable.kind),
+    }
+    item = ET.SubElement(parent, "ScalarVariable", {**about, **_initial(variable)})
+    if variable.kind in ENUMERATIONS:
+        typed = {"declaredType": variable.kind.value, **_start(variable)}
+        ET.SubElement(item, "Enumeration", typed)
+    else:
+        ET.SubElement(item, variable.kind.value, {**_quantity(variable), **_start(variable)})
+
+
+def _fmi3(header: Header, variables: Sequence[Variable]) -> ET.Element:
+    root = _root(FmiVersion.FMI3, header, "instantiationToken")
+    ET.SubElement(root, "CoSimulation", {"modelIdentifier": header.identifier, **_ABILITIES})
+    root.append(_units(variables))
+    types = ET.SubElement(root, "TypeDefinitions")
+    for kind, names in ENUMERATIONS.items():
+        _items(ET.SubElement(types, "EnumerationType", name=kind.value), names)
+    _log_categories(root)
+    _experiment(root, header)
+    listed = ET.SubElement(root, "ModelVariables")
+    time = {"name": "time", "valueReference": "0", "description": "simulation time"}
+    continuous = {"causality": "independent", "variability": "continuous"}
+    ET.SubElement(listed, "Float64", {**time, **continuous, "unit": "s"})
+    for variable in variables:
+        _variable3(listed, variable)
+    structure = ET.SubElement(root, "ModelStructure")
+    for part in ("Output", "InitialUnknown"):
+        for variable in variables:
+            if variable.role is Role.OUTPUT:
+                ET.SubElement(structure, part, valueReference=str(variable.reference))
+    return root
+
+
+def _variable3(parent: ET.Element, variable: Variable) -> None:
+    tag = {Kind.REAL: "Float64", Kind.INTEGER: "Int32"}.get(variable.kind, "Enumeration")
+    about = {
+        "name": variable.name,
+        "valueReference": str(variable.reference),
+        "description": variable.meaning,
+        "causality": variable.role.causality,
+        "variability": variable.role.variability(variable.kind),
+    }
+    typed = {"declaredType": variable.kind.value} if tag == "Enumeration" else _quantity(variable)
+    ET.SubElement(parent, tag, {**about, **_initial(variable), **typed, **_start(variable)})
+
+
+def _initial(variable: Variable) -> dict[str, str]:
+    initial = {"parameter": "exact", "output": "calculated"}.get(variable.role.causality)
+    return {} if initial is None else {"initial": initial}
+
+
+def _quantity(variable: Variable) -> dict[str, str]:
+    """Unit, display unit and limits; without a dimension there is no unit."""
+    attributes = {}
+    if variable.unit not in ("", "1"):
+        attributes["unit"] = fmi_unit(variable.unit)
+        shown = display_unit(variable.unit)
+        attributes |= {} if shown is None else {"displayUnit": shown}
+    for name, limit in (("min", variable.least), ("max", variable.most)):
+        if math.isfinite(limit):
+            attributes[name] = _number(variable, limit)
+    return attributes
+
+
+def _start(variable: Variable) -> dict[str, str]:
+    return {} if variable.start is None else {"start": _number(variable, variable.start)}
+
+
+def _number(variable: Variable, value: float) -> str:
+    return repr(float(value)) if variable.kind is Kind.REAL else str(int(value))
+
+
+def _items(parent: ET.Element, names: tuple[str, ...]) -> None:
+    for value, name in enumerate(names):
+        ET.SubElement(parent, "Item", name=name, value=str(value))
+
+
+def _units(variables: Sequence[Variable]) -> ET.Element:
+    return unit_definitions({"s", *(one.unit for one in variables)} - {"", "1"})
+
+
+def _log_categories(root: ET.Element) -> None:
+    about = {"name": "logStatusError", "description": "why a call failed"}
+    ET.SubElement(ET.SubElement(root, "LogCategories"), "Category", about)
+
+
+def _experiment(root: ET.Element, header: Header) -> None:
+    times = {"startTime": header.start_time, "stopTime": header.stop_time, "stepSize": header.step}
+    ET.SubElement(root, "DefaultExperiment", {key: repr(value) for key, value in times.items()})

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""What travels with the FMU: its parameter set, a measured shift and the result it gives.
+
+The layout is that of FMI-LS-REF 1.0: files below `extra/org.fmi-standard.fmi-ls-ref`, listed with
+their roles in a manifest.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.driveline import FloatArray
+from drivetwin.export.fmu.variables import FmiVersion, Role, Variable, variables_of
+from drivetwin.export.parameters.content import ParameterSet, Scalar
+from drivetwin.export.parameters.ssv import ssv_text
+from drivetwin.export.parameters.xml_text import document
+from drivetwin.export.subject import Subject
+from drivetwin.stepped import InputKind, stepped_run
+
+_FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+_PARAMETERS = "../../resources/parameters.ssv"
+_MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"
+_LABELS = {
+    "fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
+    "fmi-ls-version": "1.0.0-beta.1",
+    "fmi-ls-description": (
+        "Layered Standard providing information on related files included in an FMU."
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A measured shift on the FMU's communication points.
+
+    `time` (n,) [s] in steps of `step`; `inputs` (n, 3): engine torque [N m], pressures [Pa].
+    """
+
+    name: str
+    time: FloatArray
+    inputs: FloatArray
+    step: float
+
+    def digest(self) -> bytes:
+        """What tells this experiment from others."""
+        label = f"{self.name} {self.step!r}".encode()
+        return hashlib.sha256(label + self.time.tobytes() + self.inputs.tobytes()).digest()
+
+
+def reference_files(
+    subject: Subject, experiment: Experiment | None, version: FmiVersion
+) -> dict[str, bytes]:
+    """Files of the archive by path; without an experiment only the parameter set."""
+    files = {"resources/parameters.ssv": ssv_text(_parameters(subject)).encode()}
+    related = [(_PARAMETERS, "application/x-ssp-parameter-set", "parameter")]
+    if experiment is not None:
+        files |= _experiment_files(subject, experiment, version)
+        related += [
+            ("measured_shift.xml", "application/xml", "experiment/validation"),
+            ("measured_shift-in.csv", "text/csv", "other"),
+            ("measured_shift-ref.csv", "text/csv", "result"),
+        ]
+    manifest = _manifest(related, files)
+    return {**files, f"{_FOLDER}/fmi-ls-manifest.xml": manifest}
+
+
+def _parameters(subject: Subject) -> ParameterSet:
+    numbers = (
+        Scalar(one.name, one.start, one.unit, one.meaning)
+        for one in variables_of(subject)
+        if one.role is Role.TUNABLE and one.start is not None
+    )
+    return ParameterSet(subject.name, tuple(numbers), notes=(subject.note,))
+
+
+def _experiment_files(
+    subject: Subject, experiment: Experiment, version: FmiVersion
+) -> dict[str, bytes]:
+    """Stimulus, reference result by the core, and the description of both.
+
+    FMI 2.0 takes inputs with their derivatives, FMI 3.0 holds them over a step.
+    """
+    kind = InputKind.LINEAR if version is FmiVersion.FMI2 else InputKind.HOLD
+    run = stepped_run(subject.model, subject.start, experiment.time, experiment.inputs, kind)
+    variables = variables_of(subject)
+    inputs = [one for one in variables if one.role is Role.INPUT]
+    outputs = [one for one in variables if one.role is Role.OUTPUT][: len(_SPEEDS)]
+    results = np.column_stack([getattr(run, name) for name in _SPEEDS])
+    root = ET.Element("Experiments", name=experiment.name)
+    times = {
+        "startTime": repr(float(experiment.time[0])),
+        "stopTime": repr(float(experiment.time[-1])),
+        "stepSize": repr(experiment.step),
+    }
+    about = {"name": "measured_shift", "description": f"{experiment.name}, inputs {kind.value}"}
+    item = ET.SubElement(root, "Experiment", {**about, **times})
+    ET.SubElement(item, "Parameters", source=_PARAMETERS)
+    ET.SubElement(item, "Stimuli", source="measured_shift-in.csv")
+    ET.SubElement(item, "References", source="measured_shift-ref.csv")
+    return {
+        f"{_FOLDER}/measured_shift.xml": document(root).encode(),
+        f"{_FOLDER}/measured_shift-in.csv": _csv(inputs, experiment.time, experiment.inputs),
+        f"{_FOLDER}/measured_shift-ref.csv": _csv(outputs, experiment.time, results),
+    }
+
+
+_SPEEDS = ("engine_speed", "output_speed", "wheel_speed", "twist", "shaft_torque")
+"""Fields of a trajectory in the order of the FMU's first outputs."""
+
+
+def _csv(variables: Sequence[Variable], time: FloatArray, table: FloatArray) -> bytes:
+    """Rows that read back as the same doubles."""
+    lines = [",".join(("time", *(one.name for one in variables)))]
+    rows = np.column_stack((time, table)).tolist()
+    lines += [",".join(map(repr, row)) for row in rows]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _manifest(related: Sequence[tuple[str, str, str]], files: dict[str, bytes]) -> bytes:
+    names = {f"fmi-ls:{key}": value for key, value in _LABELS.items()}
+    root = ET.Element("fmiReferences", {"xmlns:fmi-ls": _MANIFEST, **names})
+    for source, kind, role in related:
+        data = files[source.removeprefix("../../") if ".." in source else f"{_FOLDER}/{source}"]
+        digest = hashlib.sha3_256(data).hexdigest()
+        about = {"type": kind, "source": source, "role": role, "checksum": digest}
+        ET.SubElement(root, "Related", about)
+    return document(root).encode()

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""Units as FMI declares them: base units, and what engineers want to read."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+
+from drivetwin.export.parameters.units import base_units
+
+_DISPLAY = {"rad/s": ("rpm", 30.0 / math.pi), "Pa": ("bar", 1e-5), "rad": ("deg", 180.0 / math.pi)}
+"""SI unit -> display unit and its factor: displayed = factor · value."""
+
+
+def fmi_unit(unit: str) -> str:
+    """A unit in the spelling of FMI and Modelica: `N.m.s/rad` for `N*m*s/rad`."""
+    return unit.replace("*", ".").replace("^", "")
+
+
+def display_unit(unit: str) -> str | None:
+    """Display unit of an SI unit, None where it is shown as it is."""
+    return _DISPLAY[unit][0] if unit in _DISPLAY else None
+
+
+def unit_definitions(units: Iterable[str]) -> ET.Element:
+    """The element `UnitDefinitions` for SI units in ASCII."""
+    root = ET.Element("UnitDefinitions")
+    for unit in sorted(set(units)):
+        item = ET.SubElement(root, "Unit", name=fmi_unit(unit))
+        powers = base_units(unit) or {}
+        ET.SubElement(item, "BaseUnit", {base: str(power) for base, power in powers.items()})
+        if unit in _DISPLAY:
+            name, factor = _DISPLAY[unit]
+            ET.SubElement(item, "DisplayUnit", name=name, factor=repr(factor))
+    return root

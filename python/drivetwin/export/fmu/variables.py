@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""The variables of the FMU; value references are those of `source/dt_fmu.h`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivetwin.export.entries import Entry, entries_of, locked_index, start_entries
+from drivetwin.export.subject import Subject
+
+INPUTS, OUTPUTS, MODES, LOSS_LAW, LOCKED, START, PARAMETERS = 1, 10, 30, 40, 41, 50, 100
+INF = math.inf
+
+
+class FmiVersion(StrEnum):
+    """Version of the interface."""
+
+    FMI2 = "2.0"
+    FMI3 = "3.0"
+
+
+class Kind(StrEnum):
+    """Type of a variable."""
+
+    REAL = "Real"
+    INTEGER = "Integer"
+    FRICTION_MODE = "FrictionMode"
+    LOSS_LAW = "LossLaw"
+
+
+ENUMERATIONS = {
+    Kind.FRICTION_MODE: ("open", "stuck", "positive slip", "negative slip"),
+    Kind.LOSS_LAW: ("paper", "dissipative"),
+}
+"""Names of the values 0, 1, … of each enumeration: `dt_mode` and `dt_loss_law`."""
+
+
+class Role(StrEnum):
+    """What a variable is for: causality and variability of FMI at once."""
+
+    INPUT = "input"
+    OUTPUT = "output"
+    TUNABLE = "tunable parameter"
+    FIXED = "fixed parameter"
+
+    @property
+    def causality(self) -> str:
+        """As FMI names it."""
+        return "parameter" if self in (Role.TUNABLE, Role.FIXED) else self.value
+
+    def variability(self, kind: Kind) -> str:
+        """As FMI names it."""
+        if self.causality == "parameter":
+            return self.value.partition(" ")[0]
+        return "continuous" if kind is Kind.REAL else "discrete"
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable; `unit` is SI, ASCII, empty for what is no Real."""
+
+    name: str
+    reference: int
+    kind: Kind
+    role: Role
+    meaning: str
+    unit: str = ""
+    start: float | None = None
+    least: float = -INF
+    most: float = INF
+
+
+def variables_of(subject: Subject) -> tuple[Variable, ...]:
+    """All variables: inputs, outputs, parameters; names are structured as FMI has it."""
+    model = subject.model
+    names = [structured(element.name) for element in model.elements]
+    return (
+        *_inputs(names),
+        *_outputs(names),
+        Variable(
+            "loss_law",
+            LOSS_LAW,
+            Kind.LOSS_LAW,
+            Role.FIXED,
+            "how losses depend on the direction of power",
+            start=float(list(ENUMERATIONS[Kind.LOSS_LAW]).index(model.loss_law)),
+        ),
+        Variable(
+            "start.locked",
+            LOCKED,
+            Kind.INTEGER,
+            Role.FIXED,
+            f"element that starts locked: 0 none, 1 {names[0]}, 2 {names[1]}",
+            start=float(locked_index(model, subject.start)),
+            least=0.0,
+            most=2.0,
+        ),
+        *(_parameter(e, START + i, Role.FIXED) for i, e in enumerate(start_entries(subject.start))),
+        *(_parameter(e, PARAMETERS + i, Role.TUNABLE) for i, e in enumerate(entries_of(model))),
+    )
+
+
+def structured(name: str) -> str:
+    """A name part that FMI's structured naming accepts: quoted where it is no identifier."""
+    plain = name.isascii() and name.isidentifier()
+    escaped = name.replace("\\", "\\\\").replace("'", "\\'")
+    return name if plain else f"'{escaped}'"
+
+
+def _parameter(entry: Entry, reference: int, role: Role) -> Variable:
+    head, dot, tail = entry.name.rpartition(".")
+    name = f"{structured(head)}{dot}{tail}" if dot else tail
+    return Variable(
+        name,
+        reference,
+        Kind.REAL,
+        role,
+        entry.meaning,
+        entry.unit,
+        float(entry.value),
+        entry.least,
+        entry.most,
+    )
+
+
+def _inputs(names: list[str]) -> list[Variable]:
+    def of(name: str, index: int, meaning: str, unit: str) -> Variable:
+        return Variable(name, INPUTS + index, Kind.REAL, Role.INPUT, meaning, unit, 0.0)
+
+    pressures = (
+        of(f"{name}.pressure", i, "gauge pressure", "Pa") for i, name in enumerate(names, 1)
+    )
+    return [of("engine_torque", 0, "indicated less friction", "N*m"), *pressures]
+
+
+def _outputs(names: list[str]) -> list[Variable]:
+    reals = (
+        ("engine_speed", "engine speed", "rad/s"),
+        ("output_speed", "speed of the gearbox output", "rad/s"),
+        ("wheel_speed", "wheel speed", "rad/s"),
+        ("twist", "twist of the output shaft", "rad"),
+        ("output_torque", "torque in the output shaft", "N*m"),
+        *((f"{name}.torque", "torque, drives the output", "N*m") for name in names),
+        *((f"{name}.slip", "slip, w_in / i_c - i_out w_out", "rad/s") for name in names),
+    )
+    return [
+        *(
+            Variable(name, OUTPUTS + i, Kind.REAL, Role.OUTPUT, meaning, unit)
+            for i, (name, meaning, unit) in enumerate(reals)
+        ),
+        *(
+            Variable(f"{n}.mode", MODES + i, Kind.FRICTION_MODE, Role.OUTPUT, "friction mode")
+            for i, n in enumerate(names)
+        ),
+    ]

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""Runs as a fixed-step importer sees them: inputs known at its communication points only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from drivetwin.driveline import (
+    Accuracy,
+    DualClutch,
+    FloatArray,
+    Signal,
+    State,
+    Trajectory,
+    simulate,
+)
+from drivetwin.errors import InputError
+
+
+class InputKind(StrEnum):
+    """What inputs do between two communication points."""
+
+    LINEAR = "linear"
+    HOLD = "hold"
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """Communication step [s] and the inputs between its points."""
+
+    step: float
+    kind: InputKind = InputKind.LINEAR
+
+    def grid(self, start: float, end: float) -> FloatArray:
+        """Communication points from `start` as far as whole steps reach. Raises InputError."""
+        if not 1e-5 <= self.step <= 0.1:
+            raise InputError(f"a step of {self.step:g} s", "choose one from 1e-5 s to 0.1 s")
+        count = int((end - start) / self.step + 1e-6)
+        if count < 1:
+            raise InputError(
+                f"one step of {self.step:g} s is longer than the {end - start:g} s to simulate",
+                "choose a shorter step",
+            )
+        return np.asarray(start + self.step * np.arange(count + 1), dtype=np.float64)
+
+
+def sampled(signals: Sequence[Signal], time: FloatArray) -> FloatArray:
+    """Values (n, signals) of inputs at `time` (n,) [s], linear between their own samples."""
+    columns = [np.interp(time, one.time + one.delay, one.values) for one in signals]
+    return np.column_stack(columns)
+
+
+def stepped_run(
+    model: DualClutch, start: State, time: FloatArray, inputs: FloatArray, kind: InputKind
+) -> Trajectory:
+    """Run with `inputs` (n, 3) given at `time` (n,): engine torque, then pressures in the order of
+    the elements; integrated to round-off. Where inputs jump, torques are those from there on.
+
+    Raises InputError for an inconsistent description; a run that fails returns its status.
+    """
+    torque, *pressures = (_signal(time, column, kind) for column in inputs.T)
+    names = [element.name for element in model.elements]
+    given = dict(zip(names, pressures, strict=True))
+    return simulate(model, torque, given, start, time, accuracy=Accuracy(exact=True))
+
+
+def _signal(time: FloatArray, values: FloatArray, kind: InputKind) -> Signal:
+    if kind is InputKind.LINEAR:
+        return Signal(time, np.ascontiguousarray(values))
+    # A repeated time stamp is a jump: every value lasts until the next point.
+    return Signal(np.repeat(time, 2)[1:-1], np.repeat(values[:-1], 2))
