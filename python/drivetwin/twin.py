@@ -229,13 +229,13 @@ class Twin:
             i_out=design.i_out,
             gain=design.gain,
             P0=given.get(f"P0.{name}", self.value(f"P0.{name}", design.P0)),
-            friction=_law(curve),
+            friction=friction_law(curve),
             peak=design.peak,
             drum_inertia=design.drum_inertia,
         )
 
 
-def _law(curve: FrictionCurve) -> Stribeck | FrictionTable:
+def friction_law(curve: FrictionCurve) -> Stribeck | FrictionTable:
     """Fitted Stribeck law, or the smoothed curve continued flat to zero slip."""
     if curve.stribeck is not None:
         return Stribeck(**curve.stribeck)

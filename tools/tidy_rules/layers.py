@@ -29,7 +29,7 @@ PYTHON_LAYERS = (
     frozenset({"logs", "vehicle", "held", "gearbox"}),
     frozenset({"shifts", "dyno", "drive"}),
     frozenset({"identify"}),
-    frozenset({"twin", "results", "start_state", "validate", "stepped"}),
+    frozenset({"twin", "results", "start_state", "validate", "stepping", "stepped"}),
     frozenset({"observer"}),
     frozenset({"report", "export"}),
     frozenset({"fleet"}),

@@ -11,6 +11,7 @@ import typer
 
 from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
+from drivetwin.cli.export import export
 from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
 from drivetwin.cli.inspect import inspect
@@ -38,6 +39,7 @@ for command in (
     simulate,
     observe,
     report,
+    export,
     gearbox,
     reduce,
     drive,

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: MIT
 """ASAM CDF 2.0 (.cdfx), as CANape, INCA and MATLAB read it.
 
-A number is a SW-INSTANCE of category VALUE; a curve is a CURVE with a STD_AXIS of its own. The
-name of the axis quantity, for which the format has no place, stands in the DISPLAY-NAME.
+A number is a SW-INSTANCE of category VALUE; a curve is a CURVE with a STD_AXIS of its own.
 """
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.export.parameters.content import (
@@ -21,38 +19,21 @@ from drivetwin.export.parameters.content import (
     finite,
     legal,
     number,
-    read_file,
 )
-from drivetwin.export.parameters.of_twin import Names, parameters_of
-from drivetwin.export.parameters.spelling import dotted_name, one_line, shown_unit, unit_of
+from drivetwin.export.parameters.spelling import (
+    dotted_name,
+    one_line,
+    shown_unit,
+    unit_of,
+    with_axis,
+    without_axis,
+)
 from drivetwin.export.parameters.xml_text import child, comment, document, parse_xml, text_at
-from drivetwin.results.atomic import write_text
-
-if TYPE_CHECKING:
-    from drivetwin.drive.powertrain import Converter
-    from drivetwin.twin import Twin
 
 _DOCTYPE = (
     '<!DOCTYPE MSRSW PUBLIC "-//ASAM//DTD CALIBRATION DATA FORMAT:V2.0.0:LAI:IAI:XML:CDF200.XSD'
     '//EN" "cdf_v2.0.0.sl.dtd">'
 )
-_OVER = "over "
-"""Before the name of the axis quantity in the DISPLAY-NAME of a curve."""
-
-
-def write_cdfx(
-    twin: Twin, path: Path, *, names: Names = Names.DRIVETWIN, converter: Converter | None = None
-) -> None:
-    """Write the parameters of a twin; the file appears whole or not at all."""
-    write_text(path, cdfx_text(parameters_of(twin, names, converter)))
-
-
-def read_cdfx(path: Path) -> ParameterSet:
-    """Read instances of the categories VALUE and CURVE; others are named as skipped.
-
-    Raises FileFormatError where the file is no CDF 2.0 or an instance is damaged.
-    """
-    return parse_cdfx(read_file(path), path.name)
 
 
 def legal_for_cdfx(parameters: ParameterSet) -> ParameterSet:
@@ -73,10 +54,11 @@ def cdfx_text(parameters: ParameterSet) -> str:
     child(tree, "SHORT-NAME", "drivetwin")
     child(tree, "CATEGORY", "NO_VCD")
     for scalar in content.scalars:
-        instance = _instance(tree, scalar, "VALUE", "")
+        instance = _instance(tree, scalar.name, scalar.text, "VALUE")
         _values(child(instance, "SW-VALUE-CONT"), scalar.unit, (scalar.value,))
     for curve in content.curves:
-        instance = _instance(tree, curve, "CURVE", _OVER + curve.axis.name)
+        text = with_axis(curve.text, curve.axis.name)
+        instance = _instance(tree, curve.name, text, "CURVE")
         _values(child(instance, "SW-VALUE-CONT"), curve.unit, curve.values)
         axis = child(child(instance, "SW-AXIS-CONTS"), "SW-AXIS-CONT")
         child(axis, "CATEGORY", "STD_AXIS")
@@ -84,12 +66,10 @@ def cdfx_text(parameters: ParameterSet) -> str:
     return document(root, _DOCTYPE, comment(content.notes))
 
 
-def _instance(tree: ET.Element, entry: Scalar | Curve, category: str, display: str) -> ET.Element:
+def _instance(tree: ET.Element, name: str, text: str, category: str) -> ET.Element:
     instance = child(tree, "SW-INSTANCE")
-    child(instance, "SHORT-NAME", entry.name)
-    child(instance, "LONG-NAME", entry.text)
-    if display:
-        child(instance, "DISPLAY-NAME", display)
+    child(instance, "SHORT-NAME", name)
+    child(instance, "LONG-NAME", text)
     child(instance, "CATEGORY", category)
     return instance
 
@@ -102,7 +82,10 @@ def _values(parent: ET.Element, unit: str, values: tuple[float, ...]) -> None:
 
 
 def parse_cdfx(text: str, source: str) -> ParameterSet:
-    """Inverse of `cdfx_text`; also reads what calibration tools write. Raises FileFormatError."""
+    """Read instances of the categories VALUE and CURVE; others are named as skipped.
+
+    Raises FileFormatError where the file is no CDF 2.0 or an instance is damaged.
+    """
     root = parse_xml(text, source)
     system = root.find("SW-SYSTEMS/SW-SYSTEM")
     if root.tag != "MSRSW" or system is None:
@@ -138,18 +121,15 @@ def _curve(name: str, at: tuple[ET.Element, ET.Element, ET.Element], source: str
     def numbers(parent: ET.Element, path: str) -> tuple[float, ...]:
         return tuple(finite(one.text or "", source, name) for one in parent.findall(path))
 
-    over = text_at(instance, "DISPLAY-NAME")
+    description, over = without_axis(text_at(instance, "LONG-NAME"))
     return curve_of(
         name,
         Axis(
-            over.removeprefix(_OVER) if over.startswith(_OVER) else "x",
+            over,
             numbers(axis, "SW-VALUES-PHYS//V"),
             unit_of(text_at(axis, "UNIT-DISPLAY-NAME")),
         ),
         numbers(holder, "SW-VALUE-CONT/SW-VALUES-PHYS//V"),
-        (
-            unit_of(text_at(holder, "SW-VALUE-CONT/UNIT-DISPLAY-NAME")),
-            text_at(instance, "LONG-NAME"),
-        ),
+        (unit_of(text_at(holder, "SW-VALUE-CONT/UNIT-DISPLAY-NAME")), description),
         source,
     )

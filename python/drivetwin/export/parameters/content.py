@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 from drivetwin.errors import FileFormatError, InputError, Where
 
@@ -61,10 +60,15 @@ class ParameterSet:
 
     def __getitem__(self, name: str) -> Scalar | Curve:
         """Number or curve by its name. Raises KeyError."""
-        for entry in (*self.scalars, *self.curves):
+        for entry in self.entries:
             if entry.name == name:
                 return entry
         raise KeyError(name)
+
+    @property
+    def entries(self) -> tuple[Scalar | Curve, ...]:
+        """Numbers, then curves."""
+        return (*self.scalars, *self.curves)
 
 
 def legal(
@@ -82,7 +86,7 @@ def legal(
         return line(entry.text + kept).strip()
 
     changed = ParameterSet(
-        name=line(parameters.name),
+        name=line(parameters.name) or "parameters",
         scalars=tuple(
             replace(one, name=spell(one.name), text=respelled(one), unit=line(one.unit))
             for one in parameters.scalars
@@ -93,7 +97,11 @@ def legal(
                 name=spell(one.name),
                 text=respelled(one),
                 unit=line(one.unit),
-                axis=replace(one.axis, name=spell(one.axis.name), unit=line(one.axis.unit)),
+                axis=replace(
+                    one.axis,
+                    name=spell(one.axis.name).replace(".", "_"),
+                    unit=line(one.axis.unit),
+                ),
             )
             for one in parameters.curves
         ),
@@ -105,8 +113,7 @@ def legal(
 
 def _refuse_twins(before: ParameterSet, after: ParameterSet) -> None:
     origin: dict[str, str] = {}
-    old = [one.name for one in (*before.scalars, *before.curves)]
-    new = [one.name for one in (*after.scalars, *after.curves)]
+    old, new = ([one.name for one in each.entries] for each in (before, after))
     for name, respelled in zip(old, new, strict=True):
         if respelled in origin:
             raise InputError(
@@ -154,19 +161,3 @@ def curve_of(
     else:
         return made
     raise FileFormatError(fault, "correct the curve", Where(file=source, key=name))
-
-
-def read_file(path: Path) -> str:
-    """Text of a parameter file in UTF-8 or, as older tools write, Latin-1.
-
-    Raises FileFormatError for a file with null bytes, and OSError.
-    """
-    data = path.read_bytes()
-    if b"\0" in data:
-        raise FileFormatError(
-            "the file is binary", "hand in a parameter file", Where(file=path.name)
-        )
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")

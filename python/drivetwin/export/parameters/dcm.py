@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.export.parameters.content import (
@@ -22,15 +22,15 @@ from drivetwin.export.parameters.content import (
     finite,
     legal,
     number,
-    read_file,
 )
-from drivetwin.export.parameters.of_twin import Names, parameters_of
-from drivetwin.export.parameters.spelling import ascii_line, dotted_name, shown_unit, unit_of
-from drivetwin.results.atomic import write_text
-
-if TYPE_CHECKING:
-    from drivetwin.drive.powertrain import Converter
-    from drivetwin.twin import Twin
+from drivetwin.export.parameters.spelling import (
+    ascii_line,
+    dotted_name,
+    shown_unit,
+    unit_of,
+    with_axis,
+    without_axis,
+)
 
 _FORMAT = "KONSERVIERUNG_FORMAT"
 _PER_LINE = 6
@@ -38,24 +38,8 @@ _CURVES = ("KENNLINIE", "FESTKENNLINIE", "GRUPPENKENNLINIE")
 _OTHERS = ("FESTWERTEBLOCK", "KENNFELD", "FESTKENNFELD", "GRUPPENKENNFELD", "TEXTSTRING")
 _BLOCKS = ("FESTWERT", *_CURVES, *_OTHERS, "STUETZSTELLENVERTEILUNG", "FUNKTIONEN")
 _COMMENTS = ("*", "!", ".")
-_AXIS_NAME = "SSTX"
 
 _Fields = dict[str, list[str]]
-
-
-def write_dcm(
-    twin: Twin, path: Path, *, names: Names = Names.DRIVETWIN, converter: Converter | None = None
-) -> None:
-    """Write the parameters of a twin; the file appears whole or not at all."""
-    write_text(path, dcm_text(parameters_of(twin, names, converter)))
-
-
-def read_dcm(path: Path) -> ParameterSet:
-    """Read fixed values and characteristic curves; other objects are named as skipped.
-
-    Raises FileFormatError where the file is no DCM or an object is damaged.
-    """
-    return parse_dcm(read_file(path), path.name)
 
 
 def legal_for_dcm(parameters: ParameterSet) -> ParameterSet:
@@ -75,8 +59,8 @@ def dcm_text(parameters: ParameterSet) -> str:
         lines += [f'  EINHEIT_W "{shown_unit(scalar.unit)}"', f"  WERT {number(scalar.value)}"]
         lines += ["END", ""]
     for curve in content.curves:
-        lines += [f"KENNLINIE {curve.name} {len(curve.values)}", *_head(curve, function)]
-        lines += [f"* {_AXIS_NAME} {curve.axis.name}"]
+        described = replace(curve, text=with_axis(curve.text, curve.axis.name))
+        lines += [f"KENNLINIE {curve.name} {len(curve.values)}", *_head(described, function)]
         lines += [f'  EINHEIT_X "{shown_unit(curve.axis.unit)}"']
         lines += [f'  EINHEIT_W "{shown_unit(curve.unit)}"']
         lines += [*_listed("ST/X", curve.axis.points), *_listed("WERT", curve.values), "END", ""]
@@ -93,7 +77,10 @@ def _listed(keyword: str, values: tuple[float, ...]) -> Iterator[str]:
 
 
 def parse_dcm(text: str, source: str) -> ParameterSet:
-    """Inverse of `dcm_text`; also reads what calibration tools write. Raises FileFormatError."""
+    """Read fixed values and characteristic curves; other objects are named as skipped.
+
+    Raises FileFormatError where the file is no DCM or an object is damaged.
+    """
     lines = [line.strip() for line in text.splitlines()]
     if not any(line.startswith(_FORMAT) for line in lines):
         raise FileFormatError(
@@ -118,10 +105,9 @@ def _blocks(lines: list[str], source: str) -> Iterator[tuple[str, str, _Fields]]
     """Keyword, rest of its line and the fields of every block up to its END."""
     open_block: tuple[str, str, _Fields] | None = None
     for line in lines:
-        keyword, _, rest = line.partition(" ")
         if line.startswith(_COMMENTS):
-            mark, _, value = line[1:].strip().partition(" ")
-            keyword, rest = (mark, value) if mark == _AXIS_NAME else ("", "")
+            continue
+        keyword, _, rest = line.partition(" ")
         if keyword == "END" and open_block is not None:
             yield open_block
             open_block = None
@@ -157,10 +143,11 @@ def _scalar(label: str, fields: _Fields, source: str) -> Scalar:
 
 
 def _curve(label: str, fields: _Fields, source: str) -> Curve:
+    text, over = without_axis(_quoted(fields, "LANGNAME"))
     axis = Axis(
-        fields.get(_AXIS_NAME, ["x"])[0],
+        over,
         _numbers(fields, "ST/X", label, source),
         unit_of(_quoted(fields, "EINHEIT_X")),
     )
-    labels = (unit_of(_quoted(fields, "EINHEIT_W")), _quoted(fields, "LANGNAME"))
+    labels = (unit_of(_quoted(fields, "EINHEIT_W")), text)
     return curve_of(label, axis, _numbers(fields, "WERT", label, source), labels, source)

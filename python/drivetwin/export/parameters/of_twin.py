@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.spelling import one_line
 from drivetwin.parameters import spec_of
 from drivetwin.twin import friction_law
@@ -38,13 +38,6 @@ _LAW = {
     "v_s": ("rad/s", "slip over which the difference decays"),
     "mu_v": ("s/rad", "rise of the friction coefficient with slip"),
 }
-
-
-class Names(StrEnum):
-    """Whose names a parameter file uses: drivetwin's own or those of Simscape Driveline blocks."""
-
-    DRIVETWIN = "drivetwin"
-    SIMSCAPE = "simscape"
 
 
 def parameters_of(

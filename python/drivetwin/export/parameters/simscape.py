@@ -17,7 +17,8 @@ _RENAMED = {
     "c_o": "b_shaft",
     "J_out": "J_output",
 }
-_CLUTCH_FIELDS = ("gain", "P0", "peak")
+_CLUTCH_FIELDS = ("gain", "P0", "peak", "mu_c", "mu_s", "v_s", "mu_v")
+"""What the block states in its own way: the geometry, and the friction law as a table."""
 
 
 def simscape(own: ParameterSet, elements: tuple[str, ...]) -> ParameterSet:
@@ -72,12 +73,14 @@ def _curve(curve: Curve) -> Curve:
 def _capacity_factor(capacity: Curve, axis: Axis) -> Curve:
     """Speed over root of torque, which is how the block states it; finite below ν = 1 only."""
     drive = [
-        (ratio, value) for ratio, value in zip(axis.points, capacity.values, strict=True) if value > 0
+        (ratio, value)
+        for ratio, value in zip(axis.points, capacity.values, strict=True)
+        if value > 0
     ]
     return Curve(
         "tc_capacity_factor",
         replace(axis, points=tuple(ratio for ratio, _ in drive)),
         tuple(value**-0.5 for _, value in drive),
-        "(rad/s)/(N*m)^0.5",
+        "rad/(s*N^0.5*m^0.5)",
         "pump speed over root of pump torque; drive only, where the torque is positive",
     )

@@ -22,16 +22,20 @@ _SIGNS = {"′": "'", "·": "*", "→": "->", "–": "-", "—": "-", "−": "-"
 _REPLACED = str.maketrans({**_GREEK, **_SIGNS})
 
 _MATLAB_NAME_LENGTH = 63
-_MATLAB_KEYWORDS = frozenset(
-    "break case catch classdef continue else elseif end for function global if otherwise parfor "
-    "persistent return spmd switch try while".split()
+_MATLAB_KEYWORDS = re.compile(
+    "break|case|catch|classdef|continue|else|elseif|end|for|function|global|if|otherwise|parfor|"
+    "persistent|return|spmd|switch|try|while"
 )
 
 
 def one_line(text: str) -> str:
     """The text with white space as single blanks, without control characters."""
-    words = " ".join(text.split())
-    return "".join(char for char in words if unicodedata.category(char) not in _UNPRINTABLE)
+    kept = (
+        " " if char.isspace() else char
+        for char in text
+        if char.isspace() or unicodedata.category(char) not in _UNPRINTABLE
+    )
+    return " ".join("".join(kept).split())
 
 
 _UNPRINTABLE = frozenset({"Cc", "Cf", "Cn", "Co", "Cs"})
@@ -48,6 +52,11 @@ def ascii_line(text: str) -> str:
     return one_line(bare.encode("ascii", "replace").decode().replace('"', "'").replace("\\", "/"))
 
 
+def free_name(name: str) -> str:
+    """Any name on one line, `_` where nothing is left."""
+    return one_line(name) or "_"
+
+
 def dotted_name(name: str) -> str:
     """Identifier of calibration tools: letters, digits, `_` and `.`, no digit or dot in front."""
     return re.sub(r"^(?=[0-9.])|^$", "_", re.sub(r"[^A-Za-z0-9_.]", "_", ascii_line(name)))
@@ -56,7 +65,7 @@ def dotted_name(name: str) -> str:
 def flat_name(name: str) -> str:
     """Identifier of MATLAB: letters, digits and `_`, a letter in front, at most 63 characters."""
     flat = re.sub(r"[^A-Za-z0-9_]", "_", ascii_line(name))
-    if not flat[:1].isalpha() or flat in _MATLAB_KEYWORDS:
+    if not flat[:1].isalpha() or _MATLAB_KEYWORDS.fullmatch(flat):
         flat = f"p_{flat}"
     return flat[:_MATLAB_NAME_LENGTH]
 
@@ -69,3 +78,14 @@ def shown_unit(unit: str) -> str:
 def unit_of(shown: str) -> str:
     """Inverse of `shown_unit`; nothing at all also means without dimension."""
     return "1" if shown.strip() in ("", "-") else shown.strip()
+
+
+def with_axis(text: str, axis: str) -> str:
+    """Description of a curve that also names its axis, for formats without a place for that."""
+    return f"{text} (over {axis})".strip()
+
+
+def without_axis(text: str) -> tuple[str, str]:
+    """Inverse of `with_axis`: text and axis, which is `x` where none is named."""
+    found = re.fullmatch(r"(.*?) ?\(over ([A-Za-z0-9_.]+)\)", text)
+    return (found[1], found[2]) if found else (text, "x")

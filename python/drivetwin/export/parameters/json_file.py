@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""Parameters as JSON, for scripts in any language."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+from pydantic import Field, FiniteFloat, ValidationError
+
+from drivetwin.errors import FileFormatError, Where
+from drivetwin.export.parameters.content import (
+    Axis,
+    ParameterSet,
+    Scalar,
+    curve_of,
+    legal,
+)
+from drivetwin.export.parameters.spelling import free_name, one_line
+from drivetwin.tomlfile import StrictModel
+
+SCHEMA = "drivetwin/parameters-1"
+
+
+class _ScalarRecord(StrictModel):
+    name: str
+    value: FiniteFloat
+    unit: str = "1"
+    text: str = ""
+
+
+class _AxisRecord(StrictModel):
+    name: str
+    points: list[FiniteFloat] = Field(min_length=1)
+    unit: str = "1"
+
+
+class _CurveRecord(StrictModel):
+    name: str
+    axis: _AxisRecord
+    values: list[FiniteFloat] = Field(min_length=1)
+    unit: str = "1"
+    text: str = ""
+
+
+class _File(StrictModel):
+    schema_name: str = Field(alias="schema", pattern=f"^{SCHEMA}$")
+    name: str
+    scalars: list[_ScalarRecord]
+    curves: list[_CurveRecord]
+    notes: list[str] = Field(default_factory=list)
+
+
+def legal_for_json(parameters: ParameterSet) -> ParameterSet:
+    """The set as the format can hold it."""
+    return legal(parameters, free_name, one_line)
+
+
+def json_text(parameters: ParameterSet) -> str:
+    """Contents of the file."""
+    fields = asdict(legal_for_json(parameters))
+    fields.pop("skipped")
+    text = json.dumps({"schema": SCHEMA, **fields}, ensure_ascii=False, allow_nan=False, indent=2)
+    return text + "\n"
+
+
+def parse_json(text: str, source: str) -> ParameterSet:
+    """Read the file. Raises FileFormatError where it is damaged or of another schema."""
+    try:
+        content = _File.model_validate_json(text)
+    except ValidationError as fault:
+        raise FileFormatError(
+            f"no parameters in the schema {SCHEMA}: {fault}",
+            "correct these keys",
+            Where(file=source),
+        ) from None
+    curves = (
+        curve_of(
+            one.name,
+            Axis(one.axis.name, tuple(one.axis.points), one.axis.unit),
+            one.values,
+            (one.unit, one.text),
+            source,
+        )
+        for one in content.curves
+    )
+    scalars = (Scalar(**one.model_dump()) for one in content.scalars)
+    return ParameterSet(content.name, tuple(scalars), tuple(curves), notes=tuple(content.notes))

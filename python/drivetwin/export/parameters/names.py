@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: MIT
+"""Whose names a parameter file uses."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Names(StrEnum):
+    """drivetwin's own ids, or what Simscape Driveline blocks call the same."""
+
+    DRIVETWIN = "drivetwin"
+    SIMSCAPE = "simscape"

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""System structure parameter values (SSP 1.0, .ssv), as FMPy, OMSimulator and Dymola read it.
+
+The format knows scalars only. A curve `mu.B3` over `slip` is written as `mu.B3[1]`, `mu.B3[2]` …
+and `mu.B3.slip[1]`, `mu.B3.slip[2]` …, in the structured naming of FMI.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+from drivetwin.errors import FileFormatError, Where
+from drivetwin.export.parameters.content import (
+    Axis,
+    Curve,
+    ParameterSet,
+    Scalar,
+    curve_of,
+    finite,
+    legal,
+    number,
+)
+from drivetwin.export.parameters.spelling import dotted_name, one_line
+from drivetwin.export.parameters.units import base_units
+from drivetwin.export.parameters.xml_text import child, comment, document, parse_xml
+
+_SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+_SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+_INDEXED = re.compile(r"(.+)\[(\d+)\]")
+
+
+def legal_for_ssv(parameters: ParameterSet) -> ParameterSet:
+    """The set as the format can hold it."""
+    return legal(parameters, dotted_name, one_line)
+
+
+def ssv_text(parameters: ParameterSet) -> str:
+    """Contents of the file."""
+    content = legal_for_ssv(parameters)
+    root = ET.Element("ssv:ParameterSet", {"xmlns:ssv": _SSV, "xmlns:ssc": _SSC})
+    root.attrib |= {"version": "1.0", "name": content.name, "generationTool": "drivetwin"}
+    listed = child(root, "ssv:Parameters")
+    for scalar in content.scalars:
+        _real(listed, scalar)
+    for curve in content.curves:
+        over = f"{curve.name}.{curve.axis.name}"
+        for index, (at, value) in enumerate(zip(curve.axis.points, curve.values, strict=True), 1):
+            _real(listed, Scalar(f"{over}[{index}]", at, curve.axis.unit))
+            text = curve.text if index == 1 else ""
+            _real(listed, Scalar(f"{curve.name}[{index}]", value, curve.unit, text))
+    units = child(root, "ssv:Units")
+    for unit in _units(content):
+        # The format declares whole powers only; a root of torque stays a bare name.
+        if (powers := base_units(unit)) is not None:
+            base = {name: str(power) for name, power in powers.items()}
+            child(child(units, "ssc:Unit", name=unit), "ssc:BaseUnit", **base)
+    return document(root, comment(content.notes))
+
+
+def _real(parent: ET.Element, scalar: Scalar) -> None:
+    about = {"description": scalar.text} if scalar.text else {}
+    parameter = child(parent, "ssv:Parameter", name=scalar.name, **about)
+    child(parameter, "ssv:Real", value=number(scalar.value), unit=scalar.unit)
+
+
+def _units(content: ParameterSet) -> list[str]:
+    entries = (one.unit for one in content.entries)
+    return sorted({*entries, *(curve.axis.unit for curve in content.curves), "1"})
+
+
+def parse_ssv(text: str, source: str) -> ParameterSet:
+    """Read the Real parameters and the curves among them; others are named as skipped.
+
+    Raises FileFormatError where the file is no SSV or a value is damaged.
+    """
+    root = parse_xml(text, source)
+    if root.tag != f"{{{_SSV}}}ParameterSet":
+        raise FileFormatError("no SSP 1.0 ParameterSet", "hand in an .ssv file", Where(file=source))
+    scalars, skipped = [], []
+    for parameter in root.iter(f"{{{_SSV}}}Parameter"):
+        name, real = parameter.get("name", ""), parameter.find(f"{{{_SSV}}}Real")
+        if real is None:
+            skipped.append(name)
+            continue
+        value = finite(real.get("value", ""), source, name)
+        about = parameter.get("description", "")
+        scalars.append(Scalar(name, value, real.get("unit", "1"), about))
+    alone, curves = _gathered(scalars, source)
+    return ParameterSet(root.get("name", Path(source).stem), alone, curves, skipped=tuple(skipped))
+
+
+def _gathered(scalars: list[Scalar], source: str) -> tuple[tuple[Scalar, ...], tuple[Curve, ...]]:
+    """Scalars that stand alone, and the curves among the indexed ones."""
+    arrays: dict[str, list[Scalar]] = {}
+    alone = []
+    for scalar in scalars:
+        found = _INDEXED.fullmatch(scalar.name)
+        if found is None:
+            alone.append(scalar)
+        else:
+            arrays.setdefault(found[1], []).append(scalar)
+    axes = {
+        prefix: name for name in arrays for prefix in [name.rpartition(".")[0]] if prefix in arrays
+    }
+    curves = [_curve(name, arrays[name], axis, arrays[axis], source) for name, axis in axes.items()]
+    paired = {*axes, *axes.values()}
+    alone += [one for name, members in arrays.items() if name not in paired for one in members]
+    return tuple(alone), tuple(curves)
+
+
+def _curve(name: str, values: list[Scalar], axis: str, points: list[Scalar], source: str) -> Curve:
+    return curve_of(
+        name,
+        Axis(axis.rpartition(".")[2], tuple(one.value for one in points), points[0].unit),
+        (one.value for one in values),
+        (values[0].unit, values[0].text),
+        source,
+    )

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""Every format gives back what was written, and refuses what is damaged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import assume, given, settings
+
+from drivetwin.errors import FileFormatError, InputError
+from drivetwin.export.parameters.content import ParameterSet
+from drivetwin.export.parameters.files import (
+    CODECS,
+    ParameterFormat,
+    read_parameters,
+    write_parameters,
+)
+from drivetwin.export.parameters.names import Names
+from drivetwin.export.parameters.of_twin import parameters_of
+from tests.export.parameters.sample import SETS, twin
+
+EVERY_FORMAT = pytest.mark.parametrize("kind", ParameterFormat)
+
+
+@EVERY_FORMAT
+@given(SETS)
+@settings(max_examples=25)
+def test_round_trip(kind: ParameterFormat, content: ParameterSet) -> None:
+    codec = CODECS[kind]
+    try:
+        held = codec.legal(content)
+    except InputError:
+        assume(False)
+    assert codec.parse(codec.text(content), "file") == held
+    assert codec.legal(held) == held
+
+
+@EVERY_FORMAT
+@pytest.mark.parametrize("names", Names)
+def test_parameters_of_a_twin_survive_the_file(
+    kind: ParameterFormat, names: Names, tmp_path: Path
+) -> None:
+    content = parameters_of(twin(), names)
+    path = tmp_path / f"twin.{kind}"
+    write_parameters(content, path, kind)
+    back = read_parameters(path)
+    assert back == CODECS[kind].legal(content)
+    assert back.skipped == ()
+    assert [one.value for one in back.scalars] == [one.value for one in content.scalars]
+    assert [one.values for one in back.curves] == [one.values for one in content.curves]
+    assert [one.unit for one in back.entries] == [one.unit for one in content.entries]
+    assert "no value of te_delay: the engine torque is constant" in path.read_text("utf-8")
+
+
+@EVERY_FORMAT
+def test_names_that_become_one_are_refused(kind: ParameterFormat) -> None:
+    content = parameters_of(twin())
+    doubled = ParameterSet("twice", content.scalars[:1] * 2)
+    with pytest.raises(InputError, match="both written as"):
+        CODECS[kind].text(doubled)
+
+
+@EVERY_FORMAT
+@pytest.mark.parametrize("text", ["", "\n", "<a/>", "{}", "a,b\n1,2\n", "x = ;", "\u00e4 = \u00b5"])
+def test_what_is_no_parameter_file_is_refused(kind: ParameterFormat, text: str) -> None:
+    with pytest.raises(FileFormatError):
+        CODECS[kind].parse(text, "file")
+
+
+@EVERY_FORMAT
+@pytest.mark.parametrize("wrong", ["nan", "inf", "0,85"])
+def test_a_value_that_is_no_finite_number_is_refused(kind: ParameterFormat, wrong: str) -> None:
+    text = CODECS[kind].text(parameters_of(twin()))
+    assert text.count("176000.0") == 1
+    with pytest.raises(FileFormatError):
+        CODECS[kind].parse(text.replace("176000.0", wrong), "file")
+
+
+@EVERY_FORMAT
+def test_a_curve_that_lost_a_point_is_refused(kind: ParameterFormat) -> None:
+    content = parameters_of(twin())
+    text = CODECS[kind].text(content)
+    last = repr(content.curves[0].axis.points[-1])
+    repeated = repr(content.curves[0].axis.points[-2])
+    assert text.count(last) >= 1
+    with pytest.raises(FileFormatError, match=r"do not increase|axis points for"):
+        CODECS[kind].parse(text.replace(last, repeated), "file")
+
+
+def test_a_format_is_known_by_its_ending(tmp_path: Path) -> None:
+    path = tmp_path / "parameters.xyz"
+    path.write_text("", "utf-8")
+    with pytest.raises(InputError, match="use one of ssv, cdfx, dcm, m, json, csv"):
+        read_parameters(path)
+
+
+def test_binary_is_refused_and_latin_1_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "old.dcm"
+    path.write_bytes(b"\0\1")
+    with pytest.raises(FileFormatError, match="binary"):
+        read_parameters(path)
+    text = 'KONSERVIERUNG_FORMAT 2.0\nFESTWERT T\n  EINHEIT_W "\xb0C"\n  WERT 20\nEND\n'
+    path.write_bytes(text.encode("latin-1"))
+    assert read_parameters(path).scalars[0].unit == "\xb0C"

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""The MATLAB script against an example written by hand."""
+
+from __future__ import annotations
+
+from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.matlab import m_text, parse_m
+
+CONTENT = ParameterSet(
+    "truck",
+    (Scalar("P0.B3", 82000.0, "Pa", "fill ends; 95 % sure"), Scalar("end", -1.5)),
+    (Curve("mu.B3", Axis("slip", (0.0, 20.0), "rad/s"), (0.13, 1e-22), text="friction"),),
+    notes=("drivetwin",),
+)
+
+EXPECTED = """%% Parameters of truck
+% drivetwin
+
+P0_B3 = 82000.0; % [Pa] fill ends; 95 % sure (P0.B3)
+p_end = -1.5; % [1] (end)
+
+mu_B3_slip = [0.0 20.0]; % [rad/s] breakpoints slip of mu_B3
+mu_B3 = [0.13 1.0e-22]; % [1] friction (mu.B3)
+"""
+
+
+def test_the_text_is_that_of_the_example() -> None:
+    assert m_text(CONTENT) == EXPECTED
+
+
+def test_lines_by_hand_are_read_and_the_rest_is_named() -> None:
+    text = "clear all\nk_o=1.8e5;\nv = [1, 2,3]; % [m] no axis\n% remark\n\n"
+    found = parse_m(text, "by_hand.m")
+    assert found.scalars == (Scalar("k_o", 1.8e5),)
+    assert found.skipped == ("clear all", "v")

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""What of a twin goes into its parameter files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.drive.powertrain import Converter
+from drivetwin.driveline import Stribeck
+from drivetwin.export.parameters.content import Curve, Scalar
+from drivetwin.export.parameters.of_twin import converter_curves, parameters_of
+from tests.export.parameters.sample import twin
+from tests.report.sample import STRIBECK
+
+
+def test_every_value_has_its_unit_meaning_and_interval() -> None:
+    k_o = parameters_of(twin())["k_o"]
+    assert isinstance(k_o, Scalar)
+    assert (k_o.value, k_o.unit) == (1.76e5, "N*m/rad")
+    assert (
+        k_o.text == "output shaft stiffness (eq. 8, 14); identified, 95 %: 1.725e+05 .. 1.795e+05"
+    )
+    weak = parameters_of(twin())["c_o"]
+    assert "; weak, 95 %" in weak.text
+
+
+def test_what_the_log_could_not_tell_has_no_entry_but_a_reason() -> None:
+    content = parameters_of(twin())
+    with pytest.raises(KeyError):
+        content["te_delay"]
+    assert any(note.startswith("no value of te_delay: the engine torque") for note in content.notes)
+
+
+def test_an_identified_value_goes_before_the_design_value() -> None:
+    content = parameters_of(twin())
+    assert [one.value for one in content.scalars if one.name == "P0.B3"] == [8.2e4]
+    design = content["P0.B2"]
+    assert isinstance(design, Scalar)
+    assert (design.value, design.unit) == (8e4, "Pa")
+    assert "design value" in design.text
+
+
+def test_the_curve_gives_the_law_of_the_simulation() -> None:
+    curve = parameters_of(twin())["mu.B3"]
+    assert isinstance(curve, Curve)
+    assert curve.axis.unit == "rad/s"
+    assert curve.axis.points[0] == 0.0
+    slip = np.linspace(0.0, 95.0, 2000)
+    law = Stribeck(**STRIBECK).at(slip)
+    assert np.interp(slip, curve.axis.points, curve.values) == pytest.approx(law, rel=1e-3)
+
+
+def test_a_table_keeps_its_own_points() -> None:
+    given = twin()
+    table = replace(given.friction["B3"], stribeck=None)
+    curve = parameters_of(replace(given, friction={"B3": table}))["mu.B3"]
+    assert isinstance(curve, Curve)
+    assert curve.axis.points == (0.0, *table.slip.tolist())
+    assert curve.values == (table.mu[0], *table.mu.tolist())
+
+
+def test_a_converter_brings_two_curves_over_the_speed_ratio() -> None:
+    converter = Converter((0.0, 0.8, 1.0), (0.03, 0.02, 0.0), (1.9, 1.1, 1.0))
+    ratio, capacity = converter_curves(converter)
+    assert ratio.axis.points == capacity.axis.points == converter.speed_ratio
+    assert (ratio.values, capacity.values) == (converter.torque_ratio, converter.capacity)
