@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
@@ -19,13 +18,10 @@ from drivetwin.driveline import (
     simulate,
 )
 from drivetwin.errors import InputError
-
-
-class InputKind(StrEnum):
-    """What inputs do between two communication points."""
-
-    LINEAR = "linear"
-    HOLD = "hold"
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.stepping import InputKind
+from drivetwin.twin import Twin
+from drivetwin.validate import Validation, compared
 
 
 @dataclass(frozen=True)
@@ -73,3 +69,29 @@ def _signal(time: FloatArray, values: FloatArray, kind: InputKind) -> Signal:
         return Signal(time, np.ascontiguousarray(values))
     # A repeated time stamp is a jump: every value lasts until the next point.
     return Signal(np.repeat(time, 2)[1:-1], np.repeat(values[:-1], 2))
+
+
+def stepped_inputs(shift: Validation, stepping: Stepping) -> tuple[FloatArray, FloatArray]:
+    """Communication points (n,) over the window of a shift and its measured inputs (n, 3) there."""
+    time = stepping.grid(float(shift.trajectory.time[0]), float(shift.trajectory.time[-1]))
+    pressures = (shift.pressures[element.name] for element in shift.model.elements)
+    return time, sampled((shift.engine_torque, *pressures), time)
+
+
+def start_of(shift: Validation) -> State:
+    """State that the simulation of a shift starts from."""
+    run = shift.trajectory
+    return State(
+        engine_speed=float(run.engine_speed[0]),
+        output_speed=float(run.output_speed[0]),
+        wheel_speed=float(run.wheel_speed[0]),
+        twist=float(run.twist[0]),
+        locked=(shift.shift.offgoing,),
+    )
+
+
+def stepped_again(shift: Validation, twin: Twin, log: ShiftLog, stepping: Stepping) -> Validation:
+    """A simulated shift as a fixed-step importer of the twin would have it."""
+    time, inputs = stepped_inputs(shift, stepping)
+    run = stepped_run(shift.model, start_of(shift), time, inputs, stepping.kind)
+    return compared(shift, twin, log, run)

@@ -106,6 +106,19 @@ def _simulated(
     return replace(validation, warnings=_warnings(twin, validation))
 
 
+def compared(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) -> Validation:
+    """`before` with another run of the same shift in place of its own."""
+    traces = _traces(before.model, log, run)
+    made = replace(
+        before,
+        trajectory=run,
+        traces=traces,
+        fit={name: _fit(trace, before.phases) for name, trace in traces.items()},
+        status=run.status,
+    )
+    return replace(made, warnings=_warnings(twin, made))
+
+
 def with_fit(found: Identification, validations: Sequence[Validation]) -> Identification:
     """Identification with the fits of its validations entered: pooled over the shifts."""
     if not validations:

@@ -11,6 +11,7 @@ import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
 from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step
+from drivetwin.stepping import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
     from drivetwin.validate import Validation
@@ -27,6 +28,18 @@ def simulate(
         Path | None,
         typer.Option("-o", "--output", metavar="FILE.csv", help="Where the traces go (SI)."),
     ] = None,
+    step_size: Annotated[
+        float | None,
+        typer.Option(
+            "--step",
+            metavar="SECONDS",
+            help="Sample the inputs at fixed steps, as an importer of the exported FMU does.",
+        ),
+    ] = None,
+    input_kind: Annotated[
+        InputKind,
+        typer.Option("--input", help="Inputs between these steps; `hold` alone takes 1 ms."),
+    ] = InputKind.LINEAR,
     as_json: JsonFlag = False,
 ) -> None:
     """Simulate the shifts of a log with an identified model and compare.
@@ -38,6 +51,7 @@ def simulate(
     from drivetwin.logs.read import read_log
     from drivetwin.results.atomic import write_text
     from drivetwin.shifts.usable import usable_shifts
+    from drivetwin.stepped import Stepping, stepped_again
     from drivetwin.twin import Twin
     from drivetwin.validate import validate
     from drivetwin.vehicle.card import load_card
@@ -48,6 +62,9 @@ def simulate(
         recording = read_log(log, card, channels)
         shifts = usable_shifts(recording, card)
         runs = [validate(model, recording, shift) for shift in shifts.shifts]
+        if step_size is not None or input_kind is InputKind.HOLD:
+            stepping = Stepping(DEFAULT_STEP if step_size is None else step_size, input_kind)
+            runs = [stepped_again(run, model, recording, stepping) for run in runs]
     if output is not None:
         write_text(output, traces_text(runs))
     if as_json:

@@ -24,9 +24,8 @@ from drivetwin.export.fmu.variables import FmiVersion, variables_of
 from drivetwin.export.parameters.xml_text import document
 from drivetwin.export.subject import Subject
 from drivetwin.results.atomic import write_bytes
+from drivetwin.stepping import DEFAULT_STEP
 
-STEP = 1e-3
-"""Communication step [s] that the description proposes."""
 _FOLDERS = {
     FmiVersion.FMI2: {
         Platform.LINUX: "linux64",
@@ -98,7 +97,7 @@ def _sources(subject: Subject, options: BuildOptions) -> tuple[Header, dict[str,
         note=subject.note,
         start_time=0.0 if experiment is None else float(experiment.time[0]),
         stop_time=1.0 if experiment is None else float(experiment.time[-1]),
-        step=STEP if experiment is None else experiment.step,
+        step=DEFAULT_STEP if experiment is None else experiment.step,
         sources=tuple(name for name in files if name.endswith(".c")),
     )
     return header, files

@@ -20,7 +20,8 @@ from drivetwin.export.parameters.content import ParameterSet, Scalar
 from drivetwin.export.parameters.ssv import ssv_text
 from drivetwin.export.parameters.xml_text import document
 from drivetwin.export.subject import Subject
-from drivetwin.stepped import InputKind, stepped_run
+from drivetwin.stepped import stepped_run
+from drivetwin.stepping import InputKind
 
 _FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 _PARAMETERS = "../../resources/parameters.ssv"
