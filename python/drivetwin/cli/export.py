@@ -1,30 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin export TWIN --to FORMAT`: the twin for other programs."""
+"""`drivetwin export TWIN --to FORM`: the twin for other programs."""
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from drivetwin.cli.arguments import ChannelsFile
 from drivetwin.cli.output import JsonFlag, note, print_json, say, step
+from drivetwin.errors import InputError
+from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.names import Names
+from drivetwin.export.platforms import Platform
+from drivetwin.export.targets import Target
 
 if TYPE_CHECKING:
     from drivetwin.drive.powertrain import Converter
-
-
-class Target(StrEnum):
-    """What a twin can be exported to."""
-
-    SSV = "ssv"
-    CDFX = "cdfx"
-    DCM = "dcm"
-    M = "m"
-    JSON = "json"
-    CSV = "csv"
+    from drivetwin.export.fmu.experiment import Experiment
+    from drivetwin.export.parameters.content import ParameterSet
+    from drivetwin.export.subject import Subject
+    from drivetwin.twin import Twin
 
 
 def export(
@@ -32,7 +29,9 @@ def export(
     to: Annotated[Target, typer.Option("--to", help="What to write.")],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Where to; by default ./TWIN.FORMAT."),
+        typer.Option(
+            "-o", "--output", metavar="PATH", help="File, a folder for c; by default ./TWIN.FORM."
+        ),
     ] = None,
     names: Annotated[
         Names, typer.Option("--names", help="Parameter files: whose names the parameters get.")
@@ -45,26 +44,93 @@ def export(
             help="Parameter files: add the torque converter of this powertrain (TOML or built-in).",
         ),
     ] = None,
+    shift: Annotated[
+        str | None,
+        typer.Option(
+            "--shift", metavar="GEAR-GEAR", help="c, fmu: which shift, as 2-3; else the first."
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            "--log", metavar="LOG", help="c, fmu: start as this log does; fmu holds its shift."
+        ),
+    ] = None,
+    channels: ChannelsFile = None,
+    fmi: Annotated[FmiVersion, typer.Option("--fmi", help="fmu: version.")] = FmiVersion.FMI2,
+    platforms: Annotated[
+        list[Platform] | None,
+        typer.Option("--platform", help="fmu: build for this one, by zig; may be repeated."),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Write the identified model for another program.
 
+    c: C99 sources for a controller. fmu: co-simulation with sources inside.
     Parameter files (ssv, cdfx, dcm, m, json, csv) hold what is known, with units and intervals.
     """
-    from drivetwin.export.parameters.files import ParameterFormat, write_parameters
-    from drivetwin.export.parameters.of_twin import parameters_of
     from drivetwin.twin import Twin
 
+    model = Twin.load(twin)
     path = output or Path(f"{twin.stem}.{to}")
     with step(f"writing {path.name}"):
-        content = parameters_of(Twin.load(twin), names, _converter(powertrain))
-        write_parameters(content, path, ParameterFormat(to.value))
+        match to:
+            case Target.C:
+                from drivetwin.export.c import write_c
+
+                write_c(_subject(model, shift, log, channels)[0], path)
+                listed: dict[str, object] = {}
+            case Target.FMU:
+                from drivetwin.export.fmu.build import BuildOptions, build_fmu
+
+                subject, experiment = _subject(model, shift, log, channels)
+                build_fmu(subject, path, BuildOptions(fmi, tuple(platforms or ()), experiment))
+                listed = {"fmi": fmi.value}
+            case _:
+                content = _write_parameters(model, path, to, (names, _converter(powertrain)))
+                listed = {"parameters": [one.name for one in content.entries]}
+                if not as_json:
+                    for line in content.notes:
+                        note(line)
     if as_json:
-        print_json({"file": str(path), "parameters": [one.name for one in content.entries]})
-        return
-    for line in content.notes:
-        note(line)
-    say(f"wrote {path}")
+        print_json({"file": str(path), **listed})
+    else:
+        say(f"wrote {path}")
+
+
+def _write_parameters(
+    twin: Twin, path: Path, to: Target, options: tuple[Names, Converter | None]
+) -> ParameterSet:
+    from drivetwin.export.parameters.files import ParameterFormat, write_parameters
+    from drivetwin.export.parameters.of_twin import parameters_of
+
+    content = parameters_of(twin, *options)
+    write_parameters(content, path, ParameterFormat(to.value))
+    return content
+
+
+def _subject(
+    twin: Twin, shift: str | None, log: Path | None, channels: Path | None
+) -> tuple[Subject, Experiment | None]:
+    """Model and start: from the shift of the log where one is given."""
+    from drivetwin.export.subject import subject_of
+
+    gears = _gears(shift)
+    if log is None:
+        return subject_of(twin, gears), None
+    from drivetwin.export.fmu.measured import measured_subject
+    from drivetwin.logs.read import read_log
+
+    return measured_subject(twin, read_log(log, twin.card(), channels), gears)
+
+
+def _gears(text: str | None) -> tuple[str, str] | None:
+    if text is None:
+        return None
+    old, dash, new = text.partition("-")
+    if not (old and dash and new):
+        raise InputError(f"--shift {text!r} does not name two gears", "write it as in --shift 2-3")
+    return old, new
 
 
 def _converter(powertrain: str | None) -> Converter | None:

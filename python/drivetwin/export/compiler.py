@@ -7,30 +7,23 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from enum import StrEnum
 from importlib.util import find_spec
 from pathlib import Path
 
 from drivetwin.errors import DrivetwinError, MissingExtraError
+from drivetwin.export.platforms import Platform
 
 
 class CompilerError(DrivetwinError):
     """A C compiler is missing or refuses the sources."""
 
 
-class Platform(StrEnum):
-    """A platform to build for; the value is zig's name of it, glibc old enough for RHEL 7."""
-
-    LINUX = "x86_64-linux-gnu.2.17"
-    WINDOWS = "x86_64-windows-gnu"
-    MACOS = "x86_64-macos"
-    MACOS_ARM = "aarch64-macos"
-
-    @property
-    def suffix(self) -> str:
-        """File name suffix of a shared library."""
-        kind = self.name.partition("_")[0]
-        return {"LINUX": ".so", "WINDOWS": ".dll", "MACOS": ".dylib"}[kind]
+_ZIG_TARGETS = {
+    Platform.LINUX: "x86_64-linux-gnu.2.17",  # runs from RHEL 7 on
+    Platform.WINDOWS: "x86_64-windows-gnu",
+    Platform.MACOS: "x86_64-macos",
+    Platform.MACOS_ARM: "aarch64-macos",
+}
 
 
 def native_platform() -> Platform | None:
@@ -82,5 +75,5 @@ def _compiler(platform: Platform | None) -> list[str]:
             "building for other platforms, or without a C compiler, needs zig",
             'pip install "drivetwin[fmu]"',
         )
-    target = [] if platform is None else ["-target", platform.value]
+    target = [] if platform is None else ["-target", _ZIG_TARGETS[platform]]
     return [sys.executable, "-m", "ziglang", "cc", *target]

@@ -16,12 +16,14 @@ from importlib import resources
 from pathlib import Path
 
 from drivetwin.export.c.write import model_sources, twin_source
-from drivetwin.export.compiler import Platform, compile_library, native_platform
+from drivetwin.export.compiler import compile_library, native_platform
 from drivetwin.export.entries import entries_of
 from drivetwin.export.fmu.describe import Header, description
 from drivetwin.export.fmu.experiment import Experiment, reference_files
-from drivetwin.export.fmu.variables import FmiVersion, variables_of
+from drivetwin.export.fmu.variables import variables_of
+from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.xml_text import document
+from drivetwin.export.platforms import Platform
 from drivetwin.export.subject import Subject
 from drivetwin.results.atomic import write_bytes
 from drivetwin.stepping import DEFAULT_STEP

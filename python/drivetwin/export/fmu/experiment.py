@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.driveline import FloatArray
-from drivetwin.export.fmu.variables import FmiVersion, Role, Variable, variables_of
+from drivetwin.export.fmu.variables import Role, Variable, variables_of
+from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.content import ParameterSet, Scalar
 from drivetwin.export.parameters.ssv import ssv_text
 from drivetwin.export.parameters.xml_text import document

@@ -14,13 +14,6 @@ INPUTS, OUTPUTS, MODES, LOSS_LAW, LOCKED, START, PARAMETERS = 1, 10, 30, 40, 41,
 INF = math.inf
 
 
-class FmiVersion(StrEnum):
-    """Version of the interface."""
-
-    FMI2 = "2.0"
-    FMI3 = "3.0"
-
-
 class Kind(StrEnum):
     """Type of a variable."""
 

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""The measured shift that travels with an export, and the model that starts where it starts."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+from drivetwin.errors import NoShiftError, Where
+from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.subject import Subject
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.shifts.usable import usable_shifts
+from drivetwin.stepped import Stepping, start_of, stepped_inputs
+from drivetwin.stepping import DEFAULT_STEP
+from drivetwin.twin import Twin
+from drivetwin.validate import validate
+
+
+def measured_subject(
+    twin: Twin, log: ShiftLog, gears: tuple[str, str] | None = None
+) -> tuple[Subject, Experiment]:
+    """Model of the first shift of a log between `gears` (None: any), and that shift's inputs.
+
+    Raises NoShiftError where there is none, and what the validation of a shift raises.
+    """
+    found = usable_shifts(log, twin.card()).shifts
+    wanted = [one for one in found if gears in (None, (one.start_gear, one.end_gear))]
+    if not wanted:
+        raise NoShiftError(
+            f"the log has no shift {'-'.join(gears or ())}",
+            f"choose one of {', '.join(f'{s.start_gear}-{s.end_gear}' for s in found)}",
+            Where(file=log.source),
+        )
+    shift = validate(twin, log, wanted[0])
+    name = f"{wanted[0].start_gear}-{wanted[0].end_gear}"
+    source = PurePath(log.source).name
+    time, inputs = stepped_inputs(shift, Stepping(DEFAULT_STEP))
+    subject = Subject(
+        name=f"{twin.name} {name}",
+        model=shift.model,
+        start=start_of(shift),
+        note=f"identified by the {twin.method} method, loss law {shift.model.loss_law}",
+    )
+    return subject, Experiment(f"shift {name} of {source}", time, inputs, DEFAULT_STEP)
