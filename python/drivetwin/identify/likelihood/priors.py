@@ -13,7 +13,6 @@ import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.identify.friction import LAW_PRIOR
-from drivetwin.identify.likelihood.fill import local_mean
 from drivetwin.identify.likelihood.known import (
     gear_inertias,
     known_unknowns,
@@ -22,6 +21,7 @@ from drivetwin.identify.likelihood.known import (
 )
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import LATEST, record_of
+from drivetwin.identify.likelihood.smooth import local_mean
 from drivetwin.identify.likelihood.unknowns import (
     AERO,
     COMMON,
@@ -94,7 +94,7 @@ def problem_of(
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
         label = f"start{k}"
-        record = record_of(s, d, span)
+        record = record_of(s, span)
         structure = Structure(d, loss_law, label, fixed, mean_speed_of(signals, d.i_f), tie)
         parts.append(Part.unweighted(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}

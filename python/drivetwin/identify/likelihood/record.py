@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from drivetwin.driveline import Signal, Trajectory
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fill import local_mean, near_fill
-from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
+from drivetwin.identify.likelihood.smooth import local_cubic, local_mean, smooth_pressure
+from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
 
 IndexArray = NDArray[np.intp]
 
@@ -128,13 +128,16 @@ class Record:
         return bool(np.median(np.diff(self.time[out.place])) > SLOW)
 
     def less(self, noise: Mapping[str, FloatArray], age: float) -> Record:
-        """The record with expected `noise` (N-1,) per step of the grid taken off its inputs."""
+        """The record with expected `noise` (N-1,) per step of the grid taken off its inputs.
+
+        Of a pressure's noise only the part that passes the local cubic is still there.
+        """
         torque = self.engine_torque
         shown = _at_samples(self.time, noise["engine torque"], torque.time - age)
-        pressures = {
-            name: Signal(p.time, p.values - _at_samples(self.time, noise[name], p.time))
-            for name, p in self.pressures.items()
-        }
+        pressures = {}
+        for name, p in self.pressures.items():
+            left = local_cubic(p.time, _at_samples(self.time, noise[name], p.time))
+            pressures[name] = Signal(p.time, p.values - left)
         torque = Signal(torque.time, torque.values - shown)
         return replace(self, engine_torque=torque, pressures=pressures)
 
@@ -167,7 +170,7 @@ class Record:
         )
 
 
-def record_of(signals: ShiftSignals, driveline: Driveline, span: Span) -> Record:
+def record_of(signals: ShiftSignals, span: Span) -> Record:
     """The record of one shift over `span` [s].
 
     Raises IdentificationError where the span holds too little to compare.
@@ -202,10 +205,7 @@ def record_of(signals: ShiftSignals, driveline: Driveline, span: Span) -> Record
     return Record(
         time,
         _held(torque),
-        {
-            name: Signal(p.time, near_fill(p, driveline.couplings[name].P0))
-            for name, p in signals.pressures.items()
-        },
+        {name: Signal(p.time, smooth_pressure(p)) for name, p in signals.pressures.items()},
         outputs,
         _held(replace(torque, values=local_mean(torque))),
         {"engine torque": torque.sigma} | {n: p.sigma for n, p in signals.pressures.items()},
