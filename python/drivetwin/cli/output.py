@@ -75,9 +75,22 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 @contextmanager
 def step(text: str) -> Iterator[None]:
-    """Show on stderr, while it runs and where that is a terminal, what the program is doing."""
-    with console(stderr=True).status(text):
-        yield
+    """Show on stderr, while it runs and where that is a terminal, what the program is doing.
+
+    With the share done and the time left where the computation tells them, else the time passed.
+    """
+    from rich.progress import Progress, SpinnerColumn, TextColumn
+
+    from drivetwin.cli.remaining import Remaining
+    from drivetwin.progress import listening
+
+    clock = Remaining(text)
+    columns = (SpinnerColumn(), TextColumn("{task.fields[clock]}", markup=False))
+    shown = console(stderr=True)
+    with Progress(*columns, console=shown, transient=True, disable=not shown.is_terminal) as live:
+        live.add_task("", total=None, clock=clock)
+        with listening(clock.hear):
+            yield
 
 
 def show_error(error: DrivetwinError, *, as_json: bool) -> None:

@@ -1,24 +1,66 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin report`: the report of an identification that has been written."""
+"""`drivetwin report`: where the report of an identification is, and comparisons of several."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.output import JsonFlag, print_json, say
-from drivetwin.errors import ResultFileError, Where
+from drivetwin.cli.arguments import ChannelsFile
+from drivetwin.cli.output import JsonFlag, print_json, say, step
+from drivetwin.errors import InputError, ResultFileError, Where
+
+if TYPE_CHECKING:
+    from drivetwin.report.candidates import Candidate, Trial
+    from drivetwin.twin import Twin
 
 
 def report(
-    source: Annotated[
-        Path, typer.Argument(metavar="DIR|RESULT", help="Folder of `identify -o`, or result.json.")
+    sources: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="SOURCE...", help="Folders of `identify -o`, result.json, twin.toml, or logs."
+        ),
     ],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="FILE.html", help="Where a comparison goes."),
+    ] = Path("comparison.html"),
+    channels: ChannelsFile = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Find the report of an identification and say what it is of."""
+    """Find the report of an identification, or compare several.
+
+    One folder or result.json: the path of its report. Several, or a twin and logs: a page that
+    compares their parameters and friction, and the simulation of each log by each twin.
+    """
+    made = [source for source in sources if _is_made(source)]
+    logs = [source for source in sources if not _is_made(source)]
+    if not made:
+        raise InputError(
+            f"{sources[0].name} is no result of an identification",
+            "name a folder that `drivetwin identify -o` wrote, its result.json or its twin.toml",
+            Where(file=str(sources[0])),
+        )
+    if len(sources) == 1 and made[0].suffix != ".toml":
+        _name_page(made[0], as_json=as_json)
+        return
+    _compare(made, logs, channels, output)
+    if as_json:
+        print_json({"report": output, "compared": made, "logs": logs})
+        return
+    say(f"wrote {output}")
+
+
+def _is_made(source: Path) -> bool:
+    """Whether a source is what an identification wrote; all others are taken for logs."""
+    return source.is_dir() or source.suffix in (".json", ".toml")
+
+
+def _name_page(source: Path, *, as_json: bool) -> None:
     from drivetwin.cli.pipeline import REPORT, RESULT
     from drivetwin.results.result_file import load_result
 
@@ -35,3 +77,67 @@ def report(
         print_json({"report": page, "result": result, "inputs": content.inputs})
         return
     say(str(page))
+
+
+def _compare(
+    made: Sequence[Path], logs: Sequence[Path], channels: Path | None, output: Path
+) -> None:
+    from drivetwin.report.comparison import save_comparison
+
+    names = _names(made)
+    with step("reading"):
+        candidates = [_candidate(name, source) for name, source in names.items()]
+        twins = {name: _twin(source) for name, source in names.items()} if logs else {}
+    trials = [trial for log in logs for trial in _trials(twins, log, channels)]
+    with step(f"writing {output.name}"):
+        save_comparison(output, candidates, trials)
+
+
+def _names(made: Sequence[Path]) -> dict[str, Path]:
+    """What tables call each source: its folder or file, numbered where two are called the same."""
+    plain = [
+        (source if source.is_dir() or source.stem not in ("result", "twin") else source.parent)
+        for source in made
+    ]
+    names: dict[str, Path] = {}
+    for place, source in zip(plain, made, strict=True):
+        name = (place.resolve().name if place.is_dir() else place.stem) or str(source)
+        number = 2
+        while name in names:
+            name = f"{name.removesuffix(f' {number - 1}')} {number}"
+            number += 1
+        names[name] = source
+    return names
+
+
+def _candidate(name: str, source: Path) -> Candidate:
+    from drivetwin.cli.pipeline import RESULT
+    from drivetwin.report.candidates import Candidate
+    from drivetwin.results.result_file import load_result
+    from drivetwin.twin import Twin
+
+    if source.suffix == ".toml":
+        return Candidate.of_twin(name, Twin.load(source))
+    return Candidate.of_result(name, load_result(source / RESULT if source.is_dir() else source))
+
+
+def _twin(source: Path) -> Twin:
+    """The twin behind a source: the file itself, or the one beside its result."""
+    from drivetwin.cli.pipeline import TWIN
+    from drivetwin.twin import Twin
+
+    if source.suffix == ".toml":
+        return Twin.load(source)
+    return Twin.load(source / TWIN if source.is_dir() else source.with_name(TWIN))
+
+
+def _trials(twins: Mapping[str, Twin], log: Path, channels: Path | None) -> list[Trial]:
+    """Every shift of a log by every twin; shifts are found with the ratios of the first."""
+    from drivetwin.logs.read import read_log
+    from drivetwin.report.comparison import trials_of
+    from drivetwin.shifts.usable import usable_shifts
+
+    card = next(iter(twins.values())).card()
+    with step(f"simulating {log.name}"):
+        recording = read_log(log, card, channels)
+        return trials_of(twins, recording, usable_shifts(recording, card).shifts, log.name)

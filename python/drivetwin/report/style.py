@@ -6,6 +6,7 @@ The blue is a little lighter than the original so that it also reads on a dark p
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import plotly.graph_objects as go
@@ -37,6 +38,36 @@ PHASE_FILL = {
     "after": "rgba(0,0,0,0)",
 }
 PHASE_NUMBER = {"before": "1", "torque": "2", "inertia": "3", "after": "4"}
+
+
+@dataclass(frozen=True)
+class CandidateStyle:
+    """How one of several compared things is drawn: colour, its pale form, dash and marker."""
+
+    colour: str
+    fill: str
+    dash: str
+    symbol: str
+
+
+_CANDIDATES = (
+    ("#D55E00", "circle"),
+    ("#009E73", "diamond"),
+    ("#E69F00", "square"),
+    ("#CC79A7", "triangle-up"),
+    ("#56B4E9", "x"),
+    (MUTED, "cross"),
+)
+_DASHES = ("solid", "dash", "dot", "dashdot")
+
+
+def candidate_style(index: int) -> CandidateStyle:
+    """Style of the `index`-th of several: six colours with markers, then again dashed."""
+    colour, symbol = _CANDIDATES[index % len(_CANDIDATES)]
+    dash = _DASHES[index // len(_CANDIDATES) % len(_DASHES)]
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return CandidateStyle(colour, f"rgba({red},{green},{blue},0.15)", dash, symbol)
+
 
 FONT = "Inter, 'Segoe UI', system-ui, -apple-system, 'Liberation Sans', sans-serif"
 GRID = "rgba(128,128,128,0.22)"

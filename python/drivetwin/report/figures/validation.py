@@ -12,11 +12,12 @@ from drivetwin.report.style import COMPARED, MEASURED, MUTED, SECOND, SIMULATED
 from drivetwin.report.units import BAR, NM, RPM, Display
 from drivetwin.validate import SignalTrace, Validation
 
-_OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
+OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
     "output_torque": ("output torque", NM, 1.6),
     "input_speed": ("input speed", RPM, 1.1),
     "output_speed": ("output speed", RPM, 1.1),
 }
+"""Compared signals: what their axis says, their unit, the height of their panel."""
 
 
 def validation_figure(validation: Validation) -> go.Figure:
@@ -36,7 +37,7 @@ def validation_panels(validation: Validation) -> list[Panel]:
         Panel("engine torque", NM, [Curve("T_e", torque.time, torque.values, MEASURED)], 0.7),
         Panel("pressure", BAR, pressures, 0.7),
     ]
-    for name, (title, display, weight) in _OUTPUTS.items():
+    for name, (title, display, weight) in OUTPUTS.items():
         if name in validation.traces:
             trace = validation.traces[name]
             panels.append(Panel(title, display, _pair(trace), weight))

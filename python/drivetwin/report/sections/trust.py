@@ -161,7 +161,7 @@ def fit_table(found: Identification) -> TableBlock:
         if name not in found.fit:
             continue
         fits = [found.fit[name].get(phase) for phase in PHASES]
-        rows.append([Cell(label), *(_fit_cell(fit, display) for fit in fits)])
+        rows.append([Cell(label), *(fit_cell(fit, display) for fit in fits)])
     return TableBlock(
         "Simulation against measurement: fit % = 100·(1 − ‖y − ŷ‖ / ‖y − mean(y)‖), the mean taken "
         "over the whole log for every phase; root mean square error below. Where a signal hardly "
@@ -171,7 +171,8 @@ def fit_table(found: Identification) -> TableBlock:
     )
 
 
-def _fit_cell(fit: SignalFit | None, display: Display) -> Cell:
+def fit_cell(fit: SignalFit | None, display: Display) -> Cell:
+    """Fit % with the error in its unit below; a dash where there is none."""
     if fit is None:
         return Cell("–", number=True)
     note = f"{significant(fit.rmse * display.factor, 3)} {display.label}"

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""The comparison: several identifications, and logs that each of them simulates, on one page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from drivetwin.errors import DrivetwinError
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.progress import tell
+from drivetwin.report.candidates import Candidate, Trial
+from drivetwin.report.html import render_page
+from drivetwin.report.sections.comparison import (
+    agreement_section,
+    friction_overlay_section,
+    origin_section,
+    trial_sections,
+)
+from drivetwin.results.atomic import write_text
+from drivetwin.results.version import program_version
+from drivetwin.shifts.shift import Shift
+from drivetwin.twin import Twin
+from drivetwin.validate import Validation, validate
+
+
+def save_comparison(path: Path, candidates: Sequence[Candidate], trials: Sequence[Trial]) -> None:
+    """Write the comparison; the file appears whole or not at all."""
+    write_text(path, render_comparison(candidates, trials))
+
+
+def render_comparison(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> str:
+    """HTML text of the comparison; with one candidate it shows the logs alone."""
+    several = len(candidates) > 1
+    sections = [
+        *([agreement_section(candidates)] if several else []),
+        *trial_sections(candidates, trials),
+        friction_overlay_section(candidates),
+        origin_section(candidates),
+    ]
+    names = ", ".join(one.name for one in candidates)
+    return render_page(
+        title=f"Comparison of {names}" if several else f"{names} over {len(trials)} shifts",
+        subtitle=f"made with drivetwin {program_version()}",
+        sections=[section for section in sections if section.blocks],
+    )
+
+
+def trials_of(
+    twins: Mapping[str, Twin], log: ShiftLog, shifts: Sequence[Shift], name: str
+) -> list[Trial]:
+    """Simulate every shift of a log, called `name`, with every twin.
+
+    A twin that lacks a parameter, gear or channel is named in `refused`; progress is told.
+    """
+    trials = []
+    for count, shift in enumerate(shifts):
+        label = f"{name}, {shift.start_gear}→{shift.end_gear} at {shift.lockup_time:.1f} s"
+        runs: dict[str, Validation] = {}
+        refused: dict[str, str] = {}
+        for place, (twin_name, twin) in enumerate(twins.items()):
+            tell((count + place / len(twins)) / len(shifts))
+            try:
+                runs[twin_name] = validate(twin, log, shift)
+            except DrivetwinError as fault:
+                refused[twin_name] = fault.what
+        trials.append(Trial(label, runs, refused))
+    return trials

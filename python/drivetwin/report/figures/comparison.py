@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""Several identifications side by side: parameters, friction, simulations of one log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+
+from drivetwin.identify.result import FrictionCurve
+from drivetwin.report.candidates import Agreement, Trial
+from drivetwin.report.figures.stack import Curve, Panel, stacked
+from drivetwin.report.figures.validation import OUTPUTS
+from drivetwin.report.labels import parameter_label
+from drivetwin.report.style import MEASURED, axis, candidate_style, layout
+
+_ROW = 0.7
+"""Share of the height of a row that the candidates of one parameter take up."""
+
+
+def agreement_figure(names: Sequence[str], found: Sequence[Agreement]) -> go.Figure:
+    """Deviation of each candidate from the common mean, with 95 % intervals, by parameter.
+
+    In standard deviations of the parameter (the median of the candidates'), so that narrow and wide
+    ones read alike. Parameters that fewer than two candidates tell with an uncertainty are left
+    out; `names` are the candidates'.
+    """
+    shown = [one for one in found if one.apart is not None]
+    figure = go.Figure()
+    for k, name in enumerate(names):
+        style = candidate_style(k)
+        points = [
+            (row + _ROW * ((k + 0.5) / len(names) - 0.5), *_standardised(one, k), one)
+            for row, one in enumerate(shown)
+            if (estimate := one.estimates[k]) is not None and estimate.value is not None
+        ]
+        figure.add_scatter(
+            x=[deviation for _, deviation, _, _ in points],
+            y=[row for row, _, _, _ in points],
+            error_x={
+                "array": [half for _, _, half, _ in points],
+                "thickness": 1.6,
+                "width": 4,
+                "color": style.colour,
+            },
+            mode="markers",
+            name=name,
+            text=[parameter_label(one.id) for _, _, _, one in points],
+            marker={"color": style.colour, "symbol": style.symbol, "size": 9},
+            hovertemplate="%{text}: %{x:+.2f} σ<extra>" + name + "</extra>",
+        )
+    ticks = {
+        "tickvals": list(range(len(shown))),
+        "ticktext": [parameter_label(one.id) for one in shown],
+        "range": [len(shown) - 0.4, -0.6],
+    }
+    figure.add_vline(x=0.0, line={"color": "rgba(128,128,128,0.7)", "width": 1})
+    figure.update_layout(
+        layout(
+            120 + (18 + 12 * len(names)) * len(shown),
+            xaxis=axis("deviation from the common mean, with 95 % interval [σ]"),
+            yaxis=axis("", **ticks),
+        )
+    )
+    return figure
+
+
+def _standardised(one: Agreement, k: int) -> tuple[float, float]:
+    """Deviation of the `k`-th value from the mean and its 95 % half width, over the median σ."""
+    stds = [each.std_total for each in one.estimates if each is not None and each.std_total]
+    unit = float(np.median(stds))
+    estimate = one.estimates[k]
+    assert estimate is not None
+    assert estimate.value is not None
+    return (estimate.value - one.mean) / unit, 1.96 * (estimate.std_total or 0.0) / unit
+
+
+def friction_overlay(
+    element: str, curves: Mapping[str, FrictionCurve], order: Sequence[str]
+) -> go.Figure:
+    """μ over slip of one element as each candidate has it, with 95 % bands.
+
+    `curves` by name of the candidate; `order` are all candidates, which gives each its colour.
+    """
+    figure = go.Figure()
+    for name, curve in curves.items():
+        style = candidate_style(order.index(name))
+        known = np.isfinite(curve.mu_lo) & np.isfinite(curve.mu_hi)
+        slip = curve.slip[known]
+        figure.add_scatter(
+            x=np.concatenate((slip, slip[::-1])),
+            y=np.concatenate((curve.mu_hi[known], curve.mu_lo[known][::-1])),
+            fill="toself",
+            fillcolor=style.fill,
+            line={"width": 0},
+            legendgroup=name,
+            showlegend=False,
+            hoverinfo="skip",
+        )
+        figure.add_scatter(
+            x=curve.slip,
+            y=curve.mu,
+            mode="lines",
+            name=name,
+            legendgroup=name,
+            line={"color": style.colour, "width": 2.0, "dash": style.dash},
+        )
+    figure.update_layout(
+        layout(
+            400,
+            xaxis=axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
+            yaxis=axis("friction coefficient μ [–]"),
+            hovermode="x",
+        )
+    )
+    return figure
+
+
+def trial_figure(trial: Trial, order: Sequence[str]) -> go.Figure:
+    """One shift as measured and as each candidate simulates it, residuals below."""
+    panels = trial_panels(trial, order)
+    phases = next(iter(trial.runs.values())).phases
+    return stacked(panels, phases, height=140 + 170 * len(panels))
+
+
+def trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
+    """What `trial_figure` shows, from top to bottom; `order` are all candidates."""
+    first = next(iter(trial.runs.values()))
+    panels = []
+    for name, (title, display, weight) in OUTPUTS.items():
+        if name not in first.traces:
+            continue
+        seen = first.traces[name]
+        over = [Curve("measured", seen.time, seen.measured, MEASURED, width=2.4)]
+        left = []
+        for candidate, run in trial.runs.items():
+            trace, style = run.traces[name], candidate_style(order.index(candidate))
+            over.append(
+                Curve(candidate, trace.time, trace.simulated, style.colour, 1.3, style.dash)
+            )
+            difference = trace.measured - trace.simulated
+            left.append(Curve(candidate, trace.time, difference, style.colour, 1.0, listed=False))
+        panels += [Panel(title, display, over, weight), Panel("residual", display, left, 0.7)]
+    return panels
+
+
+def fit_matrix(
+    rows: Sequence[str], columns: Sequence[str], percent: Sequence[Sequence[float | None]]
+) -> go.Figure:
+    """Fit [%] of the output torque: candidates over the logs that they simulate."""
+    figure = go.Figure(
+        go.Heatmap(
+            x=list(columns),
+            y=list(rows),
+            z=[[np.nan if value is None else value for value in row] for row in percent],
+            text=[["–" if value is None else f"{value:.1f}" for value in row] for row in percent],
+            texttemplate="%{text}",
+            zmin=0.0,
+            zmax=100.0,
+            colorscale=[[0.0, "#f4f4f4"], [1.0, "#0072B2"]],
+            showscale=False,
+            hovertemplate="%{y} on %{x}: %{text} %<extra></extra>",
+        )
+    )
+    figure.update_layout(
+        layout(
+            130 + 34 * len(rows),
+            xaxis=axis("log and shift", ticks="", side="top"),
+            yaxis=axis("", ticks="", autorange="reversed"),
+        )
+    )
+    return figure

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: MIT
+"""Sections of a comparison: do several identifications agree, and which one fits which log?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from drivetwin.identify.result import Estimate
+from drivetwin.report.candidates import DIFFER, Agreement, Candidate, Trial, agreements
+from drivetwin.report.figures.comparison import (
+    agreement_figure,
+    fit_matrix,
+    friction_overlay,
+    trial_figure,
+    trial_panels,
+)
+from drivetwin.report.labels import parameter_label
+from drivetwin.report.sections.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    NotesBlock,
+    Section,
+    TableBlock,
+    Tile,
+    TilesBlock,
+    Tone,
+    cells,
+)
+from drivetwin.report.sections.trust import PHASES, SIGNALS, fit_cell
+from drivetwin.report.units import Display, display_of, significant, with_uncertainty
+from drivetwin.shifts.shift import Shift
+
+
+def agreement_section(candidates: Sequence[Candidate]) -> Section:
+    """Parameters side by side: who says what, and whether they can be the same."""
+    found = agreements(candidates)
+    judged = [one for one in found if one.agrees is not None]
+    differing = [one for one in judged if not one.agrees]
+    blocks: list[Block] = [TilesBlock(_tiles(candidates, judged, differing))]
+    if differing:
+        texts = [
+            f"{parameter_label(one.id)}: {significant(one.apart or 0.0, 2)} standard deviations"
+            for one in differing
+        ]
+        blocks.append(NotesBlock("Differ by more than their uncertainty", texts, Tone.DOUBTFUL))
+    blocks.append(_parameter_table(candidates, found))
+    if judged:
+        blocks.append(
+            FigureBlock(
+                agreement_figure([one.name for one in candidates], judged),
+                "Each value against the mean of all (weighted by their uncertainty) with its total "
+                "95 % interval, in standard deviations of the parameter. Intervals that do not "
+                "overlap are a difference that needs a reason.",
+            )
+        )
+    return Section("agreement", "Do they agree?", _headline(judged, differing), blocks)
+
+
+def _headline(judged: Sequence[Agreement], differing: Sequence[Agreement]) -> str:
+    if not judged:
+        return "No parameter is told with an uncertainty by two of them."
+    text = f"{len(judged) - len(differing)} of {len(judged)} common parameters agree"
+    return f"{text} within their total uncertainty ({DIFFER} standard deviations)."
+
+
+def _tiles(
+    candidates: Sequence[Candidate], judged: Sequence[Agreement], differing: Sequence[Agreement]
+) -> list[Tile]:
+    tone = Tone.DOUBTFUL if differing else Tone.GOOD
+    tiles = [
+        Tile("compared", str(len(candidates)), note="identifications"),
+        Tile("agree", f"{len(judged) - len(differing)} of {len(judged)}", tone, "parameters"),
+    ]
+    for one in candidates:
+        fit = one.fit.get("output_torque", {}).get("all")
+        if fit is not None and math.isfinite(fit.fit_percent):
+            tiles.append(
+                Tile(
+                    f"fit of {one.name}", f"{fit.fit_percent:.1f} %", note="output torque, own log"
+                )
+            )
+    return tiles
+
+
+def _parameter_table(candidates: Sequence[Candidate], found: Sequence[Agreement]) -> TableBlock:
+    rows = []
+    for one in found:
+        told = next(each for each in one.estimates if each is not None)
+        display = display_of(told.unit)
+        rows.append(
+            (
+                Cell(parameter_label(one.id), note=one.id),
+                *(_value_cell(each, display) for each in one.estimates),
+                Cell(display.label),
+                Cell("–" if one.apart is None else significant(one.apart, 2), number=True),
+                _verdict(one),
+            )
+        )
+    head = (
+        Cell("parameter"),
+        *(Cell(one.name, number=True, note="± 95 % total") for one in candidates),
+        Cell("unit"),
+        Cell("apart", number=True, note="σ"),
+        Cell("verdict"),
+    )
+    return TableBlock("Parameters side by side.", head, rows)
+
+
+def _value_cell(one: Estimate | None, display: Display) -> Cell:
+    if one is None or one.value is None:
+        return Cell("–", number=True, note="" if one is None else one.verdict.value)
+    half = None if one.std_total is None else 1.96 * one.std_total * display.factor
+    value, width = with_uncertainty(one.value * display.factor, half)
+    return Cell(value, number=True, note=f"± {width}" if width else "")
+
+
+def _verdict(one: Agreement) -> Cell:
+    if one.agrees is None:
+        return Cell("")
+    word, tone = ("agree", Tone.GOOD) if one.agrees else ("differ", Tone.DOUBTFUL)
+    return Cell(word, badge=True, tone=tone)
+
+
+def friction_overlay_section(candidates: Sequence[Candidate]) -> Section:
+    """μ over slip of every element, one curve per candidate."""
+    order = [one.name for one in candidates]
+    elements = dict.fromkeys(element for one in candidates for element in one.friction)
+    blocks = [
+        FigureBlock(
+            friction_overlay(
+                element,
+                {c.name: c.friction[element] for c in candidates if element in c.friction},
+                order,
+            ),
+            f"Friction of {element}, each curve over the slip its log showed.",
+        )
+        for element in elements
+    ]
+    return Section("friction", "Friction", "Bands hold 95 %, sensors included.", blocks)
+
+
+def trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> list[Section]:
+    """Every log simulated by every candidate: the fit of all, then shift by shift."""
+    if not trials:
+        return []
+    order = [one.name for one in candidates]
+    matrix = FigureBlock(
+        fit_matrix(order, [one.label for one in trials], _percent(order, trials)),
+        "Fit [%] of the output torque over the whole shift; a dash where the log has none or the "
+        "simulation was not possible.",
+    )
+    shifts: list[Block] = []
+    for trial in trials:
+        if trial.runs:
+            shift = next(iter(trial.runs.values())).shift
+            shifts.append(
+                FigureBlock(
+                    trial_figure(trial, order),
+                    f"{trial.label}: measured, and simulated from the measured inputs by each.",
+                    trial_panels(trial, order),
+                    trial.label,
+                )
+            )
+            shifts.append(_trial_table(trial, shift))
+        if trial.refused:
+            texts = [f"{name}: {why}" for name, why in trial.refused.items()]
+            shifts.append(NotesBlock(f"Not simulated: {trial.label}", texts, Tone.DOUBTFUL))
+    return [
+        Section(
+            "logs",
+            "Which model fits which log?",
+            "Each model is driven by the measured inputs of each log, its own or another's.",
+            [matrix],
+        ),
+        Section("shifts", "Shift by shift", "Residuals are measured minus simulated.", shifts),
+    ]
+
+
+def _percent(order: Sequence[str], trials: Sequence[Trial]) -> list[list[float | None]]:
+    rows: list[list[float | None]] = []
+    for name in order:
+        fits = [
+            trial.runs[name].fit.get("output_torque", {}).get("all") if name in trial.runs else None
+            for trial in trials
+        ]
+        rows.append(
+            [one.fit_percent if one and math.isfinite(one.fit_percent) else None for one in fits]
+        )
+    return rows
+
+
+def _trial_table(trial: Trial, shift: Shift) -> TableBlock:
+    head = (*cells("model", "signal"), *(Cell(label, number=True) for label in PHASES.values()))
+    rows = [
+        (
+            *cells(name, label),
+            *(fit_cell(run.fit[signal].get(phase), display) for phase in PHASES),
+        )
+        for name, run in trial.runs.items()
+        for signal, (label, display) in SIGNALS.items()
+        if signal in run.fit
+    ]
+    caption = (
+        f"Fit by phase, {trial.label}: {shift.offgoing} off-going, {shift.oncoming} on-coming."
+    )
+    return TableBlock(caption, head, rows)
+
+
+def origin_section(candidates: Sequence[Candidate]) -> Section:
+    """Which files stand behind each candidate."""
+    rows = [
+        cells(one.name, one.method, one.version, file, digest)
+        for one in candidates
+        for file, digest in one.inputs.items()
+    ]
+    head = cells("identification", "method", "version", "input", "SHA-256")
+    return Section(
+        "origin", "Origin", "What each identification was made from.", [TableBlock("", head, rows)]
+    )

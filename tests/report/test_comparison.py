@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""The page that compares several identifications, and logs simulated by each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from drivetwin.report.candidates import Candidate, Trial
+from drivetwin.report.comparison import render_comparison, trials_of
+from drivetwin.report.figures.comparison import agreement_figure, trial_figure
+from drivetwin.report.sections.blocks import FigureBlock, TableBlock
+from drivetwin.report.sections.comparison import agreement_section, trial_sections
+from drivetwin.report.style import candidate_style
+from drivetwin.twin import Twin
+from tests.report.sample import SHIFT, card, friction, identification, log, validation
+from tests.report.test_candidates import candidate
+
+
+@cache
+def twins() -> dict[str, Twin]:
+    good = Twin.from_identification(identification(), card())
+    poor = replace(good, parameters={k: v for k, v in good.parameters.items() if k != "k_o"})
+    return {"good": good, "poor": poor}
+
+
+def candidates() -> list[Candidate]:
+    first = replace(
+        candidate("first <1>", eta=(0.90, 0.001), k_o=(1e5, 1e3)), friction={"B3": friction()}
+    )
+    return [first, candidate("second", eta=(0.92, 0.001), k_o=(1.01e5, 1e3))]
+
+
+def test_what_differs_is_named_first() -> None:
+    section = agreement_section(candidates())
+    assert section.intro.startswith("1 of 2 common parameters agree")
+    table = next(block for block in section.blocks if isinstance(block, TableBlock))
+    assert [(row[0].text, row[-1].text) for row in table.rows] == [
+        ("η", "differ"),
+        ("k_o", "agree"),
+    ]
+
+
+def test_narrow_and_wide_parameters_are_drawn_alike() -> None:
+    section = agreement_section(candidates())
+    block = next(block for block in section.blocks if isinstance(block, FigureBlock))
+    first, second = block.figure.data
+    assert np.allclose(first.error_x.array, 1.96)
+    assert np.allclose(np.asarray(second.x) - np.asarray(first.x), [20.0, 1.0])
+
+
+def test_a_candidate_without_a_parameter_has_no_point() -> None:
+    pair = [candidate("a", eta=(0.9, 0.01), k_o=(1e5, 1e3)), candidate("b", eta=(0.9, 0.01))]
+    section = agreement_section([*pair, candidate("c", k_o=(1e5, 1e3))])
+    block = next(block for block in section.blocks if isinstance(block, FigureBlock))
+    assert [len(trace.x) for trace in block.figure.data] == [2, 1, 1]
+    assert len(agreement_figure(["a"], []).data) == 1
+
+
+def test_every_twin_simulates_or_says_why_not() -> None:
+    (trial,) = trials_of(twins(), log(), [SHIFT], "sample.csv")
+    assert trial.label == "sample.csv, 2→3 at 1.6 s"
+    assert list(trial.runs) == ["good"]
+    assert "k_o" in trial.refused["poor"]
+
+
+def test_simulations_stand_over_one_measurement() -> None:
+    trial = Trial("log", {"a": validation(), "b": validation()}, {})
+    names = [trace.name for trace in trial_figure(trial, ["a", "b"]).data]
+    assert names[:5] == ["measured", "a", "b", "a", "b"]
+    matrix, shifts = trial_sections([candidate("a"), candidate("b")], [trial])
+    block = matrix.blocks[0]
+    assert isinstance(block, FigureBlock)
+    fit = validation().fit["output_torque"]["all"].fit_percent
+    assert block.figure.data[0].text[0][0] == f"{fit:.1f}"
+    assert isinstance(shifts.blocks[1], TableBlock)
+
+
+def test_many_candidates_are_told_apart() -> None:
+    styles = [candidate_style(k) for k in range(24)]
+    assert len({(one.colour, one.dash) for one in styles}) == 24
+
+
+def test_the_page_is_complete_and_escaped() -> None:
+    trials = trials_of({"first <1>": twins()["good"]}, log(), [SHIFT], "sample.csv")
+    page = render_comparison(candidates(), trials)
+    for anchor in ("agreement", "logs", "shifts", "friction"):
+        assert f'id="{anchor}"' in page
+    assert "first <1>" not in page
+    alone = render_comparison(candidates()[:1], trials)
+    assert 'id="agreement"' not in alone
