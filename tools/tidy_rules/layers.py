@@ -25,14 +25,25 @@ _MAY_NOT_USE = {
 """Folders of the core and what they must not know; the integrator knows no elements either."""
 
 PYTHON_LAYERS = (
-    frozenset({"errors", "progress", "parameters", "driveline", "network", "tomlfile", "_native"}),
+    frozenset(
+        {
+            "errors",
+            "progress",
+            "shown",
+            "parameters",
+            "driveline",
+            "network",
+            "tomlfile",
+            "_native",
+        }
+    ),
     frozenset({"logs", "vehicle", "held", "gearbox"}),
     frozenset({"shifts", "dyno", "drive"}),
     frozenset({"identify"}),
     frozenset({"twin", "results", "start_state", "validate", "stepping", "stepped"}),
     frozenset({"observer"}),
     frozenset({"report", "export"}),
-    frozenset({"fleet"}),
+    frozenset({"fleet", "app"}),
     frozenset({"cli", "__main__"}),
 )
 """From the bottom up: a module may import from its own layer and those below."""

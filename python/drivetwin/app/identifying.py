@@ -35,11 +35,14 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one method found, with its twin; `found` holds the validation."""
+    """What one method found, with its twin; `found` holds the validation.
+
+    `found` is None where the twin comes from a saved workspace: the evidence is not saved.
+    """
 
     method: Method
-    found: Identification
     twin: Twin
+    found: Identification | None = None
 
 
 @dataclass(frozen=True)
@@ -70,11 +73,11 @@ def identify_all(emit: Emit, task: Task) -> None:
 def _outcome(task: Task, shifts: FoundShifts, method: Method) -> Outcome:
     found = identify(task.log, task.card, shifts, method)
     twin = Twin.from_identification(found, task.card)
-    return Outcome(method, validated(found, twin, task.log), twin)
+    return Outcome(method, twin, validated(found, twin, task.log))
 
 
-def report_of(emit: Emit, outcome: Outcome, log: ShiftLog) -> None:
-    """The report of an outcome as HTML text; emits it."""
+def report_of(emit: Emit, found: Identification, log: ShiftLog) -> None:
+    """The report of an identification as HTML text; emits it."""
     from drivetwin.report.html import render_report
 
-    emit(render_report(outcome.found, log))
+    emit(render_report(found, log))

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from drivetwin.app.jobs import Emit
-from drivetwin.errors import DrivetwinError
+from drivetwin.errors import CardError, DrivetwinError
+from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.mapping import ChannelSpec, Mapped
 from drivetwin.logs.profile import read_mapping, write_mapping
 from drivetwin.logs.raw import ReadOptions
@@ -78,10 +79,13 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     emit(Opened(looked, card, log, found))
 
 
-def open_card(emit: Emit, path: Path) -> None:
-    """Read a vehicle card; emits it. Raises CardError."""
+def open_gearbox(emit: Emit, path: Path, label: str) -> None:
+    """Read a gearbox card, called `label` in messages; emits it. Raises CardError."""
     bound_memory()
-    emit(load_card(path))
+    try:
+        emit(load_gearbox(str(path)))
+    except DrivetwinError as error:
+        raise CardError(error.what, error.remedy, replace(error.where, file=label)) from None
 
 
 def bound_memory() -> None:

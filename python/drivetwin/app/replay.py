@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,7 +28,8 @@ FRICTION = "mu."
 _SPAN, _SIGMAS = 0.4, 6.0
 """A slider reaches so far to either side: a share of the value, or standard deviations."""
 _DELAY_SPAN = 0.03
-_STEPS = 400
+_POSITIONS = 500
+"""A slider has at least so many positions."""
 _FOLLOWING = ("simulated", "measured − simulated")
 """Names of the curves that a slider moves."""
 _HEIGHT = 980
@@ -35,9 +37,9 @@ _HEIGHT = 980
 
 @dataclass(frozen=True)
 class Slider:
-    """One parameter to be moved: `value` as identified, the range and the display unit.
+    """One parameter to be moved: where it stands as identified, its range and its unit.
 
-    Numbers are in the display unit.
+    Numbers are in the display unit and multiples of `step`, so that they read well.
     """
 
     id: str
@@ -46,11 +48,14 @@ class Slider:
     value: float
     low: float
     high: float
+    step: float
 
-    @property
-    def step(self) -> float:
-        """Distance of two positions."""
-        return (self.high - self.low) / _STEPS
+    @classmethod
+    def over(cls, id: str, label: str, unit: str, range: tuple[float, float, float]) -> Slider:
+        """A slider over (low, value, high), rounded to its step."""
+        step = 10.0 ** math.floor(math.log10((range[2] - range[0]) / _POSITIONS))
+        low, value, high = (float(f"{round(x / step) * step:.12g}") for x in range)
+        return cls(id, label, unit, value, low, high, step)
 
 
 def sliders_of(twin: Twin, shift: Shift) -> list[Slider]:
@@ -60,7 +65,7 @@ def sliders_of(twin: Twin, shift: Shift) -> list[Slider]:
     ids = (*names, "te_delay", *(f"P0.{element}" for element in elements))
     told = [_slider(twin, name) for name in ids if name is not None]
     laws = [
-        Slider(FRICTION + element, f"μ of {element}", "× identified", 1.0, 0.5, 1.5)
+        Slider.over(FRICTION + element, f"μ {element}", "× identified", (0.5, 1.0, 1.5))
         for element in elements
     ]
     return [one for one in told if one is not None] + laws
@@ -84,6 +89,15 @@ def model_of(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClut
         _scaled(element, changes.get(FRICTION + element.name, 1.0)) for element in model.elements
     )
     return replace(model, elements=elements)
+
+
+def changes_of(sliders: Sequence[Slider], positions: Mapping[str, float]) -> dict[str, float]:
+    """Parameters (SI) by slider id that were moved away from where they were identified."""
+    return {
+        one.id: positions[one.id] / display_for(one.id).factor
+        for one in sliders
+        if one.id in positions and abs(positions[one.id] - one.value) > 0.5 * one.step
+    }
 
 
 def first_run(twin: Twin, log: ShiftLog, shift: Shift) -> Validation:
@@ -142,14 +156,8 @@ def _slider(twin: Twin, name: str) -> Slider | None:
     if spec.stem == "te_delay":
         span = _DELAY_SPAN
     low, high = max(value - span, spec.lower), min(value + span, spec.upper)
-    return Slider(
-        name,
-        parameter_label(name),
-        display.label,
-        value * display.factor,
-        low * display.factor,
-        high * display.factor,
-    )
+    shown = (low * display.factor, value * display.factor, high * display.factor)
+    return Slider.over(name, parameter_label(name), display.label, shown)
 
 
 def _scaled(element: ShiftElement, factor: float) -> ShiftElement:

@@ -11,6 +11,7 @@ import typer
 
 from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
+from drivetwin.cli.examine import examine
 from drivetwin.cli.export import export
 from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
@@ -22,6 +23,7 @@ from drivetwin.cli.report import report
 from drivetwin.cli.shifts import shifts
 from drivetwin.cli.simulate import simulate
 from drivetwin.cli.synth import synth
+from drivetwin.cli.workbench import workbench
 from drivetwin.errors import DrivetwinError, InputError, Where
 
 app = typer.Typer(
@@ -36,6 +38,7 @@ for command in (
     inspect,
     shifts,
     identify,
+    examine,
     simulate,
     observe,
     report,
@@ -45,6 +48,7 @@ for command in (
     drive,
 ):
     app.command()(command)
+app.command(name="app")(workbench)
 
 
 def _version(wanted: bool) -> None:

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: MIT */
+/* Selects hand over their value; upload buttons send a file; figures follow light and dark. */
+"use strict";
+(() => {
+  const idOf = (element) => (element.id.startsWith("{") ? JSON.parse(element.id) : element.id);
+  const set = (id, props) => window.dash_clientside.set_props(id, props);
+
+  document.addEventListener("change", (event) => {
+    if (event.target.matches("select.choice")) {
+      set(idOf(event.target), { "data-value": event.target.value });
+    }
+  });
+
+  /* Uploads: bytes go as they are, counted by the server while they come in. */
+  const say = (text, fault) =>
+    set("message", { children: text, className: `message ${fault ? "fault" : "good"}` });
+
+  async function send(button, file) {
+    const limit = Number(document.body.dataset[`limit${button.dataset.upload}`] || 0);
+    if (limit && file.size > limit) {
+      const has = (file.size / 1e6).toFixed(0), may = (limit / 1e6).toFixed(0);
+      say(`${file.name}: the file has ${has} MB, uploads may have ${may} MB`, true);
+      return;
+    }
+    button.setAttribute("aria-busy", "true");
+    say(`uploading ${file.name} …`, false);
+    try {
+      const answer = await fetch(
+        `upload/${button.dataset.upload}?name=${encodeURIComponent(file.name)}`,
+        {
+          method: "POST",
+          body: file,
+          headers: { "X-Drivetwin-Session": JSON.parse(sessionStorage.getItem("session")) },
+        },
+      );
+      const content = await answer.json();
+      if (!answer.ok) {
+        say(content.error, true);
+        return;
+      }
+      say(`uploaded ${content.name}`, false);
+      set(button.dataset.target, { data: content });
+    } catch (fault) {
+      say(`${file.name} was not taken: ${fault.message}`, true);
+    } finally {
+      button.removeAttribute("aria-busy");
+    }
+  }
+
+  document.addEventListener("click", (event) => {
+    const button = event.target.closest("button[data-upload]");
+    if (!button) return;
+    const picker = document.createElement("input");
+    picker.type = "file";
+    picker.addEventListener("change", () => picker.files[0] && send(button, picker.files[0]));
+    picker.click();
+  });
+
+  /* Phase boundaries are dragged; the arrow keys are for the number fields beside the figure. */
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const inks = { true: "#dfe3e9", false: "#2a313b" };
+
+  function paint(plot) {
+    const ink = inks[dark.matches];
+    if (!plot.layout || (plot.layout.font || {}).color === ink) return;
+    const ground = dark.matches ? "#232a34" : "#ffffff";
+    const change = { "font.color": ink, "hoverlabel.bgcolor": ground, "hoverlabel.font.color": ink };
+    (plot.layout.updatemenus || []).forEach((_, index) => {
+      change[`updatemenus[${index}].bgcolor`] = ground;
+      change[`updatemenus[${index}].bordercolor`] = dark.matches ? "#475060" : "#c3cad4";
+      change[`updatemenus[${index}].font.color`] = ink;
+    });
+    window.Plotly.relayout(plot, change);
+  }
+  const paintAll = () => document.querySelectorAll(".js-plotly-plot").forEach(paint);
+  dark.addEventListener("change", paintAll);
+  const seen = new WeakSet();
+  new MutationObserver(() => {
+    document.querySelectorAll(".js-plotly-plot").forEach((plot) => {
+      if (seen.has(plot) || !plot.on) return;
+      seen.add(plot);
+      plot.on("plotly_afterplot", () => paint(plot));
+      paint(plot);
+    });
+  }).observe(document, { childList: true, subtree: true });
+})();

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""What a session hands over as a file: the twin for other programs, result, report, mapping."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from drivetwin.app import jobs
+from drivetwin.app.identifying import report_of
+from drivetwin.app.work import Work
+from drivetwin.errors import InputError
+from drivetwin.export.targets import Target
+from drivetwin.identify.result import Identification
+from drivetwin.shifts.shift import Shift
+from drivetwin.twin import Twin
+
+REPORT_LIMIT = 120.0
+"""Time [s] after which writing a report is given up."""
+
+
+class Record(StrEnum):
+    """Files of drivetwin itself."""
+
+    TWIN = "twin.toml"
+    RESULT = "result.json"
+    REPORT = "report.html"
+    MAPPING = "channels.toml"
+
+
+@dataclass(frozen=True)
+class Product:
+    """A file to be handed over."""
+
+    name: str
+    content: bytes
+
+
+def produce(work: Work, wanted: Target | Record, scratch: Path) -> Product:
+    """Make one file from what is shown; `scratch` is a folder of our own.
+
+    Raises InputError where the session has nothing of the kind, and the errors of the writers.
+    """
+    stem = Path(work.log.name).stem if work.log is not None else "twin"
+    if isinstance(wanted, Record):
+        return Product(f"{stem}.{wanted.value}", _record(work, wanted, scratch))
+    twin, shift = work.require_twin(), work.require_shift()
+    if wanted is Target.C:
+        return Product(f"{stem}.c.zip", _sources(twin, shift, scratch))
+    path = scratch / f"{stem}.{wanted.value}"
+    if wanted is Target.FMU:
+        from drivetwin.export.fmu.build import build_fmu
+        from drivetwin.export.subject import subject_of
+
+        build_fmu(subject_of(twin, (shift.start_gear, shift.end_gear)), path)
+    else:
+        from drivetwin.export.parameters.files import ParameterFormat, write_parameters
+        from drivetwin.export.parameters.of_twin import parameters_of
+
+        write_parameters(parameters_of(twin), path, ParameterFormat(wanted.value))
+    return Product(path.name, _taken(path))
+
+
+def _record(work: Work, wanted: Record, scratch: Path) -> bytes:
+    path = scratch / wanted.value
+    match wanted:
+        case Record.TWIN:
+            work.require_twin().save(path)
+        case Record.RESULT:
+            from drivetwin.results.result_file import save_result
+
+            save_result(path, _evidence(work))
+        case Record.REPORT:
+            log = work.require_log()
+            text: str = jobs.call(report_of, _evidence(work), log, limit=REPORT_LIMIT)
+            return text.encode()
+        case Record.MAPPING:
+            from drivetwin.logs.profile import write_mapping
+
+            survey = work.require_opened().survey
+            write_mapping(path, {**survey.mapping, **work.channels}, survey.options)
+    return _taken(path)
+
+
+def _evidence(work: Work) -> Identification:
+    """The result that is shown. Raises InputError for one from a workspace."""
+    found = work.require_outcome().found
+    if found is None:
+        raise InputError(
+            "a reopened workspace holds the twin, not the evidence behind it",
+            "identify again, then export result and report",
+        )
+    return found
+
+
+def _sources(twin: Twin, shift: Shift, scratch: Path) -> bytes:
+    """The C sources as one archive; equal twins give equal bytes."""
+    from drivetwin.export.c import write_c
+    from drivetwin.export.subject import subject_of
+
+    folder = scratch / "c"
+    folder.mkdir(exist_ok=True)
+    paths = write_c(subject_of(twin, (shift.start_gear, shift.end_gear)), folder)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in paths:
+            archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes())
+    return packed.getvalue()
+
+
+def _taken(path: Path) -> bytes:
+    content = path.read_bytes()
+    path.unlink()
+    return content

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""What the server answers to: its own pages only, by address and not by a foreign name.
+
+A page of another site can make a browser send requests here, under a name that it has made point
+to this machine (DNS rebinding). Such a request carries that name as its host: it is refused.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+from urllib.parse import urlsplit
+
+from flask import Flask, Response, request
+from werkzeug.exceptions import HTTPException
+
+MAX_REQUEST = 4 * 2**20
+"""Bytes of a request that is no upload."""
+LOCAL = "localhost"
+
+
+def protect(server: Flask, host: str, script_hashes: list[str]) -> None:
+    """Refuse foreign hosts and origins, bound requests, and let pages load nothing from outside.
+
+    `host` is the address that the server listens on; names beside it and `localhost` are refused.
+    """
+    server.config["MAX_CONTENT_LENGTH"] = MAX_REQUEST
+    policy = _policy(script_hashes)
+
+    @server.before_request
+    def refuse_strangers() -> Response | None:
+        if not is_own(request.host, host):
+            return refusal(421, f"this server does not answer to the name {request.host!r}")
+        origin = request.headers.get("Origin")
+        foreign = origin is not None and urlsplit(origin).netloc != request.host
+        if foreign or request.headers.get("Sec-Fetch-Site") == "cross-site":
+            return refusal(403, "this request comes from another site")
+        return None
+
+    @server.after_request
+    def close_in(response: Response) -> Response:
+        response.headers.update(policy)
+        return response
+
+    @server.errorhandler(HTTPException)
+    def told(error: HTTPException) -> Response:
+        too_large = f"a request may have {MAX_REQUEST / 2**20:.0f} MB"
+        return refusal(error.code or 500, too_large if error.code == 413 else error.name)
+
+
+def is_own(named: str, host: str) -> bool:
+    """Whether the host that a request names is this server and no name given to it by others.
+
+    Addresses cannot be rebound; of names only `localhost` and the one listened on count. Where the
+    server listens on this machine alone, the address is one of this machine.
+    """
+    try:
+        name = urlsplit(f"//{named}").hostname or ""
+    except ValueError:
+        return False
+    if name in (LOCAL, host.lower()):
+        return True
+    try:
+        address = ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return address.is_loopback or not is_loopback(host)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address to listen on is reachable from this machine alone."""
+    if host == LOCAL:
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def refusal(status: int, text: str) -> Response:
+    """An answer that says why there is none."""
+    return Response(json.dumps({"error": text}), status, mimetype="application/json")
+
+
+def _policy(script_hashes: list[str]) -> dict[str, str]:
+    scripts = " ".join(["'self'", *script_hashes])
+    rules = (
+        "default-src 'self'",
+        f"script-src {scripts}",
+        "style-src 'self' 'unsafe-inline'",  # figures and components set styles on elements
+        "img-src 'self' data: blob:",
+        "font-src 'self' data:",
+        "object-src 'none'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    )
+    return {
+        "Content-Security-Policy": "; ".join(rules),
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "no-referrer",
+        "Cross-Origin-Resource-Policy": "same-origin",
+        "Cross-Origin-Opener-Policy": "same-origin",
+    }

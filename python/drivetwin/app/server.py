@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""The server of the workbench: pages, uploads, and its life from start to end."""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from dash import Dash
+from flask import Response, request
+from werkzeug.serving import BaseWSGIServer, make_server
+
+from drivetwin.app import jobs, uploads, workspace
+from drivetwin.app.folder import Folder
+from drivetwin.app.guard import protect, refusal
+from drivetwin.app.session import Sessions
+from drivetwin.app.views.page import build_page
+from drivetwin.app.work import Source
+from drivetwin.errors import RefusedError
+
+SESSION_HEADER = "X-Drivetwin-Session"
+LIMITS = {
+    "log": uploads.MAX_UPLOAD,
+    "card": uploads.MAX_TEXT,
+    "gearbox": uploads.MAX_TEXT,
+    "workspace": workspace.LARGEST,
+}
+"""Bytes that an upload may have, by what it is for."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """What a session begins with: files that were named on the command line."""
+
+    log: Source | None = None
+    card: Source | None = None
+    mapping: Path | None = None
+
+
+def build(folder: Folder, start: Start, host: str = "127.0.0.1") -> tuple[Dash, Sessions]:
+    """The application and its sessions, ready to be served on `host`."""
+    sessions = Sessions(folder)
+    app = Dash(
+        "drivetwin",
+        title="drivetwin workbench",
+        update_title="",
+        assets_folder=str(Path(__file__).parent / "assets"),
+        serve_locally=True,
+        suppress_callback_exceptions=True,
+        add_log_handler=False,
+    )
+    build_page(app, sessions, start)
+    _take_uploads(app, sessions)
+    protect(app.server, host, list(app.csp_hashes()))
+    return app, sessions
+
+
+def listen(app: Dash, host: str, port: int) -> BaseWSGIServer:
+    """A server on `host` and `port` (0: any free one), not yet serving. Raises OSError."""
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)
+    jobs.warm_up()
+    return make_server(host, port, app.server, threaded=True)
+
+
+def _take_uploads(app: Dash, sessions: Sessions) -> None:
+    @app.server.post("/upload/<purpose>")  # type: ignore[untyped-decorator]
+    def upload(purpose: str) -> Response:
+        limit = LIMITS.get(purpose)
+        if limit is None:
+            return refusal(404, "there is no such upload")
+        request.max_content_length = sys.maxsize  # counted while it is received
+        name = request.args.get("name", "")
+        try:
+            session = sessions.get(request.headers.get(SESSION_HEADER))
+            key = session.receive(request.stream, name, request.content_length, limit)
+        except RefusedError as error:
+            return refusal(400, str(error))
+        return Response(json.dumps({"key": key, "name": name}), mimetype="application/json")

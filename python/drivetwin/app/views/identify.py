@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""Identify: the run in the background, how far it is, and what came of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from dash import Dash, Input, Output, State, dcc, html, no_update
+from dash.development.base_component import Component
+
+from drivetwin.app.locks import LockKind
+from drivetwin.app.session import Sessions
+from drivetwin.app.views.log import facts_line
+from drivetwin.app.views.parts import (
+    Topic,
+    announce,
+    button,
+    choice,
+    hint,
+    notes,
+    row,
+    table,
+    tell,
+    told,
+    topic_id,
+)
+from drivetwin.app.work import Work
+from drivetwin.identify.method import Method
+from drivetwin.identify.result import Verdict
+from drivetwin.report.labels import parameter_label
+
+_UP_TO = {
+    "likelihood": "paper, linear and likelihood",
+    "integral": "paper and linear (quick)",
+    "paper": "paper alone",
+}
+_POLL = 300
+"""Time [ms] between two looks at the running job."""
+
+
+def layout() -> list[Component]:
+    """Run, cancel, progress, outcome."""
+    return [
+        hint(
+            "Runs in a process of its own; the page stays free. The linear and the likelihood "
+            "method take phases and locks as set; the paper's procedure knows no locks."
+        ),
+        row(
+            choice("methods", "Methods", _UP_TO, "likelihood"),
+            button("Identify", "identify", main=True),
+            button("Cancel", "cancel", disabled=True),
+        ),
+        html.Div(
+            [
+                html.Label(
+                    [
+                        html.Span("Progress", className="label"),
+                        html.Progress(id="progress", value="0", max="1"),
+                    ],
+                    className="field",
+                ),
+                html.P(id="progress-text", className="hint"),
+            ],
+            id="progress-box",
+            hidden=True,
+        ),
+        dcc.Interval(id="tick", interval=_POLL, disabled=True),
+        html.Div(id="identify-content"),
+    ]
+
+
+def register(app: Dash, sessions: Sessions) -> None:
+    """Starting, following and stopping the job."""
+
+    @app.callback(
+        Input("identify", "n_clicks"),
+        State("session", "data"),
+        State("methods", "data-value"),
+        prevent_initial_call=True,
+    )
+    @told
+    def start(_: int, key: str, up_to: str) -> object:
+        """Begin the identification."""
+        order = list(Method)
+        sessions.get(key).identify(order[: order.index(Method(up_to)) + 1])
+        tell("")
+        announce(Topic.RESULTS)
+        return no_update
+
+    @app.callback(Input("cancel", "n_clicks"), State("session", "data"), prevent_initial_call=True)
+    @told
+    def cancel(_: int, key: str) -> object:
+        """Stop it."""
+        sessions.get(key).cancel()
+        tell("The identification was cancelled")
+        announce(Topic.RESULTS)
+        return no_update
+
+    @app.callback(
+        Output("progress", "value"),
+        Output("progress-text", "children"),
+        Input("tick", "n_intervals"),
+        State("session", "data"),
+        prevent_initial_call=True,
+    )
+    @told
+    def follow(_: int, key: str) -> tuple[object, object]:
+        """Take in results as they come."""
+        session = sessions.get(key)
+        try:
+            if session.poll():
+                announce(Topic.RESULTS)
+        except Exception:
+            announce(Topic.RESULTS)
+            raise
+        job = session.job
+        if job is None:
+            return no_update, no_update
+        return f"{job.share:.3f}", f"{job.text or 'starting'} · {job.elapsed:.0f} s"
+
+    @app.callback(
+        Output("identify-content", "children"),
+        Output("tick", "disabled"),
+        Output("progress-box", "hidden"),
+        Output("identify", "disabled"),
+        Output("cancel", "disabled"),
+        Input(topic_id(Topic.RESULTS), "data"),
+        Input(topic_id(Topic.PHASES), "data"),
+        State("session", "data"),
+    )
+    @told
+    def show(_results: int, _phases: int, key: str) -> tuple[Any, ...]:
+        """What is known so far."""
+        session = sessions.get(key)
+        busy = session.job is not None
+        return _content(session.work), not busy, not busy, busy, not busy
+
+
+def _content(work: Work) -> list[Component]:
+    content: list[Component] = [_before(work)]
+    for method, text in work.refusals.items():
+        content.append(notes(f"The {method.value} method found nothing", [text]))
+    if work.method is None:
+        return content
+    outcome = work.results[work.method]
+    count = Counter(one.verdict for one in outcome.twin.parameters.values())
+    facts = {"method": outcome.twin.method.value}
+    facts |= {verdict.value: str(count[verdict]) for verdict in Verdict if count[verdict]}
+    if outcome.found is not None:
+        for signal, fits in outcome.found.fit.items():
+            facts[f"fit of {signal.replace('_', ' ')}"] = f"{fits['all'].fit_percent:.1f} %"
+    content.append(facts_line(facts))
+    if outcome.found is None:
+        content.append(hint("From the saved workspace; identify again for evidence and report."))
+    else:
+        content.append(notes("Warnings", outcome.found.warnings))
+    content.append(notes("Assumptions", outcome.twin.assumptions, "plain"))
+    return content
+
+
+def _before(work: Work) -> Component:
+    """What the next run takes as given."""
+    rows = []
+    for index, times in work.moves.items():
+        shift = work.shifts[index]
+        rows.append((f"phases {shift.start_gear}→{shift.end_gear}", f"{len(times)} set by hand"))
+    for name, lock in work.locks.items():
+        text = "free" if lock.kind is LockKind.FREE else f"{lock.value:.5g} (SI)"
+        if lock.kind is LockKind.PRIOR:
+            text += f" ± {lock.std:.2g}"
+        rows.append((parameter_label(name), f"{lock.kind.value}: {text}"))
+    if not rows:
+        return html.Div()
+    return table(("set by hand", ""), rows, "Beside the vehicle card, the next run takes")

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""The page around the views: navigation, status line, message, and the start of a session."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dash import Dash, Input, Output, State, dcc, html, no_update
+from dash.development.base_component import Component
+
+from drivetwin.app.session import Session, Sessions
+from drivetwin.app.views import (
+    channels,
+    compare,
+    export,
+    gearbox,
+    identify,
+    log,
+    model,
+    phases,
+    workspace,
+)
+from drivetwin.app.views.parts import Topic, announce, attributes, told, topic_id
+
+if TYPE_CHECKING:
+    from drivetwin.app.server import Start
+
+VIEWS = {
+    "log": ("Log", log),
+    "channels": ("Channels", channels),
+    "phases": ("Phases", phases),
+    "identify": ("Identify", identify),
+    "model": ("Model", model),
+    "compare": ("Compare", compare),
+    "gearbox": ("Gearbox", gearbox),
+    "export": ("Export", export),
+    "workspace": ("Workspace", workspace),
+}
+_FIRST = "log"
+_INDEX = """<!DOCTYPE html>
+<html lang="en">
+  <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}</head>
+  <body>{%app_entry%}<footer hidden>{%config%}{%scripts%}{%renderer%}</footer></body>
+</html>"""
+_SWITCH = """(...args) => {
+  const names = NAMES;
+  const id = (dash_clientside.callback_context.triggered_id || "nav-FIRST").slice(4);
+  setTimeout(() => window.dispatchEvent(new Event("resize")), 0);
+  const current = names.map((name) => (name === id ? "page" : "false"));
+  return [...names.map((name) => name !== id), ...current];
+}"""
+
+
+def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
+    """Give the application its layout and the callbacks of all views."""
+    app.index_string = _INDEX
+    app.layout = _layout
+    _switch_views(app)
+    _enter(app, sessions, start)
+    _show_status(app, sessions)
+    for _, view in VIEWS.values():
+        view.register(app, sessions)
+
+
+def _layout() -> Component:
+    navigation = html.Nav(
+        [
+            html.H1(["drivetwin", html.Small("workbench")]),
+            *(
+                html.Button(
+                    title, id=f"nav-{name}", type="button", **attributes(aria_current="false")
+                )
+                for name, (title, _) in VIEWS.items()
+            ),
+        ],
+        className="side",
+        **attributes(aria_label="Views"),
+    )
+    panels = [
+        html.Section(
+            [html.H2(title), *view.layout()],
+            id=f"view-{name}",
+            hidden=name != _FIRST,
+            **attributes(aria_label=title),
+        )
+        for name, (title, view) in VIEWS.items()
+    ]
+    return html.Div(
+        [
+            dcc.Store(id="session", storage_type="session"),
+            *(dcc.Store(id=topic_id(topic)) for topic in Topic),
+            navigation,
+            html.Main(
+                [
+                    html.P(id="status", className="status"),
+                    html.Div(id="message", role="status", className="message"),
+                    *panels,
+                ]
+            ),
+        ],
+        className="shell",
+    )
+
+
+def _switch_views(app: Dash) -> None:
+    script = _SWITCH.replace("NAMES", str(list(VIEWS))).replace("FIRST", _FIRST)
+    app.clientside_callback(  # type: ignore[no-untyped-call]
+        script,
+        *(Output(f"view-{name}", "hidden") for name in VIEWS),
+        *(Output(f"nav-{name}", "aria-current") for name in VIEWS),
+        *(Input(f"nav-{name}", "n_clicks") for name in VIEWS),
+    )
+
+
+def _enter(app: Dash, sessions: Sessions, start: Start) -> None:
+    @app.callback(
+        Output("session", "data"), Input("session", "modified_timestamp"), State("session", "data")
+    )
+    @told
+    def enter(_: int, key: str | None) -> object:
+        """Go on with the session of this tab, or begin one with what the command line named."""
+        if key in sessions:
+            announce(Topic.LOG)
+            announce(Topic.GEARBOX)
+            return no_update
+        fresh = sessions.new()
+        if start.log is not None and start.card is not None:
+            _open_first(sessions.get(fresh), start)
+        return fresh
+
+
+@told
+def _open_first(session: Session, start: Start) -> None:
+    if start.log is not None and start.card is not None:
+        session.open(start.log, start.card, start.mapping)
+
+
+def _show_status(app: Dash, sessions: Sessions) -> None:
+    @app.callback(
+        Output("status", "children"),
+        Input(topic_id(Topic.LOG), "data"),
+        Input(topic_id(Topic.RESULTS), "data"),
+        State("session", "data"),
+    )
+    def status(_log: int, _results: int, key: str | None) -> list[Component | str]:
+        """One line that says what is open and what is known."""
+        if key not in sessions:
+            return []
+        work = sessions.get(key).work
+        if work.log is None or work.card is None:
+            return ["no log is open"]
+        parts: list[Component | str] = [html.B(work.log.name), f" · card {work.card.name}"]
+        for shift in work.shifts:
+            parts.append(f" · shift {shift.start_gear}→{shift.end_gear}")
+        if work.results:
+            parts.append(f" · identified: {', '.join(method.value for method in work.results)}")
+        return parts

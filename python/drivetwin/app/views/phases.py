@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""Phases: the shift with its boundaries, dragged in the figure or typed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from dash import ALL, Dash, Input, Output, State, html, no_update
+from dash.development.base_component import Component
+
+from drivetwin.app.phases import LABELS, Boundary, dragged, phase_figure, times_of
+from drivetwin.app.session import Sessions
+from drivetwin.app.views.parts import (
+    Topic,
+    announce,
+    button,
+    choice,
+    field,
+    graph,
+    hint,
+    notes,
+    row,
+    table,
+    tell,
+    told,
+    topic_id,
+)
+from drivetwin.app.work import Work
+from drivetwin.report.sections.story import PHASE_KEY
+from drivetwin.report.units import significant
+from drivetwin.shifts.quality import QUALITY_UNITS
+from drivetwin.shifts.shift import Shift
+
+
+def layout() -> list[Component]:
+    """The figure and the times."""
+    return [
+        hint(
+            "Drag a dashed line to move a phase boundary, or type its time. What is set by hand "
+            "counts for the next identification."
+        ),
+        html.Div(id="phases-content"),
+    ]
+
+
+def register(app: Dash, sessions: Sessions) -> None:
+    """Moving boundaries."""
+
+    @app.callback(
+        Output("phases-content", "children"),
+        Input(topic_id(Topic.PHASES), "data"),
+        State("session", "data"),
+    )
+    @told
+    def show(_: int, key: str) -> list[Component]:
+        """The shift that is chosen."""
+        work = sessions.get(key).work
+        return _content(work) if work.shifts else [hint("No shift is open.")]
+
+    @app.callback(
+        Input("phases-plot", "relayoutData"),
+        State("session", "data"),
+        prevent_initial_call=True,
+    )
+    @told
+    def drag(change: dict[str, Any] | None, key: str) -> object:
+        """A line was dragged."""
+        session = sessions.get(key)
+        work = session.work
+        if not change or not any(name.startswith("shapes[") for name in change):
+            return no_update
+        moves = dragged(phase_figure(work.require_log(), work.require_shift()), change)
+        announce(Topic.PHASES)
+        if moves:
+            session.move(work.shift, moves)
+            tell("; ".join(f"{LABELS[one]} at {time:.4f} s" for one, time in moves.items()))
+        return no_update
+
+    @app.callback(
+        Input("apply-phases", "n_clicks"),
+        State("session", "data"),
+        State({"boundary": ALL}, "value"),
+        prevent_initial_call=True,
+    )
+    @told
+    def apply(clicks: int | None, key: str, times: Sequence[float | None]) -> object:
+        """Times were typed."""
+        if not clicks:
+            return no_update
+        session = sessions.get(key)
+        pairs = zip(Boundary, times, strict=True)
+        session.move(session.work.shift, {one: float(t) for one, t in pairs if t is not None})
+        announce(Topic.PHASES)
+        tell("The phases are set")
+        return no_update
+
+    @app.callback(
+        Input("reset-phases", "n_clicks"), State("session", "data"), prevent_initial_call=True
+    )
+    @told
+    def reset(clicks: int | None, key: str) -> object:
+        """Back to what was detected."""
+        if not clicks:
+            return no_update
+        session = sessions.get(key)
+        session.move(session.work.shift, {})
+        announce(Topic.PHASES)
+        tell("The phases are as detected")
+        return no_update
+
+    @app.callback(
+        Input("phases-shift", "data-value"), State("session", "data"), prevent_initial_call=True
+    )
+    @told
+    def choose(shift: str | None, key: str) -> object:
+        """Another shift of the log."""
+        session = sessions.get(key)
+        if shift is not None and int(shift) != session.work.shift:
+            session.choose_shift(int(shift))
+            announce(Topic.PHASES)
+        return no_update
+
+
+def _content(work: Work) -> list[Component]:
+    shift = work.require_shift()
+    names = {str(k): f"{one.start_gear}→{one.end_gear}" for k, one in enumerate(work.shifts)}
+    times = times_of(shift)
+    fields = [
+        field(
+            {"boundary": one.value},
+            f"{LABELS[one]} [s]",
+            type="number",
+            value=round(times[one], 4),
+            step=0.001,
+        )
+        for one in Boundary
+    ]
+    return [
+        row(choice("phases-shift", "Shift", names, str(work.shift)), *fields),
+        row(
+            button("Apply times", "apply-phases", main=True),
+            button("As detected", "reset-phases"),
+        ),
+        graph(
+            "phases-plot",
+            "The shift over time with its phases",
+            phase_figure(work.require_log(), shift),
+            edits={"shapePosition": True},
+        ),
+        hint(PHASE_KEY),
+        notes("About this shift", shift.warnings),
+        _quality(shift),
+    ]
+
+
+def _quality(shift: Shift) -> Component:
+    rows = [
+        (name.replace("_", " "), f"{significant(value)} {QUALITY_UNITS[name]}")
+        for name, value in shift.quality.items()
+    ]
+    return table(("figure", "value"), rows, "Shift quality")
