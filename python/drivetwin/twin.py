@@ -22,6 +22,7 @@ from drivetwin.errors import InputError, MissingParameterError, Where
 from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, Identification, Method
 from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.shifts.shift import Shift
+from drivetwin.shown import Shown
 from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, Prior, VehicleCard
 
 
@@ -52,7 +53,7 @@ class TwinElement:
 
 
 @dataclass(frozen=True)
-class Twin:
+class Twin(Shown):
     """What is known of one driveline after an identification; immutable, SI.
 
     `parameters` by id (see parameters.py), also those that could not be told; `friction` by

@@ -15,6 +15,7 @@ from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import Shift
+from drivetwin.shown import Shown
 from drivetwin.start_state import calm_moment, start_state
 from drivetwin.twin import Twin
 from drivetwin.vehicle.spec import Prior
@@ -36,7 +37,7 @@ class SignalTrace:
 
 
 @dataclass(frozen=True)
-class Validation:
+class Validation(Shown):
     """One shift simulated from its measured inputs.
 
     `phases` maps `before`, `torque`, `inertia`, `after` to their intervals [s]; `fit` is by signal

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from drivetwin.identify.method import Method as Method
 from drivetwin.parameters import spec_of
 from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.shown import Shown
 
 FloatArray = NDArray[np.float64]
 
@@ -101,7 +102,7 @@ class SignalFit:
 
 
 @dataclass(frozen=True)
-class Identification:
+class Identification(Shown):
     """Everything one `identify` run found. Immutable; the twin, report and exports read it.
 
     `fit[signal][phase]` with signals `output_torque`, `input_speed`, `output_speed` and phases

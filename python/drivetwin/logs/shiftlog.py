@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.errors import MissingChannelError, Where
+from drivetwin.shown import Shown
 
 FloatArray = NDArray[np.float64]
 
@@ -89,7 +90,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class ShiftLog:
+class ShiftLog(Shown):
     """All mapped channels of one recording, by role."""
 
     channels: Mapping[str, Channel]

@@ -62,7 +62,7 @@ def stacked(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
     `phases` maps `before`, `torque`, `inertia`, `after` to intervals [s]; the view opens on the
     shift, buttons zoom to the phases.
     """
-    view = _view(phases)
+    view = shift_view(phases)
     figure = over_time(panels, view, height)
     figure.update_layout(updatemenus=[zoom_buttons(panels, _zooms(panels, phases, view))])
     figure.update_layout(margin={"t": 64})
@@ -167,7 +167,7 @@ def _trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -
     )
 
 
-def _view(phases: Phases) -> tuple[float, float]:
+def shift_view(phases: Phases) -> tuple[float, float]:
     """The shift with half a second before and one second after it."""
     start, end = phases["torque"][0], phases["inertia"][1]
     return max(phases["before"][0], start - 0.5), min(phases["after"][1], end + 1.0)

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""A whole log: every mapped channel over time, with the phases of its shifts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import plotly.graph_objects as go
+
+from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.report.figures.shift_phases import shift_spans
+from drivetwin.report.figures.stack import (
+    Curve,
+    Panel,
+    mark_phases,
+    over_time,
+    shift_view,
+    whole,
+    zoom_buttons,
+)
+from drivetwin.report.labels import channel_label
+from drivetwin.report.style import ACCENT, COMPARED, MEASURED, MUTED, SECOND, SIMULATED
+from drivetwin.report.units import BAR, NM, RPM, Display
+from drivetwin.shifts.shift import Shift
+
+QUANTITIES: dict[Quantity, tuple[str, Display]] = {
+    Quantity.TORQUE: ("torque", NM),
+    Quantity.PRESSURE: ("pressure", BAR),
+    Quantity.SPEED: ("speed", RPM),
+    Quantity.FRACTION: ("share", Display("%", 100.0)),
+    Quantity.TEMPERATURE: ("temperature", Display("K")),
+    Quantity.STATE: ("state", Display("–")),
+}
+"""What the axis of a quantity says, and its unit."""
+_COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
+
+
+def log_figure(log: ShiftLog, shifts: Sequence[Shift] = ()) -> go.Figure:
+    """All channels by quantity; the phases of `shifts` are shaded, with a button for each."""
+    panels = log_panels(log)
+    figure = over_time(panels, whole(panels), 120 + 170 * len(panels))
+    zooms = {"whole": whole(panels)}
+    for shift in shifts:
+        spans = shift_spans(shift)
+        mark_phases(figure, spans)
+        zooms[f"{shift.start_gear}→{shift.end_gear}, {shift.lockup_time:.1f} s"] = shift_view(spans)
+    if shifts:
+        figure.update_layout(updatemenus=[zoom_buttons(panels, zooms)], margin={"t": 64})
+    return figure
+
+
+def log_panels(log: ShiftLog) -> list[Panel]:
+    """What `log_figure` shows: one panel for each quantity that the log holds."""
+    panels = []
+    for quantity, (title, display) in QUANTITIES.items():
+        channels = [one for one in log.channels.values() if one.quantity is quantity]
+        if channels:
+            curves = [_curve(one, k) for k, one in enumerate(channels)]
+            panels.append(Panel(title, display, curves))
+    return panels
+
+
+def _curve(channel: Channel, k: int) -> Curve:
+    held = channel.held or channel.quantity is Quantity.STATE
+    return Curve(
+        channel_label(channel.role),
+        channel.time,
+        channel.values,
+        _COLOURS[k % len(_COLOURS)],
+        step=held,
+    )

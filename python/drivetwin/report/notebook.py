@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: MIT
+"""Figures and summaries of results for notebooks: what `Shown` objects answer with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import singledispatch
+
+import numpy as np
+import plotly.graph_objects as go
+from markupsafe import escape
+
+from drivetwin.identify.result import Estimate, Identification, SignalFit
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.report.figures.comparison import friction_overlay
+from drivetwin.report.figures.parameters import interval_figure
+from drivetwin.report.figures.recording import QUANTITIES, log_figure
+from drivetwin.report.figures.validation import validation_figure
+from drivetwin.report.labels import channel_label, channel_unit
+from drivetwin.report.units import display_of, significant, with_uncertainty
+from drivetwin.twin import Twin
+from drivetwin.validate import Validation
+
+Row = Sequence[str]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A small table: `head` and `rows` of texts; columns in `right` are aligned to the right."""
+
+    head: Row
+    rows: Sequence[Row]
+    right: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, repr=False)
+class Summary:
+    """A title, tables and remarks, as text and as HTML."""
+
+    title: str
+    tables: Sequence[Table]
+    remarks: Sequence[str] = ()
+
+    def __str__(self) -> str:
+        parts = [self.title, *(_text(table) for table in self.tables), *self.remarks]
+        return "\n\n".join(part for part in parts if part)
+
+    __repr__ = __str__
+
+    @property
+    def html(self) -> str:
+        """Plain HTML that takes the notebook's own colours."""
+        tables = "".join(_html(table) for table in self.tables)
+        remarks = "".join(f"<li>{escape(text)}</li>" for text in self.remarks)
+        listed = f"<ul>{remarks}</ul>" if remarks else ""
+        return f"<div><strong>{escape(self.title)}</strong>{tables}{listed}</div>"
+
+    def _repr_html_(self) -> str:
+        return self.html
+
+
+def _text(table: Table) -> str:
+    """Aligned columns, two spaces apart."""
+    lines = [table.head, *table.rows]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(table.head))]
+
+    def row(line: Row) -> str:
+        padded = (
+            text.rjust(width) if k in table.right else text.ljust(width)
+            for k, (text, width) in enumerate(zip(line, widths, strict=True))
+        )
+        return "  ".join(padded).rstrip()
+
+    return "\n".join(
+        [row(table.head), "-" * (sum(widths) + 2 * len(widths) - 2), *map(row, table.rows)]
+    )
+
+
+def _html(table: Table) -> str:
+    def cells(line: Row, tag: str) -> str:
+        return "".join(
+            f'<{tag} style="text-align:{"right" if k in table.right else "left"}">{escape(text)}'
+            f"</{tag}>"
+            for k, text in enumerate(line)
+        )
+
+    rows = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in table.rows)
+    return f"<table><thead><tr>{cells(table.head, 'th')}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+@singledispatch
+def figure_of(thing: object) -> go.Figure:
+    """Figure of a result; TypeError for what has none."""
+    raise TypeError(f"no figure of a {type(thing).__name__}")
+
+
+@singledispatch
+def summary_of(thing: object) -> Summary:
+    """Summary of a result; TypeError for what has none."""
+    raise TypeError(f"no summary of a {type(thing).__name__}")
+
+
+@figure_of.register
+def _(log: ShiftLog) -> go.Figure:
+    return log_figure(log)
+
+
+@figure_of.register
+def _(found: Identification) -> go.Figure:
+    validations = found.evidence.get("validation", ())
+    return validation_figure(validations[0]) if validations else interval_figure(found.estimates)
+
+
+@figure_of.register
+def _(twin: Twin) -> go.Figure:
+    return friction_overlay("the element", twin.friction, list(twin.friction))
+
+
+@figure_of.register
+def _(validation: Validation) -> go.Figure:
+    return validation_figure(validation)
+
+
+@summary_of.register
+def _(log: ShiftLog) -> Summary:
+    rows = []
+    for role, one in log.channels.items():
+        _, display = QUANTITIES[one.quantity]
+        low, high = (
+            significant(float(value) * display.factor)
+            for value in (np.nanmin(one.values), np.nanmax(one.values))
+        )
+        rate = significant(1.0 / one.step, 3)
+        rows.append((role, one.source_name, rate, low, high, display.label))
+    head = ("role", "channel", "Hz", "from", "to", "unit")
+    return Summary(log.source, [Table(head, rows, frozenset({2, 3, 4}))], log.warnings)
+
+
+@summary_of.register
+def _(found: Identification) -> Summary:
+    shifts = ", ".join(f"{one.start_gear}→{one.end_gear}" for one in found.shifts)
+    return Summary(
+        f"{', '.join(found.inputs)}: shift {shifts}, {found.method.value} method",
+        [_parameters(found.estimates.values()), *_fits(found.fit)],
+        [*_reasons(found.estimates.values()), *(f"warning: {text}" for text in found.warnings)],
+    )
+
+
+@summary_of.register
+def _(twin: Twin) -> Summary:
+    return Summary(
+        f"Twin of {twin.name}, {twin.method.value} method",
+        [_parameters(twin.parameters.values())],
+        _reasons(twin.parameters.values()),
+    )
+
+
+@summary_of.register
+def _(validation: Validation) -> Summary:
+    shift = validation.shift
+    return Summary(
+        f"Shift {shift.start_gear}→{shift.end_gear} simulated: {validation.status}",
+        list(_fits(validation.fit)),
+        validation.warnings,
+    )
+
+
+def _parameters(estimates: Iterable[Estimate]) -> Table:
+    rows = []
+    for one in estimates:
+        display = display_of(one.unit)
+        half = None if one.std_total is None else 1.96 * one.std_total * display.factor
+        value, width = (
+            ("–", "") if one.value is None else with_uncertainty(one.value * display.factor, half)
+        )
+        rows.append(
+            (one.id, value, f"± {width}" if width else "", display.label, one.verdict.value)
+        )
+    return Table(("parameter", "value", "95 %", "unit", "verdict"), rows, frozenset({1, 2}))
+
+
+def _reasons(estimates: Iterable[Estimate]) -> list[str]:
+    """What stands behind verdicts, each reason once with all parameters that share it."""
+    shared: dict[str, list[str]] = {}
+    for one in estimates:
+        if one.reason:
+            shared.setdefault(one.reason, []).append(one.id)
+    return [f"{', '.join(ids)}: {reason}" for reason, ids in shared.items()]
+
+
+def _fits(fit: Mapping[str, Mapping[str, SignalFit]]) -> Iterable[Table]:
+    """The table of fits; none where nothing was simulated."""
+    if not fit:
+        return
+    phases = list(dict.fromkeys(phase for one in fit.values() for phase in one))
+    rows = []
+    for signal, one in fit.items():
+        display = display_of(channel_unit(signal))
+        error = f"{significant(one['all'].rmse * display.factor, 3)} {display.label}"
+        told = [f"{one[p].fit_percent:.1f}" if p in one else "–" for p in phases]
+        rows.append((channel_label(signal), *told, error))
+    head = ("fit %", *phases, "rmse")
+    yield Table(head, rows, frozenset(range(1, len(head))))

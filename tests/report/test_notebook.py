@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""What results show in a notebook."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.identify.result import Identification
+from drivetwin.logs.shiftlog import Channel, Quantity
+from drivetwin.report.notebook import figure_of, summary_of
+from drivetwin.twin import Twin
+from drivetwin.validate import with_fit
+from tests.report.sample import card, identification, log, validation
+
+
+def found() -> Identification:
+    return with_fit(identification(), [validation()])
+
+
+def test_a_summary_fits_a_terminal_and_names_every_parameter() -> None:
+    text = str(found().summary())
+    tables = [line for line in text.splitlines() if not line.startswith(("c_o:", "te_delay:"))]
+    assert max(len(line) for line in tables) <= 80
+    assert all(f"\n{name}" in text for name in found().estimates)
+    assert "te_delay: the engine torque is constant; record throttle steps" in text
+    assert "warning: engine torque is constant" in text
+    assert repr(found().summary()) == text
+
+
+def test_numbers_stand_in_display_units_with_their_interval() -> None:
+    rows = {line.split()[0]: line.split() for line in str(found().summary()).splitlines() if line}
+    assert rows["P0.B3"] == ["P0.B3", "0.820", "±", "0.043", "bar", "identified"]
+    assert rows["te_delay"] == ["te_delay", "–", "ms", "not", "identifiable"]
+
+
+def test_the_rich_representation_escapes_names() -> None:
+    html = found()._repr_html_()
+    assert "sample &lt;1&gt;.csv" in html
+    assert "<1>" not in html
+    assert html.count("<table>") == 2
+
+
+def test_an_identification_without_simulation_shows_its_intervals() -> None:
+    bare = replace(identification(), evidence={})
+    assert "95 % interval" in bare.plot().layout.xaxis.title.text
+    assert "fit %" not in str(bare.summary())
+
+
+def test_a_twin_shows_its_friction() -> None:
+    twin = Twin.from_identification(found(), card())
+    assert [trace.name for trace in twin.plot().data if trace.name] == ["B3"]
+    assert "Twin of sample truck" in str(twin.summary())
+
+
+def test_a_log_shows_every_channel_in_its_unit() -> None:
+    names = {trace.name for trace in log().plot().data}
+    assert names == {
+        "engine torque",
+        "output torque",
+        "pressure B2",
+        "pressure B3",
+        "input speed",
+        "output speed",
+        "wheel speed",
+    }
+    lines = str(log().summary()).splitlines()
+    assert any("pressure.B2" in line and line.endswith("bar") for line in lines)
+
+
+def test_channels_of_any_quantity_are_shown() -> None:
+    time = np.arange(0.0, 3.0, 0.1)
+    gear = Channel("gear", Quantity.STATE, time, np.full(30, 2.0), "G", "")
+    pedal = Channel("throttle", Quantity.FRACTION, time, np.full(30, 0.6), "P", "%")
+    more = replace(log(), channels={"gear": gear, "throttle": pedal})
+    assert len(more.plot().data) == 2
+    assert "60" in str(more.summary())
+
+
+def test_a_validation_is_the_figure_of_the_report() -> None:
+    assert "simulated" in {trace.name for trace in validation().plot().data}
+    assert "simulated: completed" in str(validation().summary())
+
+
+def test_other_things_have_neither() -> None:
+    with pytest.raises(TypeError, match="no figure of a dict"):
+        figure_of({})
+    with pytest.raises(TypeError, match="no summary of a dict"):
+        summary_of({})
