@@ -94,7 +94,7 @@ def _attempts(
     """Fits from `start` and from points beside it, the most promising first."""
     restarts = RESTARTS
     if problem.cost(start) < NEAR * problem.size:
-        direct = _likelihood(problem, start)
+        direct = nearest(problem, start)
         yield direct
         restarts = RESTARTS if direct is None else RESTARTS[:1]
     for shaft, friction in restarts:
@@ -103,29 +103,30 @@ def _attempts(
             for name in start.names
         ]
         near = staged(problem, start.moved(start.values * np.array(factor)), shifts)
-        found = None if near is None else _likelihood(problem, near.point)
-        # Expected inputs formed far from the minimum hold it back: once more with those measured.
-        yield found and _likelihood(problem, found.point)
+        found = None if near is None else nearest(problem, near.point)
+        yield found
 
 
-def _likelihood(problem: Problem, start: Point) -> LikelihoodFit | None:
-    """Minimum of Q with input noise; weighting and expected inputs follow the point."""
+def nearest(problem: Problem, start: Point) -> LikelihoodFit | None:
+    """Minimum of Q with input noise.
 
-    def refresh(present: Problem, point: Point) -> Problem:
-        if present is problem:
-            return problem.weighted_by(point)
-        return present.with_expected_inputs(point, problem).weighted_by(point)
-
-    found = minimise(problem, start, refresh)
+    First with the inputs as measured, the weighting following the point; then from there with the
+    inputs expected at that minimum. Formed elsewhere they would explain a wrong model away.
+    """
+    found = minimise(problem, start, lambda _, point: problem.weighted_by(point))
+    if found is None:
+        return None
+    iterations = found.iterations
+    expected = found.problem.with_expected_inputs(found.point, problem)
+    found = minimise(expected.weighted_by(found.point), found.point)
     if found is None or not found.converged:
         return None
     chi2 = (found.normal.cost - problem.prior.cost(found.point.values)) / problem.size
     if chi2 > PLAUSIBLE:
         return None
     covariance = max(chi2, 1.0) * covariance_of(found.normal.information)
-    return LikelihoodFit(
-        found.problem, found.point, covariance, found.normal, chi2, found.iterations
-    )
+    iterations += found.iterations
+    return LikelihoodFit(found.problem, found.point, covariance, found.normal, chi2, iterations)
 
 
 def covariance_of(matrix: FloatArray) -> FloatArray:
