@@ -12,11 +12,10 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 from typing import IO
 
 from drivetwin.fleet.task import (
-    GO_ON,
     Finished,
     Limits,
     Lost,
@@ -39,7 +38,9 @@ _THREADS = ("OPENBLAS", "OMP", "MKL", "VECLIB", "NUMEXPR", "RAYON")
 
 _GRACE = 2.0
 """Time [s] for a worker to end that has closed its output."""
-_STARTS = 3
+_PAUSES = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
+"""Time [s] to wait after each worker that was killed before it was ready."""
+_BY_ITSELF = "ended with code"
 
 
 class _GoneError(Exception):
@@ -49,7 +50,7 @@ class _GoneError(Exception):
 class Cell:
     """A worker process that is made when needed and made anew when it is gone.
 
-    For use by one thread; `close` may be called from another one and ends a log in progress.
+    For use by one thread; only `kill` may be called by others.
     """
 
     def __init__(self, spec: WorkerSpec) -> None:
@@ -73,24 +74,30 @@ class Cell:
             self._end()
             return Finished(reply, limits.seconds)
         tree = json.loads(reply)
-        if "store" in tree:
-            return Stopped(f"a worker cannot write: {tree['store']}", GO_ON)
+        if "stop" in tree:
+            return Stopped(tree["stop"], tree["remedy"])
         return Finished(Outcome.of(tree["outcome"]), tree["seconds"])
 
+    def kill(self) -> None:
+        """End a log in progress, from any thread; no worker is made again."""
+        self._closed = True
+        process = self._process
+        if process is not None:
+            process.kill()
+
     def close(self) -> None:
-        """End the worker; a task in progress is lost."""
+        """End the worker, if there is one, from the thread that uses the cell."""
         self._closed = True
         if self._process is not None:
-            self._process.kill()
-
-    @property
-    def pid(self) -> int | None:
-        """Of the worker process, where there is one."""
-        return None if self._process is None else self._process.pid
+            self._end()
 
     def _start(self) -> Lost | Stopped | None:
-        """Have a worker that is ready; where none will start, it is no fault of the log."""
-        for _ in range(_STARTS):
+        """Have a worker that is ready; where none will start, it is no fault of the log.
+
+        One that ends by itself will do so again; one that was killed may have been unlucky.
+        """
+        why = ""
+        for pause in _PAUSES:
             if self._closed:
                 return Lost("the run was ended", blame=False)
             if self._process is not None:
@@ -104,6 +111,9 @@ class Cell:
                 why = self._end(_GRACE)
             except OSError as fault:
                 why = str(fault.strerror)
+            if why.startswith(_BY_ITSELF):
+                break
+            sleep(pause)
         return Stopped(
             f"no worker starts: it {why}", "see whether `drivetwin identify` runs on this machine"
         )
@@ -164,7 +174,7 @@ class Cell:
         last = self._last_words()
         if code < 0:
             return f"was killed by {signal.Signals(-code).name}{last}"
-        return f"ended with code {code}{last}"
+        return f"{_BY_ITSELF} {code}{last}"
 
     def _last_words(self) -> str:
         assert self._stderr is not None

@@ -99,8 +99,13 @@ class Coordinator:
             self._commit_if_due()
 
     def _due(self) -> Task | None:
-        if self._later and self._later[0][0] <= monotonic():
-            return heapq.heappop(self._later)[2]
+        """The next task to be tried again, unless its lost worker got as far as writing."""
+        while self._later and self._later[0][0] <= monotonic():
+            task = heapq.heappop(self._later)[2]
+            outcome = self._store.written(task.log)
+            if outcome is None or self._store.misses(task):
+                return task
+            self._finish(task, Finished(outcome, 0.0))
         return None
 
     def _commit_if_due(self) -> None:
@@ -179,7 +184,7 @@ class Coordinator:
         self._finish(task, reply)
 
     def _finish(self, task: Task, reply: Finished) -> None:
-        self._index.put_attempts(task.log, self._tries.pop(task.log))
+        self._index.put_attempts(task.log, self._tries.pop(task.log, 0))
         self._settle(task.log, self._out.pop(task.log), reply, computed=True)
 
     def _lost(self, task: Task, loss: Lost) -> None:

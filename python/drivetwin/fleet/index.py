@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin.errors import StoreError, Where
-from drivetwin.fleet.task import Outcome, ShiftRow, State
+from drivetwin.fleet.task import GO_ON, Outcome, ShiftRow, State
 
 INDEX = "index.sqlite"
 _FORMAT = 1
@@ -223,12 +223,13 @@ class Index:
         try:
             yield
         except sqlite3.Error as fault:
-            raise StoreError(
-                f"the index cannot be used: {fault}",
-                "check free space, permissions and that the file is an index of drivetwin; "
-                "what was committed is safe, the same command goes on from there",
-                Where(file=str(self._path)),
-            ) from None
+            text = str(fault)
+            if "readonly" in text or "full" in text:
+                text, remedy = f"the store cannot be written: {text}", GO_ON
+            else:
+                text = f"the index cannot be used: {text}"
+                remedy = "check its permissions and that it is an index of drivetwin"
+            raise StoreError(text, remedy, Where(file=str(self._path))) from None
 
 
 def _shift(row: ShiftRow) -> tuple[object, ...]:

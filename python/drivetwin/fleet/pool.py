@@ -62,6 +62,7 @@ class LocalPool:
     def _serve(self, cell: Cell) -> None:
         while (task := self._tasks.get()) is not None:
             self._replies.put((task, cell.run(task)))
+        cell.close()
 
     def submit(self, task: Task) -> None:
         """Give out a task."""
@@ -79,6 +80,6 @@ class LocalPool:
         for _ in self._threads:
             self._tasks.put(None)
         for cell in self._cells:
-            cell.close()
+            cell.kill()
         for thread in self._threads:
             thread.join()

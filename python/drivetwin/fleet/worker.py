@@ -22,7 +22,8 @@ from typing import Any
 from drivetwin.errors import DrivetwinError
 from drivetwin.fleet.parts import write_part
 from drivetwin.fleet.rows import Found
-from drivetwin.fleet.task import Outcome, State, Task, memory_exceeded
+from drivetwin.fleet.task import GO_ON, Outcome, State, Task, memory_exceeded
+from drivetwin.results.version import program_version
 
 Work = Callable[[Task], Found]
 
@@ -34,6 +35,9 @@ for what grows too fast to be seen there."""
 def answer(work: Work, task: Task, memory: int) -> dict[str, Any]:
     """Do a task, write its part, and say what became of it; see `Cell` for the keys."""
     started = perf_counter()
+    if task.recipe.version != program_version():
+        versions = f"{program_version()} where the worker is, {task.recipe.version} here"
+        return {"stop": f"drivetwin has version {versions}", "remedy": "install the same version"}
     try:
         found = work(task)
         outcome, rows = Outcome(State.DONE, tuple(found.shifts)), found.rows
@@ -42,15 +46,20 @@ def answer(work: Work, task: Task, memory: int) -> dict[str, Any]:
     except DrivetwinError as error:
         outcome, rows = _bad(error), ()
     except OSError as fault:
-        return {"store": f"{fault.strerror or fault} ({fault.filename})"}
+        return _unwritable(fault)
     except Exception as fault:
         # Whatever a log brings about must not end the run; it is named and the others go on.
         outcome, rows = _unexpected(fault), ()
     try:
         write_part(Path(task.part), task.log, outcome, rows)
     except OSError as fault:
-        return {"store": f"{fault.strerror or fault} ({fault.filename})"}
+        return _unwritable(fault)
     return {"outcome": outcome.tree(), "seconds": perf_counter() - started}
+
+
+def _unwritable(fault: OSError) -> dict[str, Any]:
+    what = f"a worker cannot write: {fault.strerror or fault} ({fault.filename})"
+    return {"stop": what, "remedy": GO_ON}
 
 
 def _bad(error: DrivetwinError) -> Outcome:
@@ -95,6 +104,7 @@ def main() -> None:
     module, name = sys.argv[1].split(":")
     memory = int(sys.argv[2])
     work: Work = getattr(import_module(module), name)
+    import_module("pyarrow.parquet")  # or the first log would pay for it
     limit_memory(memory)
     tasks: SimpleQueue[str] = SimpleQueue()
     threading.Thread(target=_listen, args=(tasks,), daemon=True).start()

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""A fleet of tiny files for `tests/fleet/work.py`, and how a test runs it.
+
+As `python -m tests.fleet.toys LOGS STORE [SCHEDULER]` it is a coordinator that a test can kill.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from drivetwin.fleet.coordinator import Wishes
+from drivetwin.fleet.events import Event, Settled, Summary, document
+from drivetwin.fleet.rules import RulesFile, RuleTable
+from drivetwin.fleet.run import FleetRun, run_fleet
+from drivetwin.fleet.sources import Sources
+from drivetwin.fleet.store import Store
+from drivetwin.fleet.task import Limits, WorkerSpec
+from drivetwin.identify.method import Method
+
+ROOT = Path(__file__).parents[2]
+LIMITS = Limits(seconds=30.0, memory=200 * 2**20)
+
+
+def make_logs(folder: Path, count: int, *, word: str = "", spoilt: Sequence[str] = ()) -> Path:
+    """`count` files that all say `word`, the first ones a word of `spoilt` too; `card.toml`."""
+    folder.mkdir()
+    (folder / "card.toml").write_text("gears = 1\n")
+    for number in range(count):
+        extra = spoilt[number] if number < len(spoilt) else ""
+        unit = folder / f"unit_{number % 3}"
+        unit.mkdir(exist_ok=True)
+        (unit / f"log_{number:04d}.csv").write_text(f"n{number} {word} {extra}\n")
+    return folder
+
+
+def request(logs: Path, store: Path, **changes: Any) -> FleetRun:
+    """What `drivetwin fleet` would ask, with the toy at work."""
+    rules = RulesFile(rules=[RuleTable(name="toy", vehicle=str(logs / "card.toml"))])
+    settings = {
+        "worker": WorkerSpec("tests.fleet.work:toy", LIMITS),
+        "workers": 2,
+        "method": Method.PAPER,
+        **changes,
+    }
+    return FleetRun(Sources([str(logs)]), rules, store, **settings)
+
+
+def run_toys(logs: Path, store: Path, **changes: Any) -> tuple[Summary, list[Event]]:
+    """Run to the end; the summary and all events."""
+    events: list[Event] = []
+    return run_fleet(request(logs, store, **changes), events.append), events
+
+
+def contents(store: Path) -> dict[str, Any]:
+    """All that a store holds of its logs: every table but what tells of the runs, every row."""
+    with Store(store) as opened:
+        tables = {name: opened.table(name) for name in ("settings", "files", "logs", "shifts")}
+        return {**tables, "rows": opened.rows().to_pylist()}
+
+
+def names(events: Sequence[Event], **wanted: object) -> list[str]:
+    """Names of the files that were settled with these attributes."""
+    return sorted(
+        Path(event.path).stem
+        for event in events
+        if isinstance(event, Settled)
+        and all(getattr(event, key) == value for key, value in wanted.items())
+    )
+
+
+def _tell(event: Event) -> None:
+    print(json.dumps(document(event)), flush=True)
+
+
+if __name__ == "__main__":
+    scheduler = sys.argv[3] if len(sys.argv) > 3 else None
+    asked = request(
+        Path(sys.argv[1]), Path(sys.argv[2]), scheduler=scheduler, wishes=Wishes(attempts=20)
+    )
+    run_fleet(asked, _tell)

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""The function that takes the place of identification where only the fleet is tested.
+
+What a file says is what happens to it: `bad`, `hang`, `eat`, `die` and `slow` as words in it, or
+nothing of the kind.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from drivetwin.errors import FileFormatError
+from drivetwin.fleet.rows import Found, Row, RowKind
+from drivetwin.fleet.task import ShiftRow, Task
+
+
+def toy(task: Task) -> Found:
+    """Rows and a shift that follow from the file's content alone."""
+    words = Path(task.path).read_text().split()
+    if "slow" in words:
+        time.sleep(0.02)
+    if "hang" in words:
+        time.sleep(1e4)
+    if "die" in words:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if "eat" in words:
+        held = [bytearray(b"x" * (8 * 2**20)) for _ in range(1000)]
+        raise AssertionError(f"{len(held)} pieces of memory were to be had")
+    if "bad" in words:
+        raise FileFormatError("it says that it is bad", "make it a good one")
+    rows = [Row(RowKind.PARAMETER, f"P0.{words[0]}", float(len(word)), 0.1, 0.2) for word in words]
+    return Found(rows, [ShiftRow(True, 0.0, float(len(words)), "2", "3")])
