@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""A driveline as a Modelica model of the Standard Library's rotational components."""

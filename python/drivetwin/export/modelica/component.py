@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""The pieces of a Modelica model, before they become text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from drivetwin.export.parameters.content import number
+
+ROTATIONAL = "Modelica.Mechanics.Rotational"
+
+Flanges = tuple[tuple[str, str], ...]
+"""Flanges of a component by name, each with its node."""
+Modifiers = tuple[tuple[str, str], ...]
+"""Parameters of a component by name, each with the text of its value."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """A declared component."""
+
+    type: str
+    name: str
+    modifiers: Modifiers = ()
+    flanges: Flanges = ()
+
+    def declaration(self) -> str:
+        """Its line in the model."""
+        values = ", ".join(f"{key}={value}" for key, value in self.modifiers)
+        return f"  {self.type} {self.name}({values});" if values else f"  {self.type} {self.name};"
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one element of a network becomes: declarations and equations.
+
+    `helpers` names the models it takes that the Standard Library lacks; `rest` is the expression
+    that is zero while a friction element does not slip.
+    """
+
+    components: tuple[Component, ...]
+    equations: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+    helpers: frozenset[str] = frozenset()
+    rest: str = ""
+
+
+def values(**modifiers: float) -> Modifiers:
+    """Modifiers from numbers."""
+    return tuple((key, number(value)) for key, value in modifiers.items())
+
+
+@dataclass(frozen=True)
+class Names:
+    """Identifiers of elements and of inputs by their names in the network."""
+
+    elements: dict[str, str] = field(default_factory=dict)
+    inputs: dict[str, str] = field(default_factory=dict)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""The dual-clutch driveline of a twin as a Modelica package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+
+from drivetwin.driveline import DualClutch, ShiftElement, Signal, State
+from drivetwin.export.modelica.model import Run, package_text
+from drivetwin.export.subject import Subject
+from drivetwin.network import Element, Start
+
+ENGINE, OUTPUT, WHEEL, SHAFT = "engine", "output", "wheel", "output shaft"
+ENGINE_TORQUE = "engine torque"
+_INPUT, _AXLE = "input gear", "axle"
+
+
+def modelica_text(
+    subject: Subject,
+    inputs: Mapping[str, Signal] | None = None,
+    time: tuple[float, float] | None = None,
+) -> str:
+    """Package of a subject; with `inputs` (engine torque and pressures by element) over `time` [s]
+    also the model of its run from the subject's start."""
+    run = None
+    if inputs is not None and time is not None:
+        run = Run(inputs, network_start(subject.start), time)
+    return package_text(subject.name, network_of(subject.model), run, subject.note)
+
+
+def network_start(start: State) -> Start:
+    """The start of a run in terms of the network."""
+    speeds = {ENGINE: start.engine_speed, OUTPUT: start.output_speed, WHEEL: start.wheel_speed}
+    return Start(speeds, {SHAFT: start.twist}, start.locked)
+
+
+def network_of(model: DualClutch) -> list[Element]:
+    """The elements of eqs. 2-9: engine, input gear with the loss, two clutches between their
+    ratios, output shaft, final drive, vehicle."""
+    loss = {"law": model.loss_law, "eta": model.eta}
+    elements: list[Element] = [
+        _inertia("J1", ENGINE, model.J1),
+        {"type": "torque", "name": "engine", "node": ENGINE, "input": ENGINE_TORQUE},
+        {**_gear("i_in", ENGINE, _INPUT, model.i_in), "loss": loss},
+        _inertia("J2", _INPUT, model.J2e * model.i_in**2),
+        _inertia("J_out", OUTPUT, model.J_out),
+        {
+            "type": "spring_damper",
+            "name": SHAFT,
+            "a": OUTPUT,
+            "b": _AXLE,
+            "stiffness": model.k_o,
+            "damping": model.c_o,
+        },
+        _gear("i_f", _AXLE, WHEEL, model.i_f),
+        _inertia("J_v", WHEEL, model.J_v),
+        {"type": "road_load", "name": "load", "node": WHEEL, **asdict(model.load)},
+    ]
+    return [*elements, *(one for element in model.elements for one in _path(element))]
+
+
+def _path(element: ShiftElement) -> list[Element]:
+    """Gear i_c, clutch, gear i_out between input gear and output (paper Figure 2)."""
+    a, b = f"{element.name} input side", f"{element.name} output side"
+    return [
+        _gear(f"i_c {element.name}", _INPUT, a, element.i_c),
+        {
+            "type": "clutch",
+            "name": element.name,
+            "a": a,
+            "b": b,
+            "friction": asdict(element.friction),
+            "gain": element.gain,
+            "p0": element.P0,
+            "peak": element.peak,
+            "pressure": element.name,
+            "drum_inertia": element.drum_inertia,
+        },
+        _gear(f"i_out {element.name}", b, OUTPUT, element.i_out),
+    ]
+
+
+def _inertia(name: str, node: str, inertia: float) -> Element:
+    return {"type": "inertia", "name": name, "node": node, "inertia": inertia}
+
+
+def _gear(name: str, a: str, b: str, ratio: float) -> Element:
+    return {"type": "gear", "name": name, "a": a, "b": b, "ratio": ratio}

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""A package of Modelica text: the driveline, the helpers it takes, and a run of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from drivetwin.driveline import FloatArray, Signal
+from drivetwin.export.modelica.component import ROTATIONAL, Component, Names, Part
+from drivetwin.export.modelica.elements import part_of
+from drivetwin.export.modelica.friction import GROUND
+from drivetwin.export.modelica.helpers import HELPERS
+from drivetwin.export.modelica.start import initial_equations
+from drivetwin.export.modelica.text import identifier, identifiers, matrix, string
+from drivetwin.export.parameters.content import number
+from drivetwin.network import Element, Start
+
+MSL_VERSION = "4.0.0"
+_INPUT_FIELDS = ("input", "pressure", "throttle")
+_INTERVAL = 1e-3
+_TOLERANCE = 1e-8
+
+
+@dataclass(frozen=True)
+class Run:
+    """Inputs by name and a start, from `time[0]` to `time[1]` [s]."""
+
+    inputs: Mapping[str, Signal]
+    start: Start
+    time: tuple[float, float]
+
+
+def package_text(
+    name: str, elements: Sequence[Element], run: Run | None = None, note: str = ""
+) -> str:
+    """Modelica package `name` with the model `Driveline` and, for a run, the model `Shift`.
+
+    Inputs of the driveline are `u_<input>`, in SI. Raises InputError for an element that has no
+    Modelica form.
+    """
+    names = _names(elements)
+    parts = {str(element["name"]): part_of(element, names) for element in elements}
+    helpers = sorted(frozenset().union(*(part.helpers for part in parts.values())))
+    plain = identifier(name)
+    texts = [
+        f"package {plain} {string(note or name)}",
+        "  extends Modelica.Icons.Package;\n",
+        *(HELPERS[helper] for helper in helpers),
+        _driveline(parts, names),
+        *([] if run is None else [_shift(elements, parts, names, run)]),
+        f'  annotation(uses(Modelica(version="{MSL_VERSION}")));',
+        f"end {plain};",
+    ]
+    return "\n".join(texts) + "\n"
+
+
+def _names(elements: Sequence[Element]) -> Names:
+    found = chain.from_iterable(_inputs(element) for element in elements)
+    listed = list(dict.fromkeys(found))
+    inputs = identifiers(f"u_{name}" for name in listed)
+    own = identifiers(str(element["name"]) for element in elements)
+    return Names(own, {name: inputs[f"u_{name}"] for name in listed})
+
+
+def _inputs(element: Element) -> list[str]:
+    nested = element.get("clutch") or {}
+    return [str(part[key]) for part in (element, nested) for key in _INPUT_FIELDS if key in part]
+
+
+def _driveline(parts: Mapping[str, Part], names: Names) -> str:
+    components = [one for part in parts.values() for one in part.components]
+    ports = [
+        f"  Modelica.Blocks.Interfaces.RealInput {plain} {string(name + ' [SI]')};"
+        for name, plain in names.inputs.items()
+    ]
+    nodes = _flanges(components)
+    fixed = Component(f"{ROTATIONAL}.Components.Fixed", "ground_")
+    lines = [
+        "model Driveline",
+        *ports,
+        *(line for part in parts.values() for line in part.parameters),
+        *(one.declaration() for one in components),
+        *([fixed.declaration()] if GROUND in nodes else []),
+        "equation",
+        *(f"  {line}" for part in parts.values() for line in part.equations),
+        *(line for node, ends in nodes.items() for line in _connections(node, ends)),
+        "end Driveline;\n",
+    ]
+    return "\n".join(f"  {line}" for line in lines)
+
+
+def _flanges(components: Sequence[Component]) -> dict[str, list[str]]:
+    """Flanges of every node, as `component.flange`."""
+    nodes: dict[str, list[str]] = {}
+    for component in components:
+        for flange, node in component.flanges:
+            nodes.setdefault(node, []).append(f"{component.name}.{flange}")
+    return nodes
+
+
+def _connections(node: str, ends: Sequence[str]) -> list[str]:
+    first, *others = ["ground_.flange", *ends] if node == GROUND else ends
+    return [f"  connect({first}, {other});" for other in others]
+
+
+def _shift(elements: Sequence[Element], parts: Mapping[str, Part], names: Names, run: Run) -> str:
+    flanges = _flanges([one for part in parts.values() for one in part.components])
+    inside = "driveline."
+    start = initial_equations(
+        elements,
+        run.start,
+        {node: f"{inside}{ends[0]}.phi" for node, ends in flanges.items()},
+        {name: f"{inside}{part.rest}" for name, part in parts.items() if part.rest},
+        {name: f"{inside}{names.elements[name]}.phi_rel" for name in parts},
+    )
+    first, last = run.time
+    lines = [
+        "model Shift",
+        "  Driveline driveline;",
+        "  Modelica.Blocks.Sources.CombiTimeTable inputs(",
+        f"    columns=2:{len(names.inputs) + 1},",
+        "    extrapolation=Modelica.Blocks.Types.Extrapolation.HoldLastPoint,",
+        f"    table={matrix(_table(names, run))});",
+        "initial equation",
+        *(f"  {line}" for line in start),
+        "equation",
+        *(
+            f"  driveline.{plain} = inputs.y[{place}];"
+            for place, plain in enumerate(names.inputs.values(), 1)
+        ),
+        f"  annotation(experiment(StartTime={number(first)}, StopTime={number(last)}, "
+        f"Interval={number(_INTERVAL)}, Tolerance={number(_TOLERANCE)}));",
+        "end Shift;\n",
+    ]
+    return "\n".join(f"  {line}" for line in lines)
+
+
+def _table(names: Names, run: Run) -> list[tuple[float, ...]]:
+    """Time and inputs at every sample of any input within the run, each linear in between."""
+    first, last = run.time
+    signals = [run.inputs[name] for name in names.inputs]
+    moments = np.unique(np.concatenate([one.time + one.delay for one in signals]))
+    inner = moments[(moments > first) & (moments < last)]
+    time: FloatArray = np.concatenate([[first], inner, [last]])
+    columns = [np.interp(time, one.time + one.delay, one.values) for one in signals]
+    return [tuple(float(value) for value in row) for row in zip(time, *columns, strict=True)]

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Initial equations: as many as the driveline has independent speeds and angles, no more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from drivetwin.driveline import FloatArray
+from drivetwin.export.modelica.friction import GROUND
+from drivetwin.export.parameters.content import number
+from drivetwin.network import Element, Start
+
+_COMPLIANT = ("spring_damper", "backlash")
+
+
+class _Independent:
+    """Rows over the nodes, of which only those count that say something new."""
+
+    def __init__(self, rows: Iterable[FloatArray], size: int) -> None:
+        self._rows = np.zeros((0, size))
+        for row in rows:
+            self.takes(row)
+
+    def takes(self, row: FloatArray) -> bool:
+        """Add a row unless those before imply it; tell whether it was added."""
+        joined = np.vstack([self._rows, row])
+        if int(np.linalg.matrix_rank(joined)) == self._rows.shape[0]:
+            return False
+        self._rows = joined
+        return True
+
+
+def initial_equations(
+    elements: Sequence[Element],
+    start: Start,
+    flanges: Mapping[str, str],
+    rests: Mapping[str, str],
+    twists: Mapping[str, str],
+) -> list[str]:
+    """Equations that set speeds and angles at the start, in terms of component variables.
+
+    `flanges` are the angle of each node, `rests` the slip of each friction element and `twists` the
+    relative angle (b less a) of each compliance, as expressions. Elements that start locked go
+    before stated speeds; of those, as many are set as are independent.
+    """
+    nodes = sorted({node for element in elements for node in _nodes(element)} - {GROUND})
+    index = {node: place for place, node in enumerate(nodes)}
+    rigid = [_row(pairs, index) for element in elements for pairs in _constraints(element)]
+    by_name = {str(element["name"]): element for element in elements}
+
+    speeds = _Independent(rigid, len(nodes))
+    lines = [
+        f"{rests[name]} = 0;"
+        for name in start.locked
+        if speeds.takes(_row(_slip(by_name[name]), index))
+    ]
+    lines += [
+        f"der({flanges[node]}) = {number(speed)};"
+        for node, speed in start.speeds.items()
+        if node in index and speeds.takes(_row(((node, 1.0),), index))
+    ]
+    angles = _Independent(rigid, len(nodes))
+    lines += [
+        f"{twists[str(element['name'])]} = {number(-start.twists.get(str(element['name']), 0.0))};"
+        for element in elements
+        if element["type"] in _COMPLIANT and angles.takes(_row(_slip(element), index))
+    ]
+    lines += [
+        f"{flanges[node]} = 0;" for node in nodes if angles.takes(_row(((node, 1.0),), index))
+    ]
+    return lines
+
+
+def _slip(element: Element) -> tuple[tuple[str, float], ...]:
+    return ((element["a"], 1.0), (element["b"], -1.0))
+
+
+def _constraints(element: Element) -> Iterator[tuple[tuple[str, float], ...]]:
+    """What an element makes proportional, as coefficients of node speeds that add up to zero."""
+    match element["type"]:
+        case "gear":
+            yield (element["a"], 1.0), (element["b"], -element["ratio"])
+        case "planetary":
+            z = element["z"]
+            yield (element["sun"], 1.0), (element["ring"], z), (element["carrier"], -(1.0 + z))
+        case "prescribed_speed":
+            yield ((element["node"], 1.0),)
+
+
+def _nodes(element: Element) -> list[str]:
+    fields = ("node", "a", "b", "sun", "ring", "carrier", "pump", "turbine")
+    return [element[field] for field in fields if field in element]
+
+
+def _row(pairs: Iterable[tuple[str, float]], index: Mapping[str, int]) -> FloatArray:
+    row = np.zeros(len(index))
+    for node, factor in pairs:
+        if node != GROUND:
+            row[index[node]] += factor
+    return row
