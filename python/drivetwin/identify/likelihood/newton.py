@@ -30,8 +30,13 @@ DAMPING = 1e-3
 LARGEST = 1e8
 """Damping at which no step is left to try."""
 MAX_STEPS = 40
+ROUGH_STEPS = 20
+"""Steps after which a rough search ends: one that crawls prepares nothing."""
 REFRESHES = 3
 """Points at which Q is formed anew: it settles in two, and may alternate about a kink after."""
+
+ROUGH = 1e-3
+"""Fall of Q relative to Q at which a search ends that only prepares the next one."""
 
 Refresh = Callable[[Problem, Point], Problem]
 
@@ -60,15 +65,19 @@ def unchanged(problem: Problem, _: Point) -> Problem:
     return problem
 
 
-def minimise(problem: Problem, start: Point, refresh: Refresh = unchanged) -> Found | None:
+def minimise(
+    problem: Problem, start: Point, refresh: Refresh = unchanged, rough: bool = False
+) -> Found | None:
     """Search from `start`; None where the simulation fails there.
 
     `refresh` gives Q anew at the first `REFRESHES` points, for a weighting that follows the point.
-    Not converged after `MAX_STEPS` says so; the values are then no estimate.
+    A `rough` search ends where Q hardly falls any more. Not converged after `MAX_STEPS` says so;
+    the values are then no estimate.
     """
     point = start.moved(np.clip(start.values, problem.lower, problem.upper))
     damping, first = DAMPING, None
-    for iteration in range(MAX_STEPS):
+    most = ROUGH_STEPS if rough else MAX_STEPS
+    for iteration in range(most):
         if iteration < REFRESHES:
             problem = refresh(problem, point)
         normal = problem.normal(point)
@@ -81,11 +90,13 @@ def minimise(problem: Problem, start: Point, refresh: Refresh = unchanged) -> Fo
         if expected < ENOUGH and settled:
             return Found(problem, point, normal, True, iteration)
         trial, fall, damping = _better(problem, point, normal, damping)
+        if rough and trial is not None and fall < ROUGH * normal.cost:
+            return Found(problem, trial, normal, True, iteration)
         if trial is None or (fall < ENOUGH and expected < STALLED and settled):
             return Found(problem, point, normal, expected < STALLED, iteration)
         point = trial
     last = problem.normal(point)
-    return None if last is None else Found(problem, point, last, False, MAX_STEPS)
+    return None if last is None else Found(problem, point, last, False, most)
 
 
 def _done(first: float, expected: float) -> float:
@@ -109,13 +120,24 @@ def _better(
 
 
 def _step(problem: Problem, point: Point, normal: Normal, damping: float) -> FloatArray:
-    """Step (p,) that stays within the bounds; an unknown pressed against its bound rests there."""
-    at_lower = (point.values <= problem.lower) & (normal.gradient > 0.0)
-    at_upper = (point.values >= problem.upper) & (normal.gradient < 0.0)
-    free = np.flatnonzero(~(at_lower | at_upper))
+    """Step (p,) that stays within the bounds.
+
+    An unknown that would leave them goes as far as its bound, and the others are solved for again
+    with that known: cut alone it would undo what those that nearly compensate it gain.
+    """
+    room = np.array([problem.lower, problem.upper]) - point.values
+    free = ~((room[0] >= 0.0) & (normal.gradient > 0.0))
+    free &= ~((room[1] <= 0.0) & (normal.gradient < 0.0))
     step = np.zeros(point.values.size)
-    step[free] = step_of(normal.information[np.ix_(free, free)], normal.gradient[free], damping)
-    return np.asarray(np.clip(point.values + step, problem.lower, problem.upper) - point.values)
+    while free.any():
+        pull = normal.gradient[free] + normal.information[np.ix_(free, ~free)] @ step[~free]
+        trial = step_of(normal.information[np.ix_(free, free)], pull, damping)
+        kept = np.clip(trial, *room[:, free])
+        step[free] = kept
+        if np.array_equal(kept, trial):
+            break
+        free[free] = kept == trial
+    return step
 
 
 def _expected(problem: Problem, point: Point, normal: Normal) -> float:

@@ -28,11 +28,11 @@ def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found | N
     )
     point = start
     for ends in stages:
-        found = minimise(problem.until(ends), point)
+        found = minimise(problem.until(ends), point, rough=True)
         if found is None:
             return None
         point = found.point
     plain = replace(
         problem, parts=tuple(Part.unweighted(p.structure, p.record) for p in problem.parts)
     )
-    return minimise(plain, point)
+    return minimise(plain, point, rough=True)

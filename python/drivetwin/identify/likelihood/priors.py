@@ -52,7 +52,7 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
     "mu_c": (1e-3, 1.0),
     "mu_drop": (-0.3, 0.5),
     "mu_v": (-5e-3, 5e-3),
-    "ln_v_s": (float(np.log(1.0)), float(np.log(200.0))),
+    "ln_v_s": (float(np.log(1.0)), float(np.log(60.0))),
     AERO: (0.0, 1e4),
     "drum": (0.0, SPECS["J_out"].upper),
 }
