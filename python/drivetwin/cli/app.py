@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from drivetwin.__main__ import INTERRUPTED
 from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
@@ -91,5 +92,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         show_error(fault, as_json="--json" in arguments)
         return fault.exit_code
     except SystemExit as stop:
-        return stop.code if isinstance(stop.code, int) else 0
+        code = stop.code if isinstance(stop.code, int) else 0
+        if code == INTERRUPTED:
+            sys.stderr.write("interrupted; no file is half-written\n")
+        return code
     return 0

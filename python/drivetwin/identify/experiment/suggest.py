@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: MIT
+"""The experiment that would narrow a weak parameter most, with the interval to expect.
+
+An experiment adds its own information to that of the log:
+
+    F' = F + Jᵀ Σ⁻¹ J        covariance' = F'⁻¹
+
+J are the core's derivatives along the simulated experiment, Σ the covariance of its residuals
+with the input noise of the log's sensors (covariance.py). What the sensors' gains and offsets
+leave open no experiment narrows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.identify.experiment.catalogue import Base, Experiment, Planned, planned
+from drivetwin.identify.likelihood.derived import parameters, slopes
+from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
+from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.momentum import MomentumSettings
+from drivetwin.identify.profile import likelihood_of
+from drivetwin.identify.result import Estimate, Identification, Verdict
+from drivetwin.identify.signals import FloatArray, ShiftSignals
+from drivetwin.identify.uncertainty import DELAY_IDENTIFIED, judge
+from drivetwin.progress import part, tell
+
+AGE = "te_delay"
+REPEATS = (1, 2, 4)
+"""How often the best experiment is repeated at most, in steps."""
+LEAST_KNOWN = 3
+"""How many identified parameters are told how to narrow."""
+NO_SCALE = "an output-shaft torque sensor alone gives torques their scale"
+SENSORS = 0.8
+"""Share of the total standard deviation from which the sensors' tolerances decide it."""
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """What an experiment would make of a parameter: half width of its 95 % interval, SI."""
+
+    experiment: Experiment
+    repeats: int
+    half_width: float
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """What would tell a parameter: experiments in order of worth.
+
+    `half_width` is that of the present 95 % interval (noise and sensors), infinite without one.
+    `limit` names what no experiment mends; empty where there is no such thing.
+    """
+
+    parameter: str
+    verdict: Verdict
+    half_width: float
+    prospects: tuple[Prospect, ...]
+    limit: str = ""
+
+    @property
+    def text(self) -> str:
+        """The suggestion in a sentence; without units, which are those of the parameter."""
+        if self.limit or not self.prospects:
+            return self.limit or "no experiment of the catalogue narrows it"
+        best = self.prospects[0]
+        times = "" if best.repeats == 1 else f", {best.repeats} times"
+        return f"{best.experiment}{times}"
+
+
+def suggest(found: Identification) -> tuple[Suggestion, ...]:
+    """The best experiments for every weak or not identifiable parameter of a likelihood fit.
+
+    After these come the `LEAST_KNOWN` others of widest relative interval.
+    Raises IdentificationError where the identification is not by the likelihood method.
+    """
+    fit, signals = likelihood_of(found)
+    open_ = [one for one in found.estimates.values() if one.verdict in _OPEN]
+    known = [one for one in found.estimates.values() if one.verdict is Verdict.IDENTIFIED]
+    least = sorted(known, key=_relative_width, reverse=True)[:LEAST_KNOWN]
+    with part(0.0, 0.9, "experiments"):
+        gains = _gains(fit, signals)
+    return tuple(_suggestion(one, fit, signals, gains) for one in (*open_, *least))
+
+
+def _relative_width(one: Estimate) -> float:
+    """Standard deviation over the value; that of a delay over what counts as known of one."""
+    if one.value is None or one.std_total is None:
+        return 0.0
+    whole = DELAY_IDENTIFIED if one.id == AGE else abs(one.value)
+    return one.std_total / max(whole, 1e-300)
+
+
+_OPEN = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
+
+
+@dataclass(frozen=True)
+class _Gain:
+    """Information (r, r) that an experiment adds, over `names` (r,)."""
+
+    experiment: Experiment
+    names: tuple[str, ...]
+    information: FloatArray
+
+
+def _gains(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> list[_Gain]:
+    """What each experiment adds; one whose simulation fails is left out."""
+    point = _with_age(fit)
+    base = Base(fit.problem.parts[-1], point, signals[-1].shift.lockup_time)
+    found = []
+    for number, experiment in enumerate(Experiment):
+        tell(number / len(Experiment))
+        gain = _gain(planned(experiment, base))
+        if gain is not None:
+            found.append(gain)
+    return found
+
+
+def _with_age(fit: LikelihoodFit) -> Point:
+    """The minimum with the torque's age among the unknowns, though the log may not show it."""
+    point = fit.point
+    if AGE in point.names:
+        return point
+    age = fit.problem.parts[0].structure.value(point, AGE)
+    return Point((*point.names, AGE), np.append(point.values, age))
+
+
+def _gain(plan: Planned) -> _Gain | None:
+    weighted = plan.part.weighted_by(plan.point)
+    found = weighted.linearised(plan.point)
+    if found is None:
+        return None
+    _, columns = found
+    return _Gain(
+        plan.experiment, plan.point.names, columns.T @ weighted.weighting.weighted(columns)
+    )
+
+
+def _covariance(
+    fit: LikelihoodFit, names: tuple[str, ...], gain: _Gain | None, repeats: int
+) -> FloatArray:
+    """Covariance over `names` with an experiment made so many times, each with its own start."""
+    size = len(names)
+    information = np.zeros((size, size))
+    own = len(fit.point.names)
+    information[:own, :own] = fit.normal.information
+    if AGE not in fit.point.names:
+        k = names.index(AGE)
+        information[k, k] += MomentumSettings().delay_prior.std ** -2
+    if gain is not None:
+        information += repeats * _without_start(gain, size)
+    return max(fit.chi2, 1.0) * covariance_of(information)
+
+
+def _without_start(gain: _Gain, size: int) -> FloatArray:
+    """Information (size, size) of an experiment whose start is unknown (Schur complement)."""
+    whole = gain.information
+    scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    unit = whole / np.outer(scale, scale)
+    inner = np.linalg.pinv(unit[size:, size:], rcond=1e-13, hermitian=True)
+    reduced = unit[:size, :size] - unit[:size, size:] @ inner @ unit[size:, :size]
+    return np.asarray(reduced * np.outer(scale[:size], scale[:size]))
+
+
+def _suggestion(
+    one: Estimate,
+    fit: LikelihoodFit,
+    signals: Sequence[ShiftSignals],
+    gains: Sequence[_Gain],
+) -> Suggestion:
+    half = np.inf if one.std_total is None else 1.96 * one.std_total
+    told = parameters(fit.problem, fit.point, signals)
+    if one.id not in told:
+        return Suggestion(one.id, one.verdict, half, (), NO_SCALE)
+    systematic = one.std_systematic or 0.0
+    if one.std_total is not None and systematic > SENSORS * one.std_total:
+        limit = "the sensors' tolerances decide its interval: calibrate them, or state less"
+        return Suggestion(one.id, one.verdict, half, (), limit)
+    names = _with_age(fit).names
+    row = _row(one.id, fit, signals, names)
+    prospects = []
+    for gain in gains:
+        for repeats in REPEATS:
+            std = float(np.sqrt(row @ _covariance(fit, names, gain, repeats) @ row))
+            verdict = judge(one.id, told[one.id], std, "", systematic).verdict
+            prospect = Prospect(
+                gain.experiment, repeats, 1.96 * float(np.hypot(std, systematic)), verdict
+            )
+            if verdict is Verdict.IDENTIFIED or one.verdict is Verdict.IDENTIFIED:
+                break
+        prospects.append(prospect)
+    order = sorted(prospects, key=_worth)
+    return Suggestion(one.id, one.verdict, half, tuple(order))
+
+
+def _worth(prospect: Prospect) -> tuple[bool, float]:
+    """What settles a parameter comes first, by how little of it has to be recorded."""
+    settles = prospect.verdict is Verdict.IDENTIFIED
+    return (not settles, prospect.half_width * np.sqrt(prospect.repeats))
+
+
+def _row(
+    name: str, fit: LikelihoodFit, signals: Sequence[ShiftSignals], names: tuple[str, ...]
+) -> FloatArray:
+    """Derivative (r,) of a parameter by the unknowns `names`."""
+    row = np.zeros(len(names))
+    if name == AGE:
+        row[names.index(AGE)] = 1.0
+        return row
+    std = np.sqrt(np.diag(fit.covariance))
+    matrix = slopes(fit.problem, fit.point, std, signals)
+    place = list(parameters(fit.problem, fit.point, signals)).index(name)
+    row[: len(fit.point.names)] = matrix[place]
+    return row

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+"""Profile likelihood of one parameter: least Q over all others while it is held.
+
+    Q_p(v) = min over θ with q(θ) = v of Q(θ)
+
+The interval from Q_p - Q_min = 3.84 needs no linearity, unlike the one from the covariance; where
+the two differ, the profile is right. Between neighbouring values the search goes on from the last
+point; its steps obey q(θ) = v by a Lagrange multiplier.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError, InputError
+from drivetwin.identify.likelihood.derived import parameters, slopes
+from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.problem import Normal, Problem
+from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.result import Identification
+from drivetwin.identify.signals import FloatArray, ShiftSignals
+from drivetwin.progress import tell
+
+REACH = 3.0
+"""Values go this many standard deviations to either side, and on as long as Q has not risen."""
+STEP = 0.5
+"""Distance of neighbouring values in standard deviations."""
+FURTHEST = 10.0
+"""Standard deviations at which a side that does not close is given up: the interval is open."""
+RISE = 3.841
+"""Rise of Q at the ends of a 95 % interval: chi-squared of one degree of freedom."""
+SETTLED = 1e-2
+"""Fall of Q that ends the search at one value."""
+SEARCHES = 8
+"""Most steps at one value."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """`rise` (n,) of Q, over the noise found in the log, at `values` (n,) of a parameter, SI.
+
+    `interval` is the 95 % interval by the profile, an end infinite where Q does not rise enough;
+    `linear` the one by the covariance, from noise alone like the other.
+    """
+
+    parameter: str
+    values: FloatArray
+    rise: FloatArray
+    estimate: float
+    interval: tuple[float, float]
+    linear: tuple[float, float]
+
+
+def profile(found: Identification, parameter: str) -> Profile:
+    """The profile of a parameter of a likelihood identification.
+
+    Raises InputError for a parameter that the fit does not have or that is known from design, and
+    IdentificationError where the identification is by another method.
+    """
+    fit, signals = likelihood_of(found)
+    told = parameters(fit.problem, fit.point, signals)
+    if parameter not in told:
+        raise InputError(
+            f"the fit has no parameter {parameter!r}", f"choose one of {', '.join(told)}"
+        )
+    held = _Held(fit, signals, list(told).index(parameter))
+    if held.std == 0.0:
+        raise InputError(
+            f"{parameter} is known from design and does not move",
+            "give it a standard deviation on the vehicle card, or choose another",
+        )
+    tell(0.0)
+    below = _side(held, -1.0)
+    tell(0.5)
+    above = _side(held, 1.0)
+    sides = np.array([*below[::-1], (0.0, 0.0), *above], dtype=np.float64)
+    distance, rise = sides[:, 0], sides[:, 1]
+    values = held.estimate + held.std * distance
+    ends = (_crossing(values[::-1], rise[::-1]), _crossing(values, rise))
+    half = 1.96 * held.std
+    linear = (held.estimate - half, held.estimate + half)
+    return Profile(parameter, values, rise, held.estimate, ends, linear)
+
+
+def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftSignals]]:
+    """The fit behind an identification and the signals it used.
+
+    Raises IdentificationError where it is by another method.
+    """
+    fit: LikelihoodFit | None = found.evidence.get("likelihood")
+    if fit is None:
+        raise IdentificationError(
+            f"the {found.method} method has no likelihood to work on",
+            "identify with --method likelihood",
+        )
+    return fit, found.evidence["signals"]
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A fit with one parameter to be held, by its place among the reported ones."""
+
+    fit: LikelihoodFit
+    signals: Sequence[ShiftSignals]
+    place: int
+
+    def value(self, point: Point) -> float:
+        """The parameter at `point`."""
+        return list(parameters(self.fit.problem, point, self.signals).values())[self.place]
+
+    def row(self, point: Point) -> FloatArray:
+        """Its derivative (p,) by the unknowns."""
+        std = np.sqrt(np.diag(self.fit.covariance))
+        return np.asarray(slopes(self.fit.problem, point, std, self.signals)[self.place])
+
+    @property
+    def estimate(self) -> float:
+        """Its value at the minimum."""
+        return self.value(self.fit.point)
+
+    @property
+    def std(self) -> float:
+        """Its standard deviation by the covariance."""
+        row = self.row(self.fit.point)
+        return float(np.sqrt(max(float(row @ self.fit.covariance @ row), 0.0)))
+
+
+def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
+    """(distance in standard deviations, rise of Q) from the minimum outwards."""
+    fit = held.fit
+    lowest, unit = fit.normal.cost, max(fit.chi2, 1.0)
+    estimate, std, point = held.estimate, held.std, fit.point
+    found: list[tuple[float, float]] = []
+    distance = 0.0
+    while distance < FURTHEST and (distance < REACH or found[-1][1] < RISE):
+        distance += STEP
+        reached = _least(held, point, estimate + sign * distance * std)
+        if reached is None:
+            break
+        point, cost = reached
+        found.append((sign * distance, (cost - lowest) / unit))
+    return found
+
+
+def _least(held: _Held, start: Point, value: float) -> tuple[Point, float] | None:
+    """The point of least Q at which the parameter has `value`; None where simulations fail."""
+    problem, point = held.fit.problem, start
+    cost = float("inf")
+    for _ in range(SEARCHES):
+        normal = problem.normal(point)
+        if normal is None:
+            return None
+        if cost - normal.cost < SETTLED and abs(held.value(point) - value) < 1e-3 * held.std:
+            return point, normal.cost
+        cost = normal.cost
+        step = _constrained(normal, held.row(point), value - held.value(point))
+        point = _within(problem, point, step)
+    return point, problem.cost(point)
+
+
+def _constrained(normal: Normal, row: FloatArray, wanted: float) -> FloatArray:
+    """Gauss-Newton step (p,) that moves the parameter by `wanted` and is else the best."""
+    scale = np.sqrt(np.maximum(np.diag(normal.information), 1e-300))
+    unit = normal.information / np.outer(scale, scale)
+    free = np.linalg.lstsq(unit, -normal.gradient / scale, rcond=1e-13)[0]
+    along = np.linalg.lstsq(unit, row / scale, rcond=1e-13)[0]
+    short = wanted - float(row / scale @ free)
+    return np.asarray((free + along * (short / float(row / scale @ along))) / scale)
+
+
+def _within(problem: Problem, point: Point, step: FloatArray) -> Point:
+    """The point after `step`, unknowns held within their bounds."""
+    return point.moved(np.clip(point.values + step, problem.lower, problem.upper))
+
+
+def _crossing(values: FloatArray, rise: FloatArray) -> float:
+    """Value at which the rise passes `RISE` outwards; infinite where it does not."""
+    outwards = float(np.sign(float(values[-1]) - float(values[0])))
+    start = int(np.argmin(np.abs(rise)))
+    for k in range(start, values.size - 1):
+        if rise[k] < RISE <= rise[k + 1]:
+            share = (np.sqrt(RISE) - np.sqrt(max(rise[k], 0.0))) / (
+                np.sqrt(rise[k + 1]) - np.sqrt(max(rise[k], 0.0))
+            )
+            return float(values[k] + share * (values[k + 1] - values[k]))
+    return outwards * float("inf")

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""Files of what was asked about an identification: suggestions, profiles, bootstrap; SI."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from drivetwin.identify.bootstrap import Bootstrap
+from drivetwin.identify.experiment.suggest import Suggestion
+from drivetwin.identify.profile import Profile
+from drivetwin.parameters import spec_of
+from drivetwin.results.result_file import plain
+
+
+def suggestions_text(found: tuple[Suggestion, ...]) -> str:
+    """`suggestions.json`: by parameter the experiments in order of worth; infinite widths null."""
+    return _text({"suggestions": [_suggestion(one) for one in found]})
+
+
+def _suggestion(one: Suggestion) -> dict[str, Any]:
+    return {
+        "parameter": one.parameter,
+        "unit": spec_of(one.parameter).unit,
+        "verdict": one.verdict,
+        "half_width": one.half_width,
+        "text": one.text,
+        "experiments": [
+            {
+                "experiment": prospect.experiment,
+                "repeats": prospect.repeats,
+                "half_width": prospect.half_width,
+                "verdict": prospect.verdict,
+            }
+            for prospect in one.prospects
+        ],
+    }
+
+
+def profile_text(one: Profile) -> str:
+    """`profile.<parameter>.json`: rise of Q over the parameter, and both intervals."""
+    return _text(
+        {
+            "parameter": one.parameter,
+            "unit": spec_of(one.parameter).unit,
+            "estimate": one.estimate,
+            "ci95_profile": one.interval,
+            "ci95_linear": one.linear,
+            "values": one.values,
+            "rise": one.rise,
+        }
+    )
+
+
+def bootstrap_text(one: Bootstrap) -> str:
+    """`bootstrap.json`: every refit by parameter, and its spread."""
+    low, high = one.interval
+    std, bias = one.std, one.bias
+    parameters = {
+        name: {
+            "unit": spec_of(name).unit,
+            "estimate": one.estimate[k],
+            "std": std[k],
+            "bias": bias[k],
+            "ci95": (low[k], high[k]),
+            "refits": one.values[:, k],
+        }
+        for k, name in enumerate(one.ids)
+    }
+    return _text({"seed": one.seed, "failed": one.failed, "parameters": parameters})
+
+
+def _text(content: dict[str, Any]) -> str:
+    return json.dumps(plain(content), allow_nan=False, ensure_ascii=False, indent=2) + "\n"

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin examine` prints and writes what it was asked."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli import main
+from tests.cli.conftest import Files
+
+
+def test_suggestions_and_profile(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["examine", str(bench_files.log), "--vehicle", str(bench_files.card)]
+    assert main([*arguments, "--profile", "eta", "-o", str(tmp_path / "asked")]) == 0
+    printed = capsys.readouterr().out
+    assert "What would tell more" in printed
+    assert "Profile likelihood of eta" in printed
+    suggestions = json.loads((tmp_path / "asked" / "suggestions.json").read_text())
+    assert all(one["experiments"] for one in suggestions["suggestions"])
+    profile = json.loads((tmp_path / "asked" / "profile.eta.json").read_text())
+    low, high = profile["ci95_profile"]
+    assert low < profile["estimate"] < high
+    assert max(profile["rise"]) > 3.84
+
+
+def test_an_unknown_parameter_writes_nothing(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["examine", str(bench_files.log), "--vehicle", str(bench_files.card)]
+    assert main([*arguments, "--profile", "nothing", "-o", str(tmp_path / "asked")]) == 2
+    assert "unknown parameter id" in capsys.readouterr().err
+    assert not (tmp_path / "asked").exists()

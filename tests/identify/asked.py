@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""Identifications of short synthetic logs, for tests of what is asked about them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import drivetwin
+from drivetwin.cli.synth import write_run
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenarios import paper, paper_steps
+from drivetwin.identify.method import Method
+from drivetwin.identify.pipeline import identify
+from drivetwin.identify.result import Identification
+
+DURATION = 3.3
+RATE = 400.0
+"""Hz of the logger: less than usual, so that the many fits of a test take less time."""
+
+
+def _identified(scenario: Callable[[], Scenario], method: Method) -> Identification:
+    base = scenario()
+    sensors = tuple(replace(s, rate=min(s.rate, RATE)) for s in base.sensors)
+    made = run(replace(base, duration=DURATION, sensors=sensors), seed=3)
+    with tempfile.TemporaryDirectory() as folder:
+        log_file, card_file, _ = write_run(Path(folder) / "log.csv", made)
+        card = drivetwin.load_card(card_file)
+        log = drivetwin.read_log(log_file, card)
+        return identify(log, card, drivetwin.find_shifts(log, card), method)
+
+
+@cache
+def still() -> Identification:
+    """A log at constant engine torque: it cannot tell the torque's age."""
+    return _identified(paper, Method.LIKELIHOOD)
+
+
+@cache
+def stepped() -> Identification:
+    """The same driveline with throttle steps before the shift."""
+    return _identified(paper_steps, Method.LIKELIHOOD)
+
+
+@cache
+def by_the_paper() -> Identification:
+    """The same by a method without a likelihood."""
+    return _identified(paper, Method.PAPER)

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""Suggestions: the right experiment comes first, with the interval that it would really give."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.experiment.catalogue import Experiment
+from drivetwin.identify.experiment.suggest import LEAST_KNOWN, suggest
+from drivetwin.identify.result import Verdict
+from tests.identify.asked import by_the_paper, stepped, still
+
+
+def test_throttle_steps_tell_the_age_of_a_torque_that_stood_still() -> None:
+    first = suggest(still())[0]
+    assert first.parameter == "te_delay"
+    assert first.verdict is Verdict.NOT_IDENTIFIABLE
+    assert first.half_width == np.inf
+    best = first.prospects[0]
+    assert best.experiment is Experiment.THROTTLE_STEPS
+    assert best.verdict is Verdict.IDENTIFIED
+    again = next(p for p in first.prospects if p.experiment is Experiment.AGAIN)
+    assert again.verdict is Verdict.NOT_IDENTIFIABLE
+    # The log with throttle steps that was then made: the promise held.
+    std = stepped().estimates["te_delay"].std_noise
+    assert std is not None
+    assert best.half_width == pytest.approx(1.96 * std, rel=0.5)
+
+
+def test_the_same_shift_again_halves_the_variance() -> None:
+    """True of what no prior and no start state shares with the log."""
+    found = still()
+    (told,) = (s for s in suggest(found) if s.parameter == "c_o")
+    again = next(p for p in told.prospects if p.experiment is Experiment.AGAIN)
+    assert again.half_width == pytest.approx(told.half_width / np.sqrt(2.0), rel=0.02)
+
+
+def test_order_is_by_worth_and_least_known_are_told_too() -> None:
+    found = suggest(stepped())
+    assert len(found) == LEAST_KNOWN
+    for one in found:
+        assert one.verdict is Verdict.IDENTIFIED
+        widths = [p.half_width for p in one.prospects]
+        assert widths == sorted(widths)
+        assert widths[0] < one.half_width
+
+
+def test_what_sensors_decide_no_experiment_narrows() -> None:
+    found = stepped()
+    c_o = found.estimates["c_o"]
+    assert c_o.std_noise is not None
+    wide = replace(c_o, std_systematic=20.0 * c_o.std_noise)
+    told = suggest(replace(found, estimates={**found.estimates, "c_o": wide}))
+    (one,) = (s for s in told if s.parameter == "c_o")
+    assert not one.prospects
+    assert "calibrate" in one.text
+
+
+def test_other_methods_have_no_information_to_compare() -> None:
+    with pytest.raises(IdentificationError, match="likelihood"):
+        suggest(by_the_paper())
