@@ -49,7 +49,7 @@ def compile_library(
     includes = sorted({str(path.parent) for path in sources})
     command = [
         *_compiler(platform),
-        *("-std=c99", "-O2", "-ffp-contract=off", "-shared"),
+        *("-std=c99", "-O2", "-g0", "-ffp-contract=off", "-shared"),
         *([] if target.suffix == ".dll" else ["-fPIC"]),
         *(f"-D{name}" for name in defines),
         *(f"-I{folder}" for folder in includes),

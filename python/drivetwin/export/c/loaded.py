@@ -5,19 +5,20 @@ from __future__ import annotations
 
 import ctypes
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from drivetwin.driveline import FloatArray
+from drivetwin.errors import InputError
+from drivetwin.export.c.layout import Precision, layout_of
 from drivetwin.export.c.write import write_c
 from drivetwin.export.compiler import compile_library
 from drivetwin.export.subject import Subject
 
-CLUTCHES, ROWS, GUARDS, STATES, POINTS = 2, 3, 4, 4, 64
 STATUS = (
     "completed",
     "bad parameter",
@@ -27,84 +28,6 @@ STATUS = (
     "engine stalled",
 )
 """Texts of `dt_status` in its order."""
-
-
-class Precision(Enum):
-    """Number type of the compiled model."""
-
-    DOUBLE = ctypes.c_double
-    FLOAT = ctypes.c_float
-
-
-@dataclass(frozen=True)
-class Layout:
-    """The structures of `dt_model.h` for one number type."""
-
-    inputs: Any
-    state: Any
-    outputs: Any
-    start: Any
-    params: Any
-
-
-def layout_of(precision: Precision) -> Layout:
-    """Structures of `dt_model.h` as ctypes sees them."""
-    real, integer = precision.value, ctypes.c_int
-
-    def structure(name: str, **fields: Any) -> Any:
-        return type(name, (ctypes.Structure,), {"_fields_": list(fields.items())})
-
-    inputs = structure("Inputs", engine_torque=real, pressure=real * CLUTCHES)
-    friction = structure(
-        "Friction",
-        **dict.fromkeys(("mu_c", "mu_s", "v_s", "mu_v"), real),
-        points=integer,
-        slip=real * POINTS,
-        mu=real * POINTS,
-    )
-    clutch = structure(
-        "Clutch",
-        **dict.fromkeys(("i_c", "i_out", "gain", "P0", "peak", "drum_inertia"), real),
-        friction=friction,
-    )
-    scalars = ("J1", "J2e", "eta", "i_in", "J_out", "i_f", "J_v", "k_o", "c_o")
-    loads = ("load_constant", "load_rolling", "load_aero")
-    return Layout(
-        inputs=inputs,
-        state=structure(
-            "State",
-            x=real * STATES,
-            carry=real * STATES,
-            mode=integer * ROWS,
-            released=integer * GUARDS,
-            cell=integer * CLUTCHES,
-            power_backward=integer,
-            wheel_backward=integer,
-            inputs=inputs,
-        ),
-        outputs=structure(
-            "Outputs",
-            **dict.fromkeys(
-                ("engine_speed", "output_speed", "wheel_speed", "twist", "output_torque"), real
-            ),
-            clutch_torque=real * CLUTCHES,
-            slip=real * CLUTCHES,
-            mode=integer * CLUTCHES,
-            pieces=integer,
-        ),
-        start=structure(
-            "Start",
-            **dict.fromkeys(("engine_speed", "output_speed", "wheel_speed", "twist"), real),
-            locked=integer,
-        ),
-        params=structure(
-            "Params",
-            **dict.fromkeys((*scalars, *loads), real),
-            loss_law=integer,
-            clutch=clutch * CLUTCHES,
-        ),
-    )
-
 
 COLUMNS = (
     *("engine_speed", "output_speed", "wheel_speed", "twist", "output_torque"),
@@ -124,25 +47,28 @@ class CRun:
 class CModel:
     """The C model of a twin as a loaded library; needs a C compiler.
 
-    `library` and `layout` are open to callers that step it themselves. Raises CompilerError.
+    `params` and `start` may be changed between runs. Raises CompilerError.
     """
 
     def __init__(self, subject: Subject, precision: Precision = Precision.DOUBLE) -> None:
         self.layout = layout_of(precision)
         defines = ["DT_FLOAT"] if precision is Precision.FLOAT else []
+        # The folder of a library that is still loaded cannot be removed on Windows.
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             paths = write_c(subject, Path(folder))
             sources = [p for p in paths if p.suffix == ".c" and p.name != "dt_run.c"]
             target = Path(folder) / "libtwin.so"
             compile_library(sources, target, None, defines)
             self.library = ctypes.CDLL(str(target))
-        self.library.dt_step.argtypes = [
-            *(ctypes.c_void_p,) * 4,
-            precision.value,
-            ctypes.c_void_p,
-        ]
-        self.params = self.layout.params.in_dll(self.library, "dt_twin_params")
-        self.start = self.layout.start.in_dll(self.library, "dt_twin_start")
+        pointer, real = ctypes.c_void_p, precision.value
+        self.library.dt_step.argtypes = [*(pointer,) * 4, real, pointer]
+        self.library.dt_observe.argtypes = [*(pointer,) * 4, real, pointer]
+        layout = self.layout
+        self.library.dt_usual_tuning.restype = layout.tuning
+        fixed = layout.params.in_dll(self.library, "dt_twin_params")
+        self.params = layout.params.from_buffer_copy(fixed)
+        start = layout.start.in_dll(self.library, "dt_twin_start")
+        self.start = layout.start.from_buffer_copy(start)
 
     def run(self, time: FloatArray, inputs: FloatArray, *, hold: bool = False) -> CRun:
         """Step over `time` (n,) [s]; `inputs` (n, 3): engine torque [N m], two pressures [Pa].
@@ -150,7 +76,7 @@ class CModel:
         Inputs are linear between rows, or held. The first row of the result is the start.
         """
         state, outputs = self.layout.state(), self.layout.outputs()
-        rows = [self._inputs(row) for row in inputs]
+        rows = [self.inputs(row) for row in inputs]
         table = np.full((len(time), len(COLUMNS)), np.nan)
         status = self.library.dt_begin(
             *map(ctypes.byref, (state, self.params, self.start, rows[0], outputs))
@@ -170,10 +96,80 @@ class CModel:
         columns = dict(zip(COLUMNS, np.ascontiguousarray(table.T), strict=True))
         return CRun(columns, STATUS[status])
 
-    def _inputs(self, row: FloatArray) -> Any:
+    def inputs(self, row: Sequence[float] | FloatArray) -> Any:
+        """Engine torque [N m] and two pressures [Pa] as the C structure."""
         return self.layout.inputs(float(row[0]), tuple(map(float, row[1:])))
 
 
 def _row(y: Any) -> list[float]:
     speeds = [y.engine_speed, y.output_speed, y.wheel_speed, y.twist, y.output_torque]
     return [*speeds, *y.clutch_torque, *y.slip, *y.mode, y.pieces]
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What the observer tells at one instant, SI; pairs are off-going, on-coming element."""
+
+    output_torque: float
+    output_torque_std: float
+    clutch_torque: tuple[float, ...]
+    scale: tuple[float, ...]
+    scale_std: tuple[float, ...]
+    load: float
+    load_std: float
+    slip: tuple[float, ...]
+    locked: int
+
+
+class CObserver:
+    """The observer of a loaded model, started at measured speeds [rad/s].
+
+    `tuning` may be changed between calls.
+    """
+
+    def __init__(self, model: CModel, inputs: Sequence[float], speeds: tuple[float, float]) -> None:
+        self._model = model
+        self.tuning = model.library.dt_usual_tuning()
+        self._memory = model.layout.observer()
+        now = self._measured(inputs, speeds)
+        model.library.dt_observer_begin(*map(ctypes.byref, (self._memory, model.params, now)))
+
+    def resume(self, inputs: Sequence[float], speeds: tuple[float, float]) -> None:
+        """Start anew at measured speeds, with friction and load as known so far."""
+        now = self._measured(inputs, speeds)
+        library, params = self._model.library, self._model.params
+        library.dt_observer_resume(*map(ctypes.byref, (self._memory, params, now)))
+
+    def observe(
+        self, inputs: Sequence[float], speeds: tuple[float, float], step: float
+    ) -> Estimates:
+        """Take in speeds of engine and output [rad/s], and inputs since the last call.
+
+        `step` [s] has passed since then. Raises InputError for what is not finite or not in range.
+        """
+        estimates = self._model.layout.estimates()
+        now = self._measured(inputs, speeds)
+        status = self._model.library.dt_observe(
+            *map(ctypes.byref, (self._memory, self._model.params, self.tuning, now)),
+            step,
+            ctypes.byref(estimates),
+        )
+        if status != 0:
+            raise InputError(
+                f"the observer refuses its inputs: {STATUS[status]}",
+                "give finite values at least every 32 ms",
+            )
+        return Estimates(
+            output_torque=estimates.output_torque,
+            output_torque_std=estimates.output_torque_std,
+            clutch_torque=tuple(estimates.clutch_torque),
+            scale=tuple(estimates.scale),
+            scale_std=tuple(estimates.scale_std),
+            load=estimates.load,
+            load_std=estimates.load_std,
+            slip=tuple(estimates.slip),
+            locked=estimates.locked,
+        )
+
+    def _measured(self, inputs: Sequence[float], speeds: tuple[float, float]) -> Any:
+        return self._model.layout.measured(self._model.inputs(inputs), *map(float, speeds))

@@ -3,13 +3,11 @@
 
 #include "dt_internal.h"
 
-static int at_least(dt_real value, dt_real least) { return value >= least && value - value >= 0; }
+static int at_least(dt_real value, dt_real least) { return value >= least && dt_is_finite(value); }
 
-static int more_than(dt_real value, dt_real least) { return value > least && value - value >= 0; }
+static int more_than(dt_real value, dt_real least) { return value > least && dt_is_finite(value); }
 
-static int finite(dt_real value) { return value - value >= 0; }
-
-static int not_zero(dt_real value) { return finite(value) && dt_abs(value) > DT_C(0); }
+static int not_zero(dt_real value) { return dt_is_finite(value) && dt_abs(value) > DT_C(0); }
 
 static const char *check_friction(const dt_friction *law) {
     if (law->points < 0 || law->points > DT_POINTS) {
@@ -19,7 +17,7 @@ static const char *check_friction(const dt_friction *law) {
         return !at_least(law->mu_c, 0)  ? "friction.mu_c"
                : !at_least(law->mu_s, 0) ? "friction.mu_s"
                : !more_than(law->v_s, 0) ? "friction.v_s"
-               : !finite(law->mu_v)      ? "friction.mu_v"
+               : !dt_is_finite(law->mu_v)      ? "friction.mu_v"
                                          : 0;
     }
     if (law->slip[0] < 0 || law->slip[0] > 0) {
@@ -40,7 +38,7 @@ static const char *check_clutch(const dt_clutch *clutch) {
     return !not_zero(clutch->i_c)                ? "i_c"
            : !not_zero(clutch->i_out)            ? "i_out"
            : !at_least(clutch->gain, 0)          ? "gain"
-           : !finite(clutch->P0)                 ? "P0"
+           : !dt_is_finite(clutch->P0)                 ? "P0"
            : !at_least(clutch->peak, 1)          ? "peak"
            : !at_least(clutch->drum_inertia, 0)  ? "drum_inertia"
                                                  : check_friction(&clutch->friction);
@@ -57,7 +55,7 @@ const char *dt_check(const dt_params *p) {
                         : !more_than(p->J_v, 0)                           ? "J_v"
                         : !at_least(p->k_o, 0)                            ? "k_o"
                         : !at_least(p->c_o, 0)                            ? "c_o"
-                        : !finite(p->load_constant)                       ? "load.constant"
+                        : !dt_is_finite(p->load_constant)                       ? "load.constant"
                         : !at_least(p->load_rolling, 0)                   ? "load.rolling"
                         : !at_least(p->load_aero, 0)                      ? "load.aero"
                         : p->loss_law != DT_PAPER && p->loss_law != DT_DISSIPATIVE ? "loss_law"

@@ -43,6 +43,8 @@ typedef double dt_real;
 
 static inline dt_real dt_larger(dt_real a, dt_real b) { return a > b ? a : b; }
 static inline dt_real dt_smaller(dt_real a, dt_real b) { return a < b ? a : b; }
+/** False for infinities and NaN; needs no macro that some headers implement by casts. */
+static inline int dt_is_finite(dt_real a) { return a - a >= DT_C(0); }
 static inline dt_real dt_square(dt_real a) { return a * a; }
 
 #endif

@@ -32,12 +32,10 @@ static int has_jumped(const dt_state *s, const dt_params *p, const dt_inputs *no
     return jumped || (p->load_rolling > DT_C(0)) != (s->mode[DT_CLUTCHES] != DT_OPEN);
 }
 
-static int is_finite(dt_real x) { return x - x >= DT_C(0); }
-
 static int inputs_are_finite(const dt_inputs *u) {
-    int finite = is_finite(u->engine_torque);
+    int finite = dt_is_finite(u->engine_torque);
     for (int j = 0; j < DT_CLUTCHES; ++j) {
-        finite = finite && is_finite(u->pressure[j]);
+        finite = finite && dt_is_finite(u->pressure[j]);
     }
     return finite;
 }
@@ -107,7 +105,7 @@ static int advance(dt_state *s, const dt_expansion *e, dt_real t) {
         const dt_real next = s->x[i] + change;
         s->carry[i] = change - (next - s->x[i]);
         s->x[i] = next;
-        finite = finite && is_finite(next);
+        finite = finite && dt_is_finite(next);
     }
     for (int j = 0; j < DT_GUARDS; ++j) {
         s->released[j] = s->released[j] && !(t > DT_C(0));
@@ -148,7 +146,7 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
     state->x[DT_TWIST] = start->twist;
     int sound = inputs_are_finite(inputs) && start->locked >= 0 && start->locked <= DT_CLUTCHES;
     for (int i = 0; i < DT_STATES; ++i) {
-        sound = sound && is_finite(state->x[i]);
+        sound = sound && dt_is_finite(state->x[i]);
     }
     if (!sound) {
         return DT_BAD_STATE;
@@ -169,7 +167,7 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
 
 dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *from,
                   const dt_inputs *to, dt_real h, dt_outputs *outputs) {
-    if (!(h > DT_C(0)) || !is_finite(h) || !inputs_are_finite(from) || !inputs_are_finite(to)) {
+    if (!(h > DT_C(0)) || !dt_is_finite(h) || !inputs_are_finite(from) || !inputs_are_finite(to)) {
         return DT_BAD_STATE;
     }
     const dt_inputs rate = rate_of(from, to, h);
