@@ -62,3 +62,12 @@ def test_a_damaged_twin_leaves_no_file(tmp_path: Path) -> None:
     path = tmp_path / "out.ssv"
     assert main(["export", str(damaged), "--to", "ssv", "-o", str(path)]) == 2
     assert not path.exists()
+
+
+def test_modelica_package_of_a_shift(twin_file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "truck.mo"
+    arguments = ["--to", "modelica", "--shift", "2-3", "-o", str(path)]
+    assert main(["export", str(twin_file), *arguments]) == 0
+    text = path.read_text("utf-8")
+    assert text.startswith('package sample_truck_2_3 "identified by the integral method')
+    assert "Components.SpringDamper output_shaft(c=176000.0, d=280.0);" in text

@@ -47,13 +47,15 @@ def export(
     shift: Annotated[
         str | None,
         typer.Option(
-            "--shift", metavar="GEAR-GEAR", help="c, fmu: which shift, as 2-3; else the first."
+            "--shift", metavar="GEAR-GEAR", help="Models: which shift, as 2-3; else the first."
         ),
     ] = None,
     log: Annotated[
         Path | None,
         typer.Option(
-            "--log", metavar="LOG", help="c, fmu: start as this log does; fmu holds its shift."
+            "--log",
+            metavar="LOG",
+            help="Models: start as this log does; fmu and modelica hold its shift.",
         ),
     ] = None,
     channels: ChannelsFile = None,
@@ -66,13 +68,14 @@ def export(
 ) -> None:
     """Write the identified model for another program.
 
-    c: C99 sources for a controller. fmu: co-simulation with sources inside.
+    c: C99 sources for a controller. fmu: co-simulation with sources inside. modelica: a package of
+    the Standard Library's components.
     Parameter files (ssv, cdfx, dcm, m, json, csv) hold what is known, with units and intervals.
     """
     from drivetwin.twin import Twin
 
     model = Twin.load(twin)
-    path = output or Path(f"{twin.stem}.{to}")
+    path = output or Path(f"{twin.stem}.{to.ending}")
     with step(f"writing {path.name}"):
         match to:
             case Target.C:
@@ -86,6 +89,11 @@ def export(
                 subject, experiment = _subject(model, shift, log, channels)
                 build_fmu(subject, path, BuildOptions(fmi, tuple(platforms or ()), experiment))
                 listed = {"fmi": fmi.value}
+            case Target.MODELICA:
+                from drivetwin.export.modelica.dual_clutch import write_modelica
+
+                write_modelica(*_subject(model, shift, log, channels), path)
+                listed = {}
             case _:
                 content = _write_parameters(model, path, to, (names, _converter(powertrain)))
                 listed = {"parameters": [one.name for one in content.entries]}

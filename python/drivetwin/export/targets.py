@@ -11,9 +11,15 @@ class Target(StrEnum):
 
     C = "c"
     FMU = "fmu"
+    MODELICA = "modelica"
     SSV = "ssv"
     CDFX = "cdfx"
     DCM = "dcm"
     M = "m"
     JSON = "json"
     CSV = "csv"
+
+    @property
+    def ending(self) -> str:
+        """Ending of its files."""
+        return "mo" if self is Target.MODELICA else self.value

@@ -19,7 +19,8 @@ from drivetwin.driveline import (
     Stribeck,
     simulate,
 )
-from drivetwin.export.modelica.dual_clutch import ENGINE_TORQUE, modelica_text
+from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.modelica.dual_clutch import ENGINE_TORQUE, modelica_text, write_modelica
 from drivetwin.export.subject import Subject
 from tests.export.modelica.compiled import run
 from tests.export.parameters.sample import twin
@@ -94,3 +95,14 @@ def test_without_inputs_there_is_the_driveline_alone() -> None:
     text = modelica_text(Subject("truck", _model(), SLIPPING))
     assert "model Driveline" in text
     assert "model Shift" not in text
+
+
+def test_an_experiment_becomes_the_run(tmp_path: Path) -> None:
+    subject = Subject("truck", _model(), SLIPPING)
+    columns = [signal.values for signal in INPUTS.values()]
+    experiment = Experiment("shift 2-3", SAMPLES, np.column_stack(columns), 0.05)
+    write_modelica(subject, experiment, tmp_path / "shift.mo")
+    text = (tmp_path / "shift.mo").read_text("utf-8")
+    assert text == modelica_text(subject, INPUTS, (0.0, 0.2))
+    write_modelica(subject, None, tmp_path / "driveline.mo")
+    assert (tmp_path / "driveline.mo").read_text("utf-8") == modelica_text(subject)

@@ -5,11 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from drivetwin.driveline import DualClutch, ShiftElement, Signal, State
 from drivetwin.export.modelica.model import Run, package_text
 from drivetwin.export.subject import Subject
 from drivetwin.network import Element, Start
+from drivetwin.results.atomic import write_text
+
+if TYPE_CHECKING:
+    from drivetwin.export.fmu.experiment import Experiment
 
 ENGINE, OUTPUT, WHEEL, SHAFT = "engine", "output", "wheel", "output shaft"
 ENGINE_TORQUE = "engine torque"
@@ -27,6 +33,19 @@ def modelica_text(
     if inputs is not None and time is not None:
         run = Run(inputs, network_start(subject.start), time)
     return package_text(subject.name, network_of(subject.model), run, subject.note)
+
+
+def write_modelica(subject: Subject, experiment: Experiment | None, path: Path) -> None:
+    """Write the package, with the run of an experiment where there is one; whole or not at all."""
+    if experiment is None:
+        text = modelica_text(subject)
+    else:
+        names = (ENGINE_TORQUE, *(element.name for element in subject.model.elements))
+        columns = zip(names, experiment.inputs.T, strict=True)
+        inputs = {name: Signal(experiment.time, column) for name, column in columns}
+        span = float(experiment.time[0]), float(experiment.time[-1])
+        text = modelica_text(subject, inputs, span)
+    write_text(path, text)
 
 
 def network_start(start: State) -> Start:
