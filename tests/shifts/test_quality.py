@@ -52,6 +52,7 @@ def test_without_torque_only_times_and_speeds() -> None:
         "inertia_phase_time",
         "flare_speed",
         "undershoot_speed",
+        "slip_at_lockup",
     }
     assert figures["shift_time"] == pytest.approx(0.6)
     assert figures["torque_phase_time"] == pytest.approx(0.2)

@@ -97,5 +97,8 @@ def _print(outcome: Outcome, source: str) -> None:
         show(friction_table(found.friction))
     if found.fit:
         show(fit_table(found.fit, "Simulation over measurement"))
+    for shift in found.shifts:
+        for text in shift.warnings:
+            note(f"{shift.start_gear}→{shift.end_gear}: {text}")
     for warning in found.warnings:
         note(f"warning: {warning}")

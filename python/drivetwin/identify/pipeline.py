@@ -31,6 +31,7 @@ from drivetwin.identify.uncertainty import systematic_std
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.parameters import spec_of
 from drivetwin.progress import part
+from drivetwin.shifts.converter import require_closed
 from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.spec import VehicleCard
@@ -96,21 +97,23 @@ def identify(
 def _recorded(
     log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
-    """The shifts, cut to where their inputs were recorded, and those refused for a gap.
+    """The shifts that can be used, cut to where their inputs were recorded, and those refused.
 
-    Raises DamagedChannelError where none is left.
+    Refused for a gap or an open converter; where none is left, the last refusal is raised
+    (DamagedChannelError, IdentificationError).
     """
     usable: list[Shift] = []
     refused: list[RejectedShift] = []
     for shift in shifts:
         fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
         try:
+            require_closed(log, card, shift)
             usable.append(recorded(log, shift, fills))
-        except DamagedChannelError as gap:
+        except (DamagedChannelError, IdentificationError) as refusal:
             if len(shifts) == len(refused) + 1:
                 raise
             span = (shift.before[1], shift.lockup_time)
-            refused.append(RejectedShift(span, gap.what))
+            refused.append(RejectedShift(span, refusal.what))
     return tuple(usable), tuple(refused)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from drivetwin.shifts.hinge import Hinge, Moving, fit_hinge
 from drivetwin.shifts.kinematics import GearboxSpeeds
 from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.shifts.sparse import Crossing, begun, ended
 
 FloatArray = NDArray[np.float64]
 
@@ -51,6 +52,9 @@ def break_away(
     first, last = held
     rest = slice(max(first, last + 1 - speeds.samples(_REST, 8)), last + 1)
     slip = _slip(speeds, ratio, rest)
+    if _is_sparse(speeds, settings):
+        part = slice(first, stop + 1)
+        return _boundary(begun(slip.time[part], slip.error[part] - slip.level, slip.noise))
     run = speeds.samples(_QUIET, 3)
     still = _runs_of_true(slip.departure[: last + 1] < _LIMIT, run)
     anchor = max(int(still.max()) + run - 1, first) if len(still) else last
@@ -70,6 +74,9 @@ def lock_up(
     first, last = held
     rest = slice(first, min(last + 1, first + speeds.samples(_REST, 8)))
     slip = _slip(speeds, ratio, rest)
+    if _is_sparse(speeds, settings):
+        part = slice(start, last + 1)
+        return _boundary(ended(slip.time[part], slip.error[part] - slip.level, slip.noise))
     run = speeds.samples(_QUIET, 3)
     still = _runs_of_true(slip.departure[first : last + 1] < _LIMIT, run)
     anchor = first + int(still.min()) if len(still) else first
@@ -79,17 +86,27 @@ def lock_up(
     return _locate(slip, (anchor, window), Moving.BEFORE, (start, last))
 
 
+def _is_sparse(speeds: GearboxSpeeds, settings: ShiftSettings) -> bool:
+    """Whether the fewest samples of a fit would take longer than any curve can follow."""
+    return _LEAST * speeds.step > 2.0 * settings.hinge_window
+
+
+def _boundary(found: Crossing | None) -> Boundary | None:
+    return None if found is None else Boundary(found.time, found.sigma)
+
+
 @dataclass(frozen=True)
 class _Slip:
     """Synchronisation error (n,) on `time` [s], and how far it is from that of the gear held.
 
-    `noise` [rad/s] is that of one sample at rest, at least `floor`. `departure` (n,) is the
-    distance, smoothed over _SMOOTH, in standard deviations of the smoothed error; divided by
-    `root` in those of a sample.
+    `level` is the error at rest. `noise` [rad/s] is that of one sample at rest, at least `floor`.
+    `departure` (n,) is the distance, smoothed over _SMOOTH, in standard deviations of the smoothed
+    error; divided by `root` in those of a sample.
     """
 
     time: FloatArray
     error: FloatArray
+    level: float
     floor: float
     noise: float
     departure: FloatArray
@@ -107,7 +124,7 @@ def _slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
     root = float(np.sqrt(width))
     mean = np.convolve(np.pad(error - level, width // 2, mode="edge"), np.ones(width), "same")
     mean = np.abs(mean[width // 2 : width // 2 + len(error)]) / width
-    return _Slip(speeds.time, error, floor, noise, mean * root / noise, root)
+    return _Slip(speeds.time, error, level, floor, noise, mean * root / noise, root)
 
 
 def _first_window(slip: _Slip, anchor: int, moving: Moving, shortest: int) -> int:

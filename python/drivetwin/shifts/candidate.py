@@ -9,6 +9,7 @@ import numpy as np
 
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.shifts.boundaries import Boundary, break_away, lock_up
+from drivetwin.shifts.flags import flag_before
 from drivetwin.shifts.held import Run
 from drivetwin.shifts.kind import shift_kind
 from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds
@@ -182,6 +183,14 @@ def _torque_start(
         dip = torque_dip_onset(torque, begin.time)
         if dip is not None:
             return dip, (f"no pressure of {oncoming}: torque phase read from the output torque",)
+    flag = flag_before(search.log, begin.time, begin.time - earliest)
+    if flag is not None and kind is ShiftKind.POWER_ON_UP:
+        half = 0.5 * (begin.time - flag)
+        reason = (
+            f"no channel tells when {oncoming} takes up torque: somewhere between the shift flag "
+            f"at {flag:.3f} s and break-away, of which the middle is given"
+        )
+        return Boundary(flag + half, half / float(np.sqrt(3.0))), (reason,)
     sigma = float(np.hypot(begin.sigma, search.settings.unknown_torque_phase))
     reason = f"no channel tells when {oncoming} takes up torque: torque phase set empty"
     return Boundary(begin.time, sigma), (reason,)

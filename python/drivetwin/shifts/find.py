@@ -16,6 +16,7 @@ from drivetwin.shifts.candidate import (
     ratio_in,
     resting_ratio,
 )
+from drivetwin.shifts.flags import checked
 from drivetwin.shifts.held import Run, gear_runs
 from drivetwin.shifts.kinematics import GearboxSpeeds, gear_ratios, gearbox_speeds
 from drivetwin.shifts.quality import shift_quality
@@ -39,7 +40,8 @@ def find_shifts(
     A gear is held where ω_in = ic·iout·ω_out (zero slip, eq. 15, of the element that makes it).
     Between two gears held, the inertia phase runs from the hinge at which the off-going slip
     leaves zero to the one at which the on-coming slip reaches it; the torque phase precedes it,
-    from the on-coming pressure's crossing of P0 (without it: from the fall of the output torque).
+    from the on-coming pressure's crossing of P0 (without it: from the fall of the output torque,
+    or halfway from the shift flag). Flag and gear of the bus are checked against the speeds.
     Raises MissingChannelError where a speed is missing, TimeError where the speeds share no time.
     """
     speeds = gearbox_speeds(log, card)
@@ -63,8 +65,9 @@ def find_shifts(
             span = (float(speeds.time[before.last]), float(speeds.time[after.first]))
             rejected.append(RejectedShift(span, str(no_shift)))
     chained = _chain(shifts, search.settings)
-    finished = tuple(replace(s, quality=shift_quality(log, card, s)) for s in chained)
-    return FoundShifts(finished, tuple(sorted(rejected, key=lambda item: item.time)))
+    rated = tuple(replace(s, quality=shift_quality(log, card, s)) for s in chained)
+    finished, refused = checked(log, rated, rejected)
+    return FoundShifts(finished, tuple(sorted(refused, key=lambda item: item.time)))
 
 
 def _standing(search: Search) -> RejectedShift:

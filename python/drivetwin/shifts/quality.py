@@ -22,6 +22,7 @@ QUALITY_UNITS: dict[str, str] = {
     "inertia_phase_time": "s",
     "flare_speed": "rad/s",
     "undershoot_speed": "rad/s",
+    "slip_at_lockup": "rad/s",
     "torque_hole_depth": "N*m",
     "torque_hole_area": "N*m*s",
     "tie_up_torque": "N*m",
@@ -35,7 +36,7 @@ QUALITY_UNITS: dict[str, str] = {
 """SI unit of every figure that `shift_quality` may return."""
 
 _REFERENCE = 0.1
-"""Span before the torque phase [s] whose mean is the torque before the shift."""
+"""Span [s] whose mean is the torque before the shift, or the slip after it."""
 _RING = 0.5
 """Span after lock-up [s] that counts as the response to the shift."""
 _BAND = 32.0
@@ -60,6 +61,7 @@ def shift_quality(
 ) -> dict[str, float]:
     """Figures of one shift by name, units in QUALITY_UNITS.
 
+    `slip_at_lockup`: mean slip of the on-coming element (eq. 15) over 0.1 s from lock-up;
     `flare_speed`: input speed above the higher of the two synchronous speeds; `undershoot_speed`:
     below the lower one (both from smoothed speeds, 0 in a clean shift).
     With an output torque T_o (low-pass 32 Hz, zero phase):
@@ -83,6 +85,7 @@ def shift_quality(
     }
     speeds = gearbox_speeds(log, card)
     figures |= _speed_excess(speeds, gear_ratios(card), shift)
+    figures |= _slip_left(speeds, card.clutch_ratios(shift.oncoming), shift)
     torque = _output_torque(log, shift)
     if torque is not None:
         J_v = J_vehicle or float(np.sqrt(np.prod(card.J_vehicle_range)))
@@ -143,6 +146,18 @@ def _speed_excess(
         "flare_speed": max(0.0, float(above.max())),
         "undershoot_speed": max(0.0, float(below.max())),
     }
+
+
+def _slip_left(
+    speeds: GearboxSpeeds, ratios: tuple[float, float], shift: Shift
+) -> dict[str, float]:
+    """What is left of the slip once the on-coming element is locked."""
+    i_c, i_out = ratios
+    held = (speeds.time >= shift.lockup_time) & (speeds.time <= shift.lockup_time + _REFERENCE)
+    if not held.any():
+        return {}
+    slip = speeds.input[held] / i_c - i_out * speeds.output[held]
+    return {"slip_at_lockup": float(slip.mean())}
 
 
 def _torque_hole(torque: _Torque, ratios: dict[str, float], shift: Shift) -> dict[str, float]:

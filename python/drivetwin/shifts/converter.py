@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""The converter's lock-up clutch: when it closes and opens, and whether a shift has it closed.
+
+Closed means ω_e = i_in·ω_in. The flag on the bus tells when; the speeds decide whether it is true.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError, Where
+from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.flags import set_spans
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import VehicleCard
+
+Span = tuple[float, float]
+
+CLOSED = 0.02
+"""Relative slip between engine and input below which the lock-up clutch counts as closed."""
+_HOLD = 0.3
+"""Time [s] over which the slip must stay closed."""
+_BESIDE = 0.5
+"""Span before a shift [s] over which its converter is looked at."""
+_STEP = 0.01
+"""Raster [s] on which slip is looked at."""
+
+
+@dataclass(frozen=True)
+class LockUp:
+    """The lock-up clutch closes at `time` ± `sigma` [s] and stays so until `end` [s].
+
+    `warning` says where flag and speeds contradict each other; empty where they agree.
+    """
+
+    time: float
+    sigma: float
+    end: float
+    warning: str = ""
+
+
+def converter_slip(log: ShiftLog, card: VehicleCard, span: Span) -> float | None:
+    """Mean of ω_e/(i_in·ω_in) - 1 over `span` [s]; None where no channel tells it."""
+    if "engine_speed" not in log or "input_speed" not in log:
+        return None
+    engine = log["engine_speed"]
+    inside = (engine.time >= span[0]) & (engine.time <= span[1])
+    inlet = card.i_in * log["input_speed"].at(engine.time[inside])
+    known = np.isfinite(inlet) & (inlet > 0.0)
+    if not known.any():
+        return None
+    return float(np.mean(engine.values[inside][known] / inlet[known])) - 1.0
+
+
+def require_closed(log: ShiftLog, card: VehicleCard, shift: Shift) -> None:
+    """Raise IdentificationError where the converter slips before `shift`.
+
+    Its torque would have to be known then; the engine torque is not that of the gearbox.
+    """
+    slip = converter_slip(log, card, (shift.before[1] - _BESIDE, shift.before[1]))
+    if slip is not None and abs(slip) > CLOSED:
+        raise IdentificationError(
+            f"the converter is open before the shift {shift.start_gear}-{shift.end_gear}: engine "
+            f"and gearbox input differ by {100.0 * slip:.1f} %",
+            "record the shift with the lock-up clutch closed; phases and speeds of this one are "
+            "told by `drivetwin shifts`",
+            Where(file=log.source, time=shift.before[1]),
+        )
+
+
+def lock_ups(log: ShiftLog, card: VehicleCard) -> tuple[LockUp, ...]:
+    """Every closing of the lock-up clutch; one that is closed from the first sample on is none."""
+    if "lockup_engaged" in log:
+        flag = log["lockup_engaged"]
+        return tuple(
+            _flagged(log, card, flag, span) for span in set_spans(flag) if span[0] > flag.time[0]
+        )
+    if "engine_speed" in log and "input_speed" in log:
+        return _seen(log["engine_speed"], log["input_speed"], card.i_in)
+    return ()
+
+
+def _flagged(log: ShiftLog, card: VehicleCard, flag: Channel, span: Span) -> LockUp:
+    """A closing that the flag tells, with the slip's word on it."""
+    slip = converter_slip(log, card, (span[0] + _HOLD, max(span[1], span[0] + 2.0 * _HOLD)))
+    warning = ""
+    if slip is None:
+        warning = "no speeds of engine and input: the flag is unchecked"
+    elif abs(slip) > CLOSED:
+        warning = f"the flag tells lock-up, but engine and input differ by {100 * slip:.1f} %"
+    return LockUp(span[0], flag.step / float(np.sqrt(12.0)), span[1], warning)
+
+
+def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
+    """Closings that the speeds show: the slip, averaged over _HOLD/3, comes to rest for _HOLD."""
+    start, end = max(engine.time[0], inlet.time[0]), min(engine.time[-1], inlet.time[-1])
+    time = np.arange(start, end, _STEP)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slip = engine.at(time) / (i_in * inlet.at(time)) - 1.0
+    width = round(_HOLD / _STEP / 3.0)
+    if time.size < 4 * width:
+        return ()
+    mean = np.convolve(np.where(np.isfinite(slip), slip, 1.0), np.ones(width) / width, "same")
+    closed = np.concatenate([[False], np.abs(mean) < CLOSED, [False]]).astype(np.int8)
+    edges = np.flatnonzero(np.diff(closed))
+    return tuple(
+        LockUp(float(time[first]), _HOLD / 6.0, float(time[stop - 1]))
+        for first, stop in zip(edges[::2], edges[1::2], strict=True)
+        if (stop - first) * _STEP >= _HOLD and first > width
+    )

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""What the transmission says of its shifts, checked against what the speeds show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.shift import RejectedShift, Shift
+
+Span = tuple[float, float]
+
+_LATE = 0.3
+"""How late [s] a gear or flag may be told on the bus."""
+
+
+def set_spans(flag: Channel) -> tuple[Span, ...]:
+    """Spans [s] in which a flag is set, from its first to its last set sample."""
+    on = np.concatenate([[False], flag.values > 0.5, [False]]).astype(np.int8)
+    edges = np.flatnonzero(np.diff(on))
+    return tuple(
+        (float(flag.time[first]), float(flag.time[stop - 1]))
+        for first, stop in zip(edges[::2], edges[1::2], strict=True)
+    )
+
+
+def flag_before(log: ShiftLog, time: float, reach: float) -> float | None:
+    """When the shift flag was set that is on at `time` [s], at most `reach` earlier."""
+    if "shift_in_process" not in log:
+        return None
+    found = [low for low, high in set_spans(log["shift_in_process"]) if low <= time <= high]
+    return found[0] if found and time - found[0] <= reach else None
+
+
+def checked(
+    log: ShiftLog, shifts: Sequence[Shift], rejected: Sequence[RejectedShift]
+) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
+    """The shifts with a warning where flag or gear contradict them, and flags without a shift."""
+    told = tuple(replace(s, warnings=(*s.warnings, *_contradictions(log, s))) for s in shifts)
+    if "shift_in_process" not in log:
+        return told, tuple(rejected)
+    seen = [(s.torque_phase[0], s.lockup_time) for s in shifts] + [r.time for r in rejected]
+    empty = [
+        RejectedShift(span, "the shift flag is set, but the speeds show no change of gear")
+        for span in set_spans(log["shift_in_process"])
+        if not any(low <= span[1] and high >= span[0] for low, high in seen)
+    ]
+    return told, (*rejected, *empty)
+
+
+def _contradictions(log: ShiftLog, shift: Shift) -> list[str]:
+    texts = []
+    if "shift_in_process" in log:
+        spans = set_spans(log["shift_in_process"])
+        start, end = shift.inertia_phase
+        if not any(low <= start + _LATE and high >= end - _LATE for low, high in spans):
+            texts.append("the shift flag is not set during this shift")
+    if "gear" in log:
+        gear = log["gear"]
+        moments = (
+            (shift.start_gear, shift.inertia_phase[0]),
+            (shift.end_gear, min(shift.lockup_time + _LATE, shift.after[1])),
+        )
+        for name, time in moments:
+            value = float(gear.at(np.array([time]))[0])
+            if name.isdecimal() and np.isfinite(value) and value != float(name):
+                texts.append(
+                    f"the bus tells gear {value:g} at {time:.2f} s, the speeds show gear {name}"
+                )
+    return texts

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""Boundaries where the speeds come so slowly that no curve can be fitted to a few of them.
+
+Encoders on a bus send means over a period that is not the same for both shafts, so while the shaft
+swings the two contradict each other by some per cent of what a shift changes, though the gear is
+held. A slip counts as begun once it exceeds that; how much earlier it may have begun is in sigma.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+_SHARE = 0.05
+"""Slip, as a part of what it changes by over the shift, that counts as begun."""
+_LIMIT = 4.0
+"""Standard deviations of the noise beyond which a slip is no longer at rest."""
+_LASTING = 3
+"""So many samples at rest in a row are a gear held."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where a slip leaves or reaches rest: `time` ± `sigma` [s]."""
+
+    time: float
+    sigma: float
+
+
+def begun(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
+    """Where a slip (n,) that ends away from rest has begun; None where it never does.
+
+    `slip` [rad/s] is that of the off-going element, 0 at rest, up to the lock-up of the other.
+    """
+    moved = np.abs(slip)
+    limit = max(_SHARE * float(moved[-1]), _LIMIT * noise)
+    below = np.flatnonzero(moved < limit)
+    if not len(below) or below[-1] + 1 >= len(slip):
+        return None
+    last = int(below[-1])
+    at = float(np.interp(limit, moved[last : last + 2], time[last : last + 2]))
+    calm = np.flatnonzero(moved[: last + 1] < _LIMIT * noise)
+    rest = float(time[calm[-1]]) if len(calm) else float(time[0])
+    # At the pace of the next samples the slip took so long to reach the limit.
+    ahead = min(last + _LASTING, len(slip) - 1)
+    hidden = limit * (float(time[ahead]) - at) / max(float(moved[ahead]) - limit, noise)
+    early = 0.5 * max(at - rest, hidden)
+    return Crossing(at, float(np.hypot(early, _step_error(time, last))))
+
+
+def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
+    """Where a slip (n,) that begins away from rest comes to it for good; None where it never does.
+
+    `slip` [rad/s] is that of the on-coming element, 0 where it is locked.
+    """
+    calm = (np.abs(slip) < _LIMIT * noise).astype(np.int64)
+    lasting = np.flatnonzero(np.convolve(calm, np.ones(_LASTING), "valid") >= _LASTING)
+    moving = np.flatnonzero(calm[: lasting[0]] == 0) if len(lasting) else np.empty(0, np.intp)
+    if not len(moving):
+        return None
+    last = int(moving[-1])
+    pace = float(slip[last] - slip[last + 1])
+    step = float(time[last + 1] - time[last])
+    share = float(np.clip(slip[last] / pace, 0.0, 1.0)) if pace != 0.0 else 1.0
+    # Half of what the limit of rest hides, at the pace of the last step.
+    reach = min(0.5 * _LIMIT * noise / abs(pace), 1.0) if pace != 0.0 else 1.0
+    return Crossing(
+        float(time[last]) + share * step, float(np.hypot(reach * step, _step_error(time, last)))
+    )
+
+
+def _step_error(time: FloatArray, index: int) -> float:
+    """Standard deviation [s] of an instant known to lie between two samples."""
+    return float(time[index + 1] - time[index]) / float(np.sqrt(12.0))
