@@ -48,7 +48,10 @@ def show(table: Table) -> None:
 
 
 def table_of(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
-    """Empty table in the program's one style; columns in `right` are aligned to the right."""
+    """Empty table in the program's one style; columns in `right` hold numbers.
+
+    Where the terminal is narrow texts are folded; a number stays whole as long as it can.
+    """
     from rich import box
     from rich.table import Table
 
@@ -59,9 +62,10 @@ def table_of(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
         pad_edge=False,
         collapse_padding=True,
     )
-    for index, column in enumerate(columns):
-        justify: Literal["left", "right"] = "right" if column in right else "left"
-        table.add_column(column, justify=justify, no_wrap=index == 0)
+    for column in columns:
+        number = column in right
+        justify: Literal["left", "right"] = "right" if number else "left"
+        table.add_column(column, justify=justify, no_wrap=number, overflow="fold")
     return table
 
 
