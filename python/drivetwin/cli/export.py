@@ -24,46 +24,53 @@ if TYPE_CHECKING:
     from drivetwin.twin import Twin
 
 
+_Output = Annotated[
+    Path | None,
+    typer.Option(
+        "-o", "--output", metavar="PATH", help="File, a folder for c; by default ./TWIN.FORM."
+    ),
+]
+_Powertrain = Annotated[
+    str | None,
+    typer.Option(
+        "--powertrain",
+        metavar="FILE",
+        help="Parameter files: add the torque converter of this powertrain (TOML or built-in).",
+    ),
+]
+_Shift = Annotated[
+    str | None,
+    typer.Option(
+        "--shift", metavar="GEAR-GEAR", help="Models: which shift, as 2-3; else the first."
+    ),
+]
+_Log = Annotated[
+    Path | None,
+    typer.Option(
+        "--log",
+        metavar="LOG",
+        help="Models: start as this log does; fmu and modelica hold its shift.",
+    ),
+]
+_Platforms = Annotated[
+    list[Platform] | None,
+    typer.Option("--platform", help="fmu: build for this one, by zig; may be repeated."),
+]
+
+
 def export(
     twin: Annotated[Path, typer.Argument(metavar="TWIN", help="Identified model (twin.toml).")],
     to: Annotated[Target, typer.Option("--to", help="What to write.")],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="PATH", help="File, a folder for c; by default ./TWIN.FORM."
-        ),
-    ] = None,
+    output: _Output = None,
     names: Annotated[
         Names, typer.Option("--names", help="Parameter files: whose names the parameters get.")
     ] = Names.DRIVETWIN,
-    powertrain: Annotated[
-        str | None,
-        typer.Option(
-            "--powertrain",
-            metavar="FILE",
-            help="Parameter files: add the torque converter of this powertrain (TOML or built-in).",
-        ),
-    ] = None,
-    shift: Annotated[
-        str | None,
-        typer.Option(
-            "--shift", metavar="GEAR-GEAR", help="Models: which shift, as 2-3; else the first."
-        ),
-    ] = None,
-    log: Annotated[
-        Path | None,
-        typer.Option(
-            "--log",
-            metavar="LOG",
-            help="Models: start as this log does; fmu and modelica hold its shift.",
-        ),
-    ] = None,
+    powertrain: _Powertrain = None,
+    shift: _Shift = None,
+    log: _Log = None,
     channels: ChannelsFile = None,
     fmi: Annotated[FmiVersion, typer.Option("--fmi", help="fmu: version.")] = FmiVersion.FMI2,
-    platforms: Annotated[
-        list[Platform] | None,
-        typer.Option("--platform", help="fmu: build for this one, by zig; may be repeated."),
-    ] = None,
+    platforms: _Platforms = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Write the identified model for another program.
