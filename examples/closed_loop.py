@@ -2,10 +2,9 @@
 """A shift controller with the exported observer inside, against the virtual dynamometer.
 
 The plant is the exact model of the paper's driveline with hydraulic lags and noisy sensors; the
-friction of its on-coming clutch fades from shift to shift. The controller runs every 10 ms. It asks
-for the clutch torque that ends the inertia phase in half a second, and turns torque into pressure by
-the friction law of the twin times the scale that the C observer tells: once it uses that scale, once
-it believes in the friction as identified.
+friction of its on-coming clutch fades from shift to shift. The controller runs every 10 ms and asks
+for the clutch torque that ends the inertia phase in half a second. It turns torque into pressure by
+the friction law of the twin, once times the scale that the C observer tells, once as identified.
 
     python examples/closed_loop.py
 """
@@ -16,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.driveline import DualClutch, Signal, State, Stribeck, simulate
+from drivetwin.driveline import DualClutch, FloatArray, Signal, State, Stribeck, simulate
 from drivetwin.dyno.scenarios import paper
 from drivetwin.export.c.loaded import CModel, CObserver, Estimates
 from drivetwin.export.subject import Subject, steady_start
@@ -60,7 +59,7 @@ class Plant:
         self.output_torque = self.model.k_o * self.state.twist
         self._rng = rng
 
-    def run(self, command: np.ndarray) -> np.ndarray:
+    def run(self, command: FloatArray) -> FloatArray:
         """Hold pressure commands (2,) [Pa] for one task; returns the mean pressures."""
         time = np.linspace(0.0, TASK, 11)
         course = command + np.outer(np.exp(-time / LAG), self.pressures - command)
@@ -78,14 +77,14 @@ class Plant:
             locked=locked,
         )
         self.output_torque = float(run.shaft_torque[-1])
-        return course.mean(axis=0)
+        return np.asarray(course.mean(axis=0), dtype=np.float64)
 
     def speeds(self) -> tuple[float, float]:
         """Measured speeds of engine and output [rad/s]."""
         noise = np.array(SPEED_NOISE) * self._rng.standard_normal(2)
         return self.state.engine_speed + noise[0], self.state.output_speed + noise[1]
 
-    def inputs(self, pressures: np.ndarray) -> list[float]:
+    def inputs(self, pressures: FloatArray) -> list[float]:
         """Measured engine torque [N m] and pressures [Pa]."""
         torque = ENGINE_TORQUE + TORQUE_NOISE * self._rng.standard_normal()
         return [torque, *(pressures + PRESSURE_NOISE * self._rng.standard_normal(2))]
@@ -102,14 +101,14 @@ class Controller:
         self._alpha = [1.0 / (twin.i_in * e.i_c) for e in twin.elements]
         self._inertia = twin.J1 * twin.eta + twin.J2e
 
-    def command(self, time: float, known: Estimates, speeds: tuple[float, float]) -> np.ndarray:
+    def command(self, time: float, known: Estimates, speeds: tuple[float, float]) -> FloatArray:
         """Pressures [Pa] for the next task."""
         if time < FILL_END or self.locked:
             return np.array([0.0, MAIN]) if self.locked else np.array([MAIN, self.on.P0])
         slip = speeds[0] * self._alpha[1] - self.on.i_out * speeds[1]
         self.locked = time > HANDOVER_END and slip < 1.0
         share = min(1.0, (time - FILL_END) / (HANDOVER_END - FILL_END))
-        wanted = self._torque(speeds) if share == 1.0 else share * self._balance() / self._alpha[1]
+        wanted = self._torque() if share == 1.0 else share * self._balance() / self._alpha[1]
         holding = (1.0 - share) * 1.2 * self._balance() / self._alpha[0]
         return np.array(
             [
@@ -122,7 +121,7 @@ class Controller:
         """Engine torque behind the losses [N m]."""
         return self.twin.eta * ENGINE_TORQUE
 
-    def _torque(self, speeds: tuple[float, float]) -> float:
+    def _torque(self) -> float:
         """Torque of the on-coming clutch that brings the engine down within the target."""
         drop = ENGINE_SPEED * (1.0 - self._ratio(1) / self._ratio(0))
         return (self._balance() + self._inertia * drop / TARGET) / self._alpha[1]
@@ -196,8 +195,8 @@ def main() -> None:
     print(" true   observed            observed T_o    adaptive   as identified")
     for a, b in zip(told, believed, strict=True):
         print(
-            f"{a.true_scale:5.2f}   {a.scale:5.3f} ± {a.scale_std:5.3f}   rms {a.torque_error:5.0f} N·m"
-            f"{a.inertia_phase:12.2f} s{b.inertia_phase:14.2f} s"
+            f"{a.true_scale:5.2f}   {a.scale:5.3f} ± {a.scale_std:5.3f}   "
+            f"rms {a.torque_error:5.0f} N·m{a.inertia_phase:12.2f} s{b.inertia_phase:14.2f} s"
         )
 
 

@@ -37,30 +37,11 @@ def layout_of(precision: Precision) -> Layout:
     """All structures, fields in the order of the headers."""
     real, integer = precision.value, ctypes.c_int
     both = real * CLUTCHES
-
-    def structure(name: str, **fields: Any) -> Any:
-        return type(name, (ctypes.Structure,), {"_fields_": list(fields.items())})
-
-    def reals(*names: str) -> dict[str, Any]:
-        return dict.fromkeys(names, real)
-
-    inputs = structure("Inputs", engine_torque=real, pressure=both)
-    speeds = reals("engine_speed", "output_speed", "wheel_speed", "twist")
-    friction = structure(
-        "Friction",
-        **reals("mu_c", "mu_s", "v_s", "mu_v"),
-        points=integer,
-        slip=real * POINTS,
-        mu=real * POINTS,
-    )
-    clutch = structure(
-        "Clutch",
-        **reals("i_c", "i_out", "gain", "P0", "peak", "drum_inertia"),
-        friction=friction,
-    )
+    speeds = _alike(real, "engine_speed", "output_speed", "wheel_speed", "twist")
+    inputs = _structure("Inputs", engine_torque=real, pressure=both)
     return Layout(
         inputs=inputs,
-        state=structure(
+        state=_structure(
             "State",
             x=real * STATES,
             carry=real * STATES,
@@ -71,7 +52,7 @@ def layout_of(precision: Precision) -> Layout:
             wheel_backward=integer,
             inputs=inputs,
         ),
-        outputs=structure(
+        outputs=_structure(
             "Outputs",
             **speeds,
             output_torque=real,
@@ -80,31 +61,55 @@ def layout_of(precision: Precision) -> Layout:
             mode=integer * CLUTCHES,
             pieces=integer,
         ),
-        start=structure("Start", **speeds, locked=integer),
-        params=structure(
-            "Params",
-            **reals("J1", "J2e", "eta", "i_in", "J_out", "i_f", "J_v", "k_o", "c_o"),
-            **reals("load_constant", "load_rolling", "load_aero"),
-            loss_law=integer,
-            clutch=clutch * CLUTCHES,
-        ),
-        tuning=structure(
+        start=_structure("Start", **speeds, locked=integer),
+        params=_params(real),
+        tuning=_structure(
             "Tuning",
-            **reals("engine_speed", "output_speed", "engine_torque"),
-            **reals("held_torque", "scale", "load", "locked_slip"),
+            **_alike(real, "engine_speed", "output_speed", "engine_torque"),
+            **_alike(real, "held_torque", "scale", "load", "locked_slip"),
         ),
-        observer=structure(
+        observer=_structure(
             "Observer", x=real * OBSERVED, P=real * OBSERVED * OBSERVED, locked=integer
         ),
-        measured=structure("Measured", inputs=inputs, **reals("engine_speed", "output_speed")),
-        estimates=structure(
+        measured=_structure(
+            "Measured", inputs=inputs, **_alike(real, "engine_speed", "output_speed")
+        ),
+        estimates=_structure(
             "Estimates",
-            **reals("output_torque", "output_torque_std"),
-            clutch_torque=both,
-            scale=both,
-            scale_std=both,
-            **reals("load", "load_std"),
+            **_alike(real, "output_torque", "output_torque_std"),
+            **_alike(both, "clutch_torque", "scale", "scale_std"),
+            **_alike(real, "load", "load_std"),
             slip=both,
             locked=integer,
         ),
     )
+
+
+def _params(real: Any) -> Any:
+    friction = _structure(
+        "Friction",
+        **_alike(real, "mu_c", "mu_s", "v_s", "mu_v"),
+        points=ctypes.c_int,
+        slip=real * POINTS,
+        mu=real * POINTS,
+    )
+    clutch = _structure(
+        "Clutch",
+        **_alike(real, "i_c", "i_out", "gain", "P0", "peak", "drum_inertia"),
+        friction=friction,
+    )
+    return _structure(
+        "Params",
+        **_alike(real, "J1", "J2e", "eta", "i_in", "J_out", "i_f", "J_v", "k_o", "c_o"),
+        **_alike(real, "load_constant", "load_rolling", "load_aero"),
+        loss_law=ctypes.c_int,
+        clutch=clutch * CLUTCHES,
+    )
+
+
+def _structure(name: str, **fields: Any) -> Any:
+    return type(name, (ctypes.Structure,), {"_fields_": list(fields.items())})
+
+
+def _alike(kind: Any, *names: str) -> dict[str, Any]:
+    return dict.fromkeys(names, kind)
