@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from drivetwin.errors import FileFormatError, InputError
 from drivetwin.export.parameters.content import ParameterSet
@@ -20,6 +22,7 @@ from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.of_twin import parameters_of
 from tests.export.parameters.sample import SETS, twin
 
+TEXTS = {kind: codec.text(parameters_of(twin())) for kind, codec in CODECS.items()}
 EVERY_FORMAT = pytest.mark.parametrize("kind", ParameterFormat)
 
 
@@ -86,6 +89,19 @@ def test_a_curve_that_lost_a_point_is_refused(kind: ParameterFormat) -> None:
     assert text.count(last) >= 1
     with pytest.raises(FileFormatError, match=r"do not increase|axis points for"):
         CODECS[kind].parse(text.replace(last, repeated), "file")
+
+
+@EVERY_FORMAT
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.text(max_size=5))
+@settings(max_examples=60)
+def test_a_damaged_file_is_read_or_refused_never_a_crash(
+    kind: ParameterFormat, start: float, length: float, inserted: str
+) -> None:
+    text = TEXTS[kind]
+    first = int(start * len(text))
+    damaged = text[:first] + inserted + text[first + int(length**6 * len(text)) :]
+    with suppress(FileFormatError):
+        CODECS[kind].parse(damaged, "file")
 
 
 def test_a_format_is_known_by_its_ending(tmp_path: Path) -> None:
