@@ -69,8 +69,28 @@ def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
     from drivetwin.report.html import save_report
     from drivetwin.results.result_file import save_result
 
+    with step("comparing experiments"):
+        found = _examined(outcome.found)
     with step("writing the report"), staged(folder) as beside:
         save_result(beside / RESULT, outcome.found)
         outcome.twin.save(beside / TWIN)
-        save_report(beside / REPORT, outcome.found, outcome.log)
+        save_report(beside / REPORT, found, outcome.log)
     return tuple(folder / name for name in (RESULT, TWIN, REPORT))
+
+
+def _examined(found: Identification) -> Identification:
+    """The identification with the experiments that would tell what its log leaves open.
+
+    `evidence["suggestions"]` holds them; unchanged where nothing is open, or by another method.
+    """
+    from drivetwin.identify.experiment.suggest import suggest
+    from drivetwin.identify.method import Method
+    from drivetwin.identify.result import Verdict
+
+    verdicts = {one.verdict for one in found.estimates.values()}
+    if found.method is not Method.LIKELIHOOD or not verdicts & {
+        Verdict.WEAK,
+        Verdict.NOT_IDENTIFIABLE,
+    }:
+        return found
+    return replace(found, evidence={**found.evidence, "suggestions": suggest(found)})

@@ -7,6 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.identify.experiment.catalogue import Experiment
+from drivetwin.identify.experiment.suggest import Prospect, Suggestion
+from drivetwin.identify.result import Verdict
 from drivetwin.report.sections.blocks import NotesBlock, TableBlock
 from drivetwin.report.sections.limits import limits_section
 from tests.report.sample import identification
@@ -47,3 +50,19 @@ def test_close_pairs_are_named() -> None:
     )
     notes = [block for block in limits_section(found).blocks if isinstance(block, NotesBlock)]
     assert notes[-1].items == ["η and J′ (2) go against each other (−0.95)."]
+
+
+def test_simulated_experiments_take_the_place_of_the_general_advice() -> None:
+    best = Prospect(Experiment.THROTTLE_STEPS, 2, 0.25e-3, Verdict.IDENTIFIED)
+    told = (
+        Suggestion("te_delay", Verdict.NOT_IDENTIFIABLE, float("inf"), (best,)),
+        Suggestion("eta", Verdict.IDENTIFIED, 0.02, (), "the gain of the torque sensor"),
+    )
+    found = identification()
+    found = replace(found, evidence={**found.evidence, "suggestions": told})
+    tables = [one for one in limits_section(found).blocks if isinstance(one, TableBlock)]
+    rows = [[cell.text for cell in row] for row in tables[1].rows]
+    assert rows == [
+        ["τ_e", "not identifiable", "open", f"{Experiment.THROTTLE_STEPS}, 2 times", "± 0.25 ms"],
+        ["η", "identified", "± 0.020", "the gain of the torque sensor", "–"],
+    ]

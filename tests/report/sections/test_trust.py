@@ -73,3 +73,14 @@ def test_design_values_do_not_count_as_identified() -> None:
     intro = trust_section(replace(found, estimates=estimates)).intro
     assert "9 of 12 parameters are identified" in intro
     assert "1 taken from the vehicle card" in intro
+
+
+def test_a_shared_remark_stands_once() -> None:
+    found = identification()
+    shared = {
+        name: replace(one, reason="poorly excited") if name in ("eta", "k_o") else one
+        for name, one in found.estimates.items()
+    }
+    rows = parameter_table(replace(found, estimates=shared)).rows
+    remarks = {row[0].text: row[0].remark for row in rows}
+    assert (remarks["η"], remarks["k_o"], remarks["J3"]) == ("poorly excited", "as for η", "")

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+import numpy as np
 import plotly.graph_objects as go
 
 from drivetwin.identify.result import Estimate, FloatArray, Verdict
@@ -64,8 +65,14 @@ def half_width_percent(value: float | None, std: float | None) -> float | None:
     return 196.0 * abs(std / value) if value and std else None
 
 
-def correlation_figure(ids: tuple[str, ...], correlation: FloatArray) -> go.Figure:
-    """Correlation matrix (n, n) of the estimates; pairs near ±1 cannot be told apart well."""
+def correlation_figure(ids: Sequence[str], correlation: FloatArray) -> go.Figure:
+    """Correlation matrix (n, n) of the estimates; pairs near ±1 cannot be told apart well.
+
+    A parameter that is known from design correlates with none and is left out.
+    """
+    shown = np.count_nonzero(correlation, axis=0) > 1
+    ids = [one for one, kept in zip(ids, shown, strict=True) if kept]
+    correlation = correlation[np.ix_(shown, shown)]
     names = [parameter_label(one) for one in ids]
     figure = go.Figure(
         go.Heatmap(

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from math import isfinite
 
+from drivetwin.identify.experiment.suggest import Suggestion
 from drivetwin.identify.result import Estimate, Identification, Verdict
 from drivetwin.identify.uncertainty import experiment_for
 from drivetwin.report.figures.parameters import correlation_figure, half_width_percent
@@ -19,7 +21,7 @@ from drivetwin.report.sections.blocks import (
     cells,
 )
 from drivetwin.report.sections.trust import TONES
-from drivetwin.report.units import significant
+from drivetwin.report.units import Display, display_of, significant
 
 _INSEPARABLE = (
     "μ and the clutch geometry N·D·A·r: only their product acts.",
@@ -36,7 +38,9 @@ _LEAST_KNOWN = 5
 
 def limits_section(found: Identification) -> Section:
     """What the log cannot tell, and which experiment would help."""
-    blocks: list[Block] = [*_remarks(found), *_least_known(found)]
+    suggestions = found.evidence.get("suggestions", ())
+    narrower = _suggested(suggestions, found) if suggestions else _least_known(found)
+    blocks: list[Block] = [*_remarks(found), *narrower]
     blocks.append(NotesBlock("Not separable from any one shift", _INSEPARABLE))
     if found.correlation is not None:
         pairs = list(_close_pairs(found))
@@ -77,6 +81,41 @@ def _remarks(found: Identification) -> Iterator[TableBlock]:
             cells("parameter", "verdict", "remark: why, and which experiment would help"),
             rows,
         )
+
+
+def _suggested(suggestions: Sequence[Suggestion], found: Identification) -> Iterator[TableBlock]:
+    """What each open or least known parameter would gain by the best experiment, simulated."""
+    rows = []
+    for one in suggestions:
+        display = display_of(found.estimates[one.parameter].unit)
+        then = one.prospects[0].half_width if one.prospects and not one.limit else None
+        rows.append(
+            (
+                Cell(parameter_label(one.parameter)),
+                Cell(one.verdict.value, badge=True, tone=TONES[one.verdict]),
+                Cell(_half_width(one.half_width, display), number=True),
+                Cell(one.text),
+                Cell("–" if then is None else _half_width(then, display), number=True),
+            )
+        )
+    head = (
+        *cells("parameter", "verdict"),
+        Cell("now", number=True, note="± 95 %"),
+        Cell("experiment that would narrow it"),
+        Cell("then", number=True, note="± 95 %, to expect"),
+    )
+    yield TableBlock(
+        "What to record next: each experiment was simulated with this model and the noise of this "
+        "log's sensors, and the information it adds gives the interval to expect.",
+        head,
+        rows,
+    )
+
+
+def _half_width(value: float, display: Display) -> str:
+    if not isfinite(value):
+        return "open"
+    return f"± {significant(value * display.factor, 2)} {display.label}".removesuffix(" –")
 
 
 def _least_known(found: Identification) -> Iterator[TableBlock]:

@@ -122,10 +122,16 @@ def parameter_table(found: Identification) -> TableBlock:
         caption += (
             " The vehicle card states no sensor tolerance, so both intervals are of noise alone."
         )
-    return TableBlock(caption, head, [_parameter_row(one) for one in found.estimates.values()])
+    first: dict[str, str] = {}
+    rows = []
+    for one in found.estimates.values():
+        label = parameter_label(one.id)
+        owner = first.setdefault(one.reason, label)
+        rows.append(_parameter_row(one, one.reason if owner == label else f"as for {owner}"))
+    return TableBlock(caption, head, rows)
 
 
-def _parameter_row(estimate: Estimate) -> tuple[Cell, ...]:
+def _parameter_row(estimate: Estimate, remark: str) -> tuple[Cell, ...]:
     spec = spec_of(estimate.id)
     display = display_of(estimate.unit)
     value, total = _shown(estimate, estimate.std_total, display)
@@ -134,7 +140,7 @@ def _parameter_row(estimate: Estimate) -> tuple[Cell, ...]:
         Cell(
             parameter_label(estimate.id),
             note=f"{spec.meaning} · {estimate.id}",
-            remark=estimate.reason,
+            remark=remark if estimate.reason else "",
         ),
         Cell(value, number=True),
         Cell(total, number=True),
