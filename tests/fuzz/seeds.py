@@ -48,6 +48,18 @@ def _mdf3(folder: Path) -> bytes:
         return Path(mdf.save(folder / "seed.mdf", overwrite=True)).read_bytes()
 
 
+def _mat5_plain(folder: Path) -> bytes:
+    """MATLAB 5 without compression, as older programs write it."""
+    from scipy.io import savemat
+
+    path = folder / "seed5.mat"
+    table: dict[str, object] = {}
+    for one in channels():
+        table |= {one.name: one.values, f"{one.name}_t": one.time, f"{one.name}_unit": one.unit}
+    savemat(path, table)
+    return path.read_bytes()
+
+
 def _mat73(folder: Path) -> bytes:
     import h5py
 
@@ -128,6 +140,7 @@ SEEDS: dict[str, Callable[[Path], bytes]] = {
     "mf4": _written(".mf4"),
     "mdf3": _mdf3,
     "mat": _written(".mat"),
+    "mat5": _mat5_plain,
     "mat73": _mat73,
     "parquet": _written(".parquet"),
     "candump": lambda _: candump(spaced=True),

@@ -15,6 +15,7 @@ import numpy as np
 
 from drivetwin.errors import FileFormatError, MissingChannelError, Where
 from drivetwin.logs.extras import foreign_parser, require
+from drivetwin.logs.mat_blocks import check_blocks
 from drivetwin.logs.mat_signals import Signals, find_signals
 from drivetwin.logs.raw import RawLog, ReadOptions, Recording
 
@@ -57,6 +58,7 @@ def _nothing(
 def _tree(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
+    check_blocks(path)
     content = loadmat(path, struct_as_record=False, squeeze_me=True, appendmat=False)
     return {name: _plain(v) for name, v in content.items() if not name.startswith("__")}
 
