@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: MIT
+"""The exported C against the core and the tight references, in double and single precision."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from drivetwin.driveline import (
+    DualClutch,
+    FloatArray,
+    FrictionTable,
+    RoadLoad,
+    State,
+    Stribeck,
+    Trajectory,
+)
+from drivetwin.errors import InputError
+from drivetwin.export.c.layout import Precision
+from drivetwin.export.c.loaded import CModel, CObserver, CRun
+from drivetwin.export.entries import entries_of, locked_index, start_entries
+from drivetwin.export.subject import steady_start
+from drivetwin.stepped import stepped_run
+from drivetwin.stepping import InputKind
+from tests.export.cases import CASES, paper_model, paper_subject
+
+FLOAT_ERROR = 2e-4
+"""Largest deviation of the float model from a reference, of its largest torque: seen are 4e-6 to
+1.2e-4 (0.04 to 0.53 N m), the last where a lock at a steep slip turns round-off into time."""
+_LOSS_LAWS = ["paper", "dissipative"]
+
+
+@pytest.fixture(scope="module")
+def loaded() -> CModel:
+    return CModel(paper_subject())
+
+
+@pytest.fixture(scope="module")
+def loaded_float() -> CModel:
+    return CModel(paper_subject(), Precision.FLOAT)
+
+
+def compare(run: CRun, core: Trajectory, tolerance: float) -> None:
+    """Every signal within `tolerance` of its largest value."""
+    names = list(core.slip)
+    pairs = {
+        "engine_speed": core.engine_speed,
+        "output_speed": core.output_speed,
+        "wheel_speed": core.wheel_speed,
+        "twist": core.twist,
+        "output_torque": core.shaft_torque,
+        "slip_1": core.slip[names[0]],
+        "slip_2": core.slip[names[1]],
+    }
+    assert run.status == core.status == "completed"
+    for name, expected in pairs.items():
+        scale = float(np.abs(expected).max()) + 1e-3
+        assert np.abs(run.columns[name] - expected).max() < tolerance * scale, name
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("kind", InputKind)
+def test_double_agrees_with_the_core(loaded: CModel, name: str, kind: InputKind) -> None:
+    case = CASES[name]()
+    subject = case.subject
+    set_model(loaded, subject.model, subject.start)
+    run = loaded.run(case.time, case.inputs, hold=kind is InputKind.HOLD)
+    core = stepped_run(subject.model, subject.start, case.time, case.inputs, kind)
+    compare(run, core, 1e-9)
+    if kind is InputKind.LINEAR:
+        assert case.deviation(run.columns["output_torque"]) < 1e-3
+        for i, element in enumerate(subject.model.elements, 1):
+            torque = core.clutch_torque[element.name]
+            deviation = np.abs(run.columns[f"clutch_torque_{i}"] - torque).max()
+            assert deviation < 1e-9 * np.abs(torque).max()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_float_agrees_with_the_references(loaded_float: CModel, name: str) -> None:
+    case = CASES[name]()
+    set_model(loaded_float, case.subject.model, case.subject.start)
+    run = loaded_float.run(case.time, case.inputs)
+    assert run.status == "completed"
+    largest = np.abs(case.reference).max()
+    assert case.deviation(run.columns["output_torque"]) < FLOAT_ERROR * largest
+
+
+def test_a_step_of_ten_milliseconds_meets_the_same_points(loaded: CModel) -> None:
+    case = CASES["tie_up"]()
+    set_model(loaded, case.subject.model, case.subject.start)
+    coarse = slice(None, None, 10)
+    fine = loaded.run(case.time, case.inputs).columns["output_torque"][coarse]
+    long = loaded.run(case.time[coarse], case.inputs[coarse]).columns["output_torque"]
+    assert np.abs(long - fine).max() < 1e-6
+
+
+def set_model(loaded: CModel, model: DualClutch, start: State) -> None:
+    """Put other parameters into a loaded model."""
+    for entry in entries_of(model):
+        target, path = loaded.params, entry.field.replace("]", "").replace("[", ".").split(".")
+        for part in path[:-1]:
+            target = target[int(part)] if part.isdigit() else getattr(target, part)
+        if path[-1].isdigit():
+            target[int(path[-1])] = entry.value
+        else:
+            setattr(target, path[-1], entry.value)
+    for clutch, element in zip(loaded.params.clutch, model.elements, strict=True):
+        clutch.friction.points = len(getattr(element.friction, "slip", ()))
+        clutch.friction.slip[0] = 0.0
+    loaded.params.loss_law = _LOSS_LAWS.index(model.loss_law)
+    for entry in start_entries(start):
+        setattr(loaded.start, entry.field, entry.value)
+    loaded.start.locked = locked_index(model, start)
+
+
+def random_case(seed: int) -> tuple[DualClutch, State, FloatArray, FloatArray]:
+    """A driveline, start and inputs anywhere in the range of the model; the engine may stall."""
+    rng = np.random.default_rng(seed)
+
+    def law() -> Stribeck | FrictionTable:
+        if rng.random() < 0.5:
+            levels = rng.uniform([0.05, 0.08, 1.0], [0.15, 0.2, 20.0])
+            mu_c, mu_s, v_s = (float(level) for level in levels)
+            return Stribeck(mu_c, mu_s, v_s, some(0.0, 1e-4, -1e-4))
+        slip = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 30.0, rng.integers(0, 7)))])
+        return FrictionTable(tuple(slip.tolist()), tuple(rng.uniform(0.05, 0.2, slip.size)))
+
+    def some(*values: float) -> float:
+        return float(rng.choice(values))
+
+    elements = tuple(
+        replace(
+            element,
+            friction=law(),
+            peak=some(1.0, 1.0, 1.1, 1.5),
+            drum_inertia=some(0.0, 0.15),
+            i_c=element.i_c * some(1.0, 1.0, -1.0),
+        )
+        for element in paper_model().elements
+    )
+    load = RoadLoad(float(rng.uniform(-2e3, 13e3)), some(0.0, 800.0), some(0.0, 12.0))
+    model = replace(paper_model(), elements=elements, load=load, J2e=some(0.0, 1.5))
+    model = replace(model, loss_law="dissipative" if rng.random() < 0.5 else "paper")
+    if rng.random() < 0.7:
+        start = steady_start(model, "B2", float(rng.uniform(60.0, 220.0)))
+    else:
+        low, high = (5.0, -20.0, -2.0, -0.01), (200.0, 100.0, 18.0, 0.02)
+        start = State(*rng.uniform(low, high).tolist())
+    time = np.linspace(0.0, 0.4, 401)
+    knots = np.linspace(0.0, 0.4, int(rng.integers(3, 8)))
+    levels = rng.choice([0.0, 8e4, 2e5, 5e5, 14e5], (2, knots.size))
+    torque = rng.uniform(-800.0, 2000.0, knots.size)
+    inputs = [np.interp(time, knots, values) for values in (torque, *levels)]
+    return model, start, time, np.column_stack(inputs)
+
+
+def cut(core: Trajectory, rows: NDArray[np.bool_]) -> Trajectory:
+    """Some rows of a trajectory."""
+    return replace(
+        core,
+        engine_speed=core.engine_speed[rows],
+        output_speed=core.output_speed[rows],
+        wheel_speed=core.wheel_speed[rows],
+        twist=core.twist[rows],
+        shaft_torque=core.shaft_torque[rows],
+        slip={name: values[rows] for name, values in core.slip.items()},
+    )
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=60, deadline=None)
+def test_any_driveline_agrees_with_the_core(loaded: CModel, seed: int) -> None:
+    model, start, time, inputs = random_case(seed)
+    core = stepped_run(model, start, time, inputs, InputKind.LINEAR)
+    set_model(loaded, model, start)
+    run = loaded.run(time, inputs)
+    if run.status == "engine stalled":
+        # Rest of the engine is outside the C model's range; up to there both agree.
+        assert model.loss_law == "dissipative"
+        assert core.engine_speed.min() < 1e-6
+        seen = np.isfinite(run.columns["engine_speed"])
+        columns = {name: values[seen] for name, values in run.columns.items()}
+        run = CRun(columns, "completed")
+        core = cut(core, seen)
+    compare(run, core, 1e-8)
+
+
+def test_what_is_out_of_range_is_refused_by_name(loaded: CModel) -> None:
+    model = paper_model()
+    set_model(loaded, model, steady_start(model, "B2", 178.0))
+    time, inputs = np.array([0.0, 1e-3]), np.zeros((2, 3))
+    loaded.params.k_o = -1.0
+    assert loaded.run(time, inputs).status == "bad parameter"
+    loaded.params.k_o = model.k_o
+    loaded.start.engine_speed = np.nan
+    assert loaded.run(time, inputs).status == "bad state or input"
+    loaded.start.engine_speed = 178.0
+    assert loaded.run(time, np.full((2, 3), np.inf)).status == "bad state or input"
+    assert loaded.run(np.array([0.0, -1e-3]), inputs).status == "bad state or input"
+
+
+@pytest.mark.parametrize("fixture", ["loaded", "loaded_float"])
+def test_observer_tells_torque_friction_and_load_that_no_sensor_shows(
+    request: pytest.FixtureRequest, fixture: str
+) -> None:
+    """Friction 15 % below and load 10 % above what the twin believes, speeds with noise."""
+    case = CASES["dual_clutch_upshift"]()
+    believed = case.subject
+    weak = Stribeck(0.0935, 0.11475, 15.0, 8.5e-5)
+    off, on = believed.model.elements
+    heavy = RoadLoad(1.1 * believed.model.load.constant)
+    elements = (off, replace(on, friction=weak))
+    truth = replace(believed.model, load=heavy, elements=elements)
+    core = stepped_run(truth, believed.start, case.time, case.inputs, InputKind.LINEAR)
+    rng = np.random.default_rng(1)
+    noise = rng.standard_normal((2, case.time.size))
+    engine = core.engine_speed + 0.1 * noise[0]
+    output = core.output_speed + 0.05 * noise[1]
+    twin: CModel = request.getfixturevalue(fixture)
+    set_model(twin, believed.model, believed.start)
+    observer = CObserver(twin, case.inputs[0], (engine[0], output[0]))
+    told = [
+        observer.observe(case.inputs[i], (engine[i], output[i]), 1e-3)
+        for i in range(1, case.time.size)
+    ]
+    torque = np.array([one.output_torque for one in told])
+    error = np.sqrt(np.mean((torque - core.shaft_torque[1:])[100:] ** 2))
+    assert error < 0.05 * np.ptp(core.shaft_torque)
+    assert told[-1].locked == 1
+    assert abs(told[-1].scale[1] - 0.85) < 3.0 * told[-1].scale_std[1] + 0.02
+    assert told[-1].scale_std[1] < 0.05
+    assert abs(told[-1].load - heavy.constant) < 3.0 * told[-1].load_std
+
+
+def test_observer_refuses_what_is_not_finite(loaded: CModel) -> None:
+    observer = CObserver(loaded, (1000.0, 1e6, 0.0), (150.0, 80.0))
+    with pytest.raises(InputError, match="bad state or input"):
+        observer.observe((np.nan, 1e6, 0.0), (150.0, 80.0), 1e-2)
+    with pytest.raises(InputError, match="bad state or input"):
+        observer.observe((1000.0, 1e6, 0.0), (150.0, 80.0), 1.0)
