@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""Logs and units that do not belong to the rest, decided against the number of them all."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from drivetwin.fleet.joint.mixed import FloatArray, IntArray
+
+FALSE_ALARMS = 0.05
+"""Probability of one outlier found in a fleet that has none."""
+_LEAST_LIMIT = 4.0
+_LEAST_UNITS = 8
+_TO_SIGMA = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+_ROUGH = 8.0
+"""Robust standard deviations beyond which a log does not take part in the first fit."""
+
+
+def limit(count: int) -> float:
+    """Standard deviations beyond which one of `count` is an outlier."""
+    return max(_LEAST_LIMIT, float(norm.isf(0.5 * FALSE_ALARMS / max(count, 1))))
+
+
+def roughly_sound(values: FloatArray, unit: IntArray) -> NDArray[np.bool_]:
+    """Which of the values (n,) may take part in a first fit: not far from their unit's middle."""
+    middles = np.array([np.median(values[unit == k]) for k in range(int(unit.max()) + 1)])
+    away = np.abs(values - middles[unit])
+    scale = _TO_SIGMA * float(np.median(away))
+    return np.asarray(away <= _ROUGH * scale) if scale > 0.0 else np.ones(values.size, np.bool_)
+
+
+def unit_scores(deviation: FloatArray) -> FloatArray:
+    """How many robust standard deviations each unit's deviation (units,) is from the middle.
+
+    NaN where there are too few units to tell.
+    """
+    away = deviation - np.median(deviation)
+    scale = _TO_SIGMA * float(np.median(np.abs(away)))
+    if deviation.size < _LEAST_UNITS or scale == 0.0:
+        return np.full(deviation.size, np.nan)
+    return away / scale
