@@ -68,17 +68,17 @@ class Folder:
         return found[:MAX_LISTED]
 
     def _inside(self, name: str) -> Path:
+        what = "this path leads outside the folder of the workbench"
         try:
             path = (self.root / name.strip()).resolve()
+            path.exists()  # asks the system, which knows what is no path at all
         except (OSError, ValueError, RuntimeError):
-            path = None
-        if not name.strip() or path is None or not path.is_relative_to(self.root):
-            raise RefusedError(
-                "this path leads outside the folder of the workbench" if name.strip()
-                else "no file is named",
-                f"give a path inside {self.root}, or upload the file",
-                Where(file=name[:200] or None),
-            )  # fmt: skip
+            path, what = Path("/"), "this is no path"
+        if not name.strip():
+            path, what = Path("/"), "no file is named"
+        if not path.is_relative_to(self.root):
+            remedy = f"give a path inside {self.root}, or upload the file"
+            raise RefusedError(what, remedy, Where(file=name[:200] or None))
         return path
 
     def _walk(self) -> Iterator[str]:

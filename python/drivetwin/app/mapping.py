@@ -12,7 +12,7 @@ from drivetwin.logs.raw import Column as LogColumn
 from drivetwin.logs.roles import PRESSURE, ROLES, quantity_of
 from drivetwin.logs.shiftlog import Quantity
 from drivetwin.logs.survey import Column, Survey
-from drivetwin.logs.units import channel_unit, usual_units
+from drivetwin.logs.units import channel_unit, first_spellings
 from drivetwin.vehicle.spec import VehicleCard
 
 
@@ -43,7 +43,7 @@ def roles_of(card: VehicleCard) -> tuple[str, ...]:
 def unit_names() -> list[str]:
     """The first spelling of each unit, for completion."""
     measured = (Quantity.TORQUE, Quantity.SPEED, Quantity.PRESSURE, Quantity.FRACTION)
-    return [spelling for quantity in measured for spelling, _ in usual_units(quantity, "")]
+    return [spelling for quantity in measured for spelling in first_spellings(quantity)]
 
 
 def rows_of(survey: Survey) -> list[Row]:
@@ -102,7 +102,7 @@ def _asserted(entry: Entry, column: Column) -> str | None:
     try:
         channel_unit(unit, quantity_of(entry.role), where)
     except UnitError as error:
-        usual = ", ".join(name for name, _ in usual_units(quantity_of(entry.role), ""))
+        usual = ", ".join(first_spellings(quantity_of(entry.role)))
         raise UnitError(error.what, f"use one of {usual}", where) from None
     return unit
 

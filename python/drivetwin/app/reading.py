@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from drivetwin.app.expansion import refuse_expansion
 from drivetwin.app.jobs import Emit
 from drivetwin.errors import CardError, DrivetwinError
 from drivetwin.gearbox import load_gearbox
@@ -64,6 +65,7 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     those of the mapping become `fault`, so that it can be corrected.
     """
     bound_memory()
+    refuse_expansion(request.log, request.label, MEMORY)
     card = load_card(request.card)
     stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
     stated = replace(stated, channels={**stated.channels, **request.channels})

@@ -151,7 +151,7 @@ def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit
     """
     if quantity is Quantity.STATE:
         return Unit(1.0, 0.0, Quantity.STATE)
-    usual = ", ".join(repr(text.split()[0]) for text in _SPELLINGS[quantity].values())
+    usual = ", ".join(map(repr, first_spellings(quantity)))
     source = where.channel or "..."
     remedy = (
         f'assert it in the channel mapping: channels.<role> = {{ source = "{source}", '
@@ -183,6 +183,11 @@ def time_factor(spelling: str | None, where: Where) -> float:
         return _TIME[_normal(spelling).casefold()]
     except KeyError:
         raise UnitError(f"unknown time unit {spelling!r}", remedy, where) from None
+
+
+def first_spellings(quantity: Quantity) -> list[str]:
+    """Return the first spelling of each size of unit of a quantity, SI among them."""
+    return [spellings.split()[0] for spellings in _SPELLINGS[quantity].values()]
 
 
 def usual_units(quantity: Quantity, without: str) -> list[tuple[str, float]]:

@@ -14,6 +14,7 @@ from drivetwin.app.reading import Opened
 from drivetwin.app.session import Sessions
 from drivetwin.app.views.parts import (
     Topic,
+    acted,
     announce,
     button,
     choice,
@@ -51,6 +52,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         Output("channels-content", "children"),
         Input(topic_id(Topic.LOG), "data"),
         State("session", "data"),
+        prevent_initial_call=True,
     )
     @told
     def show(_: int, key: str) -> list[Component]:
@@ -67,7 +69,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         running=[(Output("apply-mapping", "disabled"), True, False)],
         prevent_initial_call=True,
     )
-    @told
+    @acted
     def apply(
         clicks: int | None,
         key: str,

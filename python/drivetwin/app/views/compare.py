@@ -43,6 +43,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         Output("compare-content", "children"),
         Input(topic_id(Topic.RESULTS), "data"),
         State("session", "data"),
+        prevent_initial_call=True,
     )
     @told
     def tables(_: int, key: str) -> list[Component]:

@@ -11,6 +11,7 @@ from drivetwin.app.session import Sessions
 from drivetwin.app.views.parts import (
     Content,
     Topic,
+    acted,
     announce,
     button,
     choice,
@@ -25,6 +26,9 @@ from drivetwin.app.views.parts import (
 from drivetwin.gearbox import Gearbox, builtin_gearboxes
 from drivetwin.report.units import NM, RPM, significant
 
+_ROUND_OFF = 1e-12
+_FIRST = "three-set-4000cr"
+
 
 def layout() -> list[Component]:
     """Which gearbox, and what it is."""
@@ -35,7 +39,7 @@ def layout() -> list[Component]:
             "members; a shift is reduced to two speeds, and the error of that is told."
         ),
         row(
-            choice("gearbox-builtin", "Built-in", {"": "–", **{n: n for n in names}}, names[0]),
+            choice("gearbox-builtin", "Built-in", {"": "–", **{n: n for n in names}}, _FIRST),
             html.Div(
                 field("gearbox-path", "or gearbox card", type="text", list="card-names"),
                 className="wide",
@@ -59,10 +63,10 @@ def register(app: Dash, sessions: Sessions) -> None:
         State("session", "data"),
         prevent_initial_call=True,
     )
-    @told
+    @acted
     def choose(
         _: int, upload: dict[str, str] | None, builtin: str, path: str | None, key: str
-    ) -> object:
+    ) -> None:
         """Load a card: the one typed, else the upload, else the built-in one."""
         session = sessions.get(key)
         if path:
@@ -72,12 +76,12 @@ def register(app: Dash, sessions: Sessions) -> None:
         else:
             session.open_gearbox(builtin)
         announce(Topic.GEARBOX)
-        return no_update
 
     @app.callback(
         Output("gearbox-content", "children"),
         Input(topic_id(Topic.GEARBOX), "data"),
         State("session", "data"),
+        prevent_initial_call=True,
     )
     @told
     def show(_: int, key: str) -> list[Component]:
@@ -149,15 +153,13 @@ def _reduction(found: ReducedShift) -> list[Component]:
         [
             each.member,
             _right(f"{each.inertia:.4g}"),
-            _right(f"{each.a:.4f}"),
-            _right(f"{each.b:.4f}"),
-            _right(f"{each.coupling:+.4g}"),
+            *(_right(_number(value)) for value in (each.a, each.b, each.coupling)),
         ]
         for each in one.members
     ]
     mass: list[list[Content]] = [
-        ["ω_in", _right(f"{one.M11:.4g}"), _right(f"{one.M12:.4g}")],
-        ["ω_out", _right(f"{one.M12:.4g}"), _right(f"{one.M22:.4g}")],
+        ["ω_in", _right(_number(one.M11)), _right(_number(one.M12))],
+        ["ω_out", _right(_number(one.M12)), _right(_number(one.M22))],
     ]
     return [
         hint(one.condition()),
@@ -171,6 +173,8 @@ def _reduction(found: ReducedShift) -> list[Component]:
 
 
 def _error(found: ReducedShift) -> Component:
+    if found.reduction.exact:
+        return hint("Nothing couples the two shafts: the reduced form makes no error.")
     if found.estimated is None or found.simulated is None:
         return hint(f"The error of leaving M12 out is not told: {found.reason}")
     rows: list[list[Content]] = [
@@ -189,6 +193,11 @@ def _error(found: ReducedShift) -> Component:
     ]
     caption = "Largest error over the reference shift of the card without M12."
     return table(("signal", "estimated", "simulated"), rows, caption)
+
+
+def _number(value: float) -> str:
+    """Four digits; what is round-off beside 1 is nothing."""
+    return "0" if abs(value) < _ROUND_OFF else f"{value:.4g}"
 
 
 def _right(text: str) -> Component:

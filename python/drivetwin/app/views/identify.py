@@ -11,9 +11,11 @@ from dash.development.base_component import Component
 
 from drivetwin.app.locks import LockKind
 from drivetwin.app.session import Sessions
+from drivetwin.app.views.blocks import shown
 from drivetwin.app.views.log import facts_line
 from drivetwin.app.views.parts import (
     Topic,
+    acted,
     announce,
     button,
     choice,
@@ -29,6 +31,7 @@ from drivetwin.app.work import Work
 from drivetwin.identify.method import Method
 from drivetwin.identify.result import Verdict
 from drivetwin.report.labels import parameter_label
+from drivetwin.report.sections.trust import trust_section
 
 _UP_TO = {
     "likelihood": "paper, linear and likelihood",
@@ -72,31 +75,35 @@ def layout() -> list[Component]:
 
 def register(app: Dash, sessions: Sessions) -> None:
     """Starting, following and stopping the job."""
+    _register_buttons(app, sessions)
+    _register_progress(app, sessions)
 
+
+def _register_buttons(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Input("identify", "n_clicks"),
         State("session", "data"),
         State("methods", "data-value"),
         prevent_initial_call=True,
     )
-    @told
-    def start(_: int, key: str, up_to: str) -> object:
+    @acted
+    def start(_: int, key: str, up_to: str) -> None:
         """Begin the identification."""
         order = list(Method)
         sessions.get(key).identify(order[: order.index(Method(up_to)) + 1])
         tell("")
         announce(Topic.RESULTS)
-        return no_update
 
     @app.callback(Input("cancel", "n_clicks"), State("session", "data"), prevent_initial_call=True)
-    @told
-    def cancel(_: int, key: str) -> object:
+    @acted
+    def cancel(_: int, key: str) -> None:
         """Stop it."""
         sessions.get(key).cancel()
         tell("The identification was cancelled")
         announce(Topic.RESULTS)
-        return no_update
 
+
+def _register_progress(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Output("progress", "value"),
         Output("progress-text", "children"),
@@ -128,6 +135,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         Input(topic_id(Topic.RESULTS), "data"),
         Input(topic_id(Topic.PHASES), "data"),
         State("session", "data"),
+        prevent_initial_call=True,
     )
     @told
     def show(_results: int, _phases: int, key: str) -> tuple[Any, ...]:
@@ -144,17 +152,13 @@ def _content(work: Work) -> list[Component]:
     if work.method is None:
         return content
     outcome = work.results[work.method]
-    count = Counter(one.verdict for one in outcome.twin.parameters.values())
-    facts = {"method": outcome.twin.method.value}
-    facts |= {verdict.value: str(count[verdict]) for verdict in Verdict if count[verdict]}
-    if outcome.found is not None:
-        for signal, fits in outcome.found.fit.items():
-            facts[f"fit of {signal.replace('_', ' ')}"] = f"{fits['all'].fit_percent:.1f} %"
-    content.append(facts_line(facts))
     if outcome.found is None:
+        count = Counter(one.verdict for one in outcome.twin.parameters.values())
+        told = {verdict.value: str(count[verdict]) for verdict in Verdict if count[verdict]}
+        content.append(facts_line({"method": outcome.twin.method.value, **told}))
         content.append(hint("From the saved workspace; identify again for evidence and report."))
     else:
-        content.append(notes("Warnings", outcome.found.warnings))
+        content += shown(trust_section(outcome.found), "trust")
     content.append(notes("Assumptions", outcome.twin.assumptions, "plain"))
     return content
 

@@ -12,6 +12,7 @@ from drivetwin.app.reading import Opened
 from drivetwin.app.session import Session, Sessions
 from drivetwin.app.views.parts import (
     Topic,
+    acted,
     announce,
     button,
     field,
@@ -29,6 +30,7 @@ from drivetwin.app.work import Source
 LOGS = (".csv", ".txt", ".dat", ".mf4", ".mdf", ".mat", ".parquet", ".blf", ".asc", ".log")
 CARDS = (".toml",)
 _UPLOADED = "uploaded: "
+_SHIFT_HEAD = ("shift", "kind", "elements", "starts", "locks")
 
 
 def layout() -> list[Component]:
@@ -82,7 +84,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         running=[(Output("open", "disabled"), True, False)],
         prevent_initial_call=True,
     )
-    @told
+    @acted
     def open_files(
         _: int, key: str, log: str | None, card: str | None, log_up: Any, card_up: Any
     ) -> None:
@@ -104,6 +106,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         Output("card-names", "children"),
         Input(topic_id(Topic.LOG), "data"),
         State("session", "data"),
+        prevent_initial_call=True,
     )
     @told
     def show(_: int, key: str) -> tuple[Any, ...]:
@@ -157,9 +160,11 @@ def _content(opened: Opened) -> list[Component]:
     refused = [f"{r.time[0]:.2f} s to {r.time[1]:.2f} s: {r.reason}" for r in found.rejected]
     return [
         facts_line(facts),
-        table(("shift", "kind", "elements", "starts", "locks"), shifts, "Shifts of the log"),
+        *([table(_SHIFT_HEAD, shifts, "Shifts of the log")] if shifts else []),
         notes("About the log", log.warnings),
-        notes("Not used", refused, "plain"),
+        notes(
+            "Not used" if shifts else "No usable shift", refused, "plain" if shifts else "doubtful"
+        ),
     ]
 
 

@@ -16,6 +16,7 @@ from drivetwin.app.session import Live, Session, Sessions
 from drivetwin.app.views.compare import NAMES
 from drivetwin.app.views.parts import (
     Topic,
+    acted,
     announce,
     badge,
     button,
@@ -66,15 +67,17 @@ def layout() -> list[Component]:
 
 def register(app: Dash, sessions: Sessions) -> None:
     """Sliders and locks."""
+    _register_bench(app, sessions)
     _register_sliders(app, sessions)
     _register_locks(app, sessions)
 
 
-def _register_sliders(app: Dash, sessions: Sessions) -> None:
+def _register_bench(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Output("model-content", "children"),
         Input(topic_id(Topic.LIVE), "data"),
         State("session", "data"),
+        prevent_initial_call=True,
     )
     @told
     def show(_: int, key: str) -> list[Component]:
@@ -88,6 +91,37 @@ def _register_sliders(app: Dash, sessions: Sessions) -> None:
             return [_choices(session.work), hint(str(incomplete))]
         return _bench(session, live)
 
+    @app.callback(
+        Input("reset-sliders", "n_clicks"), State("session", "data"), prevent_initial_call=True
+    )
+    @acted
+    def reset(clicks: int | None, key: str) -> None:
+        """Back to what was identified."""
+        if clicks:
+            session = sessions.get(key)
+            session.choose_method(session.work.require_outcome().method)
+            announce(Topic.LIVE)
+
+    @app.callback(
+        Input("model-method", "data-value"),
+        Input("model-shift", "data-value"),
+        State("session", "data"),
+        prevent_initial_call=True,
+    )
+    @acted
+    def choose(method: str | None, shift: str | None, key: str) -> None:
+        """Another result or shift."""
+        session = sessions.get(key)
+        work = session.work
+        if method is not None and Method(method) is not work.method:
+            session.choose_method(Method(method))
+            announce(Topic.LIVE)
+        if shift is not None and int(shift) != work.shift:
+            session.choose_shift(int(shift))
+            announce(Topic.PHASES)
+
+
+def _register_sliders(app: Dash, sessions: Sessions) -> None:
     app.clientside_callback(  # type: ignore[no-untyped-call]
         _BOTH,
         Output({"part": "range", "id": MATCH}, "value"),
@@ -128,43 +162,13 @@ def _register_sliders(app: Dash, sessions: Sessions) -> None:
         spent = 1e3 * (time.perf_counter() - begun)
         return patch, _fit(session.simulation(), f"simulated and compared in {spent:.0f} ms")
 
-    @app.callback(
-        Input("reset-sliders", "n_clicks"), State("session", "data"), prevent_initial_call=True
-    )
-    @told
-    def reset(clicks: int | None, key: str) -> object:
-        """Back to what was identified."""
-        if clicks:
-            session = sessions.get(key)
-            session.choose_method(session.work.require_outcome().method)
-            announce(Topic.LIVE)
-        return no_update
-
-    @app.callback(
-        Input("model-method", "data-value"),
-        Input("model-shift", "data-value"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @told
-    def choose(method: str | None, shift: str | None, key: str) -> object:
-        """Another result or shift."""
-        session = sessions.get(key)
-        work = session.work
-        if method is not None and Method(method) is not work.method:
-            session.choose_method(Method(method))
-            announce(Topic.LIVE)
-        if shift is not None and int(shift) != work.shift:
-            session.choose_shift(int(shift))
-            announce(Topic.PHASES)
-        return no_update
-
 
 def _register_locks(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Output("locks-content", "children"),
         Input(topic_id(Topic.RESULTS), "data"),
         State("session", "data"),
+        prevent_initial_call=True,
     )
     @told
     def show(_: int, key: str) -> list[Component]:
@@ -180,18 +184,18 @@ def _register_locks(app: Dash, sessions: Sessions) -> None:
         State("session", "data"),
         prevent_initial_call=True,
     )
-    @told
+    @acted
     def lock(
         kinds: Sequence[str],
         values: Sequence[float | None],
         stds: Sequence[float | None],
         ids: Sequence[dict[str, str]],
         key: str,
-    ) -> object:
+    ) -> None:
         """A lock was changed by hand."""
         session = sessions.get(key)
         if not isinstance(ctx.triggered_id, dict):
-            return no_update
+            return
         name = ctx.triggered_id["id"]
         place = [one["id"] for one in ids].index(name)
         factor = display_of(spec_of(name).unit).factor
@@ -199,10 +203,9 @@ def _register_locks(app: Dash, sessions: Sessions) -> None:
             LockKind(kinds[place]), (values[place] or 0.0) / factor, (stds[place] or 0.0) / factor
         )
         if _same(wanted, session.work.lock_of(name)):
-            return no_update
+            return
         session.set_lock(name, wanted)
         tell(f"{parameter_label(name)} is {wanted.kind.value} from the next identification on")
-        return no_update
 
 
 def _same(one: Lock, other: Lock) -> bool:

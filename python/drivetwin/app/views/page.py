@@ -141,6 +141,7 @@ def _show_status(app: Dash, sessions: Sessions) -> None:
         Input(topic_id(Topic.LOG), "data"),
         Input(topic_id(Topic.RESULTS), "data"),
         State("session", "data"),
+        prevent_initial_call=True,
     )
     def status(_log: int, _results: int, key: str | None) -> list[Component | str]:
         """One line that says what is open and what is known."""

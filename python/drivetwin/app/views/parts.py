@@ -83,6 +83,19 @@ def told(callback: Callable[P, R]) -> Callable[P, R]:
     return guarded
 
 
+def acted(callback: Callable[P, None]) -> Callable[P, None]:
+    """The same for a callback without outputs."""
+
+    @functools.wraps(callback)
+    def guarded(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            callback(*args, **kwargs)
+        except DrivetwinError as error:
+            tell(str(error), fault=True)
+
+    return guarded
+
+
 def choice(
     id: Id, label: str, options: Mapping[str, str], value: str, *, hidden_label: bool = False
 ) -> Component:

@@ -6,13 +6,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from dash import ALL, Dash, Input, Output, State, html, no_update
+from dash import ALL, Dash, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin.app.phases import LABELS, Boundary, dragged, phase_figure, times_of
 from drivetwin.app.session import Sessions
 from drivetwin.app.views.parts import (
     Topic,
+    acted,
     announce,
     button,
     choice,
@@ -46,11 +47,16 @@ def layout() -> list[Component]:
 
 def register(app: Dash, sessions: Sessions) -> None:
     """Moving boundaries."""
+    _register_figure(app, sessions)
+    _register_fields(app, sessions)
 
+
+def _register_figure(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Output("phases-content", "children"),
         Input(topic_id(Topic.PHASES), "data"),
         State("session", "data"),
+        prevent_initial_call=True,
     )
     @told
     def show(_: int, key: str) -> list[Component]:
@@ -63,63 +69,61 @@ def register(app: Dash, sessions: Sessions) -> None:
         State("session", "data"),
         prevent_initial_call=True,
     )
-    @told
-    def drag(change: dict[str, Any] | None, key: str) -> object:
+    @acted
+    def drag(change: dict[str, Any] | None, key: str) -> None:
         """A line was dragged."""
         session = sessions.get(key)
         work = session.work
         if not change or not any(name.startswith("shapes[") for name in change):
-            return no_update
+            return
         moves = dragged(phase_figure(work.require_log(), work.require_shift()), change)
         announce(Topic.PHASES)
         if moves:
             session.move(work.shift, moves)
             tell("; ".join(f"{LABELS[one]} at {time:.4f} s" for one, time in moves.items()))
-        return no_update
 
+
+def _register_fields(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Input("apply-phases", "n_clicks"),
         State("session", "data"),
         State({"boundary": ALL}, "value"),
         prevent_initial_call=True,
     )
-    @told
-    def apply(clicks: int | None, key: str, times: Sequence[float | None]) -> object:
+    @acted
+    def apply(clicks: int | None, key: str, times: Sequence[float | None]) -> None:
         """Times were typed."""
         if not clicks:
-            return no_update
+            return
         session = sessions.get(key)
         pairs = zip(Boundary, times, strict=True)
         session.move(session.work.shift, {one: float(t) for one, t in pairs if t is not None})
         announce(Topic.PHASES)
         tell("The phases are set")
-        return no_update
 
     @app.callback(
         Input("reset-phases", "n_clicks"), State("session", "data"), prevent_initial_call=True
     )
-    @told
-    def reset(clicks: int | None, key: str) -> object:
+    @acted
+    def reset(clicks: int | None, key: str) -> None:
         """Back to what was detected."""
         if not clicks:
-            return no_update
+            return
         session = sessions.get(key)
         session.move(session.work.shift, {})
         announce(Topic.PHASES)
         tell("The phases are as detected")
-        return no_update
 
     @app.callback(
         Input("phases-shift", "data-value"), State("session", "data"), prevent_initial_call=True
     )
-    @told
-    def choose(shift: str | None, key: str) -> object:
+    @acted
+    def choose(shift: str | None, key: str) -> None:
         """Another shift of the log."""
         session = sessions.get(key)
         if shift is not None and int(shift) != session.work.shift:
             session.choose_shift(int(shift))
             announce(Topic.PHASES)
-        return no_update
 
 
 def _content(work: Work) -> list[Component]:

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from dash import Dash, Input, Output, State, dcc, html, no_update
+from dash import Dash, Input, Output, State, dcc, html
 from dash.development.base_component import Component
 
 from drivetwin.app.session import Sessions
 from drivetwin.app.views.parts import (
     Topic,
+    acted,
     announce,
     button,
     field,
@@ -83,26 +84,24 @@ def register(app: Dash, sessions: Sessions) -> None:
         running=[(Output("reopen", "disabled"), True, False)],
         prevent_initial_call=True,
     )
-    @told
-    def reopen(_: int, key: str, name: str | None) -> object:
+    @acted
+    def reopen(_: int, key: str, name: str | None) -> None:
         """Go on with a file of the folder."""
         session = sessions.get(key)
         session.reopen(session.in_folder(name or ""))
         announce(Topic.LOG)
         tell(f"{name} is reopened")
-        return no_update
 
     @app.callback(
         Input("workspace-upload", "data"), State("session", "data"), prevent_initial_call=True
     )
-    @told
-    def reopen_upload(upload: dict[str, str], key: str) -> object:
+    @acted
+    def reopen_upload(upload: dict[str, str], key: str) -> None:
         """Go on with an upload."""
         session = sessions.get(key)
         session.reopen(session.uploaded(upload["key"]))
         announce(Topic.LOG)
         tell(f"{upload['name']} is reopened")
-        return no_update
 
 
 def _names(sessions: Sessions, key: str) -> list[Component]:
