@@ -32,13 +32,14 @@ def save_report(path: Path, found: Identification, log: ShiftLog) -> None:
     write_text(path, render_report(found, log))
 
 
-def render_report(found: Identification, log: ShiftLog) -> str:
-    """HTML text of the report; equal inputs give equal text."""
+def render_report(found: Identification, log: ShiftLog, library: str | None = None) -> str:
+    """HTML text of the report; equal inputs give equal text. `library` as in `render_page`."""
     shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in found.shifts)
     return render_page(
         title=f"Driveline model from {Path(log.source).name}",
         subtitle=f"shift {shifts} · method {found.method.value} · loss law {found.loss_law}",
         sections=report_sections(found, log),
+        library=library,
     )
 
 
@@ -58,10 +59,13 @@ def report_sections(found: Identification, log: ShiftLog) -> list[Section]:
     return [section for section in sections if section.blocks]
 
 
-def render_page(title: str, subtitle: str, sections: list[Section]) -> str:
+def render_page(
+    title: str, subtitle: str, sections: list[Section], library: str | None = None
+) -> str:
     """Fill the page template; figures become JSON that the page's script draws.
 
-    The samples of figures over time stand once, packed, at the end of the page.
+    The samples of figures over time stand once, packed, at the end of the page. So does plotly.js,
+    unless `library` names a file of `save_library` beside the page, which many pages can share.
     """
     environment = Environment(
         loader=PackageLoader("drivetwin.report"),
@@ -80,8 +84,23 @@ def render_page(title: str, subtitle: str, sections: list[Section]) -> str:
         script=_resource("report.js"),
         samples_index=lambda: _json(store.index),
         samples=lambda: Markup(store.packed()),
-        plotly_js=Markup(packed(get_plotlyjs().encode())),
+        library=library,
+        plotly_js=Markup("" if library else _packed_library()),
     )
+
+
+def save_library(path: Path) -> None:
+    """Write plotly.js as a file that pages with `library` load; it works without a network."""
+    script = (
+        'const script = document.createElement("script");'
+        'script.type = "application/gzip"; script.id = "plotly";'
+        f'script.textContent = "{_packed_library()}"; document.body.append(script);'
+    )
+    write_text(path, "{" + script + "}\n")
+
+
+def _packed_library() -> str:
+    return packed(get_plotlyjs().encode())
 
 
 def figure_json(block: FigureBlock, store: Store) -> Markup:
