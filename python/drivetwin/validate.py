@@ -13,6 +13,7 @@ from drivetwin.errors import MissingParameterError
 from drivetwin.identify.result import FloatArray, Identification, SignalFit
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import Shift
 from drivetwin.shown import Shown
@@ -85,7 +86,7 @@ def _simulated(
 ) -> Validation:
     """Run and comparison over `window` [s]."""
     engine_torque = _moved(log["engine_torque"], -twin.value("te_delay", 0.0))
-    pressures = {element.name: _signal(log.pressure(element.name)) for element in model.elements}
+    pressures = {name: _signal(each) for name, each in shift_pressures(log, shift).items()}
     count = int((window[1] - window[0]) / _GRID + 1e-6)
     time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
     start = start_state(model, log, shift, window[0])

@@ -11,13 +11,13 @@ from drivetwin.identify.bootstrap import FEWEST, bootstrap
 from tests.identify.asked import stepped
 
 
-def test_spread_agrees_with_the_covariance_and_repeats() -> None:
+def test_spread_agrees_with_the_covariance() -> None:
     """Of ten refits a standard deviation is known to a quarter; over nine parameters together the
     ratio to that of the covariance is near one."""
     found = stepped()
     one = bootstrap(found, FEWEST, seed=5)
-    assert one.failed == 0
-    assert one.values.shape == (FEWEST, len(one.ids))
+    assert one.failed <= FEWEST // 3
+    assert one.values.shape == (FEWEST - one.failed, len(one.ids))
     names = ("eta", "J_prime_2", "J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
     linear = np.array([found.estimates[n].std_noise for n in names], dtype=float)
     place = [one.ids.index(n) for n in names]

@@ -54,7 +54,7 @@ def run(scenario: Scenario, seed: int = 0, *, noise: float = 1.0) -> DynoRun:
     channels = tuple(
         sensor.read(
             stamps[sensor.role],
-            _quantity(sensor, looks[sensor.role], trajectory, inputs),
+            _quantity(sensor, looks[sensor.role], (trajectory, scenario.model.i_in), inputs),
             noise,
             np.random.default_rng(generator),
         )
@@ -82,21 +82,29 @@ def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[st
             f"scenario {scenario.name!r} ended with status {trajectory.status!r}",
             "change its pressure commands or parameters so that the elements can hold the load",
         )
+    if scenario.one_clutch:
+        total = np.sum([each.values for each in pressures.values()], axis=0)
+        both = Signal(grid, np.asarray(total, dtype=np.float64))
+        pressures = dict.fromkeys(pressures, both)
     inputs = {f"pressure.{name}": pressure for name, pressure in pressures.items()}
     return trajectory, {"engine_torque": torque, **inputs}
 
 
 def _quantity(
-    sensor: Sensor, at: FloatArray, trajectory: Trajectory, inputs: dict[str, Signal]
+    sensor: Sensor, at: FloatArray, motion: tuple[Trajectory, float], inputs: dict[str, Signal]
 ) -> FloatArray:
-    """The exact quantity that `sensor` sees at the instants `at` (n,)."""
+    """The exact quantity that `sensor` sees at the instants `at` (n,).
+
+    `motion` is the trajectory and i_in.
+    """
+    trajectory, i_in = motion
     if sensor.role in inputs:
         signal = inputs[sensor.role]
         return np.interp(at, signal.time, signal.values)
     outputs = {
         "output_torque": trajectory.shaft_torque,
-        "input_speed": trajectory.engine_speed,
+        "input_speed": trajectory.engine_speed / i_in,
         "output_speed": trajectory.output_speed,
         "wheel_speed": trajectory.wheel_speed,
     }
-    return np.interp(at, trajectory.time, outputs[sensor.role])
+    return np.asarray(np.interp(at, trajectory.time, outputs[sensor.role]), dtype=np.float64)

@@ -13,6 +13,7 @@ from drivetwin.dyno.dyno import DynoRun
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import UnitError, Where
 from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.roles import PRESSURE
 from drivetwin.logs.shiftlog import Channel, FloatArray
 from drivetwin.logs.units import UNITS, lookup
 from drivetwin.vehicle.schema import BAR
@@ -73,7 +74,7 @@ def card_text(scenario: Scenario) -> str:
     """A vehicle card (TOML) that knows of the driveline what design would know."""
     model = scenario.model
     gears = tomlkit.aot()
-    for gear in scenario.gears:
+    for gear in sorted(scenario.gears, key=lambda gear: -scenario.ratio(gear.element)):
         ratio = round(scenario.ratio(gear.element) / model.i_in, 12)
         gears.append(tomlkit.item({"name": gear.name, "ratio": ratio, "elements": [gear.element]}))
     elements = {gear.element: _element(scenario, gear.element) for gear in scenario.gears}
@@ -90,6 +91,10 @@ def card_text(scenario: Scenario) -> str:
     card.add("gears", gears)
     card.add("elements", tomlkit.item(elements))
     card.add("inertia", tomlkit.item(inertia))
+    if scenario.one_clutch:
+        (column,) = (s.column for s in scenario.sensors if s.role.startswith(PRESSURE))
+        roles = {gear.element: {"source": column} for gear in scenario.gears}
+        card.add("channels", tomlkit.item({"pressure": roles}))
     return tomlkit.dumps(card)
 
 

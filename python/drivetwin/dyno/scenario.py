@@ -54,13 +54,14 @@ class HeldGear:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Up-shifts through `gears`, each held by one element of the model.
+    """Shifts through `gears`, each held by one element of the model.
 
     Where there is a `plant`, the whole gearbox is simulated, and `model` is its dual-clutch form.
     `engine_speed` [rad/s] is the speed at time 0, where the start gear is in quasi-steady
     acceleration. `engine_torque` [N m] is the driver's demand, without the TCU's `reductions`.
     `rate` [Hz] is the sampling of the inputs, linear between samples. `drive_range` are plausible
-    ranges for the vehicle card: of J' at the engine and of J3 at the wheel [kg m^2].
+    ranges for the vehicle card: of J' at the engine and of J3 at the wheel [kg m^2]. With
+    `one_clutch` the elements are one and the same in two gears, and a log has its pressure once.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Scenario:
     reductions: tuple[TorqueReduction, ...]
     rate: float = 1000.0
     plant: Plant | None = None
+    one_clutch: bool = False
 
     @property
     def start_gear(self) -> str:

@@ -5,8 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from drivetwin.dyno.car_scenarios import dual_clutch, manual
 from drivetwin.dyno.dual_scenarios import paper, paper_steps, throttle_steps
 from drivetwin.dyno.gearbox_scenarios import gearbox, gearbox_chain
+from drivetwin.dyno.kind_scenarios import (
+    input_gear,
+    power_off_down,
+    power_off_up,
+    power_on_down,
+)
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import InputError, Where
@@ -28,6 +35,12 @@ SCENARIOS: dict[ScenarioName, Callable[[], Scenario]] = {
     ScenarioName.PAPER_STEPS: paper_steps,
     ScenarioName.THROTTLE_STEPS: throttle_steps,
     **_WITH_DRUMS,
+    ScenarioName.POWER_ON_DOWN: power_on_down,
+    ScenarioName.POWER_OFF_UP: power_off_up,
+    ScenarioName.POWER_OFF_DOWN: power_off_down,
+    ScenarioName.INPUT_GEAR: input_gear,
+    ScenarioName.DUAL_CLUTCH: dual_clutch,
+    ScenarioName.MANUAL: manual,
 }
 
 

@@ -2,8 +2,8 @@
 """Parametric bootstrap: the log made again from the fit with other noise, and fitted again.
 
 Outputs, engine torque and pressures get noise of the levels found in the log, design priors are
-drawn like measurements. Each search starts at the fit, where it is known to end nearby. The spread of the fits is that of the estimator itself, bounds, locks and
-all; it tells where the covariance is too small, and shows a bias. It knows no effect that is not in
+drawn like measurements. Each search starts at the fit, where it is known to end nearby. The spread
+of the fits is that of the estimator itself, bounds, locks and all; it tells where the covariance is too small, and shows a bias. It knows no effect that is not in
 the model.
 """
 
@@ -80,7 +80,7 @@ def bootstrap(found: Identification, count: int, seed: int) -> Bootstrap:
             if again is None:
                 continue
             rows.append(list(parameters(again.problem, again.point, signals).values()))
-    if len(rows) < max(FEWEST, count // 2):
+    if len(rows) < count / 2:
         raise IdentificationError(
             f"{count - len(rows)} of {count} logs made from the fit could not be fitted",
             "trust no interval of this log; record one with more excitation",

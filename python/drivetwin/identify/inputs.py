@@ -11,6 +11,7 @@ from drivetwin.identify.noise import resolution, white_noise
 from drivetwin.identify.signals import Coupling, Driveline, PriorValue, Sampled, ShiftSignals
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import Prior, VehicleCard
 
@@ -62,14 +63,14 @@ def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
     else:
         engine_speed = sampled(log["input_speed"], card.i_in)
     engine_torque = sampled(log["engine_torque"])
-    elements = {shift.offgoing, shift.oncoming}
+    pressures = shift_pressures(log, shift)
     return ShiftSignals(
         engine_torque=engine_torque,
         output_torque=sampled(log["output_torque"]) if "output_torque" in log else _NOTHING,
         engine_speed=engine_speed,
         output_speed=sampled(log["output_speed"]),
         wheel_speed=sampled(log["wheel_speed"]) if "wheel_speed" in log else None,
-        pressures={name: sampled(log.pressure(name)) for name in sorted(elements)},
+        pressures={name: sampled(pressures[name]) for name in sorted(pressures)},
         shift=shift,
         torque_resolution=resolution(engine_torque.values),
     )

@@ -15,6 +15,7 @@ from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.mechanics import BoolArray, Course
 from drivetwin.observer.observed import FloatArray
+from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.shift import Shift, ShiftKind
 
 GRID = 1e-3
@@ -71,9 +72,9 @@ def recorded(log: ShiftLog, shift: Shift, i_in: float) -> Recorded:
         speeds["wheel_speed"] = sampled(log["wheel_speed"])
     speeds = {name: _floored(signal) for name, signal in speeds.items()}
     torque = sampled(log["engine_torque"])
-    roles = {name: f"pressure.{name}" for name in (shift.offgoing, shift.oncoming)}
-    there = all(role in log for role in roles.values())
-    pressures = {name: sampled(log[role]) for name, role in roles.items()} if there else {}
+    there = all(f"pressure.{name}" in log for name in (shift.offgoing, shift.oncoming))
+    channels = shift_pressures(log, shift) if there else {}
+    pressures = {name: sampled(each) for name, each in channels.items()}
     used = (torque, *speeds.values(), *pressures.values())
     start = max(shift.before[0], shift.before[1] - LONGEST, *(s.time[0] for s in used))
     end = min(shift.after[1], shift.lockup_time + LONGEST, *(s.time[-1] for s in used))

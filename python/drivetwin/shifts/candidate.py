@@ -13,6 +13,7 @@ from drivetwin.shifts.flags import flag_before
 from drivetwin.shifts.held import Run
 from drivetwin.shifts.kind import shift_kind
 from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds
+from drivetwin.shifts.pressures import one_clutch
 from drivetwin.shifts.settings import ShiftSettings
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.shifts.torque_onset import pressure_onset, smoothed, torque_dip_onset
@@ -69,7 +70,7 @@ def build_shift(search: Search, before: Run, after: Run) -> Shift:
     kind, warnings = shift_kind(
         search.log, search.ratios[start_gear] > search.ratios[end_gear], begin.time
     )
-    onset, more = _torque_start(search, (kind, oncoming), span[0], (begin, lock))
+    onset, more = _torque_start(search, (kind, (offgoing, oncoming)), span[0], (begin, lock))
     if onset.time - span[0] < settings.min_hold:
         raise CandidateRefusedError(
             f"gear {start_gear} is recorded for {onset.time - span[0]:.3f} s before the torque "
@@ -147,19 +148,22 @@ def gear_list(search: Search) -> str:
 
 def _torque_start(
     search: Search,
-    what: tuple[ShiftKind, str],
+    what: tuple[ShiftKind, tuple[str, str]],
     earliest: float,
     phase: tuple[Boundary, Boundary],
 ) -> tuple[Boundary, tuple[str, ...]]:
-    """Onset of the on-coming element's torque in a shift `what` (kind, on-coming element).
+    """Onset of the on-coming element's torque in a shift `what` (kind, both elements).
 
     The warnings say where it is not what it should be, and where it was not told by the pressure.
 
     Where the on-coming element takes hold only after break-away (power-off upshift, power-on
     downshift) the torque phase before it is empty and starts at break-away.
     """
-    kind, oncoming = what
+    kind, (offgoing, oncoming) = what
     begin, lock = phase
+    if one_clutch(search.log, offgoing, oncoming):
+        reason = f"one clutch is {offgoing} and {oncoming} in turn: the torque phase is empty"
+        return begin, (reason,)
     earliest = max(earliest, begin.time - search.settings.max_torque_phase)
     role = f"pressure.{oncoming}"
     if role in search.log:
