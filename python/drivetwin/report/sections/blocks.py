@@ -36,6 +36,8 @@ class Cell:
     """Left out on paper, where the page is narrow."""
     remark: str = ""
     """What limits the row, under the note."""
+    href: str = ""
+    """Page that the text leads to."""
 
 
 @dataclass(frozen=True)
