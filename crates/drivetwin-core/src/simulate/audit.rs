@@ -143,7 +143,10 @@ fn stored_energy<T: Real>(network: &Network<T>, x: &[T]) -> f64 {
         energy += match &spring.law {
             SpringLaw::Linear { stiffness, .. } => 0.5 * (*stiffness * twist * twist).re(),
             SpringLaw::Regions { stops, .. } => {
-                let stored = |stop: &Stop<T>| depth(stop, twist).powi(2) * stop.stiffness * 0.5;
+                let stored = |stop: &Stop<T>| {
+                    let depth = depth(stop, twist);
+                    depth * depth * stop.stiffness * 0.5
+                };
                 stops.iter().map(|stop| stored(stop).re()).sum()
             }
         };

@@ -10,7 +10,7 @@ mod trajectory;
 
 pub use audit::EnergyAudit;
 pub use dual_clutch::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
-pub use run::{SimulateError, run};
+pub use run::{Plan, SimulateError, run};
 pub use sensitivity::{Sampled, Sensitivities, SensitivityError, dual_clutch_sensitivities};
-pub use start::{Start, StartError};
+pub use start::{Start, StartError, State};
 pub use trajectory::{Output, Trajectory};

@@ -2,8 +2,8 @@
 //! One run of a network over a time grid.
 
 use super::audit::Auditor;
-use super::start::{Start, StartError};
-use super::trajectory::{Output, Recorder, Trajectory};
+use super::start::{Start, StartError, State};
+use super::trajectory::{Output, Recorder, Target, Trajectory};
 use crate::network::{CompileError, Network};
 use crate::number::Real;
 use crate::solve::{InputError, Inputs, Integrator, Settings, Signal, Status};
@@ -29,56 +29,85 @@ pub enum SimulateError {
     },
 }
 
-/// Simulate over `grid` [s] and record `outputs` on it. Signals go by the names of the inputs.
-/// A run that fails on the way ends with its status and NaN from there on.
+/// A scenario made ready for a network and all others of its structure: inputs on common knots,
+/// outputs found by name.
+#[derive(Clone, Debug)]
+pub struct Plan<T> {
+    inputs: Inputs<T>,
+    grid: Vec<f64>,
+    targets: Vec<Target>,
+    settings: Settings,
+    audit: bool,
+}
+
+impl<T: Real> Plan<T> {
+    /// For runs over `grid` [s] that record `outputs` on it. Signals go by the names of the inputs.
+    pub fn new(
+        network: &Network<T>,
+        signals: &[(&str, Signal<'_, T>)],
+        grid: &[f64],
+        outputs: &[Output],
+        (settings, audit): (Settings, bool),
+    ) -> Result<Self, SimulateError> {
+        check_grid(grid)?;
+        let inputs = join(network, signals, (grid[0], grid[grid.len() - 1]))?;
+        let find = |output: &Output| output.find(network);
+        let targets = outputs.iter().map(find).collect::<Result<Vec<_>, _>>()?;
+        // Between samples only the expansion knows the motion.
+        let motion = |target: &Target| matches!(target, Target::Angle(_));
+        let dense = audit || targets.iter().any(motion) || !inputs.has_knots(grid);
+        let settings = Settings { sprint: settings.sprint && !dense, ..settings };
+        Ok(Self { inputs, grid: grid.to_vec(), targets, settings, audit })
+    }
+
+    /// One run. If it fails on the way it ends with its status, and with NaN from there on.
+    pub fn run(&self, network: &Network<T>, start: &State<T>) -> Trajectory<T> {
+        let mut recorder = Recorder::new(network, &self.targets, &self.grid);
+        let mut events = Vec::new();
+        let mut balance = None;
+        let end = self.grid[self.grid.len() - 1];
+        let mut integrate = || -> Result<(), Status> {
+            let State { x, locked } = start;
+            let mut run =
+                Integrator::start(network, &self.inputs, self.settings, x.clone(), locked)?;
+            let mut auditor = self.audit.then(|| Auditor::new(network, &run.x));
+            let outcome = loop {
+                match run.advance(&mut recorder) {
+                    Ok(Some(step)) => {
+                        let last = (step.start + step.length).re() >= end;
+                        recorder.sample(&run, &step, last);
+                        if let Some(auditor) = &mut auditor {
+                            auditor.add(&run, &step);
+                        }
+                    }
+                    Ok(None) => break Ok(()),
+                    Err(status) => break Err(status),
+                }
+            };
+            balance = auditor.map(|auditor| auditor.close(network, &run.x));
+            events = std::mem::take(&mut run.events);
+            outcome
+        };
+        let status = integrate().err().unwrap_or(Status::Completed);
+        let frictions = network.frictions.iter().map(|row| row.element.clone());
+        let elements =
+            frictions.chain(network.losses.iter().map(|gear| gear.element.clone())).collect();
+        let (time, columns) = (self.grid.clone(), recorder.finish());
+        Trajectory { time, columns, elements, events, status, audit: balance }
+    }
+}
+
+/// Simulate once: [`Plan::new`] and [`Plan::run`].
 pub fn run<T: Real>(
     network: &Network<T>,
     signals: &[(&str, Signal<'_, T>)],
     start: &Start<T>,
     grid: &[f64],
     outputs: &[Output],
-    (settings, audit): (Settings, bool),
+    options: (Settings, bool),
 ) -> Result<Trajectory<T>, SimulateError> {
-    check_grid(grid)?;
-    let span = (grid[0], grid[grid.len() - 1]);
-    let inputs = join(network, signals, span)?;
-    let (x, locked) = start.state(network)?;
-    let mut recorder = Recorder::new(network, outputs, grid)?;
-    let mut events = Vec::new();
-    let mut balance = None;
-    // Between samples only the expansion knows the motion.
-    let dense = audit || recorder.needs_motion() || !inputs.has_knots(grid);
-    let settings = Settings { sprint: settings.sprint && !dense, ..settings };
-    let mut integrate = || -> Result<(), Status> {
-        let mut run = Integrator::start(network, &inputs, settings, x.clone(), &locked)?;
-        let mut auditor = audit.then(|| Auditor::new(network, &run.x));
-        let end = loop {
-            let mut passed = |time: f64, basis: &[T], run: &Integrator<'_, T>| {
-                recorder.sample_basis(time, basis, run);
-            };
-            match run.advance(&mut passed) {
-                Ok(Some(step)) => {
-                    let last = (step.start + step.length).re() >= span.1;
-                    recorder.sample(&run, &step, last);
-                    if let Some(auditor) = &mut auditor {
-                        auditor.add(&run, &step);
-                    }
-                }
-                Ok(None) => break Ok(()),
-                Err(status) => break Err(status),
-            }
-        };
-        balance = auditor.map(|auditor| auditor.close(network, &run.x));
-        events = std::mem::take(&mut run.events);
-        end
-    };
-    let status = integrate().err().unwrap_or(Status::Completed);
-    let columns = recorder.finish();
-    let frictions = network.frictions.iter().map(|row| row.element.clone());
-    let elements =
-        frictions.chain(network.losses.iter().map(|gear| gear.element.clone())).collect();
-    let time = grid.to_vec();
-    Ok(Trajectory { time, columns, elements, events, status, audit: balance })
+    let plan = Plan::new(network, signals, grid, outputs, options)?;
+    Ok(plan.run(network, &start.state(network)?))
 }
 
 /// The signals in the order in which the network numbers its inputs.

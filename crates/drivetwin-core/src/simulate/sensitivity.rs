@@ -4,15 +4,14 @@
 use super::dual_clutch::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
 use super::run::SimulateError;
 use crate::model::dual_clutch::DualClutch;
-use crate::number::Real;
+use crate::number::{Dual, Real};
 use crate::solve::{Settings, Signal};
-use num_dual::{Derivative, DualSVec64};
 use thiserror::Error;
 
 /// Parameters that one pass differentiates for.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
-type Dual = DualSVec64<LANES>;
+type Derived = Dual<LANES>;
 
 /// Why sensitivities cannot be computed.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -64,17 +63,12 @@ pub fn dual_clutch_sensitivities(
     for group in parameters.chunks(LANES) {
         let dual = differentiated(model, signals, start, grid, (settings, group))?;
         for lane in 0..group.len() {
-            let column = |c: &Vec<Dual>| c.iter().map(|value| part(value, lane)).collect();
+            let column = |c: &Vec<Derived>| c.iter().map(|value| value.eps[lane]).collect();
             columns.push(dual.columns.iter().map(column).collect());
-            events.push(dual.events.iter().map(|e| part(&e.time, lane)).collect());
+            events.push(dual.events.iter().map(|e| e.time.eps[lane]).collect());
         }
     }
     Ok(Sensitivities { run, columns, events })
-}
-
-/// Derivative of one lane; absent parts are zero.
-fn part(value: &Dual, lane: usize) -> f64 {
-    value.eps.0.as_ref().map_or(0.0, |parts| parts[lane])
 }
 
 fn differentiated(
@@ -83,12 +77,12 @@ fn differentiated(
     start: &DualClutchStart<f64>,
     grid: &[f64],
     (settings, parameters): (Settings, &[&str]),
-) -> Result<DualClutchRun<Dual>, SensitivityError> {
-    let mut model = model.lifted::<Dual>();
-    let mut start = start.lifted::<Dual>();
-    let lifted: Vec<Vec<Dual>> =
-        signals.iter().map(|s| s.2.iter().map(|&v| Dual::of(v)).collect()).collect();
-    let mut delays: Vec<Dual> = signals.iter().map(|s| Dual::of(s.3)).collect();
+) -> Result<DualClutchRun<Derived>, SensitivityError> {
+    let mut model = model.lifted::<Derived>();
+    let mut start = start.lifted::<Derived>();
+    let lifted: Vec<Vec<Derived>> =
+        signals.iter().map(|s| s.2.iter().map(|&v| Derived::of(v)).collect()).collect();
+    let mut delays: Vec<Derived> = signals.iter().map(|s| Derived::of(s.3)).collect();
     for (lane, &name) in parameters.iter().enumerate() {
         let place = match name.split_once('.') {
             Some(("start", field)) => start.field_mut(field),
@@ -98,7 +92,7 @@ fn differentiated(
             _ => model.parameter_mut(name),
         };
         let place = place.ok_or_else(|| SensitivityError::Unknown { name: name.to_owned() })?;
-        place.eps = Derivative::derivative_generic(nalgebra::Const::<LANES>, nalgebra::U1, lane);
+        place.eps[lane] = 1.0;
     }
     let inputs: Vec<_> = signals
         .iter()

@@ -18,6 +18,15 @@ pub struct Start<T> {
     pub locked: Vec<String>,
 }
 
+/// A start resolved against a network.
+#[derive(Clone, Debug)]
+pub struct State<T> {
+    /// States (speeds, twists, lagging torques).
+    pub x: Vec<T>,
+    /// Indices of the friction elements without slip.
+    pub locked: Vec<usize>,
+}
+
 /// Why a start does not define a state.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum StartError {
@@ -58,13 +67,13 @@ pub enum StartError {
 }
 
 impl<T: Real> Start<T> {
-    /// State vector (speeds, twists) and the indices of the elements at rest.
-    pub fn state(&self, network: &Network<T>) -> Result<(Vec<T>, Vec<usize>), StartError> {
-        let elements: Vec<&str> = network.frictions.iter().map(|f| f.element.as_str()).collect();
+    /// The state of a network.
+    pub fn state(&self, network: &Network<T>) -> Result<State<T>, StartError> {
+        let elements = network.frictions.iter().map(|f| &f.element);
         let locked = self
             .locked
             .iter()
-            .map(|name| find("friction element", name, &elements))
+            .map(|name| find("friction element", name, elements.clone()))
             .collect::<Result<Vec<_>, _>>()?;
         let mut x = self.speeds_of(network)?;
         for friction in network.frictions.iter().filter(|friction| friction.one_way) {
@@ -74,27 +83,26 @@ impl<T: Real> Start<T> {
             }
         }
         x.resize(network.states(), T::zero_());
-        let springs: Vec<&str> =
-            network.mechanism.springs.iter().map(|s| s.element.as_str()).collect();
+        let springs = network.mechanism.springs.iter().map(|s| &s.element);
         for (name, twist) in &self.twists {
-            x[network.speeds() + find("shaft", name, &springs)?] = *twist;
+            x[network.speeds() + find("shaft", name, springs.clone())?] = *twist;
         }
-        Ok((x, locked))
+        Ok(State { x, locked })
     }
 
     fn speeds_of(&self, network: &Network<T>) -> Result<Vec<T>, StartError> {
-        let nodes: Vec<&str> = network.mechanism.nodes.iter().map(String::as_str).collect();
+        let nodes = &network.mechanism.nodes;
         let n = &network.coordinates.speeds;
         let mut rows = Vec::new();
         let mut values = Matrix::zeros(self.speeds.len(), 1);
         for (i, (name, speed)) in self.speeds.iter().enumerate() {
-            rows.push(find("node", name, &nodes)?);
+            rows.push(find("node", name, nodes.iter())?);
             values[(i, 0)] = *speed;
         }
         let stated = n.select_rows(&rows);
         let keep = independent_rows(&stated);
         if keep.len() < network.speeds() {
-            let free = network.coordinates.independent.iter().map(|&i| nodes[i]);
+            let free = network.coordinates.independent.iter().map(|&i| nodes[i].as_str());
             return Err(StartError::Undetermined { free: free.collect::<Vec<_>>().join(", ") });
         }
         let v = least_norm(&stated.select_rows(&keep), &values.select_rows(&keep));
@@ -110,10 +118,14 @@ impl<T: Real> Start<T> {
 }
 
 /// Index of a name among the known ones.
-pub(super) fn find(kind: &'static str, name: &str, known: &[&str]) -> Result<usize, StartError> {
-    known.iter().position(|k| *k == name).ok_or_else(|| StartError::Unknown {
+pub(super) fn find<'n>(
+    kind: &'static str,
+    name: &str,
+    known: impl Iterator<Item = &'n String> + Clone,
+) -> Result<usize, StartError> {
+    known.clone().position(|k| k == name).ok_or_else(|| StartError::Unknown {
         kind,
         name: name.to_owned(),
-        known: known.join(", "),
+        known: known.map(String::as_str).collect::<Vec<_>>().join(", "),
     })
 }

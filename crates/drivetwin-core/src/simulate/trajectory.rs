@@ -7,8 +7,9 @@ use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
 use crate::network::{Network, Row};
 use crate::number::Real;
-use crate::solve::{Event, Integrator, RowState, Status, Step};
+use crate::solve::{BLOCK, Event, Integrator, RowState, Sink, Status, Step, Trail};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// A quantity to record, by the name of its node or element.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,7 +29,42 @@ pub enum Output {
     FrictionTorque(String),
 }
 
-/// An output resolved against a network.
+/// An output by the index of its node or element.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Target {
+    /// Node.
+    Speed(usize),
+    /// Node.
+    Angle(usize),
+    /// Shaft.
+    Twist(usize),
+    /// Shaft.
+    ShaftTorque(usize),
+    /// Friction element.
+    Slip(usize),
+    /// Friction element.
+    FrictionTorque(usize),
+}
+
+impl Output {
+    pub(super) fn find<T: Real>(&self, network: &Network<T>) -> Result<Target, StartError> {
+        let m = &network.mechanism;
+        let node = |name| find("node", name, m.nodes.iter());
+        let shaft = |name| find("shaft", name, m.springs.iter().map(|s| &s.element));
+        let friction =
+            |name| find("friction element", name, m.frictions.iter().map(|f| &f.element));
+        Ok(match self {
+            Self::Speed(name) => Target::Speed(node(name)?),
+            Self::Angle(name) => Target::Angle(node(name)?),
+            Self::Twist(name) => Target::Twist(shaft(name)?),
+            Self::ShaftTorque(name) => Target::ShaftTorque(shaft(name)?),
+            Self::Slip(name) => Target::Slip(friction(name)?),
+            Self::FrictionTorque(name) => Target::FrictionTorque(friction(name)?),
+        })
+    }
+}
+
+/// A target of one network over its basis.
 enum Column<T> {
     /// Linear form over the basis: position and coefficient of its terms.
     Linear(Vec<(usize, T)>),
@@ -64,15 +100,11 @@ pub(super) struct Recorder<'g, T> {
 }
 
 impl<'g, T: Real> Recorder<'g, T> {
-    /// Resolve the outputs by name.
-    pub fn new(
-        network: &Network<T>,
-        outputs: &[Output],
-        grid: &'g [f64],
-    ) -> Result<Self, StartError> {
+    /// Columns of a network.
+    pub fn new(network: &Network<T>, targets: &[Target], grid: &'g [f64]) -> Self {
         let column =
-            |output: &Output| Ok((resolve(network, output)?, Vec::with_capacity(grid.len())));
-        Ok(Self { grid, next: 0, columns: outputs.iter().map(column).collect::<Result<_, _>>()? })
+            |&target: &Target| (Column::of(network, target), Vec::with_capacity(grid.len()));
+        Self { grid, next: 0, columns: targets.iter().map(column).collect() }
     }
 
     /// Record the grid points before the end of the step; `last` includes the end.
@@ -99,21 +131,6 @@ impl<'g, T: Real> Recorder<'g, T> {
         }
     }
 
-    /// Whether a column depends on the motion between samples.
-    pub fn needs_motion(&self) -> bool {
-        self.columns.iter().any(|(column, _)| matches!(column, Column::Angle(..)))
-    }
-
-    /// Record the grid points at a sample, given by its basis.
-    pub fn sample_basis(&mut self, time: f64, basis: &[T], run: &Integrator<'_, T>) {
-        while self.grid.get(self.next).is_some_and(|&t| t <= time) {
-            for (column, values) in &mut self.columns {
-                values.push(value(column, run, basis));
-            }
-            self.next += 1;
-        }
-    }
-
     /// Columns at full length.
     pub fn finish(self) -> Vec<Vec<T>> {
         let length = self.grid.len();
@@ -125,31 +142,78 @@ impl<'g, T: Real> Recorder<'g, T> {
     }
 }
 
-fn resolve<T: Real>(network: &Network<T>, output: &Output) -> Result<Column<T>, StartError> {
-    let m = &network.mechanism;
-    let nodes: Vec<&str> = m.nodes.iter().map(String::as_str).collect();
-    let springs: Vec<&str> = m.springs.iter().map(|s| s.element.as_str()).collect();
-    let frictions: Vec<&str> = m.frictions.iter().map(|f| f.element.as_str()).collect();
-    let speed = |node| Column::Linear(terms(&network.over_speeds(&vec![(node, T::of(1.0))])));
-    Ok(match output {
-        Output::Speed(name) => speed(find("node", name, &nodes)?),
-        Output::Angle(name) => {
-            let node = find("node", name, &nodes)?;
-            Column::Angle(network.over_speeds(&vec![(node, T::of(1.0))]), T::zero_())
+impl<T: Real> Sink<T> for Recorder<'_, T> {
+    fn passed<const N: usize, const A: usize>(
+        &mut self,
+        run: &Integrator<'_, T>,
+        active: &[usize],
+        trail: &Trail<T, N, A>,
+        (first, count): (usize, usize),
+    ) {
+        let mut picked = [0; BLOCK];
+        let mut length = 0;
+        for k in 0..count {
+            if self.grid.get(self.next + length) == Some(&run.segment_start(first + k)) {
+                picked[length] = k;
+                length += 1;
+            }
         }
-        Output::Twist(name) => {
-            let twist = network.speeds() + find("shaft", name, &springs)?;
-            Column::Linear(vec![(twist, T::of(1.0))])
+        self.next += length;
+        let (states, inputs) = (run.x.len(), run.network.first_input());
+        for (column, values) in &mut self.columns {
+            let terms = passing_terms(column, run);
+            let from = values.len();
+            values.resize(from + length, T::zero_());
+            for &(position, c) in &*terms {
+                let out = values[from..].iter_mut().zip(&picked[..length]);
+                if position < states {
+                    out.for_each(|(v, &k)| *v += c * trail.states[k][position]);
+                } else if position < run.network.one() {
+                    let input = position - inputs;
+                    out.for_each(|(v, &k)| *v += c * run.input_at(first + k, input));
+                } else if position == run.network.one() {
+                    out.for_each(|(v, _)| *v += c);
+                } else {
+                    let channel = position - run.network.first_channel();
+                    if let Some(slot) = active.iter().position(|&j| j == channel) {
+                        out.for_each(|(v, &k)| *v += c * trail.torques[k][slot]);
+                    }
+                }
+            }
         }
-        Output::ShaftTorque(name) => shaft_torque(network, find("shaft", name, &springs)?),
-        Output::Slip(name) => {
-            let element = find("friction element", name, &frictions)?;
-            Column::Linear(terms(&network.frictions[element].slip))
+    }
+}
+
+/// What a column is a sum of while the mode lasts: positions in the basis and coefficients.
+fn passing_terms<'c, T: Real>(
+    column: &'c Column<T>,
+    run: &Integrator<'_, T>,
+) -> Cow<'c, [(usize, T)]> {
+    match column {
+        Column::Linear(terms) => Cow::Borrowed(terms),
+        Column::Angle(..) => unreachable!("angles need the motion between samples"),
+        Column::Friction(j) => Cow::Owned(match run.rows[*j] {
+            RowState::Open => Vec::new(),
+            RowState::Stuck => terms(holding_row(run, *j)),
+            RowState::Slipping { .. } | RowState::Saturated { .. } => {
+                vec![(run.network.first_channel() + j, T::of(1.0))]
+            }
+        }),
+    }
+}
+
+impl<T: Real> Column<T> {
+    fn of(network: &Network<T>, target: Target) -> Self {
+        let speed = |node| network.over_speeds(&vec![(node, T::of(1.0))]);
+        match target {
+            Target::Speed(node) => Self::Linear(terms(&speed(node))),
+            Target::Angle(node) => Self::Angle(speed(node), T::zero_()),
+            Target::Twist(shaft) => Self::Linear(vec![(network.speeds() + shaft, T::of(1.0))]),
+            Target::ShaftTorque(shaft) => shaft_torque(network, shaft),
+            Target::Slip(element) => Self::Linear(terms(&network.frictions[element].slip)),
+            Target::FrictionTorque(element) => Self::Friction(element),
         }
-        Output::FrictionTorque(name) => {
-            Column::Friction(find("friction element", name, &frictions)?)
-        }
-    })
+    }
 }
 
 /// Terms of a row that are not zero.
@@ -186,14 +250,15 @@ fn value<T: Real>(column: &Column<T>, run: &Integrator<'_, T>, basis: &[T]) -> T
             RowState::Slipping { .. } | RowState::Saturated { .. } => {
                 basis[run.network.first_channel() + j]
             }
-            RowState::Stuck => holding_torque(run, *j, basis),
+            RowState::Stuck => form(holding_row(run, *j), basis),
         },
     }
 }
 
-fn holding_torque<T: Real>(run: &Integrator<'_, T>, j: usize, basis: &[T]) -> T {
+/// Torque of a stuck element over the basis.
+fn holding_row<'r, T: Real>(run: &'r Integrator<'_, T>, j: usize) -> &'r [T] {
     let position = run.mode.stuck.iter().position(|&s| s == Row::Friction(j));
-    form(run.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode")), basis)
+    run.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode"))
 }
 
 /// Angle turned within the first `h` seconds of the present step.

@@ -44,6 +44,8 @@ pub struct Inputs<T> {
     /// Value at the start of a segment and rate within it, segments × inputs; unused for sines.
     lines: Vec<[T; 2]>,
     sines: Vec<Option<Sine<T>>>,
+    /// For every segment the number of segments of its length from it on.
+    equal: Vec<u32>,
 }
 
 /// Offset, amplitude, angular frequency [rad/s], phase [rad].
@@ -117,7 +119,6 @@ impl<T: Real> Inputs<T> {
         signals: &[(&str, Signal<'_, T>)],
         (start, end): (f64, f64),
     ) -> Result<Self, InputError> {
-        let mut knots = vec![start, end];
         let mut jumps = Vec::new();
         let mut sines = Vec::new();
         for &(name, signal) in signals {
@@ -125,9 +126,6 @@ impl<T: Real> Inputs<T> {
                 Signal::Samples { times, values, delay } => {
                     let delay = delay.re();
                     check(name, times, values, (start - delay, end - delay))?;
-                    let inside =
-                        times.iter().map(|t| t + delay).filter(|t| (start..end).contains(t));
-                    knots.extend(inside);
                     let twice = times.windows(2).filter(|w| w[0] == w[1]);
                     jumps.extend(twice.map(|w| w[0] + delay));
                     sines.push(None);
@@ -138,9 +136,7 @@ impl<T: Real> Inputs<T> {
                 }
             }
         }
-        // Stable, so that signals on a common raster are merged in linear time.
-        knots.sort_by(f64::total_cmp);
-        let knots = merge_knots(&knots, &jumps);
+        let knots = merge_knots(&inner_times(signals, (start, end)), &jumps, (start, end));
         let mut lines = Vec::with_capacity((knots.len() - 1) * signals.len());
         let mut cursors = vec![0; signals.len()];
         for span in knots.windows(2) {
@@ -153,7 +149,13 @@ impl<T: Real> Inputs<T> {
                 });
             }
         }
-        Ok(Self { knots, lines, sines })
+        let equal = equal_lengths(&knots);
+        Ok(Self { knots, lines, sines, equal })
+    }
+
+    /// Number of segments from `i` on, itself included, that are as long as it.
+    pub fn equal_from(&self, i: usize) -> usize {
+        self.equal[i] as usize
     }
 
     /// Number of segments between knots.
@@ -196,6 +198,18 @@ impl<T: Real> Inputs<T> {
             }
         }
     }
+}
+
+/// For every segment the number of segments from it on that are as long as it to 1e-9.
+fn equal_lengths(knots: &[f64]) -> Vec<u32> {
+    let mut equal = vec![1; knots.len() - 1];
+    for i in (1..equal.len()).rev() {
+        let (before, length) = (knots[i] - knots[i - 1], knots[i + 1] - knots[i]);
+        if (before - length).abs() <= 1e-9 * length {
+            equal[i - 1] = equal[i] + 1;
+        }
+    }
+    equal
 }
 
 /// Taylor coefficients of a sine about `t`.
@@ -246,23 +260,42 @@ fn check<T: Real>(
     Ok(())
 }
 
-/// Distinct times; times closer than round-off count as one, the end always as itself; inner jumps
-/// stand twice.
-fn merge_knots(sorted: &[f64], jumps: &[f64]) -> Vec<f64> {
+/// Sample times of all signals within the span [s], sorted.
+fn inner_times<T: Real>(signals: &[(&str, Signal<'_, T>)], (start, end): (f64, f64)) -> Vec<f64> {
+    let mut sorted: Vec<f64> = Vec::new();
+    let mut last: Option<(&[f64], f64)> = None;
+    for (_, signal) in signals {
+        let Signal::Samples { times, delay, .. } = *signal else { continue };
+        // Signals on one raster, as most are, have nothing to add to the first.
+        if last == Some((times, delay.re())) {
+            continue;
+        }
+        last = Some((times, delay.re()));
+        let was_empty = sorted.is_empty();
+        sorted.extend(times.iter().map(|t| t + delay.re()).filter(|t| (start..end).contains(t)));
+        if !was_empty {
+            // Stable, so that two sorted runs are merged in linear time.
+            sorted.sort_by(f64::total_cmp);
+        }
+    }
+    sorted
+}
+
+/// Start, distinct inner times and end; times closer than round-off count as one; inner jumps stand
+/// twice.
+fn merge_knots(sorted: &[f64], jumps: &[f64], (start, end): (f64, f64)) -> Vec<f64> {
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
-    let (start, end) = (sorted[0], sorted[sorted.len() - 1]);
-    let mut knots: Vec<f64> = Vec::with_capacity(sorted.len());
+    let mut knots: Vec<f64> = Vec::with_capacity(sorted.len() + 2);
+    knots.push(start);
     for &t in sorted {
-        if knots.last().is_none_or(|&last| !near(last, t)) {
+        if !near(knots[knots.len() - 1], t) && !near(t, end) {
             knots.push(t);
-            if t > start && !near(t, end) && jumps.iter().any(|&jump| near(jump, t)) {
+            if jumps.iter().any(|&jump| near(jump, t)) {
                 knots.push(t);
             }
         }
     }
-    if let Some(last) = knots.last_mut() {
-        *last = end;
-    }
+    knots.push(end);
     knots
 }
 
@@ -277,7 +310,9 @@ fn line<T: Real>(
     cursor: &mut usize,
 ) -> [T; 2] {
     let middle = 0.5 * (from + to) - delay.re();
-    *cursor += times[*cursor..].iter().take_while(|&&t| t <= middle).count();
+    while *cursor < times.len() && times[*cursor] <= middle {
+        *cursor += 1;
+    }
     let next = *cursor;
     if next == 0 || next == times.len() {
         return [values[next.saturating_sub(1)], T::zero_()];

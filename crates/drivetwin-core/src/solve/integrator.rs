@@ -4,7 +4,7 @@
 use super::expansion::{Accuracy, Expansion};
 use super::guard::{Cause, Watch, earliest};
 use super::inputs::Inputs;
-use super::sprint::Cache;
+use super::sprint::{Cache, Sink};
 use super::status::Status;
 use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
 use crate::number::{Real, Series, TERMS};
@@ -186,18 +186,14 @@ impl<'a, T: Real> Integrator<'a, T> {
     }
 
     /// Advance to the next input sample or event; `None` at the end of the inputs. Where the settings
-    /// allow it, whole samples without events are passed first; `passed` gets time [s] and basis at
-    /// the start of each.
-    pub fn advance(
-        &mut self,
-        passed: &mut impl FnMut(f64, &[T], &Self),
-    ) -> Result<Option<Step<T>>, Status> {
+    /// allow it, whole samples without events are passed first and handed to `sink`.
+    pub fn advance(&mut self, sink: &mut impl Sink<T>) -> Result<Option<Step<T>>, Status> {
         self.change_mode()?;
         if !self.enter_segment()? {
             return Ok(None);
         }
         if self.settings.sprint {
-            self.sprint(passed);
+            self.sprint(sink);
         }
         let end = self.inputs.span(self.segment).1;
         let remaining = (-self.t + end).re();
@@ -226,6 +222,16 @@ impl<'a, T: Real> Integrator<'a, T> {
         self.released.iter_mut().for_each(|r| *r &= length.re() == 0.0);
         self.check_progress(length.re())?;
         Ok(Some(Step { start, length }))
+    }
+
+    /// Start of a segment between input samples, s.
+    pub fn segment_start(&self, segment: usize) -> f64 {
+        self.inputs.span(segment).0
+    }
+
+    /// Value of an input at the start of a segment.
+    pub fn input_at(&self, segment: usize, input: usize) -> T {
+        self.inputs.lines(segment)[input][0]
     }
 
     /// Mode of a key, compiled once.

@@ -1,121 +1,341 @@
 // SPDX-License-Identifier: MIT
-//! Exact step operators of one mode over samples of equal length.
+//! Exact step operators of one mode over samples of equal length h.
 //!
-//! In one mode `x' = A x + B u + c + E φ`. Over a sample of length h the inputs are linear and a channel
-//! φ is a cubic in time, so that the state at the end is linear in the step vector
-//! `y = (x, u at the start, u at the end, 1, a0 .. a3 of every active channel)`.
+//! In one mode `x' = A x + B u + c + E φ`. Over a sample the inputs are linear and a channel φ is a
+//! cubic in `t/h` with the coefficients a0 .. a3, so that the state at the end, the argument of every
+//! channel there and its rate are linear in x, u, u', a.
 
+use super::law::Law;
+use super::march::Source;
 use crate::network::{Mode, Network};
-use crate::number::Real;
+use crate::number::{Lane, Real};
 
-/// Coefficients of a channel's cubic over a step.
+/// Coefficients of a channel's cubic over a sample.
 pub const CUBIC: usize = 4;
+/// Most channels that are carried at once.
+pub const MAX_ACTIVE: usize = 4;
+/// Most torques and speeds that are watched at once.
+pub const MAX_WATCHED: usize = 12;
+
+/// Operators over at most `N` states; unused states, channels and forms are zero.
+#[derive(Clone, Debug)]
+pub struct Operators<L, const N: usize> {
+    /// Number of states.
+    states: usize,
+    /// Columns of the transition matrix.
+    pub transition: [[L; N]; N],
+    /// What is there without state and inputs.
+    pub constant: [L; N],
+    /// Inputs that act on the state.
+    pub drives: Vec<Drive<L, N>>,
+    /// Carried channels.
+    pub channels: Vec<Carried<L, N>>,
+    /// Forms that must stay within their limits.
+    pub watched: Vec<Watched<L, N>>,
+    /// Normal loads that must stay above zero.
+    pub loads: Vec<Line<L>>,
+}
+
+/// Effect of one input; pairs are those of its value at the start and of its rate.
+#[derive(Clone, Copy, Debug)]
+pub struct Drive<L, const N: usize> {
+    /// Its index.
+    pub input: usize,
+    /// On the state at the end.
+    pub step: [[L; N]; 2],
+    /// On the arguments at the end.
+    pub argument: [[L; 2]; MAX_ACTIVE],
+    /// On the part of their rates there that comes from the state.
+    pub rate: [[L; 2]; MAX_ACTIVE],
+    /// On the rates of the arguments, directly.
+    pub now: [L; MAX_ACTIVE],
+    /// On their second derivatives at the start, by the state.
+    pub second: [L; MAX_ACTIVE],
+    /// On the watched forms.
+    pub watched: [L; MAX_WATCHED],
+}
+
+/// A linear form over state, constant and cubics.
+#[derive(Clone, Copy, Debug)]
+pub struct StepForm<L, const N: usize> {
+    /// Over the state at the start.
+    pub state: [L; N],
+    /// Constant.
+    pub constant: L,
+    /// Over the cubics of the carried channels.
+    pub cubics: [[L; CUBIC]; MAX_ACTIVE],
+}
+
+/// A linear form over state, constant and channels at one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Form<L, const N: usize> {
+    /// Over the state.
+    pub state: [L; N],
+    /// Constant.
+    pub constant: L,
+    /// Over the carried channels.
+    pub channels: [L; MAX_ACTIVE],
+}
+
+/// A channel and what its argument does.
+#[derive(Clone, Copy, Debug)]
+pub struct Carried<L, const N: usize> {
+    /// Response of the state at the end to the coefficients of the cubic.
+    pub moments: [[L; N]; CUBIC],
+    /// Argument at any instant, over the state.
+    pub argument: [L; N],
+    /// Argument at the end.
+    pub argument_end: StepForm<L, N>,
+    /// Rate of the argument at the end as far as it comes from the state.
+    pub rate_end: StepForm<L, N>,
+    /// Rate of the argument at any instant.
+    pub rate: Form<L, N>,
+    /// Second derivative at the start but for the rates of inputs and channels.
+    pub second: Form<L, N>,
+    /// Its law.
+    pub law: Law<L>,
+}
+
+/// A guard: `limit(u) - |form|` where both signs are bounded, else `limit(u) + form`.
+#[derive(Clone, Copy, Debug)]
+pub struct Watched<L, const N: usize> {
+    /// Torque or speed.
+    pub form: Form<L, N>,
+    /// Its limit, over an input.
+    pub limit: Line<L>,
+    /// Whether both signs are bounded.
+    pub both: bool,
+}
+
+/// `gain · u + offset`.
+#[derive(Clone, Copy, Debug)]
+pub struct Line<L> {
+    /// Index of the input.
+    pub input: usize,
+    /// Over the input.
+    pub gain: L,
+    /// At zero.
+    pub offset: L,
+}
 
 /// A square matrix by rows.
 type Square<T, const N: usize> = [[T; N]; N];
-
-/// Operators of a mode and a set of active channels for steps of length `h`.
-#[derive(Clone, Debug)]
-pub struct Operators<T> {
-    /// Step length, s.
-    pub h: f64,
-    /// Channels that are not off.
-    pub active: Vec<usize>,
-    /// Columns of the state at the end over y, each padded to the stride.
-    pub step: Vec<T>,
-    /// For every active channel its argument at the end over y with the first two coefficients of
-    /// the channels only, and the same for what of its rate comes from the state.
-    pub argument: Vec<Vec<T>>,
-    /// See `argument`.
-    pub rate: Vec<Vec<T>>,
-    /// For every active channel the rate of its argument over the basis (x, u, 1, φ).
-    pub rate_now: Vec<Vec<T>>,
-}
 
 /// Largest `ρ(A) h` for which a cubic follows a slipping element.
 const MAX_SLIPPING: f64 = 0.7;
 /// Largest `ρ(A) h` for which the series of the operators is summed directly.
 const MAX_LINEAR: f64 = 3.0;
-/// Terms of that series.
-const SERIES: usize = 26;
+/// What may be left of the series, relative to its first term; generous, as A is badly scaled.
+const REMAINDER: f64 = 1e-24;
+/// Most terms of the series.
+const MAX_SERIES: usize = 40;
 
-impl<T: Real> Operators<T> {
-    /// Build for at most `N` states; `None` where the step is too long for the mode.
-    pub fn build<const N: usize>(
+impl<T: Real, const N: usize> Operators<T, N> {
+    /// Build for steps of length `h` [s] with the channels `active` under `laws`; `None` where the step
+    /// is too long for the mode. Nothing is watched yet.
+    pub fn build(
         network: &Network<T>,
         mode: &Mode<T>,
-        active: &[usize],
+        (active, laws): (&[usize], &[Law<T>]),
         h: f64,
     ) -> Option<Self> {
         let n = network.states();
-        let a: Square<T, N> =
-            std::array::from_fn(|i| {
-                std::array::from_fn(|j| {
-                    if i < n && j < n { mode.derivative[(i, j)] } else { T::zero_() }
-                })
-            });
-        let limit = if active.is_empty() { MAX_LINEAR } else { MAX_SLIPPING };
-        if radius(&a) * h > limit {
+        let derivative = |i: usize, column: usize| {
+            if i < n { mode.derivative[(i, column)] } else { T::zero_() }
+        };
+        let forcing = |column: usize| -> [T; N] { std::array::from_fn(|i| derivative(i, column)) };
+        let a: Square<T, N> = std::array::from_fn(|i| {
+            std::array::from_fn(|j| if j < n { derivative(i, j) } else { T::zero_() })
+        });
+        let reach = radius(&a) * h;
+        if reach > if active.is_empty() { MAX_LINEAR } else { MAX_SLIPPING } {
             return None;
         }
-        let s = integrals(&a, h);
-        let forcing = |column: usize| -> [T; N] {
-            std::array::from_fn(|i| if i < n { mode.derivative[(i, column)] } else { T::zero_() })
-        };
-        let mut columns: Vec<[T; N]> =
-            (0..n).map(|j| std::array::from_fn(|i| s[0][i][j])).collect();
-        let inputs = network.mechanism.inputs.len();
-        let held: Vec<[T; N]> =
-            (0..inputs).map(|i| apply(&s[1], &forcing(network.first_input() + i))).collect();
-        let ramp: Vec<[T; N]> =
-            (0..inputs).map(|i| apply(&s[2], &forcing(network.first_input() + i))).collect();
-        for (held, ramp) in held.iter().zip(&ramp) {
-            columns.push(std::array::from_fn(|i| held[i] - ramp[i] / h));
+        let s = integrals(&a, h, terms(reach));
+        let transition = std::array::from_fn(|j| std::array::from_fn(|i| s[0][i][j]));
+        let constant = apply(&s[1], &forcing(network.one()));
+        let drives = (0..network.mechanism.inputs.len())
+            .map(|input| (input, forcing(network.first_input() + input)))
+            .filter(|(_, force)| force.iter().any(|f| f.re() != 0.0))
+            .map(|(input, force)| Drive::new(input, [apply(&s[1], &force), apply(&s[2], &force)]))
+            .collect();
+        let moments: Vec<[[T; N]; CUBIC]> = active
+            .iter()
+            .map(|&j| {
+                let force = forcing(network.first_channel() + j);
+                let mut weight = 1.0;
+                std::array::from_fn(|k| {
+                    weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
+                    apply(&s[k + 1], &force).map(|v| v * weight)
+                })
+            })
+            .collect();
+        let mut operators =
+            Self { states: n, transition, constant, drives, channels: vec![], watched: vec![], loads: vec![] };
+        for (slot, &j) in active.iter().enumerate() {
+            let argument: [T; N] = std::array::from_fn(|i| {
+                network.channels[j].arguments[0].get(i).map_or(T::zero_(), |&c| c)
+            });
+            operators.carry(slot, (network, mode), (active, &moments), (argument, laws[slot]));
         }
-        columns.extend(ramp.iter().map(|ramp| ramp.map(|r| r / h)));
-        columns.push(apply(&s[1], &forcing(network.one())));
-        let mut factorial = 1.0;
-        let channels: Vec<[T; N]> =
-            active.iter().map(|&j| forcing(network.first_channel() + j)).collect();
-        let mut moments: Vec<Vec<[T; N]>> = Vec::new();
-        for k in 0..CUBIC {
-            factorial *= k.max(1) as f64;
-            let moment = |e: &[T; N]| apply(&s[k + 1], e).map(|v| v * factorial);
-            moments.push(channels.iter().map(moment).collect());
+        if operators.channels.len() == 3 {
+            operators.channels.push(Carried::idle());
         }
-        for j in 0..active.len() {
-            columns.extend(moments.iter().map(|moment| moment[j]));
-        }
-        Some(Self::with_rows(network, mode, active, (h, &columns)))
+        Some(operators)
     }
 
-    fn with_rows<const N: usize>(
-        network: &Network<T>,
-        mode: &Mode<T>,
-        active: &[usize],
-        (h, columns): (f64, &[[T; N]]),
-    ) -> Self {
-        let n = network.states();
-        let over_step = |row: &[T]| -> Vec<T> {
-            let dot = |c: &[T; N]| (0..n).fold(T::zero_(), |sum, i| sum + row[i] * c[i]);
-            columns.iter().map(dot).collect()
-        };
-        let (mut argument, mut rate, mut rate_now) = (Vec::new(), Vec::new(), Vec::new());
-        for &j in active {
-            let row = &network.channels[j].arguments[0];
-            let mut now = vec![T::zero_(); network.basis()];
-            for (i, &c) in row.iter().enumerate() {
-                for (sum, &d) in now.iter_mut().zip(mode.derivative.row(i)) {
-                    *sum += c * d;
-                }
-            }
-            argument.push(over_step(row));
-            rate.push(over_step(&now[..n]));
-            rate_now.push(now);
+    /// Add a channel; `argument` is its argument over the states.
+    fn carry(
+        &mut self,
+        slot: usize,
+        (network, mode): (&Network<T>, &Mode<T>),
+        (active, moments): (&[usize], &[[[T; N]; CUBIC]]),
+        (argument, law): ([T; N], Law<T>),
+    ) {
+        let now = over_basis(network, mode, &argument);
+        let rate: [T; N] =
+            std::array::from_fn(|i| if i < network.states() { now[i] } else { T::zero_() });
+        let second = over_basis(network, mode, &rate);
+        for drive in &mut self.drives {
+            let [held, ramp] = &drive.step;
+            drive.argument[slot] = [dot(&argument, held), dot(&argument, ramp)];
+            drive.rate[slot] = [dot(&rate, held), dot(&rate, ramp)];
+            drive.now[slot] = now[network.first_input() + drive.input];
+            drive.second[slot] = second[network.first_input() + drive.input];
         }
-        let step = columns.iter().flatten().copied().collect();
-        Self { h, active: active.to_vec(), step, argument, rate, rate_now }
+        let step_form = |row: &[T; N]| {
+            let mut cubics = [[T::zero_(); CUBIC]; MAX_ACTIVE];
+            for (cubic, moments) in cubics.iter_mut().zip(moments) {
+                *cubic = std::array::from_fn(|k| dot(row, &moments[k]));
+            }
+            let state = std::array::from_fn(|j| dot(row, &self.transition[j]));
+            StepForm { state, constant: dot(row, &self.constant), cubics }
+        };
+        let carried = Carried {
+            moments: moments[slot],
+            argument,
+            argument_end: step_form(&argument),
+            rate_end: step_form(&rate),
+            rate: Form::over(network, active, &now),
+            second: Form::over(network, active, &second),
+            law,
+        };
+        self.channels.push(carried);
     }
+
+    /// Watch a form over the basis (x, u, 1, φ): see [`Watched`].
+    pub fn watch(
+        &mut self,
+        network: &Network<T>,
+        active: &[usize],
+        row: &[T],
+        (limit, both): (Line<T>, bool),
+    ) {
+        let place = self.watched.len();
+        for drive in &mut self.drives {
+            drive.watched[place] =
+                row.get(network.first_input() + drive.input).map_or(T::zero_(), |&c| c);
+        }
+        self.watched.push(Watched { form: Form::over(network, active, row), limit, both });
+    }
+}
+
+impl<T: Real, const N: usize> Drive<T, N> {
+    fn new(input: usize, step: [[T; N]; 2]) -> Self {
+        let none = T::zero_();
+        Self {
+            input,
+            step,
+            argument: [[none; 2]; MAX_ACTIVE],
+            rate: [[none; 2]; MAX_ACTIVE],
+            now: [none; MAX_ACTIVE],
+            second: [none; MAX_ACTIVE],
+            watched: [none; MAX_WATCHED],
+        }
+    }
+}
+
+impl<T: Real, const N: usize> Carried<T, N> {
+    /// A channel without torque: inner loops exist for 0, 1, 2 and 4.
+    fn idle() -> Self {
+        let none = T::zero_();
+        let step_form =
+            StepForm { state: [none; N], constant: none, cubics: [[none; CUBIC]; MAX_ACTIVE] };
+        let form = Form { state: [none; N], constant: none, channels: [none; MAX_ACTIVE] };
+        Self {
+            moments: [[none; N]; CUBIC],
+            argument: [none; N],
+            argument_end: step_form,
+            rate_end: step_form,
+            rate: form,
+            second: form,
+            law: Law::idle(),
+        }
+    }
+}
+
+impl<T: Real, const N: usize> Form<T, N> {
+    /// Of a row over the basis or over the states alone.
+    fn over(network: &Network<T>, active: &[usize], row: &[T]) -> Self {
+        let at = |position: usize| row.get(position).map_or(T::zero_(), |&c| c);
+        let state = |i: usize| if i < network.states() { at(i) } else { T::zero_() };
+        let mut channels = [T::zero_(); MAX_ACTIVE];
+        for (channel, &j) in channels.iter_mut().zip(active) {
+            *channel = at(network.first_channel() + j);
+        }
+        Self { state: std::array::from_fn(state), constant: at(network.one()), channels }
+    }
+}
+
+impl<L: Copy, const N: usize> Operators<L, N> {
+    /// Columns worth a product: few are taken as they are, so that their loop unrolls.
+    #[inline(always)]
+    pub fn columns(&self) -> usize {
+        if N <= 4 { N } else { self.states }
+    }
+}
+
+impl<L: Lane> Line<L> {
+    /// Value at the start of a segment and rate within it.
+    #[inline(always)]
+    pub fn line<const F: bool>(&self, source: &impl Source<L>, segment: usize) -> [L; 2] {
+        let [start, rate] = source.line(segment, self.input);
+        [self.gain.fma::<F>(start, self.offset), self.gain * rate]
+    }
+}
+
+impl<L: Copy> Line<L> {
+    /// The same line over another number.
+    #[inline(always)]
+    pub fn map<M>(&self, f: impl Fn(L) -> M) -> Line<M> {
+        Line { input: self.input, gain: f(self.gain), offset: f(self.offset) }
+    }
+}
+
+/// A form over the states, differentiated: over the basis.
+fn over_basis<T: Real, const N: usize>(
+    network: &Network<T>,
+    mode: &Mode<T>,
+    row: &[T; N],
+) -> Vec<T> {
+    let mut out = vec![T::zero_(); network.basis()];
+    for i in 0..network.states() {
+        for (sum, &d) in out.iter_mut().zip(mode.derivative.row(i)) {
+            *sum += row[i] * d;
+        }
+    }
+    out
+}
+
+/// Terms that the series of the operators needs.
+fn terms(reach: f64) -> usize {
+    let mut left = 1.0;
+    (1..MAX_SERIES)
+        .find(|&k| {
+            left *= reach / k as f64;
+            left < REMAINDER
+        })
+        .unwrap_or(MAX_SERIES)
 }
 
 /// Estimate of the spectral radius [1/s] from `A^16`, of which a bad scaling of the states counts only
@@ -139,24 +359,25 @@ fn radius<T: Real, const N: usize>(a: &Square<T, N>) -> f64 {
 /// `S_k = Σ_i A^i h^(i+k) / (i+k)!` for k = 0 .. CUBIC: S_0 is the transition matrix, and
 /// `k! S_(k+1) e` the response to a force `e t^k`. The highest by its series, the lower ones by
 /// `S_(k-1) = I h^(k-1)/(k-1)! + A S_k`.
-fn integrals<T: Real, const N: usize>(a: &Square<T, N>, h: f64) -> [Square<T, N>; CUBIC + 1] {
+fn integrals<T: Real, const N: usize>(
+    a: &Square<T, N>,
+    h: f64,
+    terms: usize,
+) -> [Square<T, N>; CUBIC + 1] {
     let ah = a.map(|row| row.map(|v| v * h));
     let identity = |value: f64| -> Square<T, N> {
         std::array::from_fn(|i| std::array::from_fn(|j| T::of(if i == j { value } else { 0.0 })))
     };
     let mut sum = identity(1.0);
-    for i in (1..SERIES).rev() {
-        let scaled = ah.map(|row| row.map(|v| v / (i + CUBIC) as f64));
-        sum = multiply(&scaled, &sum);
+    for i in (1..terms).rev() {
+        let weight = 1.0 / (i + CUBIC) as f64;
+        sum = multiply(&ah, &sum).map(|row| row.map(|v| v * weight));
         (0..N).for_each(|d| sum[d][d] += 1.0);
     }
-    let mut weight = 1.0;
-    let weights: Vec<f64> = (0..=CUBIC)
-        .map(|k| {
-            weight *= if k > 0 { h / k as f64 } else { 1.0 };
-            weight
-        })
-        .collect();
+    let mut weights = [1.0; CUBIC + 1];
+    for k in 1..=CUBIC {
+        weights[k] = weights[k - 1] * h / k as f64;
+    }
     let mut all = [identity(0.0); CUBIC + 1];
     all[CUBIC] = sum.map(|row| row.map(|v| v * weights[CUBIC]));
     for k in (0..CUBIC).rev() {
@@ -166,6 +387,7 @@ fn integrals<T: Real, const N: usize>(a: &Square<T, N>, h: f64) -> [Square<T, N>
     all
 }
 
+#[inline(always)]
 fn multiply<T: Real, const N: usize>(a: &Square<T, N>, b: &Square<T, N>) -> Square<T, N> {
     let mut out = [[T::zero_(); N]; N];
     for i in 0..N {
@@ -178,6 +400,12 @@ fn multiply<T: Real, const N: usize>(a: &Square<T, N>, b: &Square<T, N>) -> Squa
     out
 }
 
+#[inline(always)]
 fn apply<T: Real, const N: usize>(a: &Square<T, N>, v: &[T; N]) -> [T; N] {
-    std::array::from_fn(|i| (0..N).fold(T::zero_(), |sum, j| sum + a[i][j] * v[j]))
+    std::array::from_fn(|i| dot(&a[i], v))
+}
+
+#[inline(always)]
+fn dot<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
+    (0..N).fold(T::zero_(), |sum, i| sum + a[i] * b[i])
 }

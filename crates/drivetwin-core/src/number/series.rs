@@ -1,22 +1,7 @@
 // SPDX-License-Identifier: MIT
-//! The number type the physics is written over: `f64` for values, dual numbers for derivatives.
+//! Truncated Taylor series in time.
 
-use num_dual::DualNum;
-
-/// A real number or a dual number over `f64`.
-pub trait Real: DualNum<Primitive = f64> + Copy + Send + Sync {
-    /// Zero, with zero derivatives.
-    fn zero_() -> Self {
-        Self::from(0.0)
-    }
-
-    /// A value without derivatives.
-    fn of(value: f64) -> Self {
-        Self::from(value)
-    }
-}
-
-impl<T: DualNum<Primitive = f64> + Copy + Send + Sync> Real for T {}
+use super::Real;
 
 /// Number of Taylor coefficients of a step, order 0 included.
 pub const TERMS: usize = 15;

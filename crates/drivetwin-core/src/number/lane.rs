@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+//! Arithmetic without decisions: what the inner loop over samples needs of a number.
+
+use super::Dual;
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// One run, one run with derivatives, or several runs side by side. Operations act on every run alike,
+/// so that a run's result does not depend on its neighbours.
+///
+/// Multiply-adds are fused by the caller's word (`F`), not by the compiler: a fused one is an
+/// instruction where the processor has it and a slow call where it has not.
+pub trait Lane:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+    /// Whether a value carries derivatives, so that inputs may jump in these alone.
+    const DERIVATIVES: bool;
+
+    /// The values alone.
+    type Values: Values;
+
+    /// The same value in every run.
+    fn all(value: f64) -> Self;
+
+    /// `self · a + b`.
+    fn fma<const F: bool>(self, a: Self, b: Self) -> Self;
+
+    /// Product with a number.
+    fn times(self, factor: f64) -> Self;
+
+    /// `e^x` to a few units in the last place for |x| < 700, beyond that of the bound.
+    fn exponential<const F: bool>(self) -> Self;
+
+    /// The values without derivatives.
+    fn values(self) -> Self::Values;
+}
+
+/// Values of one or several runs, as guards compare them.
+pub trait Values: Lane<Values = Self> {
+    /// Magnitude.
+    fn magnitude(self) -> Self;
+
+    /// The smaller of two, run by run; NaN where either is.
+    fn lower(self, other: Self) -> Self;
+
+    /// The larger of two, run by run.
+    fn upper(self, other: Self) -> Self;
+
+    /// The smaller of two; 1 where both are zero.
+    fn lower_unless_idle(self, other: Self) -> Self;
+
+    /// Runs whose value is not above zero, as bits; NaN counts.
+    fn fallen(self) -> u32;
+}
+
+/// `a · b + c`, fused or not.
+#[inline(always)]
+pub(super) fn fused<const F: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if F { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// 1.5 · 2^52: a sum with it leaves the nearest integer in the low bits.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+/// ln 2 in two parts, of which the first has trailing zeros (Cody and Waite).
+const LN_2: (f64, f64) = (0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10);
+/// 1/k! for k = 13 .. 0.
+const EXPONENTIAL: [f64; 14] = [
+    1.0 / 6_227_020_800.0,
+    1.0 / 479_001_600.0,
+    1.0 / 39_916_800.0,
+    1.0 / 3_628_800.0,
+    1.0 / 362_880.0,
+    1.0 / 40_320.0,
+    1.0 / 5_040.0,
+    1.0 / 720.0,
+    1.0 / 120.0,
+    1.0 / 24.0,
+    1.0 / 6.0,
+    0.5,
+    1.0,
+    1.0,
+];
+
+/// By `e^x = 2^n e^r` with |r| ≤ ln 2 / 2 and the series of `e^r`; free of branches.
+#[inline(always)]
+pub(super) fn exponential<const F: bool>(x: f64) -> f64 {
+    let x = x.clamp(-700.0, 700.0);
+    let shifted = fused::<F>(x, std::f64::consts::LOG2_E, ROUND);
+    let n = shifted - ROUND;
+    let r = fused::<F>(n, -LN_2.1, fused::<F>(n, -LN_2.0, x));
+    let power = f64::from_bits((shifted.to_bits() << 52).wrapping_add(1023 << 52));
+    // Even and odd powers apart, for half the chain of dependent products.
+    let square = r * r;
+    let (mut odd, mut even) = (EXPONENTIAL[0], EXPONENTIAL[1]);
+    for k in (2..EXPONENTIAL.len()).step_by(2) {
+        odd = fused::<F>(odd, square, EXPONENTIAL[k]);
+        even = fused::<F>(even, square, EXPONENTIAL[k + 1]);
+    }
+    fused::<F>(odd, r, even) * power
+}
+
+impl Lane for f64 {
+    const DERIVATIVES: bool = false;
+
+    type Values = Self;
+
+    #[inline(always)]
+    fn all(value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn fma<const F: bool>(self, a: Self, b: Self) -> Self {
+        fused::<F>(self, a, b)
+    }
+    #[inline(always)]
+    fn times(self, factor: f64) -> Self {
+        self * factor
+    }
+    #[inline(always)]
+    fn exponential<const F: bool>(self) -> Self {
+        exponential::<F>(self)
+    }
+    #[inline(always)]
+    fn values(self) -> Self {
+        self
+    }
+}
+
+impl Values for f64 {
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        self.abs()
+    }
+    #[inline(always)]
+    fn lower(self, other: Self) -> Self {
+        // A comparison with NaN is false: NaN in either is kept.
+        if self > other || other.is_nan() { other } else { self }
+    }
+    #[inline(always)]
+    fn upper(self, other: Self) -> Self {
+        if self < other || other.is_nan() { other } else { self }
+    }
+    #[inline(always)]
+    fn lower_unless_idle(self, other: Self) -> Self {
+        if self == 0.0 && other == 0.0 { 1.0 } else { self.lower(other) }
+    }
+    #[inline(always)]
+    fn fallen(self) -> u32 {
+        u32::from(!(self > 0.0))
+    }
+}
+
+impl<const P: usize> Lane for Dual<P> {
+    const DERIVATIVES: bool = true;
+
+    type Values = f64;
+
+    #[inline(always)]
+    fn all(value: f64) -> Self {
+        Self::new(value, [0.0; P])
+    }
+    #[inline(always)]
+    fn fma<const F: bool>(self, a: Self, b: Self) -> Self {
+        let mut eps = b.eps;
+        for i in 0..P {
+            eps[i] = fused::<F>(self.eps[i], a.re, eps[i]);
+            eps[i] = fused::<F>(self.re, a.eps[i], eps[i]);
+        }
+        Self::new(fused::<F>(self.re, a.re, b.re), eps)
+    }
+    #[inline(always)]
+    fn times(self, factor: f64) -> Self {
+        self * factor
+    }
+    #[inline(always)]
+    fn exponential<const F: bool>(self) -> Self {
+        let value = exponential::<F>(self.re);
+        self.chain(value, value)
+    }
+    #[inline(always)]
+    fn values(self) -> f64 {
+        self.re
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_exponential_agrees_with_the_library(x in -600.0..600.0_f64) {
+            for value in [exponential::<false>(x), exponential::<true>(x)] {
+                prop_assert!((value / x.exp() - 1.0).abs() < 4.0 * f64::EPSILON);
+            }
+        }
+    }
+
+    #[test]
+    fn fused_and_plain_products_of_duals_agree_to_round_off() {
+        let (a, b) = (Dual::<2>::new(1.7, [0.3, -2.0]), Dual::<2>::new(-0.4, [1.1, 5.0]));
+        let (fused, plain) = (a.fma::<true>(b, a), a * b + a);
+        for (x, y) in fused.eps.iter().zip(plain.eps) {
+            assert!((x - y).abs() < 1e-14);
+        }
+    }
+}

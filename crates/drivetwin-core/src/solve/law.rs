@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+//! The laws of smooth channels in one form, as the inner loop evaluates them.
+
+use super::operators::Line;
+use crate::model::FrictionLaw;
+use crate::model::mechanism::Normal;
+use crate::network::channel;
+use crate::network::{Cell, Channel};
+use crate::number::{Lane, Real};
+
+/// `φ(s, u) = sign · N(u) · μ(m)`, `m = sign · s`,
+/// `μ(m) = c0 + c1 m + c2 m² + excess · exp(-rate m)` while `m` lies between `from` and `to`: a friction
+/// torque over the slip, or `c2 · s|s|` with N = 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Law<L> {
+    /// Direction of motion.
+    pub sign: L,
+    /// N over its input.
+    pub normal: Line<L>,
+    /// Coefficients of μ, the highest last.
+    pub polynomial: [L; 3],
+    /// Stiction above the polynomial at rest.
+    pub excess: L,
+    /// Its decay over the slip, s/rad.
+    pub rate: L,
+    /// Least `m` of this branch, rad/s.
+    pub from: L,
+    /// Largest `m` of this branch, rad/s.
+    pub to: L,
+}
+
+/// A channel at one instant with its partial derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Value<L> {
+    /// φ.
+    pub value: L,
+    /// φ_s.
+    pub by_argument: L,
+    /// φ_ss.
+    pub bend: L,
+    /// φ_N.
+    pub by_normal: L,
+    /// φ_sN.
+    pub mixed: L,
+}
+
+impl<T: Real> Law<T> {
+    /// No torque, whatever the argument.
+    pub fn idle() -> Self {
+        let zero = T::zero_();
+        Self {
+            sign: T::of(1.0),
+            normal: Line { input: 0, gain: zero, offset: zero },
+            polynomial: [zero; 3],
+            excess: zero,
+            rate: zero,
+            from: T::of(f64::NEG_INFINITY),
+            to: T::of(f64::INFINITY),
+        }
+    }
+
+    /// The law of a channel in its present cell; `None` where it is not smooth over one argument.
+    pub fn of(channel: &Channel<T>, cell: Cell) -> Option<Self> {
+        let Cell::Moving { sign, piece } = cell else { return None };
+        let (zero, one) = (T::zero_(), T::of(1.0));
+        let normal = Line { input: 0, gain: zero, offset: one };
+        let plain = Self { sign: T::of(sign), normal, from: zero, ..Self::idle() };
+        match &channel.law {
+            channel::Law::Quadratic(coefficient) => {
+                Some(Self { polynomial: [zero, zero, *coefficient], ..plain })
+            }
+            channel::Law::Friction { mu, normal, .. } => {
+                let plain = Self { normal: line_of(normal), ..plain };
+                Some(match mu {
+                    FrictionLaw::Stribeck(law) => Self {
+                        polynomial: [law.mu_c, law.mu_v, zero],
+                        excess: law.mu_s - law.mu_c,
+                        rate: law.v_s.recip(),
+                        ..plain
+                    },
+                    FrictionLaw::Table(table) => {
+                        let (piece, (from, to)) = table.piece(piece);
+                        let level = piece.value - piece.slope * piece.from;
+                        let polynomial = [level, piece.slope, zero];
+                        Self { polynomial, from: T::of(from), to: T::of(to), ..plain }
+                    }
+                })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The normal load over its input.
+pub fn line_of<T: Real>(normal: &Normal<T>) -> Line<T> {
+    match *normal {
+        Normal::Pressure { input, gain, p0 } => Line { input, gain, offset: -(gain * p0) },
+        Normal::Constant(normal) => Line { input: 0, gain: T::zero_(), offset: normal },
+    }
+}
+
+impl<L: Lane> Law<L> {
+    /// Value and partial derivatives at argument `s` and normal load `normal`.
+    #[inline(always)]
+    pub fn at<const F: bool>(&self, s: L, normal: L) -> Value<L> {
+        let m = self.sign * s;
+        let stiction = self.excess * (-(self.rate * m)).exponential::<F>();
+        let [c0, c1, c2] = self.polynomial;
+        let faded = self.rate * stiction;
+        let mu = c2.fma::<F>(m, c1).fma::<F>(m, c0) + stiction;
+        let slope = (c2 + c2).fma::<F>(m, c1) - faded;
+        let signed = self.sign * normal;
+        Value {
+            value: signed * mu,
+            by_argument: normal * slope,
+            bend: signed * self.rate.fma::<F>(faded, c2 + c2),
+            by_normal: self.sign * mu,
+            mixed: slope,
+        }
+    }
+
+}
+
+impl<L: Lane> Value<L> {
+    /// Nothing.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        let zero = L::all(0.0);
+        Self { value: zero, by_argument: zero, bend: zero, by_normal: zero, mixed: zero }
+    }
+
+    /// Value and slopes where the argument is larger by a small `ds`.
+    #[inline(always)]
+    pub fn moved<const F: bool>(&self, ds: L) -> Self {
+        let half = self.bend.times(0.5);
+        Self {
+            value: half.fma::<F>(ds, self.by_argument).fma::<F>(ds, self.value),
+            by_argument: self.bend.fma::<F>(ds, self.by_argument),
+            by_normal: self.mixed.fma::<F>(ds, self.by_normal),
+            ..*self
+        }
+    }
+}
