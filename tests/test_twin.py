@@ -11,7 +11,9 @@ import pytest
 
 from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.errors import InputError, MissingParameterError, ResultFileError
+from drivetwin.identify.result import LoadLaw
 from drivetwin.logs.mapping import ChannelSpec
+from drivetwin.parameters import OVER_ETA
 from drivetwin.twin import Twin
 from tests.report.sample import SHIFT, STRIBECK, card, identification
 
@@ -28,6 +30,48 @@ def test_identifiable_engine_side_inertia_is_kept(twin: Twin) -> None:
     i_g = card().ratio("2")
     assert model.J1 * model.eta + model.J2e + model.J_out / i_g**2 == pytest.approx(J_prime)
     assert model.load.constant == pytest.approx(2300.0 * 5.38)
+
+
+def test_a_load_that_grows_with_speed_holds_the_told_value_at_the_mean_speed(
+    twin: Twin, tmp_path: Path
+) -> None:
+    law = LoadLaw(aero=4.8, std=0.1, mean_speed=14.3)
+    replace(twin, load_law=law).save(tmp_path / "twin.toml")
+    load = Twin.load(tmp_path / "twin.toml").dual_clutch(SHIFT).load
+    assert load.at(14.3) == pytest.approx(2300.0 * 5.38)
+    assert load.at(20.0) - load.at(10.0) == pytest.approx(4.8 * (20.0**2 - 10.0**2))
+
+
+def test_a_twin_of_the_schema_before_has_a_constant_load(twin: Twin, tmp_path: Path) -> None:
+    path = tmp_path / "twin.toml"
+    twin.save(path)
+    path.write_text(path.read_text().replace("drivetwin/twin-2", "drivetwin/twin-1"))
+    assert Twin.load(path).dual_clutch(SHIFT).load == twin.dual_clutch(SHIFT).load
+
+
+def test_without_a_torque_scale_the_model_is_over_eta_and_its_motion_the_same(twin: Twin) -> None:
+    eta = twin.parameters["eta"].value
+    assert eta is not None
+    told = dict(twin.parameters)
+    for name in ("J_prime_2", "J_prime_3", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o"):
+        one = told[name]
+        assert one.value is not None
+        told[name] = replace(one, value=None)
+        told[name + OVER_ETA] = replace(one, id=name + OVER_ETA, value=one.value / eta)
+    told["eta"] = replace(told["eta"], value=None)
+    curve = twin.friction["B3"]
+    law = {k: v if k == "v_s" else v / eta for k, v in (curve.stribeck or {}).items()}
+    partial = replace(twin, parameters=told, friction={"B3": replace(curve, stribeck=law)})
+    assert partial.over_eta
+    whole, ratio = twin.dual_clutch(SHIFT), partial.dual_clutch(SHIFT)
+    for name in ("J_out", "J_v", "k_o", "c_o"):
+        assert getattr(ratio, name) == pytest.approx(getattr(whole, name) / eta)
+    assert pytest.approx(whole.J1) == ratio.J1
+    scaled = partial.dual_clutch(SHIFT, overrides={"eta": eta})
+    assert scaled.k_o == pytest.approx(whole.k_o)
+    assert pytest.approx(whole.J1) == scaled.J1
+    law_found, law_true = scaled.elements[1].friction, whole.elements[1].friction
+    assert law_found.at(np.array([30.0])) == pytest.approx(law_true.at(np.array([30.0])))
 
 
 def test_locked_ratios_are_those_of_the_gears(twin: Twin) -> None:
@@ -115,8 +159,8 @@ def test_round_trip(twin: Twin, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("schema = 'drivetwin/twin-2'", "newer"),
-        ("schema = 'other'", "expected 'drivetwin/twin-1'"),
+        ("schema = 'drivetwin/twin-3'", "newer"),
+        ("schema = 'other'", "expected 'drivetwin/twin-2'"),
         ("schema = 'drivetwin/twin-1'", "cannot be read as a twin"),
         ("not toml", "cannot be read as a twin"),
     ],

@@ -79,6 +79,11 @@ class RoadLoad:
     rolling: float = 0.0
     aero: float = 0.0
 
+    def at(self, wheel_speed: float) -> float:
+        """Load torque at the wheel [N m] at a speed [rad/s] of either sign."""
+        turning = self.rolling * float(np.sign(wheel_speed))
+        return self.constant + turning + self.aero * wheel_speed * abs(wheel_speed)
+
 
 @dataclass(frozen=True)
 class DualClutch:

@@ -64,7 +64,8 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
     Raises MissingChannelError where neither input nor output speed is there.
     """
     ratio = _ratio(model, shift.offgoing)
-    twist, rate = _twist(model, log, ratio, time)
+    torque = _local(log["output_torque"], time) if "output_torque" in log else None
+    rate = torque.slope / model.k_o if torque is not None else 0.0
     motions = []
     if "input_speed" in log:
         motions.append((_local(log["input_speed"], time), ratio / model.i_in, 0.0))
@@ -81,11 +82,18 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
     weights = np.array([scale**2 / fit.variance for fit, scale, _ in motions])
     speeds = np.array([fit.value / scale + lead for fit, scale, lead in motions])
     output_speed = float(weights @ speeds / weights.sum())
+    wheel_speed = (output_speed - rate) / model.i_f
+    if torque is not None:
+        carried = torque.value - model.c_o * rate
+    else:
+        carried = _steady_torque(
+            model, _local(log["engine_torque"], time).value, ratio, wheel_speed
+        )
     return State(
         engine_speed=ratio * output_speed,
         output_speed=output_speed,
-        wheel_speed=(output_speed - rate) / model.i_f,
-        twist=twist,
+        wheel_speed=wheel_speed,
+        twist=carried / model.k_o,
         locked=(shift.offgoing,),
     )
 
@@ -96,15 +104,13 @@ def _ratio(model: DualClutch, element: str) -> float:
     return model.i_in * spec.i_c * spec.i_out
 
 
-def _twist(model: DualClutch, log: ShiftLog, ratio: float, time: float) -> tuple[float, float]:
-    """Shaft twist [rad] and twist rate ω_out - i_f·ω_w [rad/s] at `time`."""
-    if "output_torque" not in log:
-        load = model.load.constant / model.i_f
-        drive = ratio * model.eta * _local(log["engine_torque"], time).value
-        return (load + _share(model, ratio) * (drive - load)) / model.k_o, 0.0
-    torque_fit = _local(log["output_torque"], time)
-    rate = torque_fit.slope / model.k_o
-    return (torque_fit.value - model.c_o * rate) / model.k_o, rate
+def _steady_torque(
+    model: DualClutch, engine_torque: float, ratio: float, wheel_speed: float
+) -> float:
+    """Shaft torque [N m] at which both sides of the shaft accelerate alike."""
+    load = model.load.at(wheel_speed) / model.i_f
+    drive = ratio * model.eta * engine_torque
+    return load + _share(model, ratio) * (drive - load)
 
 
 def _share(model: DualClutch, ratio: float) -> float:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,16 @@ from drivetwin.driveline import (
     Stribeck,
 )
 from drivetwin.errors import InputError, MissingParameterError, Where
-from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, Identification, Method
+from drivetwin.identify.result import (
+    Estimate,
+    FloatArray,
+    FrictionCurve,
+    Identification,
+    LoadLaw,
+    Method,
+)
 from drivetwin.logs.mapping import ChannelSpec
+from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.shift import Shift
 from drivetwin.shown import Shown
 from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, Prior, VehicleCard
@@ -59,7 +67,8 @@ class Twin(Shown):
     `parameters` by id (see parameters.py), also those that could not be told; `friction` by
     element; `covariance` (n, n) over `covariance_ids`, total; `validity` the ranges of slip,
     pressure, torque and speed that the log covered; `inputs` file name -> SHA-256. The design
-    ranges [kg m^2] and `channels` by role are those of the vehicle card.
+    ranges [kg m^2] and `channels` by role are those of the vehicle card. `load_law` says how the
+    load torque grows with speed; None where it is constant.
     """
 
     name: str
@@ -81,6 +90,7 @@ class Twin(Shown):
     covariance_ids: tuple[str, ...] = ()
     covariance: FloatArray | None = None
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+    load_law: LoadLaw | None = None
 
     @classmethod
     def from_identification(cls, found: Identification, card: VehicleCard) -> Twin:
@@ -115,6 +125,8 @@ class Twin(Shown):
 
         Only Je = J1·η + J2e is identifiable: J′ = Je + Jo′/i_g² gives it, and it is carried as
         J2e = 0, J1 = Je/η. `overrides` sets parameters by id, in place of identified ones.
+        A twin that knows quantities over η only (`over_eta`) is simulated with the η of the
+        overrides, else with η = 1: the speeds are the same, all torques are then over η.
         Raises MissingParameterError naming every parameter that neither source gives, and
         InputError for a gear or element the twin does not know.
         """
@@ -122,7 +134,8 @@ class Twin(Shown):
         gear = self._inertia_gear(shift, given)
         inertia_id = f"J_prime_{gear}"
         needed = ("eta", inertia_id, "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
-        values = self._values(needed, given)
+        scale = given.get("eta", 1.0) if self.over_eta else 1.0
+        values = self._values(needed, given, scale)
         J_e = values[inertia_id] - values["J_out"] / self.gear(gear).ratio ** 2
         return DualClutch(
             J1=J_e / values["eta"],
@@ -135,9 +148,9 @@ class Twin(Shown):
             J_v=values["J_vehicle"],
             k_o=values["k_o"],
             c_o=values["c_o"],
-            load=RoadLoad(constant=values["Tv_over_if"] * self.final_drive),
+            load=self._load(values["Tv_over_if"], scale),
             elements=tuple(
-                self._element(name, partner, given)
+                self._element(name, partner, given, scale)
                 for name, partner in (
                     (shift.offgoing, shift.oncoming),
                     (shift.oncoming, shift.offgoing),
@@ -162,6 +175,13 @@ class Twin(Shown):
             channels=self.channels,
         )
 
+    def _load(self, Tv_over_if: float, scale: float) -> RoadLoad:
+        """Load at the wheel: constant, or with the part that grows with speed."""
+        law = self.load_law or LoadLaw(aero=0.0, std=0.0, mean_speed=0.0)
+        if law.over_eta:
+            law = replace(law, aero=scale * law.aero)
+        return law.road_load(Tv_over_if, self.final_drive)
+
     def gear(self, name: str) -> TwinGear:
         """Gear by its name on the card. Raises InputError where the twin has none such."""
         try:
@@ -177,30 +197,43 @@ class Twin(Shown):
         estimate = self.parameters.get(parameter_id)
         return default if estimate is None or estimate.value is None else estimate.value
 
+    @property
+    def over_eta(self) -> bool:
+        """Whether torque-like quantities are known over η only: no output torque was measured."""
+        return self._known("J_vehicle") is None and self._known("J_vehicle" + OVER_ETA) is not None
+
+    def _known(self, parameter_id: str) -> float | None:
+        estimate = self.parameters.get(parameter_id)
+        return None if estimate is None else estimate.value
+
     def _inertia_gear(self, shift: Shift, given: Mapping[str, float]) -> str:
         """Gear whose J′ carries the engine-side inertia: overridden, else told most narrowly."""
 
         def rank(gear: str) -> float:
             if f"J_prime_{gear}" in given:
                 return -1.0
-            estimate = self.parameters.get(f"J_prime_{gear}")
+            ending = OVER_ETA if self.over_eta else ""
+            estimate = self.parameters.get(f"J_prime_{gear}{ending}")
             if estimate is None or estimate.value is None:
                 return np.inf
             return estimate.std_total / estimate.value if estimate.std_total is not None else 1e9
 
         return min((shift.start_gear, shift.end_gear), key=rank)
 
-    def _values(self, ids: tuple[str, ...], given: Mapping[str, float]) -> dict[str, float]:
-        values, missing = {}, []
+    def _values(
+        self, ids: tuple[str, ...], given: Mapping[str, float], scale: float
+    ) -> dict[str, float]:
+        """Values of `ids`: given, told, or told over η and brought to `scale`."""
+        values, missing = {"eta": scale} if self.over_eta else {}, []
         for parameter_id in ids:
-            estimate = self.parameters.get(parameter_id)
-            value = given.get(parameter_id, None if estimate is None else estimate.value)
+            value = given.get(parameter_id, self._known(parameter_id))
+            ratio = self._known(parameter_id + OVER_ETA) if self.over_eta else None
+            if value is None and ratio is not None:
+                value = scale * ratio
             if value is not None:
                 values[parameter_id] = float(value)
-            elif estimate is None:
-                missing.append(f"{parameter_id} (not part of the identification)")
-            else:
-                missing.append(f"{parameter_id} ({estimate.reason or estimate.verdict.value})")
+            elif parameter_id not in values:
+                missing.append(f"{parameter_id} ({self._why_unknown(parameter_id)})")
         if missing:
             raise MissingParameterError(
                 f"the twin cannot be simulated without {'; '.join(missing)}",
@@ -209,7 +242,15 @@ class Twin(Shown):
             )
         return values
 
-    def _element(self, name: str, partner: str, given: Mapping[str, float]) -> ShiftElement:
+    def _why_unknown(self, parameter_id: str) -> str:
+        estimate = self.parameters.get(parameter_id)
+        if estimate is None:
+            return "not part of the identification"
+        return estimate.reason or estimate.verdict.value
+
+    def _element(
+        self, name: str, partner: str, given: Mapping[str, float], scale: float
+    ) -> ShiftElement:
         try:
             design = self.elements[name]
         except KeyError:
@@ -230,17 +271,18 @@ class Twin(Shown):
             i_out=design.i_out,
             gain=design.gain,
             P0=given.get(f"P0.{name}", self.value(f"P0.{name}", design.P0)),
-            friction=friction_law(curve),
+            friction=friction_law(curve, scale),
             peak=design.peak,
             drum_inertia=design.drum_inertia,
         )
 
 
-def friction_law(curve: FrictionCurve) -> Stribeck | FrictionTable:
-    """Fitted Stribeck law, or the smoothed curve continued flat to zero slip."""
+def friction_law(curve: FrictionCurve, scale: float = 1.0) -> Stribeck | FrictionTable:
+    """Fitted Stribeck law, or the smoothed curve continued flat to zero slip, times `scale`."""
     if curve.stribeck is not None:
-        return Stribeck(**curve.stribeck)
-    slip, mu = curve.slip.tolist(), curve.mu.tolist()
+        law = Stribeck(**curve.stribeck)
+        return Stribeck(scale * law.mu_c, scale * law.mu_s, law.v_s, scale * law.mu_v)
+    slip, mu = curve.slip.tolist(), (scale * curve.mu).tolist()
     if slip[0] > 0.0:
         slip, mu = [0.0, *slip], [mu[0], *mu]
     return FrictionTable(tuple(slip), tuple(mu))

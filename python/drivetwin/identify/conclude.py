@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin.identify.combine import combine
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.known import with_known
-from drivetwin.identify.result import Estimate, FrictionCurve
+from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw
 from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
 from drivetwin.identify.uncertainty import correlation, designed, judge, refused
 
@@ -33,6 +33,7 @@ class Conclusions:
     correlation_ids: tuple[str, ...]
     correlation: FloatArray
     warnings: tuple[str, ...]
+    load: LoadLaw | None = None
 
 
 def _low_gear_note(signals: ShiftSignals, gear: str) -> str:

@@ -36,6 +36,11 @@ from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.spec import VehicleCard
 
+LOADS = {
+    False: "is constant over the log",
+    True: "grows with the square of the wheel speed and else is constant over the log",
+}
+
 
 class Shifts(Protocol):
     """What shift detection hands over."""
@@ -88,9 +93,10 @@ def identify(
         settings=_settings(card, method),
         evidence={**evidence, "signals": tuple(signals)},
         warnings=(*log.warnings, *found.warnings),
-        assumptions=_assumptions(card, method),
+        assumptions=_assumptions(card, method, found.load is not None),
         correlation_ids=found.correlation_ids,
         correlation=found.correlation,
+        load=found.load,
     )
 
 
@@ -259,11 +265,11 @@ def _settings(card: VehicleCard, method: Method) -> dict[str, Any]:
     }
 
 
-def _assumptions(card: VehicleCard, method: Method) -> tuple[str, ...]:
+def _assumptions(card: VehicleCard, method: Method, growing: bool) -> tuple[str, ...]:
     texts = [
         f"loss law `{card.loss_law}` (THEORY section 3)",
         "gear ratios, final drive and clutch gains are as on the card",
-        "the load torque is constant over the log",
+        f"the load torque {LOADS[growing]}",
         "the off-going element carries no torque once its pressure is below P0",
     ]
     if method is Method.PAPER:

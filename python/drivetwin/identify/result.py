@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin.driveline import RoadLoad
 from drivetwin.identify.method import Method as Method
 from drivetwin.parameters import spec_of
 from drivetwin.shifts.shift import RejectedShift, Shift
@@ -94,6 +95,28 @@ class FrictionCurve:
 
 
 @dataclass(frozen=True)
+class LoadLaw:
+    """How the load torque at the wheel grows with the wheel's speed ω:
+
+        T_v(ω) = i_f·(T_v/i_f) + aero·(ω·|ω| - mean_speed²)
+
+    `aero` [N m s^2/rad^2] with its standard deviation (total); T_v/i_f, a parameter of its own,
+    holds at `mean_speed` [rad/s], the wheel's mean over the fit. `over_eta` marks a log without an
+    output torque: `aero` is then divided by η, as T_v/i_f is.
+    """
+
+    aero: float
+    std: float
+    mean_speed: float
+    over_eta: bool = False
+
+    def road_load(self, Tv_over_if: float, i_f: float) -> RoadLoad:
+        """The same law in the model's terms."""
+        constant = i_f * Tv_over_if - self.aero * self.mean_speed**2
+        return RoadLoad(constant=constant, aero=self.aero)
+
+
+@dataclass(frozen=True)
 class SignalFit:
     """Agreement of simulation and measurement in one phase of one signal (THEORY section 4)."""
 
@@ -108,6 +131,7 @@ class Identification(Shown):
     `fit[signal][phase]` with signals `output_torque`, `input_speed`, `output_speed` and phases
     `all`, `before`, `torque`, `inertia`, `after`. `evidence[stage]` is the stage's own dataclass
     (see the estimator files); the report draws from it. `correlation` is over `correlation_ids`.
+    `load` is None where the load torque is constant.
     """
 
     estimates: dict[str, Estimate]
@@ -126,3 +150,4 @@ class Identification(Shown):
     assumptions: tuple[str, ...] = ()
     correlation_ids: tuple[str, ...] = ()
     correlation: FloatArray | None = None
+    load: LoadLaw | None = None

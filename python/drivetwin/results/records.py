@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
 
 from drivetwin.errors import ResultFileError, Where
-from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, Verdict
+from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, LoadLaw, Verdict
 
 
 def finite_or_none(value: object) -> object:
@@ -36,6 +36,27 @@ class StribeckRecord(Record):
     mu_s: FiniteFloat
     v_s: FiniteFloat
     mu_v: FiniteFloat
+
+
+class LoadRecord(Record):
+    """T_v(ω) = i_f·(T_v/i_f) + aero·(ω·|ω| - mean_speed²) at the wheel; `std` of aero, total.
+
+    aero in N·m·s²/rad², mean_speed in rad/s; `over_eta`: aero is divided by η, as T_v/i_f is.
+    """
+
+    aero: FiniteFloat
+    std: FiniteFloat
+    mean_speed: FiniteFloat
+    over_eta: bool = False
+
+    @classmethod
+    def of(cls, law: LoadLaw | None) -> LoadRecord | None:
+        """Record of a law; None where the load is constant."""
+        return None if law is None else cls(**vars(law))
+
+    def law(self) -> LoadLaw:
+        """Back to the law."""
+        return LoadLaw(**self.model_dump())
 
 
 class FrictionRecord(Record):

@@ -17,6 +17,7 @@ from drivetwin.results.atomic import write_text
 from drivetwin.results.records import (
     FrictionRecord,
     Interval,
+    LoadRecord,
     OptionalFloat,
     ParameterRecord,
     Record,
@@ -27,7 +28,7 @@ from drivetwin.results.records import (
 from drivetwin.results.version import program_version
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
 
-RESULT_SCHEMA = "drivetwin/result-1"
+RESULT_SCHEMA = "drivetwin/result-2"
 
 
 class ShiftRecord(Record):
@@ -81,6 +82,7 @@ class ResultFile(Record):
     loss_law: Literal["paper", "dissipative"]
     parameters: dict[str, ParameterRecord]
     friction: dict[str, FrictionRecord]
+    load: LoadRecord | None = None
     shifts: list[ShiftRecord]
     rejected: list[RejectedRecord]
     fit: dict[str, dict[str, FitRecord]]
@@ -102,6 +104,7 @@ class ResultFile(Record):
                 "loss_law": found.loss_law,
                 "parameters": {k: ParameterRecord.of(e) for k, e in found.estimates.items()},
                 "friction": {k: FrictionRecord.of(c) for k, c in found.friction.items()},
+                "load": LoadRecord.of(found.load),
                 "shifts": [ShiftRecord.of(shift) for shift in found.shifts],
                 "rejected": [RejectedRecord.of(one) for one in found.rejected],
                 "fit": {

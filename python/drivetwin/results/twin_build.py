@@ -11,7 +11,7 @@ from drivetwin.identify.conclude import KNOWN
 from drivetwin.identify.result import FloatArray, Identification
 from drivetwin.identify.uncertainty import designed
 from drivetwin.logs.mapping import ChannelSpec
-from drivetwin.results.records import FrictionRecord, ParameterRecord
+from drivetwin.results.records import FrictionRecord, LoadRecord, ParameterRecord
 from drivetwin.results.result_file import plain
 from drivetwin.results.twin_file import (
     TWIN_SCHEMA,
@@ -63,6 +63,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
         covariance_ids=ids,
         covariance=covariance,
         channels=card.channels,
+        load_law=found.load,
     )
 
 
@@ -121,6 +122,7 @@ def file_of(twin: Twin) -> TwinFile:
         ),
         parameters={name: ParameterRecord.of(one) for name, one in twin.parameters.items()},
         friction={name: FrictionRecord.of(curve) for name, curve in twin.friction.items()},
+        load=LoadRecord.of(twin.load_law),
         covariance=None
         if twin.covariance is None
         else CovarianceRecord(ids=list(twin.covariance_ids), matrix=twin.covariance.tolist()),
@@ -178,4 +180,5 @@ def twin_from_file(content: TwinFile) -> Twin:
         covariance_ids=() if covariance is None else tuple(covariance.ids),
         covariance=None if covariance is None else np.asarray(covariance.matrix),
         channels={role: ChannelSpec(**one.model_dump()) for role, one in gearbox.channels.items()},
+        load_law=None if content.load is None else content.load.law(),
     )

@@ -16,6 +16,7 @@ from drivetwin.results.atomic import write_text
 from drivetwin.results.records import (
     FrictionRecord,
     Interval,
+    LoadRecord,
     ParameterRecord,
     Record,
     SchemaName,
@@ -23,7 +24,7 @@ from drivetwin.results.records import (
 )
 from drivetwin.vehicle.spec import ElementKind
 
-TWIN_SCHEMA = "drivetwin/twin-1"
+TWIN_SCHEMA = "drivetwin/twin-2"
 _HEADER = (
     "An identified driveline model; written by drivetwin. All values in SI units:",
     "rad, s, N*m, kg*m^2, Pa. A parameter without `value` could not be told from the log.",
@@ -98,6 +99,7 @@ class TwinFile(Record):
     transmission: TransmissionRecord
     parameters: dict[str, ParameterRecord]
     friction: dict[str, FrictionRecord]
+    load: LoadRecord | None = None
     covariance: CovarianceRecord | None = None
     validity: dict[str, Interval]
     inputs: dict[str, str]

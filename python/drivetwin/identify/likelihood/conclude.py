@@ -21,7 +21,8 @@ from drivetwin.identify.likelihood.null_space import null_directions
 from drivetwin.identify.likelihood.priors import over_eta
 from drivetwin.identify.likelihood.residuals import residual_tests
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
-from drivetwin.identify.result import Estimate, FrictionCurve, Verdict
+from drivetwin.identify.likelihood.unknowns import AERO
+from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
 from drivetwin.identify.uncertainty import correlation, designed, judge, refused
 from drivetwin.parameters import OVER_ETA
@@ -74,7 +75,18 @@ def conclude(
         tuple(values),
         correlation(covariance),
         (*dict.fromkeys(notes.values()), *_warnings(fit, signals)),
+        _load_law(fit, systematic),
     )
+
+
+def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
+    """How the load grows with speed; None where the fit has it constant."""
+    if AERO not in fit.point.names:
+        return None
+    k, part = fit.point.names.index(AERO), fit.problem.parts[0]
+    std = float(np.sqrt(fit.covariance[k, k] + systematic[k, k]))
+    mean_speed = part.structure.mean_speed
+    return LoadLaw(fit.point[AERO], std, mean_speed, over_eta=not part.scale_known)
 
 
 def _estimate(
