@@ -49,6 +49,11 @@ test-rust: $(venv)/.dev ## tests of the core
 test-python: $(venv)/.native ## tests of the package
 	$(bin)/pytest -q
 
+.PHONY: test-browser
+test-browser: $(venv)/.native ## report and workbench in Chromium; pictures go to out/browser
+	tools/browser.sh
+	$(bin)/pytest -q -m browser tests/browser
+
 .PHONY: wheel
 wheel: $(venv)/.dev ## the abi3 wheel, into dist/
 	rm -f dist/drivetwin-*.whl

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 
 from tools.tidy_rules.base import Fault, Tree
 
-WHOLE_PROGRAM = "tests/system"
+WHOLE_PROGRAM = ("tests/system", "tests/browser")
 GIVEN_LOGS = "given_logs"
 _SOURCE_ROOTS = ("python/drivetwin", ".")
 
@@ -17,14 +17,15 @@ def tests_mirror_sources(tree: Tree) -> Iterator[Fault]:
     """`tests/logs/test_units.py` tests the module `python/drivetwin/logs/units.py`.
 
     A second file on one module adds a word (`test_units_property.py`); `test_given_logs.py` runs
-    its whole folder on recordings from outside; tests of several folders stand in `tests/system`.
+    its whole folder on recordings from outside; tests of several folders stand in `tests/system`,
+    those that need a browser in `tests/browser`.
     """
     modules = {source.path.with_suffix("") for source in tree.below("", ".py", ".sh")}
     packages = {path.parent for path in modules}
     for source in tree.below("tests", ".py"):
         if not source.path.name.startswith("test_"):
             continue
-        if PurePosixPath(WHOLE_PROGRAM) in source.path.parents:
+        if any(PurePosixPath(one) in source.path.parents for one in WHOLE_PROGRAM):
             continue
         subject = source.path.stem.removeprefix("test_")
         folder = source.path.parent.relative_to("tests")
