@@ -71,7 +71,7 @@ def _artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
 
         save_single(Path(task.report), found, log)
     if task.traces is not None:
-        from drivetwin.fleet.traces import save_traces
+        from drivetwin.fleet.pages import save_traces
 
         save_traces(Path(task.traces), found)
 

@@ -118,6 +118,12 @@ class Index:
         with self._told():
             yield from self._db.execute(sql, values)
 
+    def named(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Names of the columns, and all rows, of a query."""
+        with self._told():
+            cursor = self._db.execute(sql)
+            return [column[0] for column in cursor.description], cursor.fetchall()
+
     def columns(self, table: str) -> list[str]:
         """Names of a table's columns."""
         return [row[1] for row in self.select(f"PRAGMA table_info({table})")]
@@ -125,8 +131,9 @@ class Index:
     def file(self, path: str) -> FileRow | None:
         """The file as last seen, None for a new one."""
         sql = "SELECT path, log, content, size, modified, rule, unit, fields FROM files"
-        for row in self.select(f"{sql} WHERE path = ?", path):
-            return FileRow(*row[:-1], json.loads(row[-1]))
+        for *known, text in self.select(f"{sql} WHERE path = ?", path):
+            place, log, content, size, modified, rule, unit = known
+            return FileRow(place, log, content, size, modified, rule, unit, json.loads(text))
         return None
 
     def seen_in_this_run(self, path: str) -> bool:

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""Figures of a fleet: a parameter over a field, its units side by side, friction of all logs."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import numpy as np
+import plotly.graph_objects as go
+
+from drivetwin.fleet.joint.mixed import FloatArray
+from drivetwin.fleet.joint.result import Drift, JointEstimate
+from drivetwin.fleet.rules import is_date
+from drivetwin.report.labels import parameter_label
+from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, axis, layout
+from drivetwin.report.units import display_of
+
+_MOST_POINTS = 4000
+_BAND = "rgba(213,94,0,0.18)"
+_Z95 = 1.96
+
+
+def drift_figure(one: JointEstimate) -> go.Figure:
+    """Every log over the first field, with the shared line, its 95 % band, changes and outliers.
+
+    Of very many logs every n-th is drawn.
+    """
+    display = display_of(one.si_unit)
+    drift, points = one.drifts[0], one.points
+    odd = {outlier.value for outlier in one.outliers}
+    out = np.isin(points.value, list(odd))
+    stride = -(-points.value.size // _MOST_POINTS)
+    kept = np.arange(0, points.value.size, stride)
+    figure = go.Figure()
+    for name, picked, colour, symbol in (
+        ("log", kept[~out[kept]], MEASURED, "circle"),
+        ("outlier", np.flatnonzero(out), ACCENT, "x"),
+    ):
+        if picked.size:
+            figure.add_scatter(
+                x=_shown(drift.field, points.reading[picked]),
+                y=display.of(points.value[picked]),
+                text=[points.unit[k] for k in picked],
+                mode="markers",
+                name=name,
+                marker={"color": colour, "size": 5 if name == "log" else 9, "symbol": symbol,
+                        "opacity": 0.45 if name == "log" else 1.0},
+                hovertemplate="unit %{text}: %{y:.4g}<extra></extra>",
+            )  # fmt: skip
+    _add_line(figure, one, drift)
+    for change in one.changes:
+        place = _shown(drift.field, np.array([0.5 * (change.before + change.after)]))[0]
+        figure.add_vline(x=place, line={"color": SECOND, "width": 1.5, "dash": "dash"})
+    figure.update_layout(
+        layout(
+            380,
+            xaxis=axis(drift.field),
+            yaxis=axis(f"{parameter_label(one.parameter)} [{display.label}]"),
+            hovermode="closest",
+        )
+    )
+    return figure
+
+
+def _add_line(figure: go.Figure, one: JointEstimate, drift: Drift) -> None:
+    """The shared line through the reference, and the band of its level and slope together."""
+    display = display_of(one.si_unit)
+    ends = np.linspace(np.min(one.points.reading), np.max(one.points.reading), 41)
+    away = ends - drift.reference
+    middle = one.value + drift.slope * away
+    level = 0.5 * (one.ci95[1] - one.ci95[0])
+    slope = 0.5 * (drift.ci95[1] - drift.ci95[0])
+    half = np.hypot(level, slope * away)
+    x = _shown(drift.field, ends)
+    figure.add_scatter(
+        x=np.concatenate((x, x[::-1])),
+        y=display.of(np.concatenate((middle + half, (middle - half)[::-1]))),
+        fill="toself",
+        fillcolor=_BAND,
+        line={"width": 0},
+        name="95 % of the fleet's mean",
+        hoverinfo="skip",
+    )
+    figure.add_scatter(
+        x=x, y=display.of(middle), mode="lines", name="fleet", line={"color": FITTED, "width": 2.2}
+    )
+
+
+def units_figure(one: JointEstimate) -> go.Figure:
+    """Deviations of the units with 95 % intervals, sorted; those beyond chance stand out."""
+    display = display_of(one.si_unit)
+    units = sorted(one.units, key=lambda unit: unit.deviation)
+    figure = go.Figure()
+    for odd, colour, name in ((False, MEASURED, "unit"), (True, ACCENT, "beyond chance")):
+        picked = [(k, unit) for k, unit in enumerate(units) if unit.odd is odd]
+        if not picked:
+            continue
+        figure.add_scatter(
+            x=[k for k, _ in picked],
+            y=[unit.deviation * display.factor for _, unit in picked],
+            error_y={
+                "array": [_Z95 * unit.std * display.factor for _, unit in picked],
+                "color": MUTED,
+                "thickness": 1,
+                "width": 0,
+            },
+            text=[unit_label(unit.unit, unit.since) for _, unit in picked],
+            mode="markers",
+            name=name,
+            marker={"color": colour, "size": 6},
+            hovertemplate="unit %{text}: %{y:.3g}<extra></extra>",
+        )
+    few = len(units) <= 80
+    ticks = [unit_label(unit.unit, unit.since) for unit in units] if few else None
+    figure.update_layout(
+        layout(
+            340,
+            xaxis=axis(
+                "unit, from low to high",
+                tickvals=list(range(len(units))) if few else None,
+                ticktext=ticks,
+                showticklabels=few,
+                tickfont={"size": 9},
+            ),
+            yaxis=axis(f"deviation of {parameter_label(one.parameter)} [{display.label}]"),
+            hovermode="closest",
+        )
+    )
+    return figure
+
+
+def unit_label(unit: str, since: float | None) -> str:
+    """A unit, or what became of it after a change."""
+    return unit if since is None else f"{unit} from {since:g}"
+
+
+def _shown(
+    field: str, readings: FloatArray
+) -> FloatArray | np.ndarray[tuple[int], np.dtype[np.object_]]:
+    """Readings as they are drawn: dates as such."""
+    if not is_date(field):
+        return readings
+    return np.array([datetime.fromtimestamp(each, UTC) for each in readings], dtype=object)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT
+"""Pages of single logs that share one plotly.js, and the samples behind them."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from drivetwin.identify.result import Identification
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.report.html import render_report, save_library
+from drivetwin.results.atomic import write_bytes, write_text
+
+LIBRARY = "plotly.js"
+
+
+def save_single(path: Path, found: Identification, log: ShiftLog) -> None:
+    """Write the report of one log beside the library that all reports of a fleet share."""
+    library = path.with_name(LIBRARY)
+    if not library.is_file():
+        save_library(library)
+    write_text(path, render_report(found, log, LIBRARY))
+
+
+def save_traces(path: Path, found: Identification) -> None:
+    """Write simulation over measurement as a Parquet table: shift, signal, time [s], values SI."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns: dict[str, list[object]] = {"shift": [], "signal": []}
+    numbers: dict[str, list[np.ndarray[tuple[int], np.dtype[np.float64]]]] = {
+        "time": [], "measured": [], "simulated": [],
+    }  # fmt: skip
+    for number, validation in enumerate(found.evidence.get("validation", ())):
+        for signal, trace in validation.traces.items():
+            columns["shift"] += [number] * trace.time.size
+            columns["signal"] += [signal] * trace.time.size
+            for name, parts in numbers.items():
+                parts.append(getattr(trace, name))
+    values = {name: np.concatenate([np.empty(0), *parts]) for name, parts in numbers.items()}
+    buffer = BytesIO()
+    pq.write_table(pa.table({**columns, **values}), buffer, compression="zstd")
+    write_bytes(path, buffer.getvalue())

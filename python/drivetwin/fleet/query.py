@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""SQL over a store by DuckDB: the Parquet parts, and the index beside them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drivetwin.errors import QueryError
+from drivetwin.fleet.index import Index
+from drivetwin.fleet.rows import RowKind, schema
+from drivetwin.fleet.store import Store
+from drivetwin.logs.extras import require
+
+_VIEWS = (RowKind.PARAMETER, RowKind.FRICTION, RowKind.FIT, RowKind.QUALITY, RowKind.WARNING)
+_TABLES = ("logs", "shifts", "settings")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Columns and rows of a query."""
+
+    columns: Sequence[str]
+    rows: Sequence[tuple[Any, ...]]
+
+
+def ask(store: Store, sql: str) -> Answer:
+    """Answer a question in SQL. The tables are
+
+    `rows`, all numbers of all logs; `files`, with a column for each field; `logs`, `shifts` and
+    `settings` of the index; and, with path, unit and fields of the file beside each row,
+    `parameters`, `frictions`, `fits`, `qualities` and `warnings`. Raises QueryError for a question
+    that DuckDB does not take, MissingExtraError without DuckDB.
+    """
+    duckdb = require("duckdb", "query", "a query", store.folder)
+    with duckdb.connect(config={"autoinstall_known_extensions": "false"}) as database:
+        _make_tables(database, store)
+        try:
+            database.execute(sql)
+            columns = [column[0] for column in database.description or ()]
+            return Answer(columns, database.fetchall() if columns else ())
+        except duckdb.Error as fault:
+            raise QueryError(
+                f"the database does not take this: {fault}",
+                "try `SELECT * FROM parameters LIMIT 5`; docs/howto/fleet.md lists the tables",
+            ) from None
+
+
+def _make_tables(database: Any, store: Store) -> None:
+    import pyarrow as pa
+
+    names = [str(path) for path in store.parts()]
+    if names:
+        database.from_parquet(names).create_view("rows")
+    else:
+        database.register("rows", schema().empty_table())
+    for table in _TABLES:
+        database.register(table, _table(store.index, f"SELECT * FROM {table}"))
+    files = _files(store.index)
+    database.register("files", pa.Table.from_pylist(files) if files else _table(store.index, _NO))
+    for kind in _VIEWS:
+        plural = {"quality": "qualities"}.get(kind.value, f"{kind.value}s")
+        database.execute(
+            f"CREATE VIEW {plural} AS SELECT files.* EXCLUDE (log), rows.* EXCLUDE (kind) "
+            f"FROM rows JOIN files USING (log) WHERE kind = '{kind.value}'"
+        )
+
+
+_NO = "SELECT path, log, rule, unit FROM files WHERE 0"
+
+
+def _table(index: Index, sql: str) -> Any:
+    """Arrow table of a query of the index."""
+    import pyarrow as pa
+
+    names, rows = index.named(sql)
+    return pa.table({name: [row[k] for row in rows] for k, name in enumerate(names)})
+
+
+def _files(index: Index) -> list[dict[str, Any]]:
+    """One row for each file, with its fields as columns; a field may be absent."""
+    found = [
+        {"path": path, "log": log, "rule": rule, "unit": unit, **json.loads(fields)}
+        for path, log, rule, unit, fields in index.select(
+            "SELECT path, log, rule, unit, fields FROM files ORDER BY path"
+        )
+    ]
+    columns = dict.fromkeys(name for row in found for name in row)
+    return [{name: row.get(name) for name in columns} for row in found]
+
+
+def save_answer(answer: Answer, path: Path) -> None:
+    """Write an answer as CSV, or as Parquet where the name ends so."""
+    from io import BytesIO, StringIO
+
+    from drivetwin.results.atomic import write_bytes, write_text
+
+    if path.suffix.casefold() == ".parquet":
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        table = pa.table({n: [row[k] for row in answer.rows] for k, n in enumerate(answer.columns)})
+        buffer = BytesIO()
+        pq.write_table(table, buffer)
+        write_bytes(path, buffer.getvalue())
+        return
+    import csv
+
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(answer.columns)
+    writer.writerows(answer.rows)
+    write_text(path, text.getvalue())
