@@ -99,5 +99,5 @@ def traces_text(runs: Sequence[Validation]) -> str:
         motion = run.trajectory
         input_speed = motion.engine_speed / run.model.i_in
         columns = (motion.time, motion.shaft_torque, input_speed, motion.output_speed)
-        lines += [",".join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)]
+        lines += [",".join(f"{value:.12g}" for value in row) for row in zip(*columns, strict=True)]
     return "\n".join(lines) + "\n"

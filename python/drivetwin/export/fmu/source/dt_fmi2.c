@@ -9,10 +9,24 @@
 #include "dt_fmu_twin.h"
 #include "fmi2Functions.h"
 
+/* The message is the format itself: importers exist that take no further arguments. */
+static void log_error(const dt_fmu *fmu) {
+    char format[2 * sizeof fmu->message];
+    size_t end = 0;
+    for (const char *from = fmu->message; *from != 0; ++from) {
+        if (*from == '%') {
+            format[end++] = '%';
+        }
+        format[end++] = *from;
+    }
+    format[end] = 0;
+    ((fmi2CallbackLogger)fmu->logger)(fmu->environment, fmu->name, fmi2Error, "logStatusError",
+                                      format);
+}
+
 static fmi2Status finish(dt_fmu *fmu, int done) {
     if (!done && fmu->logger != 0) {
-        ((fmi2CallbackLogger)fmu->logger)(fmu->environment, fmu->name, fmi2Error, "logStatusError",
-                                          "%s", fmu->message);
+        log_error(fmu);
     }
     return done ? fmi2OK : fmi2Error;
 }
@@ -40,7 +54,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (fmuType != fmi2CoSimulation || fmuGUID == 0 || strcmp(fmuGUID, DT_FMU_TOKEN) != 0) {
         if (functions != 0 && functions->logger != 0) {
             functions->logger(functions->componentEnvironment, instanceName, fmi2Error,
-                              "logStatusError", "%s",
+                              "logStatusError",
                               fmuType != fmi2CoSimulation ? "only co-simulation is provided"
                                                           : "the GUID is not that of this FMU");
         }

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: MIT
+"""The C sources as a user gets them: strict compilers, no mutable data, sanitizers, the runner."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivetwin.driveline import FrictionTable
+from drivetwin.errors import InputError
+from drivetwin.export.c.write import c_string, twin_source, write_c
+from tests.export.cases import CASES, Case, paper_subject
+
+STRICT = (
+    *("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror"),
+    *("-Wshadow", "-Wdouble-promotion"),
+)
+SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+CORTEX_M = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
+
+
+@pytest.fixture
+def sources(tmp_path: Path) -> list[Path]:
+    """Paths of the C files of the paper's driveline."""
+    return [path for path in write_c(paper_subject(), tmp_path) if path.suffix == ".c"]
+
+
+def compiler(name: str) -> str:
+    found = shutil.which(name)
+    if found is None:
+        pytest.skip(f"{name} is not installed")
+    return found
+
+
+def call(*command: str | Path, text: str | None = None) -> str:
+    done = subprocess.run(
+        [str(part) for part in command], capture_output=True, text=True, input=text, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+def table(case: Case) -> str:
+    """Inputs of a case as the runner reads them."""
+    rows = np.column_stack((case.time, case.inputs)).tolist()
+    return "time,torque,off,on\n" + "\n".join(",".join(map(repr, row)) for row in rows)
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_compiles_without_a_warning(sources: list[Path], tmp_path: Path, real: str) -> None:
+    define = ["-DDT_FLOAT"] if real == "float" else []
+    call(compiler("gcc"), *STRICT, *define, *sources, "-lm", "-o", tmp_path / "run")
+
+
+def test_compiles_for_a_microcontroller_without_mutable_data(
+    sources: list[Path], tmp_path: Path
+) -> None:
+    gcc = compiler("arm-none-eabi-gcc")
+    size = compiler("arm-none-eabi-size")
+    for source in sources:
+        if source.name == "dt_run.c":
+            continue
+        target = tmp_path / f"{source.stem}.o"
+        call(gcc, *CORTEX_M, *STRICT, "-O2", "-DDT_FLOAT", "-c", source, "-o", target)
+        data, bss = call(size, target).splitlines()[1].split()[1:3]
+        assert (source.name, data, bss) == (source.name, "0", "0")
+
+
+def test_neither_heap_nor_recursion_nor_library_beyond_math(
+    sources: list[Path], tmp_path: Path
+) -> None:
+    nm = compiler("nm")
+    for source in sources:
+        if source.name == "dt_run.c":
+            continue
+        target = tmp_path / f"{source.stem}.o"
+        call(compiler("gcc"), "-std=c99", "-O2", "-fno-builtin", "-c", source, "-o", target)
+        wanted = set(re.findall(r"^ +U (\w+)$", call(nm, target), re.M))
+        foreign = {name for name in wanted if not name.startswith("dt_")}
+        assert foreign <= {"exp", "pow", "sqrt", "fabs", "memcpy", "memset"}, source.name
+
+
+def test_runner_is_clean_under_sanitizers_and_within_the_reference(tmp_path: Path) -> None:
+    case = CASES["tie_up"]()
+    sources = [path for path in write_c(case.subject, tmp_path) if path.suffix == ".c"]
+    program = tmp_path / "run"
+    call(compiler("gcc"), "-std=c99", *SANITIZERS, *sources, "-lm", "-o", program)
+    for arguments in ([], ["hold"]):
+        rows = call(program, *arguments, text=table(case)).splitlines()
+        told = np.genfromtxt(rows, delimiter=",", names=True)
+        assert told.size == case.time.size
+        deviation = case.deviation(told["output_torque"])
+        assert (deviation < 1e-3) == (not arguments)
+
+
+def test_the_same_twin_gives_the_same_files(tmp_path: Path) -> None:
+    first, second = (write_c(paper_subject(), tmp_path / name) for name in ("a", "b"))
+    assert [p.name for p in first] == [p.name for p in second]
+    assert all(a.read_bytes() == b.read_bytes() for a, b in zip(first, second, strict=True))
+
+
+def test_a_table_of_friction_is_written_point_by_point() -> None:
+    subject = paper_subject()
+    off, on = subject.model.elements
+    law = FrictionTable((0.0, 5.0, 40.0), (0.14, 0.12, 0.11))
+    model = replace(subject.model, elements=(off, replace(on, friction=law)))
+    text = twin_source(replace(subject, model=model))
+    assert ".clutch[1].friction.points = 3," in text
+    assert ".clutch[1].friction.slip[2] = DT_C(40.0)," in text
+    assert ".clutch[1].friction.mu[0] = DT_C(0.14)," in text
+
+
+def test_what_c_cannot_hold_is_refused() -> None:
+    subject = paper_subject()
+    off, on = subject.model.elements
+    slip = tuple(float(i) for i in range(65))
+    long = replace(on, friction=FrictionTable(slip, (0.1,) * 65))
+    with pytest.raises(InputError, match="friction table of B3 has 65 points"):
+        twin_source(replace(subject, model=replace(subject.model, elements=(off, long))))
+    three = replace(subject.model, elements=(off, on, on))
+    with pytest.raises(InputError, match="3 shift elements"):
+        twin_source(replace(subject, model=three))
+    with pytest.raises(InputError, match="not a finite number: k_o"):
+        twin_source(replace(subject, model=replace(subject.model, k_o=float("nan"))))
+
+
+@given(st.text(max_size=30))
+def test_any_name_becomes_one_string_literal(text: str) -> None:
+    try:
+        data = text.encode()
+    except UnicodeEncodeError:
+        return
+    literal = c_string(text)
+    body = re.sub(r"\\(\d{3})", lambda m: chr(int(m[1], 8)), literal[1:-1])
+    assert body.encode("latin-1") == data
+    assert re.fullmatch(r'"(?:[^"\\\n]|\\[0-7]{3})*"', literal)
+
+
+@given(st.text(max_size=30).filter(lambda text: text.isprintable()))
+def test_any_name_of_a_twin_leaves_the_source_whole(text: str) -> None:
+    source = twin_source(replace(paper_subject(), name=text, note=text))
+    assert source.count("/*") == source.count("*/")
+    assert "#include" in source.splitlines()[3]

@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: MIT
+"""FMUs as importers see them: FMPy's checks, simulation, parameters, states, many instances."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
+from fmpy.validation import validate_fmu
+
+from drivetwin.driveline import FloatArray
+from drivetwin.export.compiler import compile_library, native_platform
+from drivetwin.export.entries import entries_of, start_entries
+from drivetwin.export.fmu.build import BuildOptions, build_fmu, identifier
+from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.fmu.version import FmiVersion
+from drivetwin.stepped import stepped_run
+from drivetwin.stepping import InputKind
+from tests.export.cases import CASES, STEP, Case
+
+pytestmark = pytest.mark.skipif(
+    native_platform() is None, reason="FMI names no platform like this one"
+)
+INPUTS = [1, 2, 3]
+SPEED, TORQUE, MODES = 10, 14, (30, 31)
+START_SPEED, LOCKED, STIFFNESS = 50, 41, 107
+
+
+@dataclass(frozen=True)
+class Built:
+    """An FMU and the case behind it."""
+
+    path: Path
+    case: Case
+
+
+@pytest.fixture(scope="module", params=list(FmiVersion))
+def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """The upshift of the paper with itself as experiment."""
+    case = CASES["dual_clutch_upshift"]()
+    path = tmp_path_factory.mktemp("fmu") / f"shift_{request.param.name}.fmu"
+    build_fmu(case.subject, path, options(request.param, case))
+    return Built(path, case)
+
+
+def options(version: FmiVersion, case: Case) -> BuildOptions:
+    return BuildOptions(version, (), Experiment("upshift", case.time, case.inputs, STEP))
+
+
+class Instance:
+    """An instance of either version by FMPy's own binding; messages are collected."""
+
+    def __init__(self, path: Path, folder: str, name: str = "one") -> None:
+        description = fmpy.read_model_description(str(path))
+        self.is_fmi2 = description.fmiVersion == "2.0"
+        self.messages: list[str] = []
+        kind = FMU2Slave if self.is_fmi2 else FMU3Slave
+        self.fmu = kind(
+            guid=description.guid,
+            unzipDirectory=folder,
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        self._callbacks = self._fmi2_callbacks() if self.is_fmi2 else None
+        self.instantiate()
+
+    def instantiate(self) -> None:
+        if self.is_fmi2:
+            self.fmu.instantiate(callbacks=self._callbacks)
+        else:
+            self.fmu.instantiate(logMessage=self._log)
+
+    def _fmi2_callbacks(self) -> object:
+        from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+
+        def log(*arguments: object) -> None:
+            self.messages.append(str(arguments[-1]))
+
+        callbacks = fmi2CallbackFunctions()
+        callbacks.logger = fmi2CallbackLoggerTYPE(log)
+        return callbacks
+
+    def _log(self, *arguments: object) -> None:
+        self.messages.append(str(arguments[-1]))
+
+    def initialize(self, inputs: FloatArray) -> None:
+        if self.is_fmi2:
+            self.fmu.setupExperiment(startTime=0.0)
+            self.fmu.enterInitializationMode()
+        else:
+            self.fmu.enterInitializationMode(startTime=0.0)
+        self.set(INPUTS, inputs)
+        self.fmu.exitInitializationMode()
+
+    def set(self, references: list[int], values: FloatArray | list[float]) -> None:
+        setter = self.fmu.setReal if self.is_fmi2 else self.fmu.setFloat64
+        setter(references, [float(value) for value in values])
+
+    def get(self, *references: int) -> list[float]:
+        getter = self.fmu.getReal if self.is_fmi2 else self.fmu.getFloat64
+        return list(getter(list(references)))
+
+    def run(self, case: Case, first: int, last: int) -> FloatArray:
+        """Engine speed and output torque (n, 2) after each step; FMI 2.0 gets input rates."""
+        rows = []
+        for i in range(first, last):
+            h = float(case.time[i + 1] - case.time[i])
+            self.set(INPUTS, case.inputs[i])
+            if self.is_fmi2:
+                rates = (case.inputs[i + 1] - case.inputs[i]) / h
+                self.fmu.setRealInputDerivatives(INPUTS, [1, 1, 1], [float(r) for r in rates])
+            self.fmu.doStep(float(case.time[i]), h)
+            rows.append(self.get(SPEED, TORQUE))
+        return np.array(rows)
+
+    def free(self) -> None:
+        self.fmu.freeInstance()
+
+
+@pytest.fixture
+def instance(built: Built) -> Iterator[Instance]:
+    folder = fmpy.extract(str(built.path))
+    one = Instance(built.path, folder)
+    yield one
+    one.free()
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def test_fmpy_finds_no_fault(built: Built) -> None:
+    assert validate_fmu(str(built.path)) == []
+
+
+def test_the_same_twin_gives_the_same_bytes(built: Built, tmp_path: Path) -> None:
+    again = tmp_path / built.path.name
+    version = FmiVersion(fmpy.read_model_description(str(built.path)).fmiVersion)
+    build_fmu(built.case.subject, again, options(version, built.case))
+    assert again.read_bytes() == built.path.read_bytes()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_reference_problem_as_the_core_has_it(built: Built, name: str) -> None:
+    """By `simulate_fmu`, which holds inputs; the problem's parameters come as start values."""
+    case = CASES[name]()
+    subject = case.subject
+    numbers = (*entries_of(subject.model), *start_entries(subject.start))
+    columns = [("time", float), *((n, float) for n in ("engine_torque", "B2.pressure"))]
+    dtype = np.dtype([*columns, ("B3.pressure", float)])
+    signals = np.array([(t, *row) for t, row in zip(case.time, case.inputs, strict=True)], dtype)
+    told = fmpy.simulate_fmu(
+        str(built.path),
+        start_time=case.time[0],
+        stop_time=case.time[-1],
+        output_interval=STEP,
+        start_values={one.name: one.value for one in numbers},
+        input=signals,
+        output=["engine_speed", "output_torque"],
+        fmi_type="CoSimulation",
+    )
+    core = stepped_run(subject.model, subject.start, case.time, case.inputs, InputKind.HOLD)
+    for column, expected in (
+        ("engine_speed", core.engine_speed),
+        ("output_torque", core.shaft_torque),
+    ):
+        assert np.abs(told[column] - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_inputs_with_their_rates_meet_the_tight_reference(built: Built, instance: Instance) -> None:
+    """FMI 2.0 interpolates inputs; FMI 3.0, which has no such rates, holds them."""
+    case = built.case
+    subject = case.subject
+    instance.initialize(case.inputs[0])
+    told = instance.run(case, 0, case.time.size - 1)
+    kind = InputKind.LINEAR if instance.is_fmi2 else InputKind.HOLD
+    core = stepped_run(subject.model, subject.start, case.time, case.inputs, kind)
+    for column, expected in zip(told.T, (core.engine_speed, core.shaft_torque), strict=True):
+        assert np.abs(column - expected[1:]).max() < 1e-9 * np.abs(expected).max()
+    if instance.is_fmi2:
+        torque = np.concatenate([[core.shaft_torque[0]], told[:, 1]])
+        assert case.deviation(torque) < 1e-3
+
+
+def test_a_state_saved_in_mid_shift_goes_on_the_same_way(built: Built, instance: Instance) -> None:
+    case = built.case
+    instance.initialize(case.inputs[0])
+    instance.run(case, 0, 600)
+    saved = instance.fmu.getFMUState()
+    packed = instance.fmu.serializeFMUState(saved)
+    first = instance.run(case, 600, 900)
+    instance.fmu.setFMUState(saved)
+    assert np.array_equal(instance.run(case, 600, 900), first)
+    unpacked = instance.fmu.deserializeFMUState(packed)
+    instance.fmu.setFMUState(unpacked)
+    assert np.array_equal(instance.run(case, 600, 900), first)
+    for state in (saved, unpacked):
+        instance.fmu.freeFMUState(state)
+
+
+def test_reset_starts_again(built: Built, instance: Instance) -> None:
+    case = built.case
+    instance.initialize(case.inputs[0])
+    first = instance.run(case, 0, 400)
+    instance.set([STIFFNESS], [1e5])
+    instance.fmu.reset()
+    instance.initialize(case.inputs[0])
+    assert np.array_equal(instance.run(case, 0, 400), first)
+
+
+def test_parameters_are_tuned_while_it_runs(built: Built, instance: Instance) -> None:
+    case = built.case
+    description = fmpy.read_model_description(str(built.path))
+    by_name = {one.name: one for one in description.modelVariables}
+    assert by_name["k_o"].valueReference == STIFFNESS
+    assert (by_name["k_o"].variability, by_name["k_o"].unit) == ("tunable", "N.m/rad")
+    speed = by_name["start.engine_speed"]
+    assert (speed.valueReference, speed.displayUnit) == (START_SPEED, "rpm")
+    instance.initialize(case.inputs[0])
+    before = instance.run(case, 0, 100)[-1, 1]
+    assert instance.get(STIFFNESS) == [case.subject.model.k_o]
+    instance.set([STIFFNESS], [2.0 * case.subject.model.k_o])
+    assert instance.get(STIFFNESS) == [2.0 * case.subject.model.k_o]
+    after = instance.run(case, 100, 101)[-1, 1]
+    assert after > 1.5 * before
+
+
+@pytest.mark.parametrize(
+    ("reference", "value", "told"),
+    [
+        (STIFFNESS, -1.0, "parameter out of range: k_o"),
+        (START_SPEED, float("nan"), "not a finite number"),
+        (9999, 1.0, "value reference cannot be set"),
+    ],
+)
+def test_bad_values_are_errors_with_a_message(
+    built: Built, instance: Instance, reference: int, value: float, told: str
+) -> None:
+    def start() -> None:
+        instance.set([reference], [value])
+        instance.initialize(built.case.inputs[0])
+
+    with pytest.raises(FMICallException):
+        start()
+    assert any(told in message for message in instance.messages)
+
+
+def test_a_locked_element_that_is_none_is_refused(instance: Instance) -> None:
+    setter = instance.fmu.setInteger if instance.is_fmi2 else instance.fmu.setInt32
+    with pytest.raises(FMICallException):
+        setter([LOCKED], [7])
+    assert any("not a value of this variable" in message for message in instance.messages)
+
+
+def test_a_thousand_instances_at_once(built: Built, instance: Instance) -> None:
+    case, fmu = built.case, instance.fmu
+    instance.initialize(case.inputs[0])
+    expected = instance.run(case, 0, 3)[-1]
+    first, many = fmu.component, []
+    for _ in range(1000):
+        instance.instantiate()
+        instance.initialize(case.inputs[0])
+        many.append(fmu.component)
+    for i in range(3):
+        for fmu.component in many:
+            instance.run(case, i, i + 1)
+    for fmu.component in many:
+        assert np.array_equal(instance.get(SPEED, TORQUE), expected)
+        fmu.fmi2FreeInstance(fmu.component) if instance.is_fmi2 else fmu.fmi3FreeInstance(
+            fmu.component
+        )
+    fmu.component = first
+
+
+def test_experiment_inside_repeats_from_the_archive_alone(built: Built, instance: Instance) -> None:
+    """Stimulus and result that travel with the FMU agree with what it does."""
+    place = "extra/org.fmi-standard.fmi-ls-ref/measured_shift"
+    with zipfile.ZipFile(built.path) as archive:
+        stimulus, result = (
+            np.genfromtxt(
+                archive.read(f"{place}-{end}.csv").decode().splitlines(),
+                delimiter=",",
+                skip_header=1,
+            )
+            for end in ("in", "ref")
+        )
+        manifest = archive.read("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml").decode()
+        assert "resources/parameters.ssv" in archive.namelist()
+    assert 'role="experiment/validation"' in manifest
+    assert np.array_equal(stimulus[:, 0], built.case.time)
+    instance.initialize(stimulus[0, 1:])
+    told = instance.run(built.case, 0, built.case.time.size - 1)
+    for column, expected in ((0, result[:, 1]), (1, result[:, 5])):
+        assert np.abs(told[:, column] - expected[1:]).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_sources_inside_are_complete(built: Built, tmp_path: Path) -> None:
+    """What the description lists is what is there, and it compiles alone."""
+    with zipfile.ZipFile(built.path) as archive:
+        archive.extractall(tmp_path)
+    folder = tmp_path / "sources"
+    fmi3 = folder / "buildDescription.xml"
+    text = (fmi3 if fmi3.exists() else tmp_path / "modelDescription.xml").read_text("utf-8")
+    listed = re.findall(r'File name="([^"]+)"', text)
+    assert sorted(listed) == sorted(path.name for path in folder.glob("*.c"))
+    compile_library([folder / name for name in listed], tmp_path / "again.so", None)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("paper 2-3", "paper_2_3"), ("7G Wörth", "twin_7G_W_rth"), ("", "twin"), ("a", "a")],
+)
+def test_identifier_is_one_of_c(name: str, expected: str) -> None:
+    assert identifier(name) == expected

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""A twin, exported by the program with a measured shift, does what `drivetwin simulate` does."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from itertools import pairwise
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+
+from drivetwin.cli import main
+from drivetwin.export.compiler import native_platform
+
+ROOT = Path(__file__).resolve().parents[2]
+STIMULUS = "extra/org.fmi-standard.fmi-ls-ref/measured_shift-in.csv"
+INPUTS = ["engine_torque", "B2.pressure", "B3.pressure"]
+
+
+@pytest.fixture(scope="module")
+def identified(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A log with noise, and the twin that an identification of it gives."""
+    folder = tmp_path_factory.mktemp("identified")
+    log = folder / "shift.csv"
+    assert main(["synth", "-o", str(log)]) == 0
+    card, out = str(log.with_suffix(".card.toml")), str(folder / "out")
+    assert main(["identify", str(log), "--vehicle", card, "--method", "integral", "-o", out]) == 0
+    return log, folder / "out" / "twin.toml"
+
+
+def simulated(log: Path, twin: Path, path: Path, kind: str) -> np.ndarray:
+    """Columns of `drivetwin simulate` at 1 ms steps."""
+    arguments = ["simulate", str(twin), str(log), "--step", "0.001", "--input", kind]
+    assert main([*arguments, "-o", str(path)]) == 0
+    return np.genfromtxt(path, delimiter=",", skip_header=2)
+
+
+def stimulus_of(path: Path) -> np.ndarray:
+    with zipfile.ZipFile(path) as archive:
+        text = archive.read(STIMULUS).decode().splitlines()
+    return np.genfromtxt(text, delimiter=",", skip_header=1)
+
+
+def same(told: np.ndarray, expected: np.ndarray) -> bool:
+    """Within 1e-9 of the largest value of every column."""
+    largest = np.abs(expected).max(axis=0)
+    return bool((np.abs(told - expected).max(axis=0) < 1e-9 * largest).all())
+
+
+@pytest.mark.skipif(native_platform() is None, reason="FMI names no platform like this one")
+def test_fmu_3_with_the_log_as_input_is_simulate_with_held_inputs(
+    identified: tuple[Path, Path], tmp_path: Path
+) -> None:
+    log, twin = identified
+    path = tmp_path / "shift.fmu"
+    assert main(["export", str(twin), "--to", "fmu", "--fmi", "3.0", "--log", str(log),
+                 "-o", str(path)]) == 0  # fmt: skip
+    stimulus = stimulus_of(path)
+    signals = np.array(
+        [tuple(row) for row in stimulus], [(name, float) for name in ("time", *INPUTS)]
+    )
+    told = fmpy.simulate_fmu(
+        str(path),
+        output_interval=1e-3,
+        input=signals,
+        output=["output_torque", "engine_speed", "output_speed"],
+    )
+    expected = simulated(log, twin, tmp_path / "hold.csv", "hold")
+    columns = np.column_stack(
+        [told["time"], told["output_torque"], told["engine_speed"], told["output_speed"]]
+    )
+    assert same(columns, expected)
+
+
+@pytest.mark.skipif(native_platform() is None, reason="FMI names no platform like this one")
+def test_fmu_2_with_input_rates_is_simulate_with_linear_inputs(
+    identified: tuple[Path, Path], tmp_path: Path
+) -> None:
+    log, twin = identified
+    path = tmp_path / "shift.fmu"
+    assert main(["export", str(twin), "--to", "fmu", "--log", str(log), "-o", str(path)]) == 0
+    stimulus = stimulus_of(path)
+    description = fmpy.read_model_description(str(path))
+    fmu = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=fmpy.extract(str(path)),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="shift",
+    )
+    number = {one.name: one.valueReference for one in description.modelVariables}
+    inputs = [number[name] for name in INPUTS]
+    outputs = [number[name] for name in ("output_torque", "engine_speed", "output_speed")]
+    fmu.instantiate()
+    fmu.setupExperiment(startTime=stimulus[0, 0])
+    fmu.enterInitializationMode()
+    fmu.setReal(inputs, stimulus[0, 1:].tolist())
+    fmu.exitInitializationMode()
+    rows = [fmu.getReal(outputs)]
+    for now, after in pairwise(stimulus):
+        h = after[0] - now[0]
+        fmu.setReal(inputs, now[1:].tolist())
+        fmu.setRealInputDerivatives(inputs, [1, 1, 1], ((after - now)[1:] / h).tolist())
+        fmu.doStep(now[0], h)
+        rows.append(fmu.getReal(outputs))
+    fmu.freeInstance()
+    expected = simulated(log, twin, tmp_path / "linear.csv", "linear")
+    assert same(np.column_stack([stimulus[:, 0], np.array(rows)]), expected)
+
+
+def test_c_sources_and_what_is_refused(
+    identified: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, twin = identified
+    folder = tmp_path / "c"
+    capsys.readouterr()
+    assert main(["export", str(twin), "--to", "c", "--log", str(log), "-o", str(folder),
+                 "--json"]) == 0  # fmt: skip
+    assert json.loads(capsys.readouterr().out)["file"] == str(folder)
+    assert "dt_twin_params" in (folder / "dt_twin.c").read_text("utf-8")
+    for bad, told in (("2", "does not name two gears"), ("2-7", "no gear '7'")):
+        target = str(tmp_path / "other")
+        assert main(["export", str(twin), "--to", "c", "--shift", bad, "-o", target]) == 2
+        assert told in capsys.readouterr().err
+    assert not (tmp_path / "other").exists()
+    arguments = ["export", str(twin), "--to", "c", "--shift", "3-2", "--log", str(log)]
+    assert main([*arguments, "-o", str(tmp_path / "other")]) == 2
+    assert "no shift 3-2" in capsys.readouterr().err
