@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.recorded import recorded
+from drivetwin.progress import tell
 from drivetwin.shifts.shift import Shift
 from drivetwin.shown import Shown
 from drivetwin.start_state import calm_moment, start_state
@@ -141,9 +142,16 @@ def validated(found: Identification, twin: Twin, log: ShiftLog) -> Identificatio
     warning says which: the other parameters stand all the same. Raises MissingChannelError.
     """
     try:
-        return with_fit(found, [validate(twin, log, shift) for shift in found.shifts])
+        return with_fit(found, list(_runs(twin, log, found.shifts)))
     except MissingParameterError as incomplete:
         return replace(found, warnings=(*found.warnings, f"no validation: {incomplete.what}"))
+
+
+def _runs(twin: Twin, log: ShiftLog, shifts: Sequence[Shift]) -> Iterator[Validation]:
+    """Simulate one shift after the other, telling how far it is."""
+    for count, shift in enumerate(shifts):
+        tell(count / len(shifts))
+        yield validate(twin, log, shift)
 
 
 def fit_of(measured: FloatArray, simulated: FloatArray, mean: float) -> SignalFit:

@@ -33,6 +33,7 @@ from drivetwin.driveline import FloatArray
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, Reduction, reduce
 from drivetwin.network import NetworkRun, Output, simulate
+from drivetwin.progress import tell
 
 STEP = 1e-3
 """Time between recorded samples, s: eighty per period of the output shaft."""
@@ -65,7 +66,8 @@ def run(gearbox: Gearbox, powertrain: Powertrain, plan: Plan) -> DriveRun:
         raise InputError("the plan has no legs", "give at least one leg, with pedal and end")
     driver = _Driver(gearbox, powertrain)
     state = driver.begin(plan[0])
-    for leg in plan:
+    for count, leg in enumerate(plan):
+        tell(count / (len(plan) + 1))
         state = driver.drive(leg, state)
     motion = driver.simulate(state.schedule, _grid(0, round(state.time / STEP)), audit=True)
     return observe(gearbox, powertrain, state.schedule, state.actions, motion)

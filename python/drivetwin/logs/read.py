@@ -25,6 +25,7 @@ from drivetwin.logs.roles import FOR_SHIFTS, quantity_of
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.logs.units import channel_unit, lookup
 from drivetwin.logs.validate import check_channel
+from drivetwin.progress import tell
 from drivetwin.vehicle.card import VehicleCard
 
 
@@ -53,7 +54,8 @@ def read_log(
         specs = {**card.channels, **stated.channels}
         mapped = resolve(recording.columns, specs, kinds, needed, str(path))
         warnings = [*recording.warnings, *mapped.warnings]
-        for role, spec in mapped.channels.items():
+        for count, (role, spec) in enumerate(mapped.channels.items()):
+            tell(count / len(mapped.channels))
             raw = _load(recording, spec, window)
             warnings += [f"channel {raw.name!r}: {note}" for note in raw.notes]
             warnings += _asserted(spec, raw)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
+from itertools import count
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -13,6 +14,7 @@ from plotly.offline import get_plotlyjs
 
 from drivetwin.identify.result import Identification
 from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.progress import part, tell
 from drivetwin.report.packing import Store, packed
 from drivetwin.report.sections.blocks import FigureBlock, Section
 from drivetwin.report.sections.evidence import evidence_sections
@@ -34,11 +36,13 @@ def save_report(path: Path, found: Identification, log: ShiftLog) -> None:
 
 def render_report(found: Identification, log: ShiftLog, library: str | None = None) -> str:
     """HTML text of the report; equal inputs give equal text. `library` as in `render_page`."""
+    with part(0.0, 0.5):
+        sections = report_sections(found, log)
     shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in found.shifts)
     return render_page(
         title=f"Driveline model from {Path(log.source).name}",
         subtitle=f"shift {shifts} · method {found.method.value} · loss law {found.loss_law}",
-        sections=report_sections(found, log),
+        sections=sections,
         library=library,
     )
 
@@ -75,7 +79,14 @@ def render_page(
         lstrip_blocks=True,
     )
     store = Store()
-    environment.filters["figure_json"] = lambda block: figure_json(block, store)
+    figures = sum(isinstance(block, FigureBlock) for one in sections for block in one.blocks)
+    drawn = count(1)
+
+    def as_json(block: FigureBlock) -> Markup:
+        tell(next(drawn) / (figures + 1))
+        return figure_json(block, store)
+
+    environment.filters["figure_json"] = as_json
     return environment.get_template("report.html.j2").render(
         title=title,
         subtitle=subtitle,

@@ -7,7 +7,7 @@
     modeBarButtons: [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
   };
   /* Paper is narrower than the screen and always light. */
-  const paper = { width: 690, shrink: 0.8, tallest: 820 };
+  const paper = { width: 690, shrink: 0.8, tallest: 770 };
   /* Points drawn of one curve: more than a screen has columns. */
   const mostPoints = 4000;
   const plots = [];
