@@ -51,6 +51,9 @@ _SPECS = (
     ParameterSpec("zeta", "ζ", "1", "damping ratio of the lock-up oscillation", 0.0, 1.0, "gear"),
     ParameterSpec("P0", "P0", "Pa", "pressure at which the clutch fill ends", 0.0, 1e7, "element"),
     ParameterSpec("mu", "μ", "1", "friction at the slip where a fleet compares", 0, 1, "element"),
+    ParameterSpec(
+        "drum", "I_d", "kg*m^2", "drum that runs with the slip (THEORY §2)", 0.0, 1e4, "element"
+    ),
     ParameterSpec("te_delay", "τ_e", "s", "age of a fresh engine torque value", -1.0, 1.0),
 )
 

@@ -14,6 +14,7 @@ from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
 from drivetwin.cli.export import export
+from drivetwin.cli.fleet import fleet
 from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
 from drivetwin.cli.inspect import inspect
@@ -50,6 +51,7 @@ for command in (
 ):
     app.command()(command)
 app.command(name="app")(workbench)
+app.add_typer(fleet, name="fleet")
 
 
 def _version(wanted: bool) -> None:

@@ -92,12 +92,15 @@ def slip_of(signals: ShiftSignals, driveline: Driveline, time: FloatArray) -> Fl
 
 
 def _filled(signals: ShiftSignals, driveline: Driveline, settings: FrictionSettings) -> float:
-    """Instant in the torque phase from which the on-coming element is surely filled [s]."""
+    """Instant of the shift from which the on-coming element is surely filled [s].
+
+    It comes after break-away where that element only takes hold at the other gear's speed.
+    """
     element = driveline.oncoming
     pressure = signals.pressures[element.name]
     limit = element.P0.value + 2.0 * element.P0.std + settings.fill_margin
     smooth = np.convolve(pressure.values, np.ones(9) / 9.0, mode="same")
-    start, end = signals.shift.before[1], signals.shift.inertia_phase[0]
+    start, end = signals.shift.before[1], signals.shift.lockup_time
     inside = (pressure.time >= start) & (pressure.time <= end)
     below = pressure.time[inside & (smooth < limit)]
     return float(below[-1]) if below.size else start
@@ -110,9 +113,10 @@ def _spans(
     shift = signals.shift
     sigma = shift.sigma
     clear = settings.margin + 3.0 * sigma.get("inertia_start", 0.0)
-    torque = (_filled(signals, driveline, settings), shift.inertia_phase[0] - clear)
+    filled = _filled(signals, driveline, settings)
+    torque = (filled, shift.inertia_phase[0] - clear)
     lockup = shift.lockup_time - settings.margin - 3.0 * sigma.get("lockup", 0.0)
-    return torque, (max(free, shift.inertia_phase[0] + clear), lockup)
+    return torque, (max(free, filled, shift.inertia_phase[0] + clear), lockup)
 
 
 def _windows(signals: ShiftSignals, span: Span, settings: FrictionSettings) -> Windows:

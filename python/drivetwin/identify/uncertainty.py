@@ -29,6 +29,7 @@ _EXPERIMENT = {
     "zeta": "hold the pedal still for a second after a firm lock-up",
     "P0": "record a shift with a slower pressure ramp, or shifts at two torque levels",
     "mu": "record shifts whose inertia phase passes the slip asked for",
+    "drum": "state the drum inertias on the vehicle card from design",
     "te_delay": "step the pedal in gear: a constant torque has no visible age",
 }
 

@@ -50,7 +50,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
             gear.name: TwinGear(card.ratio(gear.name), card.element_of(gear.name))
             for gear in card.gears
         },
-        elements={name: _element(card, name) for name in card.elements},
+        elements={name: _element(card, name, found) for name in card.elements},
         J_prime_range=card.J_prime_range,
         J_vehicle_range=card.J_vehicle_range,
         parameters=parameters,
@@ -67,12 +67,13 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
     )
 
 
-def _element(card: VehicleCard, name: str) -> TwinElement:
+def _element(card: VehicleCard, name: str, found: Identification) -> TwinElement:
+    """Design data of an element, its drum as the log tells it where it does."""
     spec = card.elements[name]
     i_c, i_out = card.clutch_ratios(name)
-    return TwinElement(
-        spec.kind, i_c, i_out, spec.gain, spec.P0.value, spec.peak, spec.drum_inertia.value
-    )
+    told = found.estimates.get(f"drum.{name}")
+    drum = spec.drum_inertia.value if told is None or told.value is None else told.value
+    return TwinElement(spec.kind, i_c, i_out, spec.gain, spec.P0.value, spec.peak, drum)
 
 
 def _borrowed_friction(found: Identification) -> list[str]:

@@ -5,6 +5,7 @@ use super::channel::{Channel, Law};
 use super::constraints::{Coordinates, coordinates};
 use super::error::CompileError;
 use super::linalg::{Matrix, independent_rows, solve};
+use super::mode::{ModeKey, Motion};
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
 use crate::model::{Driveline, FrictionLaw};
 use crate::number::Real;
@@ -96,6 +97,8 @@ pub struct Network<T> {
     /// Node torques of everything but rigid couplings and stuck friction, over the basis: nodes ×
     /// basis.
     pub node_torques: Matrix<T>,
+    /// What all modes share where no gear's loss depends on its state.
+    pub(super) motion: Option<Motion<T>>,
 }
 
 impl<T: Real> Network<T> {
@@ -126,6 +129,7 @@ impl<T: Real> Network<T> {
             channels: Vec::new(),
             drives: Vec::new(),
             lags: Vec::new(),
+            motion: None,
         };
         network.set_mass();
         network.give_mass_between_frictions();
@@ -134,6 +138,9 @@ impl<T: Real> Network<T> {
         network.refuse_prescribed_twice()?;
         network.add_drives();
         network.node_torques = network.assemble_node_torques();
+        if !network.losses.iter().any(|gear| gear.loss.is_directional()) {
+            network.motion = network.motion(ModeKey::default());
+        }
         Ok(network)
     }
 

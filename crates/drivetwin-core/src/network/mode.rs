@@ -7,6 +7,8 @@ use super::constraints::force_map;
 use super::linalg::{Matrix, independent_rows, least_norm, solve};
 use crate::model::mechanism::{Loss, LossLaw};
 use crate::number::Real;
+use std::borrow::Cow;
+use std::sync::OnceLock;
 
 /// How a lossy gear moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,11 +78,24 @@ pub struct Mode<T> {
     /// Their torques in that order (a held gear's is its loss torque), then the torques of
     /// prescribed speeds; rows × basis.
     pub stuck_torque: Matrix<T>,
-    /// Torque entering each lossy gear at its driving side, losses × basis.
-    pub gear_torque: Matrix<T>,
+    /// See [`Mode::gear_torque`].
+    gear_torque: OnceLock<Matrix<T>>,
     /// Whether more is stuck than there are speeds to hold; the torque split then depends on the
     /// capacities.
     pub redundant: bool,
+}
+
+/// What all modes with the same states of the lossy gears share.
+#[derive(Clone, Debug)]
+pub struct Motion<T> {
+    /// Rows of the constraints as their forces act on the nodes.
+    force_rows: Matrix<T>,
+    /// Node torques over the basis, with the drag of the gears.
+    node_torques: Matrix<T>,
+    /// Accelerations of the independent speeds per node torque, speeds × nodes.
+    mobility: Matrix<T>,
+    /// Accelerations with nothing at rest, speeds × basis.
+    free: Matrix<T>,
 }
 
 /// Bounds of the loss torque of a gear at rest, as lines over the torque through it: each bound is
@@ -150,18 +165,21 @@ impl<T: Real> Network<T> {
     /// Compile one mode. `capacity[j]` weighs the torque split of redundant locks.
     /// `None` if the efficiencies leave the accelerations undetermined.
     pub fn mode(&self, key: ModeKey, capacity: &[T]) -> Option<Mode<T>> {
-        let n = &self.coordinates.speeds;
-        let efficiency = |_: &_, constraint: usize| self.efficiency(key, constraint);
-        let (map, force_rows) = force_map(&self.mechanism, &self.coordinates, efficiency)?;
-        let node_torques = self.with_drag(key);
-        let kt = map.transposed();
-        let mass = kt.times(&self.inertia).times(n);
-        let free = solve(&mass, &kt.times(&node_torques)).ok()?;
-
+        let motion = self.motion_of(key)?;
         let stuck = key.rows();
+        if stuck.is_empty() && self.prescribed.is_empty() {
+            return Some(Mode {
+                key,
+                derivative: self.with_other_states(&motion.free),
+                stuck,
+                stuck_torque: Matrix::zeros(0, self.basis()),
+                gear_torque: OnceLock::new(),
+                redundant: false,
+            });
+        }
         let (speeds, nodes) = self.held_speeds(&stuck);
-        let response = solve(&mass, &kt.times(&nodes)).ok()?;
-        let mut needed = speeds.times(&free);
+        let response = motion.mobility.times(&nodes);
+        let mut needed = speeds.times(&motion.free);
         for i in 0..self.prescribed.len() {
             needed[(stuck.len() + i, self.first_rate() + i)] -= 1.0;
         }
@@ -171,17 +189,36 @@ impl<T: Real> Network<T> {
             &self.weights(&stuck, capacity),
             stuck.len(),
         );
-        let acceleration = difference(&free, &response.times(&stuck_torque));
-        let torques = difference(&node_torques, &nodes.times(&stuck_torque));
-        let residual = difference(&torques, &self.inertia.times(n).times(&acceleration));
+        let acceleration = difference(&motion.free, &response.times(&stuck_torque));
         Some(Mode {
             key,
             derivative: self.with_other_states(&acceleration),
-            gear_torque: self.gear_torques(&force_rows, &residual, (&stuck, &stuck_torque))?,
+            gear_torque: OnceLock::new(),
             stuck_torque,
             stuck,
             redundant,
         })
+    }
+
+    /// The motion that the modes of a key share; compiled with the network where it has no gear whose
+    /// loss depends on its state.
+    fn motion_of(&self, key: ModeKey) -> Option<Cow<'_, Motion<T>>> {
+        match &self.motion {
+            Some(motion) => Some(Cow::Borrowed(motion)),
+            None => self.motion(key).map(Cow::Owned),
+        }
+    }
+
+    /// `None` if the efficiencies leave the accelerations undetermined.
+    pub(super) fn motion(&self, key: ModeKey) -> Option<Motion<T>> {
+        let efficiency = |_: &_, constraint: usize| self.efficiency(key, constraint);
+        let (map, force_rows) = force_map(&self.mechanism, &self.coordinates, efficiency)?;
+        let node_torques = self.with_drag(key);
+        let kt = map.transposed();
+        let mass = kt.times(&self.inertia).times(&self.coordinates.speeds);
+        let mobility = solve(&mass, &kt).ok()?;
+        let free = mobility.times(&node_torques);
+        Some(Motion { force_rows, node_torques, mobility, free })
     }
 
     fn efficiency(&self, key: ModeKey, constraint: usize) -> Option<T> {
@@ -264,29 +301,37 @@ impl<T: Real> Network<T> {
         }
         derivative
     }
+}
 
-    /// Torques entering the lossy gears: the multipliers of their constraints from the balance of
-    /// the dependent nodes, `D_depᵀ λ = (f - I ω')_dep`, and at rest the loss torque on top.
-    fn gear_torques(
-        &self,
-        force_rows: &Matrix<T>,
-        residual: &Matrix<T>,
-        (stuck, stuck_torque): (&[Row], &Matrix<T>),
-    ) -> Option<Matrix<T>> {
-        let dependent = &self.coordinates.dependent;
-        let balance = force_rows.transposed().select_rows(dependent);
-        let multipliers = solve(&balance, &residual.select_rows(dependent)).ok()?;
-        let lossy: Vec<usize> = self.losses.iter().map(|loss| loss.constraint).collect();
-        let mut entering = multipliers.select_rows(&lossy);
-        for (position, &row) in stuck.iter().enumerate() {
-            if let Row::Gear(i) = row {
-                for (total, &loss) in entering.row_mut(i).iter_mut().zip(stuck_torque.row(position))
-                {
-                    *total += loss;
+impl<T: Real> Mode<T> {
+    /// Torque entering each lossy gear at its driving side, losses × basis: the multipliers of their
+    /// constraints from the balance of the dependent nodes, `D_depᵀ λ = (f - I ω')_dep`, and at rest
+    /// the loss torque on top. Computed when first asked for.
+    pub fn gear_torque(&self, network: &Network<T>) -> &Matrix<T> {
+        self.gear_torque.get_or_init(|| {
+            let motion = network.motion_of(self.key).expect("compiled with the mode");
+            let (_, nodes) = network.held_speeds(&self.stuck);
+            let torques = difference(&motion.node_torques, &nodes.times(&self.stuck_torque));
+            let mut acceleration = Matrix::zeros(network.speeds(), network.basis());
+            for i in 0..network.speeds() {
+                acceleration.row_mut(i).copy_from_slice(self.derivative.row(i));
+            }
+            let inertia = network.inertia.times(&network.coordinates.speeds);
+            let residual = difference(&torques, &inertia.times(&acceleration));
+            let dependent = &network.coordinates.dependent;
+            let balance = motion.force_rows.transposed().select_rows(dependent);
+            let multipliers = solve(&balance, &residual.select_rows(dependent));
+            let multipliers = multipliers.expect("the forces determine the accelerations");
+            let lossy: Vec<usize> = network.losses.iter().map(|loss| loss.constraint).collect();
+            let mut entering = multipliers.select_rows(&lossy);
+            for (position, &row) in self.stuck.iter().enumerate() {
+                if let Row::Gear(i) = row {
+                    let loss = self.stuck_torque.row(position);
+                    entering.row_mut(i).iter_mut().zip(loss).for_each(|(total, &l)| *total += l);
                 }
             }
-        }
-        Some(entering)
+            entering
+        })
     }
 }
 

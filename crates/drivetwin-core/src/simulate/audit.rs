@@ -106,7 +106,7 @@ impl Auditor {
 
     fn add_gear_losses<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
         for (i, gear) in run.network.losses.iter().enumerate() {
-            let torque = form(run.mode.gear_torque.row(i), basis);
+            let torque = form(run.mode.gear_torque(run.network).row(i), basis);
             let speed = form(&gear.speed, basis);
             let lost = match run.gears[i] {
                 GearState::Held => 0.0,

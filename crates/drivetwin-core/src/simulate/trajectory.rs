@@ -153,7 +153,7 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
         let mut picked = [0; BLOCK];
         let mut length = 0;
         for k in 0..count {
-            if self.grid.get(self.next + length) == Some(&run.segment_start(first + k)) {
+            if self.grid.get(self.next + length) == Some(&run.knot(first + k)) {
                 picked[length] = k;
                 length += 1;
             }

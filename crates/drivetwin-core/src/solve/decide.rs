@@ -214,7 +214,7 @@ impl<T: Real> Integrator<'_, T> {
                     (-capacities[j].re(), f64::INFINITY)
                 }
                 Row::Friction(j) => (-capacities[j].re(), capacities[j].re()),
-                Row::Gear(g) => self.gear_bounds(g, form(mode.gear_torque.row(g), basis).re()),
+                Row::Gear(g) => self.gear_bounds(g, form(mode.gear_torque(self.network).row(g), basis).re()),
             };
             let (excess, sign) =
                 if torque > high { (torque - high, 1.0) } else { (low - torque, -1.0) };
@@ -253,9 +253,12 @@ impl<T: Real> Integrator<'_, T> {
     fn is_reversed(&self, gear: GearState, i: usize, (mode, basis): (&Mode<T>, &[T])) -> bool {
         let GearState::Rolling { sign, backward } = gear else { return false };
         let loss = &self.network.losses[i].loss;
-        let (torque, scale) = sum_and_scale(mode.gear_torque.row(i), basis);
+        if !loss.is_directional() {
+            return false;
+        }
+        let (torque, scale) = sum_and_scale(mode.gear_torque(self.network).row(i), basis);
         let excess = torque * sign - loss.threshold().re();
-        loss.is_directional() && excess.abs() > ROUND_OFF * scale && (excess < 0.0) != backward
+        excess.abs() > ROUND_OFF * scale && (excess < 0.0) != backward
     }
 
     /// Acceleration [rad/s²] of a row's speed and the size of the terms it is the sum of.

@@ -113,7 +113,7 @@ fn gear_guards<T: Real>(
     if !gear.loss.is_directional() {
         return;
     }
-    let torque = expansion.form(watch.network, watch.mode.gear_torque.row(i));
+    let torque = expansion.form(watch.network, watch.mode.gear_torque(watch.network).row(i));
     match watch.gears[i] {
         GearState::Rolling { sign, backward } => {
             let mut power = scaled(&torque, T::of(sign));

@@ -168,6 +168,11 @@ impl<T: Real> Inputs<T> {
         (self.knots[i], self.knots[i + 1])
     }
 
+    /// Start of segment `i`, or the end of the last where `i` is their number [s].
+    pub fn knot(&self, i: usize) -> f64 {
+        self.knots[i]
+    }
+
     /// Whether all inputs are linear within every segment.
     pub fn is_sampled(&self) -> bool {
         self.sines.iter().all(Option::is_none)

@@ -150,9 +150,9 @@ impl<'a, T: Real> Integrator<'a, T> {
         let frictions = network.frictions.len();
         let none = vec![T::zero_(); frictions];
         let mode = network.mode(ModeKey::default(), &none);
+        let mode = Arc::new(mode.ok_or_else(|| self_locking(network, t))?);
         let mut run = Self {
             rows: vec![RowState::Open; frictions],
-            mode: Arc::new(mode.ok_or_else(|| self_locking(network, t))?),
             expansion: Expansion::new(network),
             events: Vec::new(),
             t: T::of(t),
@@ -167,7 +167,8 @@ impl<'a, T: Real> Integrator<'a, T> {
             network,
             inputs,
             settings,
-            modes: HashMap::new(),
+            modes: HashMap::from([(mode.key, Arc::clone(&mode))]),
+            mode,
             sprints: Cache::new(),
             segment: 0,
             pending: None,
@@ -194,6 +195,9 @@ impl<'a, T: Real> Integrator<'a, T> {
         }
         if self.settings.sprint {
             self.sprint(sink);
+            if self.is_at_end() {
+                return Ok(None);
+            }
         }
         let end = self.inputs.span(self.segment).1;
         let remaining = (-self.t + end).re();
@@ -224,14 +228,23 @@ impl<'a, T: Real> Integrator<'a, T> {
         Ok(Some(Step { start, length }))
     }
 
-    /// Start of a segment between input samples, s.
-    pub fn segment_start(&self, segment: usize) -> f64 {
-        self.inputs.span(segment).0
+    /// Time of a knot of the inputs, s; they have one more than segments.
+    pub fn knot(&self, i: usize) -> f64 {
+        self.inputs.knot(i)
     }
 
-    /// Value of an input at the start of a segment.
-    pub fn input_at(&self, segment: usize, input: usize) -> T {
-        self.inputs.lines(segment)[input][0]
+    /// Value of an input at a knot.
+    pub fn input_at(&self, i: usize, input: usize) -> T {
+        if i < self.inputs.segments() {
+            return self.inputs.lines(i)[input][0];
+        }
+        let [start, rate] = self.inputs.lines(i - 1)[input];
+        start + rate * (self.inputs.knot(i) - self.inputs.knot(i - 1))
+    }
+
+    /// Whether the inputs end here.
+    pub(super) fn is_at_end(&self) -> bool {
+        self.t.re() >= self.inputs.knot(self.inputs.segments())
     }
 
     /// Mode of a key, compiled once.

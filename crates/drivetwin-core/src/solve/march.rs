@@ -35,8 +35,6 @@ pub struct Trail<L, const N: usize, const A: usize> {
     pub torques: [[L; A]; BLOCK],
 }
 
-/// What torques may deviate from their chord within a sample, relative to their size.
-const BOW: f64 = 0.05;
 /// Largest cubic part of a channel over a sample, relative to its size.
 const MAX_CUBIC: f64 = 2e-4;
 /// Largest change of a channel by the correction, relative to its size.
@@ -63,13 +61,12 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
             *carry = Carry::start::<F, N>(op, source, segment, x);
         }
         trail.states[k] = *x;
-        for a in 0..A {
-            trail.torques[k][a] = carry.value[a].value;
-        }
+        carry.torques(&mut trail.torques[k]);
         let mut least = step::<L, F, N, A>(op, (source, h), segment, (x, carry));
         for (place, guard) in guards.iter_mut().enumerate().take(op.watched.len()) {
             let after = op.guard::<F, A>(place, source, (segment, h), (x, carry));
-            let bow = (guard[0] - after[0]).magnitude() + guard[1].upper(after[1]).times(BOW);
+            let rise = (guard[0] - after[0]).magnitude();
+            let bow = op.bow[0].values() * rise + op.bow[1].values() * guard[1].upper(after[1]);
             least = least.lower(guard[0].lower(after[0]) - bow);
             *guard = after;
         }
@@ -224,6 +221,14 @@ impl<L: Lane, const N: usize> Operators<L, N> {
 }
 
 impl<L: Lane, const A: usize> Carry<L, A> {
+    /// The torques.
+    #[inline(always)]
+    pub fn torques(&self, out: &mut [L; A]) {
+        for a in 0..A {
+            out[a] = self.value[a].value;
+        }
+    }
+
     /// Everything at the start of a segment.
     #[inline(always)]
     pub fn start<const F: bool, const N: usize>(

@@ -22,6 +22,9 @@ pub const MAX_WATCHED: usize = 12;
 pub struct Operators<L, const N: usize> {
     /// Number of states.
     states: usize,
+    /// What a watched form may deviate from its chord within a sample, relative to its rise and to its
+    /// size.
+    pub bow: [L; 2],
     /// Columns of the transition matrix.
     pub transition: [[L; N]; N],
     /// What is there without state and inputs.
@@ -170,8 +173,10 @@ impl<T: Real, const N: usize> Operators<T, N> {
                 })
             })
             .collect();
+        // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
+        let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
         let mut operators =
-            Self { states: n, transition, constant, drives, channels: vec![], watched: vec![], loads: vec![] };
+            Self { states: n, bow, transition, constant, drives, channels: vec![], watched: vec![], loads: vec![] };
         for (slot, &j) in active.iter().enumerate() {
             let argument: [T; N] = std::array::from_fn(|i| {
                 network.channels[j].arguments[0].get(i).map_or(T::zero_(), |&c| c)

@@ -68,9 +68,6 @@ impl<T: Real> Integrator<'_, T> {
         let on = |j: &usize| self.cells[*j] != Cell::Off;
         let active: Vec<usize> = (0..self.cells.len()).filter(on).collect();
         let Some(operators) = self.operators(&active, h) else { return };
-        // The last sample of all is left to the expansion, which knows the end.
-        let last = self.segment + count == self.inputs.segments();
-        let count = count - usize::from(last);
         let active = &active[..];
         match &*operators {
             AnySize::Four(operators) => self.pass(operators, active, (h, count), sink),
@@ -81,7 +78,9 @@ impl<T: Real> Integrator<'_, T> {
                 }
             }
         }
-        self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
+        if !self.is_at_end() {
+            self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
+        }
     }
 
     /// Pass samples with operators of known size.
@@ -203,7 +202,7 @@ impl<T: Real> Integrator<'_, T> {
             }
             let side = if backward { -1.0 } else { 1.0 };
             let scaled = |row: &[T], by: f64| row.iter().map(|&c| c * by).collect::<Vec<T>>();
-            let power = scaled(self.mode.gear_torque.row(i), sign * side);
+            let power = scaled(self.mode.gear_torque(self.network).row(i), sign * side);
             let limit = constant(-gear.loss.threshold() * side);
             operators.watch(self.network, active, &power, (limit, false));
             let speed = scaled(&gear.speed, sign);
@@ -253,7 +252,13 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
             }
         }
         run.x.copy_from_slice(&x[..n]);
-        run.t = T::of(run.inputs.span(run.segment).0);
+        run.t = T::of(run.inputs.knot(run.segment));
+        if run.segment == run.inputs.segments() {
+            trail.states[0] = x;
+            carry.torques(&mut trail.torques[0]);
+            sink.passed(run, active, &trail, (run.segment, 1));
+            run.segment -= 1;
+        }
     }
 }
 

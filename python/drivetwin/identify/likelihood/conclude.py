@@ -114,10 +114,13 @@ def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
         return drivelines[0].J_out
     if name == "J_out" + OVER_ETA and drivelines[0].J_out is not None:
         return over_eta(drivelines[0].J_out)
-    if name.startswith("P0."):
-        couplings = [c for d in drivelines for c in (d.offgoing, d.oncoming)]
-        return next(c.P0 for c in couplings if c.name == name.removeprefix("P0."))
-    return None
+    stem, _, element = name.partition(".")
+    coupling = drivelines[0].couplings.get(element.removesuffix(OVER_ETA))
+    if coupling is None or stem not in ("P0", "drum"):
+        return None
+    if stem == "P0":
+        return coupling.P0
+    return over_eta(coupling.drum) if name.endswith(OVER_ETA) else coupling.drum
 
 
 def _systematic(matrix: FloatArray, systematic: FloatArray) -> dict[int, float]:

@@ -17,7 +17,7 @@ from drivetwin.identify.likelihood.unknowns import Point, Structure
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.parameters import OVER_ETA, spec_of
 
-TORQUE_LIKE = ("J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+TORQUE_LIKE = ("J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "drum")
 """Stems of parameters that share the one scale that only an output torque shows."""
 DIRECT = ("J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Unknowns that are parameters themselves."""
@@ -39,6 +39,8 @@ def parameters(problem: Problem, point: Point, signals: Sequence[ShiftSignals]) 
         values |= {f"f_d_{s.shift.end_gear}": f_d, f"zeta_{s.shift.end_gear}": zeta}
         for element in structure.elements:
             values[f"P0.{element.name}"] = structure.value(point, f"{element.name}.P0")
+    for element in structures[0].driveline.drums:
+        values[f"drum.{element.name}"] = first.value(point, f"{element.name}.drum")
     return values if signals[0].scale_known else _over_eta(values)
 
 
@@ -54,7 +56,7 @@ def _over_eta(values: dict[str, float]) -> dict[str, float]:
 def absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
     """Ids that a log without an output torque cannot tell."""
     gears = dict.fromkeys(g for s in signals for g in (s.shift.start_gear, s.shift.end_gear))
-    others = tuple(stem for stem in TORQUE_LIKE if stem != "J_prime")
+    others = tuple(stem for stem in TORQUE_LIKE if stem in DIRECT)
     return ("eta", *(f"J_prime_{gear}" for gear in gears), *others)
 
 
@@ -62,7 +64,7 @@ def oscillation(structure: Structure, point: Point) -> tuple[float, float]:
     """Damped frequency [Hz] and damping ratio of the lock-up oscillation."""
     d = structure.driveline
     inertia = structure.value(point, "J_e")
-    for one in structure.elements:
+    for one in (*structure.elements, *structure.spinning):
         inertia += structure.value(point, f"{one.name}.drum") * (one.a - one.b / d.i_after) ** 2
     J4 = inertia * d.i_after**2 + structure.value(point, "J_out")
     J5 = structure.value(point, "J_vehicle") / d.i_f**2

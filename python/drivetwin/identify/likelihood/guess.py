@@ -60,8 +60,8 @@ def _laws(shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]) -> d
             law = {key: float(theta[i]) for key, i in zip(LAW, order, strict=True)}
         laws[d.oncoming.name] = law
         laws.setdefault(d.offgoing.name, law)
-        for e in (d.offgoing, d.oncoming):
-            found |= {f"{e.name}.P0": e.P0.value, f"{e.name}.drum": e.drum.value}
+        found |= {f"{e.name}.P0": e.P0.value for e in (d.offgoing, d.oncoming)}
+        found |= {f"{e.name}.drum": e.drum.value for e in d.couplings.values()}
         if shift.friction is not None:
             found[f"{d.oncoming.name}.P0"] = shift.friction.P0
     for name, law in laws.items():

@@ -8,6 +8,7 @@ those of the linear friction fit.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -139,14 +140,19 @@ def shows_age(torque: Sampled) -> bool:
 
 
 def spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
-    """Span [s] of the log that each shift accounts for; no sample is counted twice."""
-    found: list[Span] = []
-    for s in signals:
-        start = s.shift.before[0]
-        if found:
-            start = max(start, found[-1][1])
-        found.append((start, s.shift.after[1]))
-    return tuple(found)
+    """Span [s] of the log that each shift accounts for; no sample is counted twice.
+
+    A gear between two shifts is divided in its middle: each run then starts in a gear that is
+    surely held, and ends before the next shift's pressures act.
+    """
+    shifts = [s.shift for s in signals]
+    middles = [0.5 * (max(a.after[0], b.before[0]) + b.before[1]) for a, b in pairwise(shifts)]
+    starts = [shifts[0].before[0], *middles]
+    ends = [*middles, shifts[-1].after[1]]
+    return tuple(
+        (max(start, one.before[0]), min(end, one.after[1]))
+        for start, end, one in zip(starts, ends, shifts, strict=True)
+    )
 
 
 def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
@@ -172,8 +178,10 @@ def _laws(drivelines: Sequence[Driveline]) -> list[str]:
 
 
 def _fills(drivelines: Sequence[Driveline]) -> list[str]:
+    """P0 of the elements of the shifts, and drums of all that have one."""
     elements = dict.fromkeys(e.name for d in drivelines for e in (d.oncoming, d.offgoing))
-    return [f"{e}.{key}" for e in elements for key in ("P0", "drum")]
+    drums = dict.fromkeys((*elements, *(e.name for d in drivelines for e in d.drums)))
+    return [*(f"{e}.P0" for e in elements), *(f"{e}.drum" for e in drums)]
 
 
 def _priors(
@@ -197,7 +205,10 @@ def _priors(
     coming = {d.oncoming.name for d in drivelines}
     for d in drivelines:
         for e in (d.offgoing, d.oncoming):
-            found |= {f"{e.name}.P0": e.P0, f"{e.name}.drum": e.drum}
+            found[f"{e.name}.P0"] = e.P0
+        for e in d.couplings.values():
+            drum = e.drum if signals[0].scale_known else over_eta(e.drum)
+            found[f"{e.name}.drum"] = drum
         if d.offgoing.name not in coming:
             level = guess[f"{d.offgoing.name}.mu_c"]
             found[f"{d.offgoing.name}.mu_c"] = PriorValue(level, OFF_GOING_LEVEL)

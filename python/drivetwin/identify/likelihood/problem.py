@@ -62,7 +62,7 @@ class Part:
             found = simulate(
                 self.structure.model(point),
                 self._torque(point),
-                self.record.pressures,
+                self._pressures(),
                 self.structure.start(point),
                 self.record.time,
             )
@@ -87,7 +87,7 @@ class Part:
             found: Sensitivities = sensitivities(
                 model,
                 self._torque(point),
-                self.record.pressures,
+                self._pressures(),
                 self.structure.start(point),
                 self.record.time,
                 names,
@@ -168,6 +168,12 @@ class Part:
         if run is None:
             return self
         return replace(part, returned=part.answer_to(point, run, taken))
+
+    def _pressures(self) -> dict[str, Signal]:
+        """Pressures of all elements of the model: none of those that stay open."""
+        ends = self.record.time[[0, -1]]
+        idle = {one.name: Signal(ends, np.zeros(2)) for one in self.structure.spinning}
+        return {**self.record.pressures, **idle}
 
     def _torque(self, point: Point) -> Signal:
         """Engine torque as it acts: read, less its mean error, moved back by its age."""

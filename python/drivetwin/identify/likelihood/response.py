@@ -72,6 +72,8 @@ def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
     torque[:, 0] = model.eta
     force = {"engine torque": torque}
     for one in model.elements:
+        if one.name not in record.pressures:
+            continue
         signal = record.pressures[one.name]
         pressure = np.interp(middle, signal.time, signal.values)
         slip = 0.5 * (run.slip[one.name][1:] + run.slip[one.name][:-1])

@@ -46,9 +46,10 @@ def guess_without_torque(
         "k_o": J * (rate**2 + omega**2),
         "c_o": 2.0 * rate * J,
     }
+    found |= {f"{one.name}.drum": one.drum.value for one in driveline.couplings.values()}
     law = {**TYPICAL_LAW, "mu_c": _level(signals, driveline, J_e)}
     for one in (driveline.offgoing, driveline.oncoming):
-        found |= {f"{one.name}.P0": one.P0.value, f"{one.name}.drum": one.drum.value}
+        found[f"{one.name}.P0"] = one.P0.value
         found |= {f"{one.name}.{key}": value for key, value in law.items()}
     return found
 

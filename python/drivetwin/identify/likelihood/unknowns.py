@@ -25,6 +25,8 @@ TE_OFFSET = "te_offset"
 AERO = "aero"
 """Part of the load that grows with the square of the wheel speed [N m s^2/rad^2]."""
 LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
+NO_LAW = (0.1, 0.1, 1.0, 0.0)
+"""Any friction law, for an element without pressure."""
 START = ("speed", "wheel_speed", "twist")
 """Unknowns of the start of each shift's run: ω_out and ω_w [rad/s], shaft twist [rad]."""
 
@@ -73,6 +75,12 @@ class Structure:
         """Off-going and on-coming element."""
         return (self.driveline.offgoing, self.driveline.oncoming)
 
+    @property
+    def spinning(self) -> tuple[Coupling, ...]:
+        """Elements open throughout whose drums turn with their slip all the same."""
+        taking_part = [one.name for one in self.elements]
+        return tuple(one for one in self.driveline.drums if one.name not in taking_part)
+
     def value(self, point: Point, name: str) -> float:
         """Value of an unknown, free, fixed or tied."""
         if name == "J_e" and self.tie is not None:
@@ -94,7 +102,10 @@ class Structure:
             k_o=self.value(point, "k_o"),
             c_o=self.value(point, "c_o"),
             load=self._load(point),
-            elements=tuple(self._element(point, one) for one in self.elements),
+            elements=(
+                *(self._element(point, one) for one in self.elements),
+                *(self._drum(point, one) for one in self.spinning),
+            ),
         )
 
     def _load(self, point: Point) -> RoadLoad:
@@ -113,6 +124,12 @@ class Structure:
             friction=Stribeck(c, c + drop, float(np.exp(ln_v_s)), v),
             drum_inertia=self.value(point, f"{one.name}.drum"),
         )
+
+    def _drum(self, point: Point, one: Coupling) -> ShiftElement:
+        """An element of which only the drum acts."""
+        drum = self.value(point, f"{one.name}.drum")
+        law = Stribeck(*NO_LAW)
+        return ShiftElement(one.name, 1.0 / one.a, one.b, one.gain, one.P0.value, law, 1.0, drum)
 
     def start(self, point: Point) -> State:
         """Start of the run at `point`: the off-going element is locked."""
@@ -161,5 +178,7 @@ class Structure:
             }
             for key, slopes in fields.items():
                 table[f"{one.name}.{key}"] = [(f"{one.name}.{f}", d) for f, d in slopes]
+        for one in self.spinning:
+            table[f"{one.name}.drum"] = [(f"{one.name}.drum_inertia", 1.0)]
         for field, slope in table.get(name, ()):
             yield field, name, slope
