@@ -13,9 +13,9 @@ from drivetwin.errors import MissingParameterError
 from drivetwin.identify.result import FloatArray, Identification, SignalFit
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.progress import tell
 from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.recorded import recorded
-from drivetwin.progress import tell
 from drivetwin.shifts.shift import Shift
 from drivetwin.shown import Shown
 from drivetwin.start_state import calm_moment, start_state
