@@ -53,6 +53,18 @@ def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
     return Sampled(fresh.time[good], values, max(white_noise(values), float(floor)))
 
 
+def pressures_of(log: ShiftLog, shift: Shift) -> dict[str, Sampled]:
+    """Pressures of both elements by name, with the noise of their whole channels.
+
+    Raises MissingChannelError where one is missing.
+    """
+    parts = shift_pressures(log, shift)
+    return {
+        name: replace(sampled(parts[name]), sigma=sampled(log.pressure(name)).sigma)
+        for name in sorted(parts)
+    }
+
+
 def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
     """The signals of a log that the estimators need, around `shift`.
 
@@ -63,14 +75,13 @@ def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
     else:
         engine_speed = sampled(log["input_speed"], card.i_in)
     engine_torque = sampled(log["engine_torque"])
-    pressures = shift_pressures(log, shift)
     return ShiftSignals(
         engine_torque=engine_torque,
         output_torque=sampled(log["output_torque"]) if "output_torque" in log else _NOTHING,
         engine_speed=engine_speed,
         output_speed=sampled(log["output_speed"]),
         wheel_speed=sampled(log["wheel_speed"]) if "wheel_speed" in log else None,
-        pressures={name: sampled(pressures[name]) for name in sorted(pressures)},
+        pressures=pressures_of(log, shift),
         shift=shift,
         torque_resolution=resolution(engine_torque.values),
     )

@@ -9,13 +9,12 @@ import numpy as np
 
 from drivetwin.driveline import DualClutch, ShiftElement
 from drivetwin.errors import InputError, Where
-from drivetwin.identify.inputs import sampled
+from drivetwin.identify.inputs import pressures_of, sampled
 from drivetwin.identify.likelihood.smooth import local_mean
 from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.mechanics import BoolArray, Course
 from drivetwin.observer.observed import FloatArray
-from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.shift import Shift, ShiftKind
 
 GRID = 1e-3
@@ -73,8 +72,7 @@ def recorded(log: ShiftLog, shift: Shift, i_in: float) -> Recorded:
     speeds = {name: _floored(signal) for name, signal in speeds.items()}
     torque = sampled(log["engine_torque"])
     there = all(f"pressure.{name}" in log for name in (shift.offgoing, shift.oncoming))
-    channels = shift_pressures(log, shift) if there else {}
-    pressures = {name: sampled(each) for name, each in channels.items()}
+    pressures = pressures_of(log, shift) if there else {}
     used = (torque, *speeds.values(), *pressures.values())
     start = max(shift.before[0], shift.before[1] - LONGEST, *(s.time[0] for s in used))
     end = min(shift.after[1], shift.lockup_time + LONGEST, *(s.time[-1] for s in used))

@@ -14,12 +14,11 @@ import numpy as np
 
 from drivetwin.driveline import DualClutch, Signal, State, Trajectory, simulate
 from drivetwin.errors import InputError, SimulationError
-from drivetwin.identify.inputs import sampled
+from drivetwin.identify.inputs import pressures_of, sampled
 from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.observed import Band, FloatArray, Observation, Observer
 from drivetwin.observer.uncertain import uncertain, with_drawn_friction
-from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin import Twin
 from drivetwin.validate import validate
@@ -59,7 +58,7 @@ def simulate_observed(
     ids = (*STEMS, *(f"P0.{one.name}" for one in base.model.elements))
     known = uncertain(twin, shift, ids)
     generators = np.random.SeedSequence(seed).spawn(runs)
-    noise = {name: sampled(each) for name, each in shift_pressures(quiet, shift).items()}
+    noise = pressures_of(quiet, shift)
     torque = sampled(quiet["engine_torque"])
     near = torque.within((float(run.time[0]) - UNREST, float(run.time[0]) + UNREST)).values
     unrest = float(np.std(near)) if near.size else 0.0

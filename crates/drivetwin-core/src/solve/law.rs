@@ -8,9 +8,8 @@ use crate::network::channel;
 use crate::network::{Cell, Channel};
 use crate::number::{Lane, Real};
 
-/// `φ(s, u) = sign · N(u) · μ(m)`, `m = sign · s`,
-/// `μ(m) = c0 + c1 m + c2 m² + excess · exp(-rate m)` while `m` lies between `from` and `to`: a friction
-/// torque over the slip, or `c2 · s|s|` with N = 1.
+/// `τ = N(u) · μ(m)`, `μ(m) = c0 + c1 m + c2 m² + excess · exp(-rate m)` over `m = sign · s` between `from`
+/// and `to`: a friction torque over the slip, or `c2 · s|s|` with N = 1. The channel is `φ = sign · τ`.
 #[derive(Clone, Copy, Debug)]
 pub struct Law<L> {
     /// Direction of motion.
@@ -32,15 +31,15 @@ pub struct Law<L> {
 /// A channel at one instant with its partial derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Value<L> {
-    /// φ.
+    /// τ.
     pub value: L,
-    /// φ_s.
+    /// τ_m.
     pub by_argument: L,
-    /// φ_ss.
+    /// τ_mm.
     pub bend: L,
-    /// φ_N.
+    /// τ_N.
     pub by_normal: L,
-    /// φ_sN.
+    /// τ_mN.
     pub mixed: L,
 }
 
@@ -100,25 +99,36 @@ pub fn line_of<T: Real>(normal: &Normal<T>) -> Line<T> {
 }
 
 impl<L: Lane> Law<L> {
-    /// Value and partial derivatives at argument `s` and normal load `normal`.
+    /// What stiction adds to μ.
     #[inline(always)]
-    pub fn at<const F: bool>(&self, s: L, normal: L) -> Value<L> {
-        let m = self.sign * s;
-        let stiction = self.excess * (-(self.rate * m)).exponential::<F>();
+    pub fn stiction<const F: bool>(&self, m: L) -> L {
+        self.excess * (-(self.rate * m)).exponential::<F>()
+    }
+
+    /// The same where `m` is larger by a small `dm`, and the smallness `rate · dm`.
+    #[inline(always)]
+    pub fn moved_stiction<const F: bool>(&self, stiction: L, dm: L) -> (L, L) {
+        let q = -(self.rate * dm);
+        let (one, half) = (L::all(1.0), L::all(0.5));
+        let series = q.fma::<F>(q.fma::<F>(q.fma::<F>(L::all(1.0 / 6.0), half), one), one);
+        (stiction * series, q)
+    }
+
+    /// Value and partial derivatives at argument `m` and normal load `normal`.
+    #[inline(always)]
+    pub fn at<const F: bool>(&self, m: L, stiction: L, normal: L) -> Value<L> {
         let [c0, c1, c2] = self.polynomial;
         let faded = self.rate * stiction;
         let mu = c2.fma::<F>(m, c1).fma::<F>(m, c0) + stiction;
         let slope = (c2 + c2).fma::<F>(m, c1) - faded;
-        let signed = self.sign * normal;
         Value {
-            value: signed * mu,
+            value: normal * mu,
             by_argument: normal * slope,
-            bend: signed * self.rate.fma::<F>(faded, c2 + c2),
-            by_normal: self.sign * mu,
+            bend: normal * self.rate.fma::<F>(faded, c2 + c2),
+            by_normal: mu,
             mixed: slope,
         }
     }
-
 }
 
 impl<L: Lane> Value<L> {

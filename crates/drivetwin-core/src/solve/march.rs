@@ -4,7 +4,8 @@
 //! The torque φ of a slipping element is a cubic in time over a sample, through value and rate at both
 //! ends. Its argument at the end is predicted with the second derivative of φ at the start, which
 //! leaves an error of fourth order; the cubic through the predicted end corrects it, and the law is
-//! moved to the corrected argument by its own derivatives. One exponential a sample and channel.
+//! moved to the corrected argument by its own derivatives. One exponential a sample and channel, taken
+//! before its argument is known exactly.
 
 use super::law::Value;
 use super::operators::{CUBIC, Carried, Form, MAX_WATCHED, Operators, StepForm, Watched};
@@ -37,6 +38,8 @@ pub struct Trail<L, const N: usize, const A: usize> {
 
 /// Largest cubic part of a channel over a sample, relative to its size.
 const MAX_CUBIC: f64 = 2e-4;
+/// Largest distance over which stiction is moved by its series, relative to its decay.
+const MAX_MOVE: f64 = 0.05;
 /// Largest change of a channel by the correction, relative to its size.
 const MAX_CORRECTION: f64 = 1e-4;
 
@@ -61,7 +64,7 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
             *carry = Carry::start::<F, N>(op, source, segment, x);
         }
         trail.states[k] = *x;
-        carry.torques(&mut trail.torques[k]);
+        carry.torques(op, &mut trail.torques[k]);
         let mut least = step::<L, F, N, A>(op, (source, h), segment, (x, carry));
         for (place, guard) in guards.iter_mut().enumerate().take(op.watched.len()) {
             let after = op.guard::<F, A>(place, source, (segment, h), (x, carry));
@@ -127,6 +130,12 @@ fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
             second[a] = channels[a].second.state[j].fma::<F>(x[j], second[a]);
         }
     }
+    // Stiction at about the end, early: nothing waits for the exponential then.
+    let mut near = [(none, none); A];
+    for a in 0..A {
+        let about = carry.rate[a].times(h) + carry.argument[a];
+        near[a] = (about, channels[a].law.stiction::<F>(about));
+    }
     // The cubics as known at the start: value, rate and second derivative.
     let start = carry.value;
     let mut cubics = [[none; CUBIC]; A];
@@ -149,10 +158,14 @@ fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
     add_moments::<L, F, N, A, 0, 3>(op, &cubics, &mut end);
     // The end as predicted, and the cubics through it.
     let mut value = start;
+    let mut least = L::Values::all(1.0);
     for a in 0..A {
         argument[a] = over_cubics::<L, F, N, A, 0, 3>(&channels[a].argument_end, &cubics, argument[a]);
         rate[a] = over_cubics::<L, F, N, A, 0, 3>(&channels[a].rate_end, &cubics, rate[a]);
-        value[a] = channels[a].law.at::<F>(argument[a], lines[a][1].times(h) + lines[a][0]);
+        let (law, normal) = (&channels[a].law, lines[a][1].times(h) + lines[a][0]);
+        let (stiction, moved) = law.moved_stiction::<F>(near[a].1, argument[a] - near[a].0);
+        value[a] = law.at::<F>(argument[a], stiction, normal);
+        least = least.lower(L::Values::all(MAX_MOVE) - moved.values().magnitude());
     }
     let mut change = [[none; CUBIC]; A];
     for a in 0..A {
@@ -165,7 +178,6 @@ fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
     }
     add_moments::<L, F, N, A, 2, 4>(op, &change, &mut end);
     let before = (carry.argument, carry.rate);
-    let mut least = L::Values::all(1.0);
     for a in 0..A {
         let ds = over_cubics::<L, F, N, A, 2, 4>(&channels[a].argument_end, &change, none);
         rate[a] = over_cubics::<L, F, N, A, 2, 4>(&channels[a].rate_end, &change, rate[a]);
@@ -181,9 +193,9 @@ fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
         carry.rate[a] = rate[a] + over_channels::<L, F, N, A>(&channels[a].rate, &carry.value, direct[a]);
         let law = &channels[a].law;
         // Between its ends the argument stays within these values (Bernstein's form of the cubic).
-        let (m0, m3) = ((law.sign * before.0[a]).values(), (law.sign * carry.argument[a]).values());
-        let m1 = (law.sign * before.1[a]).values().times(h / 3.0) + m0;
-        let m2 = m3 - (law.sign * carry.rate[a]).values().times(h / 3.0);
+        let (m0, m3) = (before.0[a].values(), carry.argument[a].values());
+        let m1 = before.1[a].values().times(h / 3.0) + m0;
+        let m2 = m3 - carry.rate[a].values().times(h / 3.0);
         let (low, high) = (m0.lower(m1).lower(m2.lower(m3)), m0.upper(m1).upper(m2.upper(m3)));
         least = least.lower(low - law.from.values()).lower(law.to.values() - high);
     }
@@ -223,9 +235,9 @@ impl<L: Lane, const N: usize> Operators<L, N> {
 impl<L: Lane, const A: usize> Carry<L, A> {
     /// The torques.
     #[inline(always)]
-    pub fn torques(&self, out: &mut [L; A]) {
+    pub fn torques<const N: usize>(&self, op: &Operators<L, N>, out: &mut [L; A]) {
         for a in 0..A {
-            out[a] = self.value[a].value;
+            out[a] = op.channels[a].law.sign * self.value[a].value;
         }
     }
 
@@ -245,7 +257,9 @@ impl<L: Lane, const A: usize> Carry<L, A> {
             for i in 0..op.columns() {
                 out.argument[a] = argument[i].fma::<F>(x[i], out.argument[a]);
             }
-            out.value[a] = law.at::<F>(out.argument[a], law.normal.line::<F>(source, segment)[0]);
+            let m = out.argument[a];
+            let normal = law.normal.line::<F>(source, segment)[0];
+            out.value[a] = law.at::<F>(m, law.stiction::<F>(m), normal);
         }
         for a in 0..A {
             let form = &channels[a].rate;

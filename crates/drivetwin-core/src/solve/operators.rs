@@ -3,7 +3,8 @@
 //!
 //! In one mode `x' = A x + B u + c + E φ`. Over a sample the inputs are linear and a channel φ is a
 //! cubic in `t/h` with the coefficients a0 .. a3, so that the state at the end, the argument of every
-//! channel there and its rate are linear in x, u, u', a.
+//! channel there and its rate are linear in x, u, u', a. Channels count in their direction of motion:
+//! `τ = sign · φ` over `m = sign · s`.
 
 use super::law::Law;
 use super::march::Source;
@@ -25,6 +26,8 @@ pub struct Operators<L, const N: usize> {
     /// What a watched form may deviate from its chord within a sample, relative to its rise and to its
     /// size.
     pub bow: [L; 2],
+    /// Signs of the carried channels.
+    signs: [L; MAX_ACTIVE],
     /// Columns of the transition matrix.
     pub transition: [[L; N]; N],
     /// What is there without state and inputs.
@@ -85,7 +88,7 @@ pub struct Form<L, const N: usize> {
 pub struct Carried<L, const N: usize> {
     /// Response of the state at the end to the coefficients of the cubic.
     pub moments: [[L; N]; CUBIC],
-    /// Argument at any instant, over the state.
+    /// Argument `m = sign · s` at any instant, over the state.
     pub argument: [L; N],
     /// Argument at the end.
     pub argument_end: StepForm<L, N>,
@@ -162,10 +165,13 @@ impl<T: Real, const N: usize> Operators<T, N> {
             .filter(|(_, force)| force.iter().any(|f| f.re() != 0.0))
             .map(|(input, force)| Drive::new(input, [apply(&s[1], &force), apply(&s[2], &force)]))
             .collect();
+        let mut signs = [T::zero_(); MAX_ACTIVE];
+        signs.iter_mut().zip(laws).for_each(|(sign, law)| *sign = law.sign);
         let moments: Vec<[[T; N]; CUBIC]> = active
             .iter()
-            .map(|&j| {
-                let force = forcing(network.first_channel() + j);
+            .enumerate()
+            .map(|(slot, &j)| {
+                let force = forcing(network.first_channel() + j).map(|f| f * signs[slot]);
                 let mut weight = 1.0;
                 std::array::from_fn(|k| {
                     weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
@@ -176,10 +182,10 @@ impl<T: Real, const N: usize> Operators<T, N> {
         // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
         let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
         let mut operators =
-            Self { states: n, bow, transition, constant, drives, channels: vec![], watched: vec![], loads: vec![] };
+            Self { states: n, bow, signs, transition, constant, drives, channels: vec![], watched: vec![], loads: vec![] };
         for (slot, &j) in active.iter().enumerate() {
             let argument: [T; N] = std::array::from_fn(|i| {
-                network.channels[j].arguments[0].get(i).map_or(T::zero_(), |&c| c)
+                network.channels[j].arguments[0].get(i).map_or(T::zero_(), |&c| c * signs[slot])
             });
             operators.carry(slot, (network, mode), (active, &moments), (argument, laws[slot]));
         }
@@ -221,8 +227,8 @@ impl<T: Real, const N: usize> Operators<T, N> {
             argument,
             argument_end: step_form(&argument),
             rate_end: step_form(&rate),
-            rate: Form::over(network, active, &now),
-            second: Form::over(network, active, &second),
+            rate: Form::over(network, (active, &self.signs), &now),
+            second: Form::over(network, (active, &self.signs), &second),
             law,
         };
         self.channels.push(carried);
@@ -241,7 +247,8 @@ impl<T: Real, const N: usize> Operators<T, N> {
             drive.watched[place] =
                 row.get(network.first_input() + drive.input).map_or(T::zero_(), |&c| c);
         }
-        self.watched.push(Watched { form: Form::over(network, active, row), limit, both });
+        let form = Form::over(network, (active, &self.signs), row);
+        self.watched.push(Watched { form, limit, both });
     }
 }
 
@@ -281,12 +288,16 @@ impl<T: Real, const N: usize> Carried<T, N> {
 
 impl<T: Real, const N: usize> Form<T, N> {
     /// Of a row over the basis or over the states alone.
-    fn over(network: &Network<T>, active: &[usize], row: &[T]) -> Self {
+    fn over(
+        network: &Network<T>,
+        (active, signs): (&[usize], &[T; MAX_ACTIVE]),
+        row: &[T],
+    ) -> Self {
         let at = |position: usize| row.get(position).map_or(T::zero_(), |&c| c);
         let state = |i: usize| if i < network.states() { at(i) } else { T::zero_() };
         let mut channels = [T::zero_(); MAX_ACTIVE];
-        for (channel, &j) in channels.iter_mut().zip(active) {
-            *channel = at(network.first_channel() + j);
+        for ((channel, &j), &sign) in channels.iter_mut().zip(active).zip(signs) {
+            *channel = at(network.first_channel() + j) * sign;
         }
         Self { state: std::array::from_fn(state), constant: at(network.one()), channels }
     }

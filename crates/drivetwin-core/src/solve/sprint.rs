@@ -255,7 +255,7 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
         run.t = T::of(run.inputs.knot(run.segment));
         if run.segment == run.inputs.segments() {
             trail.states[0] = x;
-            carry.torques(&mut trail.torques[0]);
+            carry.torques(operators, &mut trail.torques[0]);
             sink.passed(run, active, &trail, (run.segment, 1));
             run.segment -= 1;
         }

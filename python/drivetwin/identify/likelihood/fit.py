@@ -53,9 +53,12 @@ class LikelihoodFit:
     iterations: int
 
 
-def fit(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:
+def fit(
+    problem: Problem, start: Point, shifts: Sequence[Shift], thorough: bool = True
+) -> LikelihoodFit:
     """Fit from `start`: directly where it is near, by stages and from other starts where not.
 
+    Unless `thorough` the first plausible minimum is taken, good or not.
     Raises IdentificationError where no minimum is plausible.
     """
     best: LikelihoodFit | None = None
@@ -66,7 +69,7 @@ def fit(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFi
             return min(best, found, key=lambda one: one.chi2)
         if best is None or found.chi2 < best.chi2:
             best = found
-        if best.chi2 < GOOD:
+        if best.chi2 < GOOD or not thorough:
             return best
     if best is None:
         raise IdentificationError(

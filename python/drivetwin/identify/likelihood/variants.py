@@ -15,7 +15,7 @@ import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of, fit
+from drivetwin.identify.likelihood.fit import GOOD, LikelihoodFit, covariance_of, fit
 from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
@@ -46,7 +46,7 @@ def choose(
     wide, wide_start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
     try:
         with part(0.0, 0.5):
-            best = fit(problem, start, shifts)
+            best = fit(problem, start, shifts, thorough=False)
         wide_start = _taken(wide_start, best.point)
         grows = _grows(best, wide, wide_start)
     except IdentificationError:
@@ -56,6 +56,9 @@ def choose(
         with part(0.5, 0.8):
             problem, best = wide, fit(wide, wide_start, shifts)
         notes.append(_growth(best))
+    elif best.chi2 >= GOOD:
+        with part(0.5, 0.8):
+            best = fit(problem, start, shifts)
     with part(0.8, 1.0):
         means = _with_means(problem, best, shifts) if problem.slow else None
     if means is not None:

@@ -4,8 +4,8 @@
 
 #include "dt_internal.h"
 
-#define SEARCHES 120 /* intervals tried before the rest counts as one; 50 halvings reach round-off */
-#define NEWTON 100   /* a bracket of doubles halves 60 times at most */
+#define SEARCHES 60 /* intervals tried; beyond, a root between the last and the end counts as there */
+#define NEWTON 60   /* a bracket of doubles halves so often at most */
 
 static dt_real slope_at(const dt_real *c, int order, dt_real t) {
     dt_real value = DT_C(0);

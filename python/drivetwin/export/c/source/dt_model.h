@@ -30,7 +30,7 @@ extern "C" {
 #define DT_GUARDS 4    /**< what is released: the rows, then the power through the input gear */
 #define DT_STATES 4   /**< engine, output and wheel speed, twist of the output shaft */
 #define DT_POINTS 64  /**< most points of a friction table */
-#define DT_PIECES 64  /**< most pieces of one step, a piece ending at an event or where the
+#define DT_PIECES 32  /**< most pieces of one step, a piece ending at an event or where the
                            truncation error asks for it */
 
 /** What a call came to. */
