@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""`python -m benchmarks.fleet.acceptance COUNT [FOLDER]`: a made fleet through the local mode.
+
+Every healthy log must be done and every damaged one named; level, drift and spread over units of μ
+and P0 must lie in their 95 % intervals, and the one unit that was changed be found. The folder is
+kept where it is named, and a run in it goes on; else it is a temporary one.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+
+from benchmarks.fleet.made import ELEMENT, ODOMETER, UNITS, Ageing, Made, Truth, make_fleet, plan
+from drivetwin.cli.fleet_view import watching
+from drivetwin.fleet.events import Event, Settled
+from drivetwin.fleet.joint.estimate import joint_estimates
+from drivetwin.fleet.joint.result import Interval, JointEstimate
+from drivetwin.fleet.rules import read_rules
+from drivetwin.fleet.run import FleetRun, run_fleet
+from drivetwin.fleet.sources import Sources
+from drivetwin.fleet.store import Store
+from drivetwin.fleet.task import State
+from drivetwin.identify.method import Method
+
+LOGS_TO_SEE_A_CHANGE = 20
+"""Logs of a unit from which its change must be found."""
+
+
+def settle(folder: Path, store: Path) -> dict[str, Settled]:
+    """Run the fleet; what became of each file, by its name."""
+    settled: dict[str, Settled] = {}
+    request = FleetRun(
+        Sources([str(folder)]), read_rules(folder / "rules.toml"), store, Method.INTEGRAL
+    )
+    started = perf_counter()
+    with watching(as_json=False) as show:
+
+        def hear(event: Event) -> None:
+            show(event)
+            if isinstance(event, Settled):
+                settled[Path(event.path).name] = event
+
+        summary = run_fleet(request, hear)
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{summary.computed} logs computed in {perf_counter() - started:.0f} s, "
+          f"coordinator at most {memory:.0f} MiB")  # fmt: skip
+    return settled
+
+
+def named(planned: Sequence[Made], settled: dict[str, Settled]) -> list[str]:
+    """What is wrong with the states: healthy logs not done, damaged ones not named."""
+    faults = []
+    for made in planned:
+        end = settled.get(Path(made.path).name)
+        wanted = State.BAD if made.damage else State.DONE
+        if end is None or end.state is not wanted or bool(end.error) is not bool(made.damage):
+            faults.append(f"{made.path} ({made.damage or 'healthy'}): {end}")
+    return faults
+
+
+def _inside(label: str, true: float, ci95: Interval | None) -> list[str]:
+    assert ci95 is not None
+    held = ci95[0] <= true <= ci95[1]
+    print(f"  {label}: true {true:.5g}, 95 % {ci95[0]:.5g} to {ci95[1]:.5g}"
+          f"{'' if held else '  <-- outside'}")  # fmt: skip
+    return [] if held else [f"{label}: {true:.5g} is outside {ci95[0]:.5g} to {ci95[1]:.5g}"]
+
+
+def compare(one: JointEstimate, true: Ageing, planned: Sequence[Made], key: str) -> list[str]:
+    """Print and check one parameter."""
+    print(f"{one.parameter}: {one.logs} logs, scatter {one.excess:.2f} of what they state")
+    (drift,) = one.drifts
+    level = true.mean + true.drift * (drift.reference - 0.5 * ODOMETER)
+    found = _inside("level", level, one.ci95)
+    found += _inside("drift", true.drift, drift.ci95)
+    found += _inside("spread", true.spread, one.spread_ci95)
+    units = {made.unit: getattr(made, key) - true.drift * (made.odometer - 0.5 * ODOMETER)
+             for made in reversed(planned)}  # fmt: skip
+    first = [unit for unit in one.units if unit.since is None]
+    reach = [
+        abs(units[unit.unit] - true.mean - unit.deviation) <= 1.96 * unit.std for unit in first
+    ]
+    share = sum(reach) / len(reach)
+    print(f"  units inside their 95 % intervals: {100 * share:.0f} %")
+    return found + ([] if share >= 0.85 else [f"{one.parameter}: units {share:.2f}"])
+
+
+def changes(found: Sequence[JointEstimate], truth: Truth, count: int) -> list[str]:
+    """Whether the changed unit was found, and no other."""
+    seen = [(one.parameter, change) for one in found for change in one.changes]
+    for parameter, change in seen:
+        print(f"change of {parameter}: unit {change.unit} between {change.before:.1f} and "
+              f"{change.after:.1f}, by {change.size:.4f} ± {1.96 * change.std:.4f}")  # fmt: skip
+    wrong = [
+        f"{parameter}: unit {change.unit} did not change"
+        for parameter, change in seen
+        if (parameter, int(change.unit)) != (f"mu.{ELEMENT}", truth.changed)
+    ]
+    if count / UNITS >= LOGS_TO_SEE_A_CHANGE and len(seen) == len(wrong):
+        wrong.append(f"the change of unit {truth.changed} was not found")
+    return wrong
+
+
+def check(folder: Path, count: int) -> list[str]:
+    """Make, run, compare; what does not hold."""
+    truth, store = Truth(), folder / "store"
+    planned = plan(count, truth)
+    if not (folder / "truth.json").is_file():
+        make_fleet(folder, count, truth)
+    settled = settle(folder, store)
+    faults = named(planned, settled)
+    print(Counter((made.damage or "healthy") for made in planned))
+    with Store(store) as opened:
+        found = joint_estimates(opened)
+    by_name = {one.parameter: one for one in found}
+    faults += compare(by_name[f"mu.{ELEMENT}"], truth.mu, planned, "mu")
+    faults += compare(by_name[f"P0.{ELEMENT}"], truth.P0, planned, "P0")
+    return faults + changes(found, truth, count)
+
+
+def main() -> int:
+    """Check as many logs as asked for."""
+    count = int(sys.argv[1])
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(sys.argv[2] if len(sys.argv) > 2 else temporary) / f"fleet_{count}"
+        faults = check(folder, count)
+    for fault in faults[:20]:
+        print(f"FAULT {fault}")
+    print("all as it should be" if not faults else f"{len(faults)} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

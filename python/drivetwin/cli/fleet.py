@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin fleet`: many logs into a store, and what can be asked of the store."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from drivetwin.__main__ import INTERRUPTED
+from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step, table_of
+from drivetwin.identify.method import DEFAULT_METHOD, Method
+
+if TYPE_CHECKING:
+    from drivetwin.fleet.events import Summary
+    from drivetwin.fleet.joint.result import JointEstimate
+
+RUN = "run"
+
+
+class LogsOrCommand(TyperGroup):
+    """`drivetwin fleet LOGS` is `drivetwin fleet run LOGS`: what is no command is a log."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put in the command that is meant."""
+        if args and args[0] not in (*self.commands, "--help"):
+            args = [RUN, *args]
+        return super().parse_args(ctx, args)
+
+
+fleet = typer.Typer(
+    cls=LogsOrCommand,
+    help="Identify many logs into a store that resumes; report, estimate and query it.",
+    no_args_is_help=True,
+)
+StoreFolder = Annotated[Path, typer.Argument(metavar="STORE", help="Folder of `fleet -o`.")]
+
+
+@fleet.command(RUN)
+def run(
+    logs: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="LOGS...", help="Files, folders and quoted globs."),
+    ] = None,
+    vehicle: Annotated[
+        Path,
+        typer.Option("--vehicle", metavar="CARD|RULES", help="Vehicle card, or rules (TOML)."),
+    ] = ...,  # type: ignore[assignment]
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="STORE", help="Folder of the store.")
+    ] = ...,  # type: ignore[assignment]
+    listed: Annotated[
+        Path | None,
+        typer.Option("--list", metavar="FILE", help="CSV with a column `path`, or a path a line."),
+    ] = None,
+    method: Annotated[
+        Method, typer.Option(metavar="METHOD", help="paper, integral or likelihood.")
+    ] = DEFAULT_METHOD,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes on this machine; one a core if not given.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Work on a Dask cluster, tcp://host:port."),
+    ] = None,
+    time_limit: Annotated[
+        float, typer.Option(min=0.1, metavar="S", help="Time that one log may take.")
+    ] = 600.0,
+    memory_limit: Annotated[
+        int, typer.Option(min=64, metavar="MIB", help="Memory that one worker may hold.")
+    ] = 4096,
+    attempts: Annotated[
+        int, typer.Option(min=1, help="How often a log is tried that loses its worker.")
+    ] = 3,
+    retry: Annotated[
+        bool, typer.Option("--retry", help="Try again what is in quarantine.")
+    ] = False,
+    reports: Annotated[
+        bool, typer.Option("--reports", help="Write the report of each log too.")
+    ] = False,
+    traces: Annotated[
+        bool, typer.Option("--traces", help="Write simulation over measurement of each log too.")
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON event a line on stdout.")
+    ] = False,
+) -> None:
+    """Identify all logs that the store does not hold yet.
+
+    Whatever ends a run, the same command goes on from there; nothing is computed twice.
+    """
+    from drivetwin.cli.fleet_view import watching
+    from drivetwin.errors import InputError
+    from drivetwin.fleet.coordinator import Wishes
+    from drivetwin.fleet.rules import read_rules
+    from drivetwin.fleet.run import FleetRun, run_fleet
+    from drivetwin.fleet.sources import Sources
+    from drivetwin.fleet.task import Limits, WorkerSpec
+
+    if not logs and listed is None:
+        raise InputError("no logs are named", "give files, folders, a quoted glob or --list FILE")
+    request = FleetRun(
+        Sources(logs or [], listed),
+        read_rules(vehicle),
+        output,
+        method,
+        workers,
+        scheduler,
+        WorkerSpec(limits=Limits(time_limit, memory_limit * 2**20)),
+        Wishes(attempts, retry, reports, traces),
+    )
+    signal.signal(signal.SIGTERM, _as_interrupt)
+    with watching(as_json=as_json) as tell:
+        summary = run_fleet(request, tell)
+    if not as_json:
+        _print_summary(summary, output)
+    if not summary.complete:
+        raise typer.Exit(INTERRUPTED)
+
+
+def _as_interrupt(_number: int, _frame: object) -> None:
+    """A scheduler's or a shell's wish to end is that of the keyboard."""
+    raise KeyboardInterrupt
+
+
+def _print_summary(summary: Summary, output: Path) -> None:
+    table = table_of(f"Fleet in {output}", "logs", "", right=("",))
+    rows = {
+        "identified": summary.done,
+        "bad": summary.bad,
+        "in quarantine": summary.quarantined,
+        "left out by the rules": summary.skipped,
+        "computed in this run": summary.computed,
+    }
+    for name, count in rows.items():
+        table.add_row(name, str(count))
+    show(table)
+    for name, count in summary.failures.items():
+        note(f"{count} {name}")
+    if not summary.complete:
+        say("interrupted; the same command goes on from here")
+    elif summary.failures:
+        say(f"reasons: drivetwin fleet query {output} \"SELECT path, what FROM files "
+            "JOIN logs USING (log) WHERE error <> ''\"")  # fmt: skip
+
+
+@fleet.command()
+def report(
+    store: StoreFolder,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE.html", help="report.html in the store if not given."
+        ),
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Write the report of a store: shared values, ageing, units, what is odd, what failed."""
+    from drivetwin.fleet.report import PAGE, save_fleet_report
+    from drivetwin.fleet.store import Store
+
+    page = store / PAGE if output is None else output
+    with step("estimating over the fleet"), Store(store) as opened:
+        save_fleet_report(opened, page)
+    if as_json:
+        print_json({"report": page})
+        return
+    say(f"wrote {page}")
+
+
+@fleet.command()
+def estimate(
+    store: StoreFolder,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option("--parameter", metavar="ID", help="Only this one; may be given again."),
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Estimate over all logs: shared values, spread over units, ageing, changes, outliers."""
+    from drivetwin.fleet.joint.estimate import joint_estimates
+    from drivetwin.fleet.store import Store
+
+    with step("estimating over the fleet"), Store(store) as opened:
+        found = joint_estimates(opened, parameter or ())
+    if as_json:
+        print_json({"estimates": [one.document() for one in found]})
+        return
+    _print_estimates(found)
+
+
+def _print_estimates(found: list[JointEstimate]) -> None:
+    from drivetwin.cli.numbers import shown
+
+    table = table_of(
+        "Fleet", "parameter", "value", "95 %", "unit", "spread", "drift", "per",
+        right=("value", "95 %", "spread", "drift"),
+    )  # fmt: skip
+    for one in found:
+        value, interval, unit = shown(one.value, one.ci95, one.si_unit)
+        drift = one.drifts[0] if one.drifts else None
+        table.add_row(
+            one.parameter, value, interval, unit,
+            "" if one.spread is None else shown(one.spread, None, one.si_unit)[0],
+            "" if drift is None else shown(drift.slope, None, one.si_unit)[0],
+            "" if drift is None else drift.field,
+        )  # fmt: skip
+    show(table)
+    for one in found:
+        for change in one.changes:
+            note(
+                f"{one.parameter}: unit {change.unit} changed between {change.before:g} and "
+                f"{change.after:g} {change.field}"
+            )
+        for outlier in one.outliers:
+            note(f"{one.parameter}: {Path(outlier.path).name}: {outlier.reason}")
+
+
+@fleet.command()
+def query(
+    store: StoreFolder,
+    sql: Annotated[str, typer.Argument(metavar="SQL", help="SELECT over parameters, files, …")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="Write .csv or .parquet instead."),
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Ask a store in SQL (DuckDB).
+
+    Tables: parameters, frictions, fits, qualities, warnings, rows, files, logs, shifts, settings.
+    """
+    from drivetwin.fleet.query import ask, save_answer
+    from drivetwin.fleet.store import Store
+
+    with step("asking"), Store(store) as opened:
+        answer = ask(opened, sql)
+    if output is not None:
+        save_answer(answer, output)
+    if as_json:
+        rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+        print_json({"rows": rows})
+        return
+    if output is not None:
+        say(f"wrote {output}")
+        return
+    table = table_of("", *answer.columns)
+    for row in answer.rows:
+        table.add_row(*("" if cell is None else str(cell) for cell in row))
+    show(table)
