@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+# %% [markdown]
+# # Identify a shift
+#
+# From a log to a driveline model, with what each number is worth. The cells (`# %%`) run as a
+# notebook in Jupyter or an editor, or all at once: `python identify_a_shift.py`.
+
+# %%
+from pathlib import Path
+
+import drivetwin
+from drivetwin.cli import main
+
+# A log with known truth; take your own log and card instead.
+main(["synth", "-o", "shift.csv"])
+
+# %% Read the log with the vehicle card, and look at it: the last line of a cell is shown.
+card = drivetwin.load_card(Path("shift.card.toml"))
+log = drivetwin.read_log(Path("shift.csv"), card)
+print(log.summary())
+log.plot()
+
+# %% Find the shift, identify, simulate the model over the measurement.
+found = drivetwin.find_shifts(log, card)
+result = drivetwin.identify_shifts(log, card, found)
+twin = drivetwin.Twin.from_identification(result, card)
+result = drivetwin.validated(result, twin, log)
+print(result.summary())
+result.plot()
+
+# %% Friction over slip with its 95 % band.
+twin.plot()
+
+# %% The same as files: for people, for machines, and the model to simulate.
+drivetwin.save_report(Path("report.html"), result, log)
+drivetwin.save_result(Path("result.json"), result)
+twin.save(Path("twin.toml"))
+
+# %% The truth of the synthetic log lies within the interval.
+low, high = result.estimates["J_vehicle"].ci95_total or (0.0, 0.0)
+print(f"J3 between {low:.0f} and {high:.0f} kg·m²; the log was made with 6056")
+assert low < 6056.0 < high

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: MIT
+"""The example notebooks run from the first cell to the last, and leave what they promise."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+NOTEBOOKS = Path(__file__).resolve().parents[2] / "examples" / "notebooks"
+LEAVES = {
+    "identify_a_shift": {"report.html", "result.json", "twin.toml"},
+    "compare_two_logs": {"comparison.html"},
+    "what_if": {"shift.csv"},
+}
+
+
+def test_every_notebook_is_run() -> None:
+    assert {path.stem for path in NOTEBOOKS.glob("*.py")} == set(LEAVES)
+
+
+@pytest.mark.parametrize("name", LEAVES)
+def test_a_notebook_runs(name: str, tmp_path: Path) -> None:
+    path = NOTEBOOKS / f"{name}.py"
+    assert len(re.findall(r"^# %%", path.read_text(encoding="utf-8"), re.M)) >= 4
+    done = subprocess.run(
+        [sys.executable, path], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert LEAVES[name] <= {file.name for file in tmp_path.iterdir()}
