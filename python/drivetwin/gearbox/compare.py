@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray, RoadLoad, Signal, State
+from drivetwin.driveline import DualClutch, FloatArray, RoadLoad, Signal, State
 from drivetwin.driveline import simulate as simulate_dual_clutch
 from drivetwin.errors import SimulationError
 from drivetwin.gearbox.drive import Drive
@@ -71,7 +71,17 @@ def _start(reduction: Reduction, maneuver: Maneuver, coupling: float) -> tuple[f
     return output, output / drive.i_f, twist
 
 
-def _whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: FloatArray) -> Traces:
+@dataclass(frozen=True)
+class WholeGearbox:
+    """The reference shift with all members: elements, inputs by name, start."""
+
+    elements: tuple[Element, ...]
+    inputs: dict[str, Signal]
+    start: Start
+
+
+def whole_gearbox(reduction: Reduction, maneuver: Maneuver) -> WholeGearbox:
+    """State the reference shift for the network."""
     gearbox = reduction.gearbox
     torque, pressures = signals(reduction, maneuver)
     dogs = [name for name in reduction.common if name in gearbox.dogs]
@@ -89,10 +99,15 @@ def _whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: FloatArray) -
         twists={SHAFT: twist},
         locked=(reduction.off_going.element, *friction),
     )
+    return WholeGearbox(tuple(elements), inputs, start)
+
+
+def _whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: FloatArray) -> Traces:
+    gearbox, stated = reduction.gearbox, whole_gearbox(reduction, maneuver)
     run = simulate_network(
-        elements,
-        inputs,
-        start,
+        stated.elements,
+        stated.inputs,
+        stated.start,
         time,
         [("shaft_torque", SHAFT), ("speed", gearbox.input), ("speed", gearbox.output)],
     )
@@ -119,20 +134,25 @@ def _surroundings(reduction: Reduction, maneuver: Maneuver) -> list[Element]:
     ]
 
 
+def dual_clutch_form(
+    reduction: Reduction, maneuver: Maneuver, *, keep_coupling: bool = False
+) -> tuple[DualClutch, State]:
+    """Model and start of the reference shift in the dual-clutch form."""
+    model = reduction.dual_clutch(maneuver.drive, keep_coupling=keep_coupling)
+    model = replace(model, load=RoadLoad(constant=maneuver.load * maneuver.drive.i_f))
+    coupling = reduction.M12 if keep_coupling else 0.0
+    output, wheel, twist = _start(reduction, maneuver, coupling)
+    locked = (reduction.off_going.element,)
+    return model, State(maneuver.old_ratio * output, output, wheel, twist, locked)
+
+
 def _dual_clutch(
     reduction: Reduction, maneuver: Maneuver, time: FloatArray, *, keep_coupling: bool
 ) -> Traces:
-    model = reduction.dual_clutch(maneuver.drive, keep_coupling=keep_coupling)
-    model = replace(model, load=RoadLoad(constant=maneuver.load * maneuver.drive.i_f))
+    model, start = dual_clutch_form(reduction, maneuver, keep_coupling=keep_coupling)
     torque, pressures = signals(reduction, maneuver)
-    coupling = reduction.M12 if keep_coupling else 0.0
-    output, wheel, twist = _start(reduction, maneuver, coupling)
     run = simulate_dual_clutch(
-        model,
-        torque,
-        {each.name: pressures[each.name] for each in model.elements},
-        State(maneuver.old_ratio * output, output, wheel, twist, (reduction.off_going.element,)),
-        time,
+        model, torque, {each.name: pressures[each.name] for each in model.elements}, start, time
     )
     _require_completed(run.status, "the dual-clutch form")
     return Traces(run.shaft_torque, run.engine_speed, run.output_speed)
