@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from drivetwin.driveline import Stribeck
 from drivetwin.dyno.actuators import Actuator, Program
 from drivetwin.dyno.dual_scenarios import paper, paper_steps, torque_steps
 from drivetwin.dyno.names import ScenarioName
@@ -17,6 +18,8 @@ from drivetwin.dyno.scenario import HeldGear, Scenario
 
 _DEAD_TIME, _LAG = 0.012, 0.020
 _MAIN, _KISS = 1.4e6, 7.6e4
+_WORN = Stribeck(mu_c=0.100, mu_s=0.115, v_s=20.0, mu_v=2e-4)
+"""Friction of B2, another than that of B3: the log has to tell both apart."""
 _SECOND, _THIRD = HeldGear("2", "B2"), HeldGear("3", "B3")
 
 
@@ -96,8 +99,12 @@ def _shift(
 ) -> Scenario:
     """`course` holds the engine speed at time 0 [rad/s] and the duration [s]."""
     speed, duration = course
+    base = paper()
+    first, second = base.model.elements
+    worn = replace(first, friction=_WORN)
     return replace(
-        paper(),
+        base,
+        model=replace(base.model, elements=(worn, second)),
         name=name,
         gears=gears,
         duration=duration,

@@ -26,16 +26,18 @@ POINTS = 60
 def curves_of(
     fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], systematic: FloatArray
 ) -> dict[str, FrictionCurve]:
-    """Curve of every element that comes on.
+    """Curve of every element whose law is free (carriers.py).
 
     `linear` are the curves of the linear method: their points and slip range are shown. Its
     place is taken by the slips of the simulation where there is none. `systematic` (p, p) is the
     covariance from the sensors' tolerances; it widens the band.
     """
-    found = {}
-    for part in fit.problem.parts:
-        name = part.structure.driveline.oncoming.name
-        base = linear.get(name) or _seen(fit, part)
+    found: dict[str, FrictionCurve] = {}
+    pairs = [(part, one.name) for part in fit.problem.parts for one in part.structure.elements]
+    for part, name in pairs:
+        if f"{name}.{LAW[-1]}" not in fit.point.names or name in found:
+            continue
+        base = linear.get(name) or _seen(fit, part, name)
         index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
         theta, square = fit.point.values[index], np.ix_(index, index)
         mu, slopes = stribeck(theta, base.slip)
@@ -56,9 +58,8 @@ def curves_of(
     return found
 
 
-def _seen(fit: LikelihoodFit, part: Part) -> FrictionCurve:
+def _seen(fit: LikelihoodFit, part: Part, name: str) -> FrictionCurve:
     """An empty curve over the slips at which the simulated element carried torque."""
-    name = part.structure.driveline.oncoming.name
     run = part.run(fit.point)
     assert run is not None
     slip = np.abs(run.slip[name])

@@ -14,6 +14,7 @@ import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.identify.friction import LAW_PRIOR
+from drivetwin.identify.likelihood.carriers import all_carriers
 from drivetwin.identify.likelihood.known import (
     gear_inertias,
     known_unknowns,
@@ -80,7 +81,7 @@ def problem_of(
     shift holds too little.
     """
     priors = _priors(signals, drivelines, guess)
-    every = (*COMMON, *_laws(drivelines), *_fills(drivelines))
+    every = (*COMMON, *_laws(signals, drivelines), *_fills(drivelines))
     names = [n for n in every if not _is_known(priors.get(n))]
     inertias = gear_inertias(signals, drivelines)
     tie = tie_of(inertias)
@@ -170,11 +171,11 @@ def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     return lower, upper
 
 
-def _laws(drivelines: Sequence[Driveline]) -> list[str]:
+def _laws(signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]) -> list[str]:
     """Free coefficients of the friction laws."""
-    coming = [d.oncoming.name for d in drivelines]
-    leaving = [d.offgoing.name for d in drivelines if d.offgoing.name not in coming]
-    return [f"{e}.{key}" for e in coming for key in LAW] + [f"{e}.mu_c" for e in leaving]
+    shown = all_carriers(signals, drivelines)
+    leaving = [d.offgoing.name for d in drivelines if d.offgoing.name not in shown]
+    return [f"{e}.{key}" for e in shown for key in LAW] + [f"{e}.mu_c" for e in leaving]
 
 
 def _fills(drivelines: Sequence[Driveline]) -> list[str]:
@@ -200,16 +201,16 @@ def _priors(
     if AERO in guess:
         found[AERO] = PriorValue(0.0, AERO_SPREAD)
     law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)}
-    for name in _laws(drivelines):
+    for name in _laws(signals, drivelines):
         found[name] = law[name.split(".")[-1]]
-    coming = {d.oncoming.name for d in drivelines}
+    shown = all_carriers(signals, drivelines)
     for d in drivelines:
         for e in (d.offgoing, d.oncoming):
             found[f"{e.name}.P0"] = e.P0
         for e in d.couplings.values():
             drum = e.drum if signals[0].scale_known else over_eta(e.drum)
             found[f"{e.name}.drum"] = drum
-        if d.offgoing.name not in coming:
+        if d.offgoing.name not in shown:
             level = guess[f"{d.offgoing.name}.mu_c"]
             found[f"{d.offgoing.name}.mu_c"] = PriorValue(level, OFF_GOING_LEVEL)
     return found
