@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
+from itertools import islice
 from pathlib import Path
 
 from drivetwin.errors import DrivetwinError, MissingExtraError
@@ -66,10 +67,15 @@ def compile_library(
         )
 
 
+def native_compiler() -> tuple[str, ...]:
+    """Command of the C compiler found here; empty without one."""
+    found = (name for name in ("cc", "gcc", "clang") if shutil.which(name))
+    return tuple(islice(found, 1))
+
+
 def _compiler(platform: Platform | None) -> list[str]:
-    found = next((name for name in ("cc", "gcc", "clang") if shutil.which(name)), None)
-    if platform is None and found is not None:
-        return [found]
+    if platform is None and native_compiler():
+        return [*native_compiler()]
     if find_spec("ziglang") is None:
         raise MissingExtraError(
             "building for other platforms, or without a C compiler, needs zig",

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from drivetwin.driveline import FrictionTable
 from drivetwin.errors import InputError
-from drivetwin.export.c.write import c_string, twin_source, write_c
+from drivetwin.export.c.write import c_string, model_sources, twin_source, write_c
 from tests.export.cases import CASES, Case, paper_subject
 
 STRICT = (
@@ -105,6 +105,24 @@ def test_the_same_twin_gives_the_same_files(tmp_path: Path) -> None:
     first, second = (write_c(paper_subject(), tmp_path / name) for name in ("a", "b"))
     assert [p.name for p in first] == [p.name for p in second]
     assert all(a.read_bytes() == b.read_bytes() for a, b in zip(first, second, strict=True))
+
+
+@pytest.mark.parametrize(("index", "stated"), [(1, 272250), (0, 145300)])
+def test_the_stated_bound_of_operations_follows_from_the_limits_of_the_loops(
+    index: int, stated: int
+) -> None:
+    """Index 0: float, the first branch of `dt_real.h`; 1: double."""
+    text = {name: data.decode() for name, data in model_sources().items()}
+    terms = int(re.findall(r"#define DT_TERMS (\d+)", text["dt_real.h"])[index])
+    searches, newton = (
+        int(re.findall(rf"#define {name} (\d+)", text["dt_fall.c"])[0])
+        for name in ("SEARCHES", "NEWTON")
+    )
+    expansion = 90 * terms + 4 * terms**2
+    guards = 12 * (searches * (terms**2 + 6 * terms) + newton * 4 * terms)
+    assert expansion + guards == stated
+    assert f"{stated}" in text["dt_model.h"]
+    assert f"{expansion}" in text["dt_model.h"]
 
 
 def test_a_table_of_friction_is_written_point_by_point() -> None:

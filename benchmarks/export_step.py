@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: MIT
+"""Time of the exported C beside the core, on this machine and on a Cortex-M4F by instruction count.
+
+`python benchmarks/export_step.py` runs the upshift of `reference/dual_clutch_upshift` and writes
+`docs/export-cost.md`. Without the ARM compiler and emulator it says so in place of those rows.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from drivetwin.driveline import Accuracy, Signal, simulate  # noqa: E402
+from drivetwin.export.c.write import write_c  # noqa: E402
+from drivetwin.export.compiler import native_compiler  # noqa: E402
+from tests.export.cases import CASES, Case  # noqa: E402
+
+HERE = Path(__file__).resolve().parent / "export"
+PAGE = ROOT / "docs" / "export-cost.md"
+STEPS = (1, 10)
+"""Steps measured [ms]."""
+CLOCK = 168e6
+CYCLES_PER_INSTRUCTION = 1.5
+"""A Cortex-M4F at 168 MHz; cycles an instruction takes on it, loads and divisions included."""
+REPEATS = 7
+_CORTEX_M = (
+    *("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"),
+    *("--specs=rdimon.specs", "-nostartfiles", "-T", str(HERE / "cortex_m.ld")),
+)
+_EMULATOR = (
+    *("qemu-system-arm", "-machine", "mps2-an386", "-nographic", "-icount", "shift=0"),
+    *("-semihosting-config", "enable=on,target=native", "-kernel"),
+)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Mean and largest cost of a call: ns on this machine, instructions on the Cortex-M."""
+
+    mean: float
+    largest: float
+
+
+def costs(output: str) -> dict[str, Cost]:
+    """What `time_steps.c` printed, by name."""
+    rows = (line.split() for line in output.splitlines())
+    return {name: Cost(float(mean), float(most)) for name, mean, most in rows}
+
+
+def program(folder: Path, case: Case, step: int, compiler: tuple[str, ...]) -> Path:
+    """Build `time_steps.c` with the model of a case and every `step`-th of its inputs."""
+    sources = [p for p in write_c(case.subject, folder) if p.suffix == ".c"]
+    rows = case.inputs[::step].tolist()
+    listed = ",\n".join("{" + ", ".join(f"DT_C({value!r})" for value in row) + "}" for row in rows)
+    (folder / "inputs.h").write_text(
+        f"#define INPUT_STEP DT_C({step * 1e-3!r})\n#define INPUT_ROWS {len(rows)}\n"
+        f"static const dt_real input_rows[INPUT_ROWS][3] = {{\n{listed}\n}};\n",
+        encoding="utf-8",
+    )
+    own = [HERE / "time_steps.c"]
+    if "-mthumb" in compiler:
+        own.append(HERE / "cortex_m.c")
+    target = folder / "program"
+    model = [str(path) for path in sources if path.name != "dt_run.c"]
+    command = [*compiler, "-std=gnu99", "-O2", f"-I{folder}", *model, *map(str, own)]
+    subprocess.run([*command, "-lm", "-o", str(target)], check=True, stderr=subprocess.DEVNULL)
+    return target
+
+
+def on_this_machine(case: Case, step: int, defines: tuple[str, ...]) -> dict[str, Cost]:
+    """Smallest means of several runs [ns]."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = program(Path(folder), case, step, (*native_compiler(), *defines))
+        runs = [
+            costs(subprocess.run([path], capture_output=True, text=True, check=True).stdout)
+            for _ in range(REPEATS)
+        ]
+    return {name: min((run[name] for run in runs), key=lambda cost: cost.mean) for name in runs[0]}
+
+
+def on_cortex_m(case: Case, step: int, defines: tuple[str, ...]) -> dict[str, Cost] | None:
+    """Instructions; None without the tools."""
+    if not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")):
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        compiler = ("arm-none-eabi-gcc", *_CORTEX_M, *defines)
+        path = program(Path(folder), case, step, compiler)
+        done = subprocess.run(
+            [*_EMULATOR, str(path)], capture_output=True, text=True, check=True, timeout=120
+        )
+    return costs(done.stdout)
+
+
+def of_core(case: Case, step: int, accuracy: Accuracy) -> float:
+    """Time of the core per step [ns], the call from Python included."""
+    time_grid, inputs = case.time[::step], case.inputs[::step]
+    torque, off, on = (Signal(time_grid, np.ascontiguousarray(column)) for column in inputs.T)
+    subject = case.subject
+
+    def run() -> None:
+        pressures = {"B2": off, "B3": on}
+        simulate(subject.model, torque, pressures, subject.start, time_grid, accuracy=accuracy)
+
+    return 1e9 * fastest(run) / (len(time_grid) - 1)
+
+
+def fastest(run: Callable[[], None]) -> float:
+    """Smallest wall time of several runs [s]."""
+    times = []
+    for _ in range(5 * REPEATS):
+        start = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def page(case: Case) -> str:
+    """The document."""
+    host, arm = [], []
+    for step in STEPS:
+        for name, accuracy in (("exact", Accuracy(exact=True)), ("default", Accuracy())):
+            spent = of_core(case, step, accuracy)
+            host.append(f"| {step} ms | core, {name} | {spent / 1e3:.2f} µs | |")
+        for real, defines in (("double", ()), ("float", ("-DDT_FLOAT",))):
+            told = on_this_machine(case, step, defines)
+            for name, label in (("step", "model"), ("observer", "observer")):
+                cost = told[name]
+                host.append(
+                    f"| {step} ms | C {label}, {real} | {cost.mean / 1e3:.2f} µs "
+                    f"| {cost.largest / 1e3:.1f} µs |"
+                )
+        counted = on_cortex_m(case, step, ("-DDT_FLOAT",))
+        for name, label in (("step", "model"), ("observer", "observer")):
+            if counted is not None:
+                arm.append(_arm_row(step, label, counted[name]))
+    if not arm:
+        arm = ["| | not measured: arm-none-eabi-gcc or qemu-system-arm is missing | | | |"]
+    return _TEXT.format(host="\n".join(host), arm="\n".join(arm))
+
+
+def _arm_row(step: int, label: str, cost: Cost) -> str:
+    seconds = cost.largest * CYCLES_PER_INSTRUCTION / CLOCK
+    return (
+        f"| {step} ms | {label} | {cost.mean:,.0f} | {cost.largest:,.0f} "
+        f"| {1e3 * seconds:.2f} ms, {100.0 * seconds / (step * 1e-3):.0f} % |"
+    )
+
+
+_TEXT = """# What the exported C costs
+
+Written by `benchmarks/export_step.py`. One upshift, `reference/dual_clutch_upshift`, with inputs
+linear between points 1 ms or 10 ms apart, 10 ms being the task of a usual transmission controller.
+
+## On a PC
+
+Smallest mean of several runs, one thread, `-O2`; the largest single call of that run holds what
+the operating system took as well. The core's time has the call from Python in it, spread over the
+steps.
+
+| step | | mean of a call | largest |
+|---|---|---|---|
+{host}
+
+## On a Cortex-M4F
+
+Single precision, `-O2`, instructions counted by QEMU (`-icount`). The last column takes 1.5 cycles
+an instruction at 168 MHz: the largest call, and its share of the task.
+
+| step | | mean, instructions | largest | largest, of the task |
+|---|---|---|---|---|
+{arm}
+
+What no input can exceed is stated in `dt_model.h`.
+"""
+
+
+def main() -> None:
+    """Measure and write the page."""
+    text = page(CASES["dual_clutch_upshift"]())
+    PAGE.write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
