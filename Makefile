@@ -76,8 +76,13 @@ bench: $(venv)/.native ## measure what has a stated limit
 fuzz: $(venv)/.native ## 20,000 damaged files through each reader, for an hour or two
 	$(bin)/python -m tests.fuzz.run --count 20000
 
+.PHONY: fuzz-identify
+fuzz-identify: $(venv)/.native ## 2,000 harmless and 2,000 damaged logs through `identify`, for an hour or two
+	$(bin)/python -m tests.fuzz.identified --count 2000
+	$(bin)/python -m tests.fuzz.identified --count 100 --method likelihood
+
 .PHONY: picture
-picture: $(venv)/.native ## draw the README's picture (needs Chromium)
+picture: $(venv)/.native ## draw the pictures of the documents (needs Chromium)
 	$(bin)/python -m tools.picture
 
 .PHONY: accuracy

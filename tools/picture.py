@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Draw the README's picture: simulation over measurement of the demo's shift.
+"""Draw the pictures of the documents from the demo's shift.
 
-`python -m tools.picture` writes docs/img/validation.png; needs Chromium on the PATH.
+`python -m tools.picture` writes docs/img/validation.png (simulation over measurement) and
+docs/img/report.png (first page of the report); needs Chromium on the PATH.
 """
 
 from __future__ import annotations
@@ -14,14 +15,15 @@ from pathlib import Path
 
 from plotly.io import to_html
 
-from drivetwin.cli.pipeline import run
+from drivetwin.cli.pipeline import Outcome, run
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.identify.method import DEFAULT_METHOD
 from drivetwin.report.figures.validation import validation_figure
+from drivetwin.report.html import save_report
 
-PICTURE = Path(__file__).resolve().parents[1] / "docs" / "img" / "validation.png"
+PICTURES = Path(__file__).resolve().parents[1] / "docs" / "img"
 WIDTH, HEIGHT = 1000, 960
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 OPTIONS = (
@@ -31,17 +33,22 @@ OPTIONS = (
     "--hide-scrollbars",
     "--no-first-run",
     "--disable-background-networking",
-    "--virtual-time-budget=5000",
+    "--virtual-time-budget=20000",
     f"--window-size={WIDTH},{HEIGHT}",
 )
 
 
-def page(folder: Path) -> Path:
-    """Make the demo's log in `folder`, identify it, and write a page of the figure alone."""
+def identified(folder: Path) -> Outcome:
+    """Make the demo's log in `folder` and identify it."""
     log, card, _ = write_run(folder / "shift.csv", run_dyno(paper_steps(), seed=0))
-    (validation,) = run(log, card, None, DEFAULT_METHOD).found.evidence["validation"]
+    return run(log, card, None, DEFAULT_METHOD)
+
+
+def figure_page(outcome: Outcome, folder: Path) -> Path:
+    """A page of the validation figure alone."""
+    (validation,) = outcome.found.evidence["validation"]
     figure = validation_figure(validation)
-    figure.update_layout(width=WIDTH, height=HEIGHT, paper_bgcolor="white")
+    figure.update_layout(width=WIDTH, height=HEIGHT, paper_bgcolor="white", margin={"t": 30})
     figure.layout.updatemenus = ()
     path = folder / "figure.html"
     text = to_html(figure, config={"displayModeBar": False}, default_width=WIDTH)
@@ -49,28 +56,34 @@ def page(folder: Path) -> Path:
     return path
 
 
+def report_page(outcome: Outcome, folder: Path) -> Path:
+    """The report itself."""
+    path = folder / "report.html"
+    save_report(path, outcome.found, outcome.log)
+    return path
+
+
 def main() -> int:
-    """Write the picture; 1 where no browser is found."""
+    """Write the pictures; 1 where no browser is found."""
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         print(f"no browser found: install one of {', '.join(BROWSERS)}", file=sys.stderr)
         return 1
-    PICTURE.parent.mkdir(parents=True, exist_ok=True)
+    PICTURES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        subprocess.run(
-            [
-                browser,
-                *OPTIONS,
-                f"--user-data-dir={folder / 'profile'}",
-                f"--screenshot={PICTURE}",
-                page(folder).as_uri(),
-            ],
-            check=True,
-            capture_output=True,
-        )
-    print(f"wrote {PICTURE} ({PICTURE.stat().st_size / 1e3:.0f} kB)")
+        outcome = identified(folder)
+        for picture, page in (("validation.png", figure_page), ("report.png", report_page)):
+            shoot(browser, page(outcome, folder), PICTURES / picture)
     return 0
+
+
+def shoot(browser: str, page: Path, picture: Path) -> None:
+    """Write what the browser shows of a page. Raises CalledProcessError where it fails."""
+    profile = f"--user-data-dir={page.parent / 'profile'}"
+    command = [browser, *OPTIONS, profile, f"--screenshot={picture}", page.as_uri()]
+    subprocess.run(command, check=True, capture_output=True)
+    print(f"wrote {picture} ({picture.stat().st_size / 1e3:.0f} kB)")
 
 
 if __name__ == "__main__":
