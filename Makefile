@@ -71,6 +71,7 @@ reference: $(venv)/.native ## solve the reference problems anew with SciPy
 .PHONY: bench
 bench: $(venv)/.native ## measure what has a stated limit
 	for program in benchmarks/*.py; do $(bin)/python "$$program"; done
+	$(bin)/python -m benchmarks.speed # writes docs/benchmarks.md
 
 .PHONY: fuzz
 fuzz: $(venv)/.native ## 20,000 damaged files through each reader, for an hour or two

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
+from drivetwin.errors import IdentificationError
 from drivetwin.identify.signals import FloatArray, Span
 
 
@@ -98,7 +99,8 @@ def hann_kernels(time: FloatArray, windows: Windows, shift: float = 0.0) -> Kern
 
     A sample stamped t is taken to show the instant t - `shift` (the age of the value). `psi` is
     the trapezoidal sum, scaled to be exact for a constant; `slope` is exact for a signal that is
-    linear between its samples, so a large constant speed leaves nothing behind.
+    linear between its samples, so a large constant speed leaves nothing behind. Raises
+    IdentificationError for a window without a sample.
     """
     instants = time - shift
     end = windows.start + windows.width
@@ -110,9 +112,18 @@ def hann_kernels(time: FloatArray, windows: Windows, shift: float = 0.0) -> Kern
     column = np.arange(indptr[-1]) - indptr[row] + first[row]
     u = (instants[column] - windows.start[row]) / windows.width[row]
     psi = np.sin(np.pi * np.clip(u, 0.0, 1.0)) ** 2 * _sample_weights(time)[column]
-    psi *= (0.5 * windows.width / np.add.reduceat(psi, indptr[:-1]))[row]
-    weight = windows.width[row[:-1]] * np.diff(_hann_integral(u)) / np.diff(instants[column])
-    weight[row[1:] != row[:-1]] = 0.0
+    total = np.add.reduceat(psi, indptr[:-1]) if row.size else np.empty(0)
+    if not np.all(total > 0.0):
+        raise IdentificationError(
+            f"{np.count_nonzero(~(total > 0.0))} windows of {windows.width.min():.3g} s hold no "
+            "sample of a channel",
+            "record the channels at 10 ms or faster",
+        )
+    psi *= (0.5 * windows.width / total)[row]
+    weight = np.zeros(max(row.size - 1, 0))
+    inside = row[1:] == row[:-1]
+    spread = windows.width[row[:-1]] * np.diff(_hann_integral(u))
+    np.divide(spread, np.diff(instants[column]), out=weight, where=inside)
     slope = np.concatenate([[0.0], weight]) - np.concatenate([weight, [0.0]])
     shape = (windows.count, time.size)
     return Kernels(

@@ -111,13 +111,21 @@ class BandedCholesky:
 
     @classmethod
     def of(cls, cov: FloatArray) -> BandedCholesky:
-        """Factor of `cov` (m, m), its bandwidth found from its zeros."""
+        """Factor of `cov` (m, m), its bandwidth found from its zeros.
+
+        Raises IdentificationError where it is no covariance: the search has left all reason.
+        """
+        if not np.isfinite(cov).all() or not np.diag(cov).all():
+            raise _unweighable()
         row, column = np.nonzero(cov)
         width = int(np.max(row - column))
         band = np.zeros((width + 1, cov.shape[0]))
         for k in range(width + 1):
             band[k, : cov.shape[0] - k] = np.diagonal(cov, -k)
-        return cls(cholesky_banded(band, lower=True))
+        try:
+            return cls(cholesky_banded(band, lower=True))
+        except np.linalg.LinAlgError:
+            raise _unweighable() from None
 
     def solve(self, x: FloatArray) -> FloatArray:
         """S⁻¹x for x (m,) or (m, r)."""
@@ -126,6 +134,13 @@ class BandedCholesky:
     def whiten(self, x: FloatArray) -> FloatArray:
         """L⁻¹x for x (m,) or (m, r)."""
         return np.asarray(solve_banded((self.lower.shape[0] - 1, 0), self.lower, x), dtype=float)
+
+
+def _unweighable() -> IdentificationError:
+    return IdentificationError(
+        "the noise of the channels gives the equations no finite weights",
+        "look at the channels with `drivetwin inspect`: one is damaged, or in another unit",
+    )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""Runs many cases in a process of their own: a crash is a finding and not an end.
+
+Each case must end within 10 s and 1 GB.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+LONGEST = 10.0
+"""Seconds of CPU time for one case."""
+
+MOST_MEMORY = 1_000_000_000
+"""Bytes that one case may add."""
+
+PATIENCE = 12.0
+"""A case that has not answered after so many times LONGEST on a busy machine hangs."""
+
+Prepare = Callable[[Path], Callable[[int], str]]
+"""Makes, in a folder of its own, the function from a seed to the name of what happened."""
+
+
+@dataclass
+class Tally:
+    """Outcomes by name, and the seeds that should not have ended as they did."""
+
+    outcomes: Counter[str] = field(default_factory=Counter)
+    faults: list[tuple[int, str]] = field(default_factory=list)
+    slowest: float = 0.0
+
+    def __str__(self) -> str:
+        shown = ", ".join(f"{what} {count}" for what, count in self.outcomes.most_common())
+        lines = [f"{shown}; slowest {self.slowest:.2f} s; {len(self.faults)} faults"]
+        lines += [f"  seed {seed}:\n{fault}" for seed, fault in self.faults[:5]]
+        return "\n".join(lines)
+
+
+def run(prepare: Prepare, count: int, first: int = 0) -> Tally:
+    """Run the seeds `first` to `first + count` in other processes; `prepare` must be picklable."""
+    tally = Tally()
+    seed = first
+    while seed < first + count:
+        here, there = multiprocessing.Pipe(duplex=False)
+        worker = multiprocessing.Process(target=_work, args=(there, prepare, seed, first + count))
+        worker.start()
+        there.close()
+        seed = _follow(here, worker, tally, seed)
+    return tally
+
+
+def _follow(here: Connection, worker: multiprocessing.Process, tally: Tally, seed: int) -> int:
+    """Collect outcomes until the worker ends or hangs; the seed to go on with."""
+    while True:
+        if not here.poll(PATIENCE * LONGEST):
+            worker.kill()
+            tally.faults.append((seed, f"no answer within {PATIENCE * LONGEST:g} s"))
+            return seed + 1
+        try:
+            what, seconds, fault = here.recv()
+        except EOFError:
+            worker.join()
+            if worker.exitcode:
+                tally.faults.append((seed, f"the process died: {worker.exitcode}"))
+                return seed + 1
+            return seed
+        tally.outcomes[what] += 1
+        tally.slowest = max(tally.slowest, seconds)
+        if fault:
+            tally.faults.append((seed, fault))
+        seed += 1
+
+
+def _work(there: Connection, prepare: Prepare, first: int, end: int) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        outcome = prepare(Path(folder))
+        before = _memory()
+        resource.setrlimit(resource.RLIMIT_DATA, (before + 3 * MOST_MEMORY, resource.RLIM_INFINITY))
+        for seed in range(first, end):
+            started, fault = time.process_time(), ""
+            try:
+                what = outcome(seed)
+            except BaseException:  # everything that is no DrivetwinError is what is looked for
+                what, fault = "untyped", traceback.format_exc()
+            seconds, more = time.process_time() - started, _memory() - before
+            if seconds > LONGEST or more > MOST_MEMORY:
+                fault += f"took {seconds:.1f} s and {more / 1e6:.0f} MB"
+            before = max(before, _memory()) if more > MOST_MEMORY else before
+            there.send((what, seconds, fault))
+    there.close()
+
+
+def _memory() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""A short run of what `make fuzz-identify` does at length."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.errors import DrivetwinError
+from drivetwin.identify.method import Method
+from tests.fuzz.identified import Base, base, identified, moved, told, written
+from tests.fuzz.tables import DAMAGING, HARMLESS
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Base:
+    return base(ScenarioName.PAPER_STEPS, Method.INTEGRAL, tmp_path_factory.mktemp("fuzz"))
+
+
+@pytest.mark.parametrize("kind", HARMLESS)
+def test_harmless_changes_leave_the_result(kind: str, sound: Base, tmp_path: Path) -> None:
+    table = HARMLESS[kind](sound.table, np.random.default_rng(3))
+    found = identified(written(table, tmp_path), sound.card, Method.INTEGRAL)
+    assert moved(found, sound.found) == []
+
+
+TELLING = ("missing_anywhere", "stuck", "dropout", "spiked", "wrapped", "exchanged", "bad_clock")
+"""Damage that must be refused or told whatever channel it hits; others nothing may show."""
+
+
+@pytest.mark.parametrize("kind", DAMAGING)
+def test_damage_ends_as_a_result_or_a_typed_error(kind: str, sound: Base, tmp_path: Path) -> None:
+    table = DAMAGING[kind](sound.table, np.random.default_rng(8))
+    try:
+        found = identified(written(table, tmp_path), sound.card, Method.INTEGRAL)
+    except DrivetwinError:
+        return
+    assert kind not in TELLING or told(found, sound.found)
