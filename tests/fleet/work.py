@@ -20,6 +20,9 @@ from drivetwin.fleet.task import ShiftRow, Task
 def toy(task: Task) -> Found:
     """Rows and a shift that follow from the file's content alone."""
     words = Path(task.path).read_text().split()
+    if "print" in words:
+        print("not an answer")
+        os.write(1, b"nor this\n")
     if "slow" in words:
         time.sleep(0.02)
     if "hang" in words:
@@ -31,5 +34,6 @@ def toy(task: Task) -> Found:
         raise AssertionError(f"{len(held)} pieces of memory were to be had")
     if "bad" in words:
         raise FileFormatError("it says that it is bad", "make it a good one")
-    rows = [Row(RowKind.PARAMETER, f"P0.{words[0]}", float(len(word)), 0.1, 0.2) for word in words]
+    name = f"P0.{words[0]}"
+    rows = [Row(RowKind.PARAMETER, name, float(len(word)), 0.1, 0.2) for word in words]
     return Found(rows, [ShiftRow(True, 0.0, float(len(words)), "2", "3")])

@@ -150,7 +150,11 @@ def fit(seen: Observations, *, intervals: bool = True) -> MixedFit:
     Without `intervals`, which take most of the time, `sigma_ci` is NaN.
     """
     scale = float(np.median(seen.std))
-    scaled = Observations(seen.y / scale, seen.std / scale, seen.unit, seen.x, seen.z)
+    root = 1.0 / seen.std
+    start, *_ = np.linalg.lstsq(seen.x * root[:, None], seen.y * root, rcond=None)
+    # Far from zero the sums of squares would lose the digits that the search lives on.
+    centred = (seen.y - seen.x @ start) / scale
+    scaled = Observations(centred, seen.std / scale, seen.unit, seen.x, seen.z)
     likelihood = _Likelihood(scaled)
     best = _minimum(likelihood)
     solved = likelihood.solve(best)
@@ -167,7 +171,7 @@ def fit(seen: Observations, *, intervals: bool = True) -> MixedFit:
     effects = np.sum(scaled.z * deviation[scaled.unit], axis=1)
     residual = scaled.y - scaled.x @ solved.beta - effects
     return MixedFit(
-        beta=scale * solved.beta,
+        beta=start + scale * solved.beta,
         covariance=np.asarray(scale**2 * covariance),
         half=scale * quantile * np.sqrt(np.diag(covariance)),
         sigma=scale * sigma,

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Rules: which card a log gets, whose it is, its fields; every fault told."""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivetwin.errors import RulesError
+from drivetwin.fleet.rules import field_value, read_rules, rule_for
+from drivetwin.fleet.sources import Source
+from tests.fleet.toys import ROOT
+
+DOCUMENTED = re.findall(
+    r"^```toml\n(.*?)^```", (ROOT / "docs/howto/fleet.md").read_text("utf-8"), re.M | re.S
+)[0]
+
+
+@pytest.fixture
+def rules_file(tmp_path: Path) -> Path:
+    """The rules of the how-to, with the files they name."""
+    for name in ("truck_a.toml", "truck_b.toml", "channels.toml"):
+        (tmp_path / name).write_text("")
+    path = tmp_path / "rules.toml"
+    path.write_text(DOCUMENTED, encoding="utf-8")
+    return path
+
+
+def _chosen(rules_file: Path, path: str, channels: frozenset[str] = frozenset()) -> str:
+    rules, source = read_rules(rules_file), Source(Path(path))
+    return rule_for(rules, source, rules.unit_of(source), lambda: channels).name
+
+
+def test_the_first_rule_that_fits_decides(rules_file: Path) -> None:
+    known = frozenset({"EngTrq", "SpdIn"})
+    assert _chosen(rules_file, "/x/workshop/unit_07/a.csv") == "left out"
+    assert _chosen(rules_file, "/x/truck_a/unit_07/a.csv", known) == "truck A"
+    assert _chosen(rules_file, "/x/truck_a/unit_01/a.csv", known) == "all others"
+    assert _chosen(rules_file, "/x/truck_a/unit_07/a.csv") == "all others"
+    rule = read_rules(rules_file).rules[1]
+    assert rule.vehicle == str(rules_file.parent / "truck_a.toml")
+    assert rule.channels == str(rules_file.parent / "channels.toml")
+
+
+def test_fields_come_from_path_and_list_and_name_channels(rules_file: Path) -> None:
+    rules = read_rules(rules_file)
+    told = {"recorded": "2025-03-31", "other": "x"}
+    fields = rules.fields_of(Source(Path("/x/unit_1/a_1234km.csv"), told))
+    assert fields == {"odometer_km": 1234.0, "recorded_date": 1743379200.0}
+    assert rules.means() == (("oil_temperature_degC", "TOil"),)
+    assert rules.fields_of(Source(Path("/x/unit_1/a.csv"))) == {}
+
+
+def test_the_unit_is_the_lists_else_the_patterns_else_the_folder(rules_file: Path) -> None:
+    rules = read_rules(rules_file)
+    assert rules.unit_of(Source(Path("/x/unit_12/a.csv"))) == "12"
+    assert rules.unit_of(Source(Path("/x/unit_12/a.csv"), {"unit": "T9"})) == "T9"
+    with pytest.raises(RulesError, match="unit's id"):
+        rules.unit_of(Source(Path("/x/y/a.csv")))
+    card = rules_file.with_name("card.toml")
+    card.write_text("gears = 1")
+    assert read_rules(card).unit_of(Source(Path("/x/y/a.csv"))) == "y"
+
+
+def test_no_rule_is_told(rules_file: Path) -> None:
+    rules_file.write_text('[[rules]]\npath = "*.mf4"\nvehicle = "truck_a.toml"\n')
+    with pytest.raises(RulesError, match="no rule takes this log of unit 'x'"):
+        _chosen(rules_file, "/x/a.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", r"rules.*required"),
+        ("rules = []", "at least 1 item"),
+        ('[[rules]]\nname = "a"', "names a vehicle card"),
+        ('[[rules]]\nvehicle = "truck_a.toml"\nskip = true', "names a vehicle card"),
+        ('[[rules]]\nvehicle = "nowhere.toml"', r"no file 'nowhere\.toml'"),
+        ('unit = "abc"\n[[rules]]\nskip = true', "one group"),
+        ('unit = "(a"\n[[rules]]\nskip = true', "regular expression"),
+        ('[[rules]]\nskip = true\n[fields.x]\ncolumn = "a"\nchannel = "b"', "exactly one"),
+        ("[[rules]]\nskip = true\nvehicles = 1", "did you mean 'vehicle'"),
+    ],
+)
+def test_faults_of_a_rules_file_are_told(rules_file: Path, text: str, says: str) -> None:
+    rules_file.write_text(text)
+    with pytest.raises(RulesError, match=says):
+        read_rules(rules_file)
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_numbers_of_fields_are_what_they_say(number: float) -> None:
+    assert field_value("odometer_km", repr(number)) == number
+
+
+@given(st.datetimes())
+def test_dates_are_seconds_since_1970(moment: datetime) -> None:
+    since = (moment - datetime(1970, 1, 1)).total_seconds()
+    assert field_value("date", moment.isoformat()) == pytest.approx(since, abs=1e-3)
+
+
+@pytest.mark.parametrize(("field", "text"), [("odometer_km", "12 km"), ("date", "yesterday")])
+def test_a_text_that_is_no_field_is_told(field: str, text: str) -> None:
+    with pytest.raises(RulesError, match=text):
+        field_value(field, text)

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""The store: what it says of itself, compaction, parts that are gone, formats."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from drivetwin.errors import StoreError
+from drivetwin.fleet import parts
+from drivetwin.fleet.rows import Row, RowKind
+from drivetwin.fleet.store import Store
+from drivetwin.fleet.task import Outcome, ShiftRow, State
+from tests.fleet.toys import contents, make_logs, run_toys
+
+ROWS = [Row(RowKind.PARAMETER, "eta", 0.85), Row(RowKind.WARNING, "", reason="ü")]
+
+
+def _key(number: int) -> str:
+    return f"{number * 2654435761 % 2**32:08x}"
+
+
+def _fill(store: Store, numbers: range) -> None:
+    """Add logs that are done, as a run does."""
+    for number in numbers:
+        log = _key(number)
+        outcome = Outcome(State.DONE, (ShiftRow(True, 0.0, float(number)),))
+        parts.write_part(store.part(log), log, outcome, ROWS)
+        store.index.put_waiting(log, "c", "s", "v")
+        store.index.put_outcome(log, outcome, 1.0)
+
+
+def _files(store: Store) -> dict[str, bytes]:
+    folder = store.folder / parts.ROWS
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def test_compaction_depends_on_the_logs_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(parts, "_LOGS_PER_PART", 4)
+    with Store(tmp_path / "a", write=True) as store:
+        for start in range(0, 40, 10):
+            _fill(store, range(start, start + 10))
+            before = store.rows()
+            store.compact()
+            assert store.rows() == before
+            assert not list((store.folder / parts.INBOX).glob("*/*"))
+        step_by_step = _files(store)
+    with Store(tmp_path / "b", write=True) as store:
+        _fill(store, range(39, -1, -1))
+        store.compact()
+        assert _files(store) == step_by_step
+    assert len(step_by_step) > 4
+
+
+def test_rows_come_back_as_they_were(tmp_path: Path) -> None:
+    with Store(tmp_path / "a", write=True) as store:
+        _fill(store, range(2))
+        rows = store.rows().to_pylist()
+        assert [row["log"] for row in rows] == sorted(2 * [_key(0), _key(1)])
+        assert [row["reason"] for row in rows] == ["", "ü", "", "ü"]
+        assert store.rows(RowKind.PARAMETER).num_rows == 2
+        assert store.written(_key(1)) == Outcome(State.DONE, (ShiftRow(True, 0.0, 1.0),))
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1 and some more that is no footer PAR1"])
+def test_a_part_that_is_none_is_not_taken_for_one(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "x.parquet").write_bytes(content)
+    assert parts.read_outcome(tmp_path / "x.parquet") is None
+    with pytest.raises(StoreError, match="a part cannot be read"):
+        parts.read_rows(tmp_path / "x.parquet")
+
+
+def test_parts_that_are_gone_are_made_again(tmp_path: Path) -> None:
+    logs, store = make_logs(tmp_path / "logs", 4), tmp_path / "store"
+    run_toys(logs, store)
+    before = contents(store)
+    shutil.rmtree(store / parts.ROWS)
+    assert run_toys(logs, store)[0].computed == 4
+    assert contents(store) == before
+
+
+def test_what_a_stopped_compaction_left_is_no_harm(tmp_path: Path) -> None:
+    with Store(tmp_path / "a", write=True) as store:
+        _fill(store, range(3))
+        (store.folder / parts.ROWS / "all-0123.parquet").write_bytes(b"no run finished this")
+        (store.part(_key(0)).parent / "x.partial").write_bytes(b"half")
+        before = store.rows()
+    with Store(tmp_path / "a", write=True) as store:
+        assert store.rows() == before
+        assert not _files(store)
+        assert not list(store.folder.glob("inbox/*/*.partial"))
+
+
+def test_what_is_no_store_is_told(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="no store"):
+        Store(tmp_path / "nothing")
+    assert not (tmp_path / "nothing").exists()
+    (tmp_path / "index.sqlite").write_bytes(b"something else, long enough to be read" * 50)
+    with pytest.raises(StoreError, match="cannot be used"):
+        Store(tmp_path)
+
+
+def test_a_store_of_another_format_is_told(tmp_path: Path) -> None:
+    with Store(tmp_path / "a", write=True):
+        pass
+    with sqlite3.connect(tmp_path / "a" / "index.sqlite") as database:
+        database.execute("PRAGMA user_version = 99")
+    database.close()
+    with pytest.raises(StoreError, match="format 99"):
+        Store(tmp_path / "a")
+
+
+def test_readers_and_a_writer_get_along(tmp_path: Path) -> None:
+    with Store(tmp_path / "a", write=True) as writer:
+        _fill(writer, range(3))
+        writer.index.commit()
+        _fill(writer, range(3, 5))
+        with Store(tmp_path / "a") as reader:
+            assert reader.index.count(State.DONE) == 3
