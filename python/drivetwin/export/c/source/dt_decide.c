@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Who stays at rest: the box-constrained programme over all friction elements at zero slip, together
- * with the direction of power through the input gear. */
+/* Who stays at rest: the box-constrained programme over all friction elements at zero slip,
+ * together with the direction of power through the input gear. */
 
 #include "dt_internal.h"
 

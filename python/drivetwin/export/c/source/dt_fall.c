@@ -4,7 +4,7 @@
 
 #include "dt_internal.h"
 
-#define SEARCHES 60 /* intervals tried; beyond, a root between the last and the end counts as there */
+#define SEARCHES 60 /* intervals tried; beyond, a root up to the end counts as at the last one */
 #define NEWTON 60   /* a bracket of doubles halves so often at most */
 
 static dt_real slope_at(const dt_real *c, int order, dt_real t) {

@@ -91,7 +91,7 @@ typedef struct {
 /** Parameters; may change between steps. */
 typedef struct {
     dt_real J1;            /**< inertia before the input gear, kg m^2, >= 0 */
-    dt_real J2e;           /**< inertia between input gear and clutches, at the engine, kg m^2, >= 0 */
+    dt_real J2e;           /**< inertia from input gear to clutches, at the engine, kg m^2, >= 0 */
     dt_real eta;           /**< lumped efficiency, 1, 0 to 1.5 */
     dt_real i_in;          /**< input gear, 1, not 0 */
     dt_real J_out;         /**< output side before the shaft, kg m^2, > 0 */
@@ -156,7 +156,8 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
 /** Advance by `h` [s] with inputs linear from `from` to `to` (the same twice: held).
  *
  *  Locks and break-aways are located inside the step to round-off. Inputs may jump between steps.
- *  Where the result is not DT_OK the state is that of the instant the run ended. */
+ *  Where the result is not DT_OK the state is that of the instant the run ended, and the outputs
+ *  are those of the last piece that was completed, if any. */
 dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *from,
                   const dt_inputs *to, dt_real h, dt_outputs *outputs);
 

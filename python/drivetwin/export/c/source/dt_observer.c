@@ -30,7 +30,8 @@ static dt_real normal_of(const dt_params *p, const dt_inputs *u, int j) {
 }
 
 /* What a clutch transmits at most without slip, by the friction known so far. */
-static dt_real static_capacity(const dt_params *p, const dt_observer *o, const dt_inputs *u, int j) {
+static dt_real static_capacity(const dt_params *p, const dt_observer *o, const dt_inputs *u,
+                               int j) {
     const dt_friction *friction = &p->clutch[j].friction;
     return o->x[DT_SCALE + j] * p->clutch[j].peak * dt_mu_rest(friction) * normal_of(p, u, j);
 }
@@ -49,7 +50,8 @@ static int locked_clutch(const dt_observer *o, const dt_mechanism *m, const dt_p
         const dt_real capacity = static_capacity(p, o, &now->inputs, j);
         const dt_real doubt = DT_C(2) * dt_sqrt(dt_larger(o->P[DT_HELD][DT_HELD], DT_C(0)));
         const dt_real needed = before ? dt_abs(o->x[DT_HELD]) - doubt : DT_C(0);
-        if (capacity > dt_larger(needed, DT_C(0)) && slip < bound && (locked < 0 || slip < smallest)) {
+        const int holds = capacity > dt_larger(needed, DT_C(0)) && slip < bound;
+        if (holds && (locked < 0 || slip < smallest)) {
             locked = j;
             smallest = slip;
         }
@@ -301,8 +303,9 @@ dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tu
         take_up_lock(observer, &m, params, &now->inputs, locked);
     }
     observer->locked = locked;
+    const dt_real most = DT_C(1.001) * DT_C(DT_OBSERVER_SUBSTEP); /* 10 ms are ten, not eleven */
     int parts = 1;
-    while (parts < DT_OBSERVER_SUBSTEPS && h > DT_C(DT_OBSERVER_SUBSTEP) * DT_C(parts) * DT_C(1.001)) {
+    while (parts < DT_OBSERVER_SUBSTEPS && h > most * DT_C(parts)) {
         ++parts;
     }
     for (int i = 0; i < parts; ++i) {

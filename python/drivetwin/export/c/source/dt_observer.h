@@ -32,7 +32,7 @@ typedef struct {
     dt_real held_torque;   /**< drift of the torque of a locked clutch, N m over 1 s */
     dt_real scale;         /**< drift of the friction scale of a slipping clutch, 1 over 1 s */
     dt_real load;          /**< drift of the load at the wheel, N m over 1 s */
-    dt_real locked_slip;   /**< measured slip below which a pressed clutch counts as locked, rad/s */
+    dt_real locked_slip;   /**< slip below which a pressed clutch counts as locked, rad/s */
 } dt_tuning;
 
 /** Everything that lives from call to call. */

@@ -157,12 +157,15 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
     dt_bring_to_rest(state, &m, start->locked - 1);
     dt_set_inputs(&e, params, inputs, &still);
     const dt_status status = refresh(state, params, &e, DT_C(1));
+    if (status != DT_OK) {
+        return status;
+    }
     dt_set_inputs(&e, params, inputs, &still);
     dt_mechanism_of(&m, params, state->power_backward);
     (void)dt_expand(&e, &m, params, state, DT_C(0));
     fill_outputs(outputs, state, params, &e, DT_C(0));
     outputs->pieces = 0;
-    return status;
+    return DT_OK;
 }
 
 dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *from,
@@ -183,12 +186,12 @@ dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *fro
         dt_set_inputs(&e, params, &at, &rate);
         status = n == 1 && jumped ? refresh(state, params, &e, remaining)
                                   : change_mode(state, params, &e, event, remaining);
-        dt_set_inputs(&e, params, &at, &rate);
+        if (status != DT_OK) {
+            return status;
+        }
+        dt_set_inputs(&e, params, &at, &rate); /* a decision looks ahead and moves them on */
         dt_mechanism_of(&m, params, state->power_backward);
         const dt_real length = dt_expand(&e, &m, params, state, remaining);
-        if (status != DT_OK) {
-            break;
-        }
         event = dt_earliest(&e, &m, params, state, length);
         status = advance(state, &e, event.at) ? DT_OK : DT_BAD_STATE;
         t += event.at;

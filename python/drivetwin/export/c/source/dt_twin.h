@@ -7,6 +7,10 @@
 
 #include "dt_model.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /** Parameters as identified; copy them to change them. */
 extern const dt_params dt_twin_params;
 /** Where a run starts unless told otherwise: steadily in the old gear. */
@@ -15,5 +19,9 @@ extern const dt_start dt_twin_start;
 extern const char dt_twin_name[];
 /** Names of the shift elements: off-going, on-coming. */
 extern const char *const dt_twin_clutch_names[DT_CLUTCHES];
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""The FMU in a second importer: libcosim of the Open Simulation Platform, on the FMI Library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.export.compiler import native_platform
+from drivetwin.export.fmu.build import build_fmu
+from drivetwin.stepped import stepped_run
+from drivetwin.stepping import InputKind
+from tests.export.cases import CASES, STEP
+
+pytestmark = pytest.mark.skipif(
+    native_platform() is None, reason="FMI names no platform like this one"
+)
+INPUTS, OUTPUTS = [1, 2, 3], [10, 14]
+
+
+def test_libcosim_runs_it_as_the_core_does(tmp_path: Path) -> None:
+    pytest.importorskip("libcosimpy", reason="libcosimpy is not installed")
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    case = CASES["tie_up"]()
+    path = tmp_path / "tie_up.fmu"
+    build_fmu(case.subject, path)
+    log_output_level(CosimLogLevel.ERROR)
+    execution = CosimExecution.from_step_size(step_size=round(1e9 * STEP))
+    twin = execution.add_local_slave(CosimLocalSlave(str(path), "twin"))
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    inputs = CosimManipulator.create_override()
+    execution.add_manipulator(inputs)
+    for reference, value in zip(INPUTS, case.inputs[0].tolist(), strict=True):
+        execution.real_initial_value(twin, reference, value)
+    rows = []
+    for row in case.inputs[:-1].tolist():
+        inputs.slave_real_values(twin, INPUTS, row)
+        assert execution.step()
+        rows.append(observer.last_real_values(twin, OUTPUTS))
+    subject = case.subject
+    core = stepped_run(subject.model, subject.start, case.time, case.inputs, InputKind.HOLD)
+    for told, expected in zip(
+        np.array(rows).T, (core.engine_speed, core.shaft_torque), strict=True
+    ):
+        assert np.abs(told - expected[1:]).max() < 1e-9 * np.abs(expected).max()
