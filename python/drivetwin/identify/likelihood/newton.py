@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.identify.likelihood.problem import Normal, Problem
+from drivetwin.identify.likelihood.retraction import ahead
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import FloatArray
 from drivetwin.progress import tell
@@ -111,7 +112,8 @@ def _better(
 ) -> tuple[Point | None, float, float]:
     """A point with less Q, by how much less, and the next damping, raised until there is one."""
     while damping < LARGEST:
-        trial = point.moved(point.values + _step(problem, point, normal, damping))
+        values = ahead(point, _step(problem, point, normal, damping))
+        trial = point.moved(np.clip(values, problem.lower, problem.upper))
         fall = normal.cost - problem.cost(trial)
         if fall > 0.0:
             return trial, fall, damping / 10.0

@@ -98,10 +98,10 @@ class Part:
             return None
         columns = np.column_stack([self.record.stacked(found.derivatives[n]) for n in names])
         slopes = columns @ matrix
+        response = self.response(point, found.run)
         for name, disturbance in self._torque_changes(point).items():
-            slopes[:, point.names.index(name)] = self.answer_to(
-                point, found.run, {"engine torque": disturbance}
-            )
+            answer = self._seen(point, response.to({"engine torque": disturbance}))
+            slopes[:, point.names.index(name)] = answer
         if not np.all(np.isfinite(slopes)):
             return None
         return self.residual(found.run), slopes
@@ -126,8 +126,11 @@ class Part:
         self, point: Point, run: Trajectory, disturbance: dict[str, FloatArray]
     ) -> FloatArray:
         """Change (n,) of the simulated samples by disturbances (N-1,) of inputs, by name."""
+        return self._seen(point, self.response(point, run).to(disturbance))
+
+    def _seen(self, point: Point, z: FloatArray) -> FloatArray:
+        """What the sensors see (n,) of disturbances z (N, 4) of the state."""
         model = self.structure.model(point)
-        z = self.response(point, run).to(disturbance)
         with np.errstate(over="ignore", invalid="ignore"):
             return np.concatenate(
                 [z[out.centre] @ observed(model, out.name) for out in self.record.outputs]

@@ -15,9 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_banded
 
 from drivetwin.driveline import DualClutch, ShiftElement, Trajectory
 from drivetwin.identify.likelihood.record import Record
@@ -48,11 +50,28 @@ class Response:
         push = np.zeros_like(next(iter(self.drive.values())))
         for name, values in disturbance.items():
             push += self.drive[name] * values[:, None]
-        z = np.zeros((len(push) + 1, STATES))
+        start = np.zeros((1, STATES))
         with np.errstate(over="ignore", invalid="ignore"):
-            for k, matrix in enumerate(self.transition):
-                z[k + 1] = matrix @ z[k] + push[k]
-        return z
+            z = solve_banded(
+                (2 * STATES - 1, 0),
+                self._banded,
+                np.vstack([start, push]).ravel(),
+                check_finite=False,
+            )
+        return np.asarray(z.reshape(-1, STATES))
+
+    @cached_property
+    def _banded(self) -> FloatArray:
+        """z_{k+1} - transition_k·z_k as a banded matrix (8, 4N) of unit diagonal."""
+        count = len(self.transition) + 1
+        banded = np.zeros((2 * STATES, STATES * count))
+        banded[0] = 1.0
+        for i in range(STATES):
+            for j in range(STATES):
+                banded[STATES + i - j, j : STATES * (count - 1) : STATES] = -self.transition[
+                    :, i, j
+                ]
+        return banded
 
     @property
     def finite(self) -> bool:

@@ -3,20 +3,18 @@
 
 A part of the model that is wrongly left out biases everything (a load that grows with speed moves
 J3 by several per cent), and one that is wrongly left in widens intervals. The growing part is
-added where a score test finds it; what slow speeds show is the variant that leaves less.
+kept where it is significant; what slow speeds show is the variant that leaves less.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fit import GOOD, LikelihoodFit, covariance_of, fit
-from drivetwin.identify.likelihood.newton import step_of
+from drivetwin.identify.likelihood.fit import LikelihoodFit, fit
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
@@ -42,23 +40,16 @@ def choose(
     Raises IdentificationError where no variant converges.
     """
     shifts = [s.shift for s in signals]
-    problem, start = problem_of(signals, drivelines, loss_law, guess)
-    wide, wide_start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
-    try:
-        with part(0.0, 0.5):
-            best = fit(problem, start, shifts, thorough=False)
-        wide_start = _taken(wide_start, best.point)
-        grows = _grows(best, wide, wide_start)
-    except IdentificationError:
-        grows = True
+    problem, start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
     notes = []
-    if grows:
-        with part(0.5, 0.8):
-            problem, best = wide, fit(wide, wide_start, shifts)
-        notes.append(_growth(best))
-    elif best.chi2 >= GOOD:
-        with part(0.5, 0.8):
-            best = fit(problem, start, shifts)
+    with part(0.0, 0.6):
+        best = fit(problem, start, shifts)
+    with part(0.6, 0.8):
+        if _grows(best):
+            notes.append(_growth(best))
+        else:
+            problem, start = problem_of(signals, drivelines, loss_law, guess)
+            best = fit(problem, _taken(start, best.point), shifts)
     with part(0.8, 1.0):
         means = _with_means(problem, best, shifts) if problem.slow else None
     if means is not None:
@@ -72,23 +63,16 @@ def _with_means(
 ) -> LikelihoodFit | None:
     """The fit with slow speeds as means over their period; None where that leaves more."""
     try:
-        means = fit(problem.averaged(), best.point, shifts)
+        means = fit(problem.averaged(), best.point, shifts, thorough=False)
     except IdentificationError:
         return None
     return means if means.chi2 < best.chi2 else None
 
 
-def _grows(best: LikelihoodFit, wide: Problem, point: Point) -> bool:
-    """Whether one step from the minimum with a growing part added finds it significant."""
-    pairs = zip(wide.parts, best.problem.parts, strict=True)
-    parts = tuple(replace(found, structure=new.structure) for new, found in pairs)
-    normal = replace(wide, parts=parts).normal(point)
-    if normal is None:
-        return False
-    k = point.names.index(AERO)
-    step = step_of(normal.information, normal.gradient)[k]
-    std = np.sqrt(covariance_of(normal.information)[k, k])
-    return bool(point[AERO] + step > SIGNIFICANT * std)
+def _grows(best: LikelihoodFit) -> bool:
+    """Whether the growing part of the load differs from none by more than its noise."""
+    k = best.point.names.index(AERO)
+    return bool(best.point[AERO] > SIGNIFICANT * np.sqrt(best.covariance[k, k]))
 
 
 def _growth(best: LikelihoodFit) -> str:
