@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+"""Run the comparison, print it and write docs/benchmarks.md with its picture.
+
+`python -m benchmarks.speed [--rounds N] [--no-build] [--no-write]`
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks.speed import c_peer, cvode_peer, general, numba_peer, reference, scipy_peer, shift
+from benchmarks.speed.batch import batches
+from benchmarks.speed.core import ROOT, Example, Scenario
+from benchmarks.speed.growth import curves
+from benchmarks.speed.instructions import instruction_table
+from benchmarks.speed.limits import limit_table
+from benchmarks.speed.measure import Entry, Measured, Skipped, measure
+from benchmarks.speed.page import page
+from benchmarks.speed.picture import svg
+from benchmarks.speed.statement import Inputs, Problem, inputs, problem
+
+PAGE = ROOT / "docs" / "benchmarks.md"
+PICTURE = ROOT / "docs" / "img" / "benchmark-growth.svg"
+
+
+def main() -> int:
+    """Measure and write."""
+    options = _options()
+    of, given = problem(), inputs()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _tell("building the example of the core")
+        example = Example(folder, build=options.build)
+        stated = shift.scenario_of(of, given)
+        entries, skipped = _entries(of, given, example, stated)
+        measured = measure(entries, options.rounds, _tell)
+        extra = {
+            "What was set out to be reached": limit_table(measured),
+            "Many runs": batches(of, given, folder),
+            "Instructions": instruction_table(of, given, example, stated, folder),
+            "Growth": "Time of one run inside Rust, network ready, over the number of samples of "
+            "inputs and outputs, of states, and of clutches that slip.\n\n"
+            f"![Growth of the time of a run](img/{PICTURE.name})\n",
+        }
+        text = page(measured, skipped, _base(measured), extra)
+        picture = svg(curves(stated, example))
+    _tell("")
+    print(text)
+    if options.write:
+        PAGE.write_text(text, encoding="utf-8")
+        PICTURE.write_text(picture, encoding="utf-8")
+    return 0
+
+
+def _entries(
+    of: Problem, given: Inputs, example: Example, stated: Scenario
+) -> tuple[list[Entry], list[Skipped]]:
+    judge = shift.judge(reference.read())
+    found = [
+        c_peer.entries(of, given, judge, example.folder),
+        shift.entries(of, given, judge, example),
+        cvode_peer.entries(of, given, judge),
+        scipy_peer.entries(of, given, judge),
+        numba_peer.entries(of, given, judge),
+        general.entries(stated, example),
+    ]
+    skipped = [one for one in found if isinstance(one, Skipped)]
+    return [entry for one in found if not isinstance(one, Skipped) for entry in one], skipped
+
+
+def _base(measured: list[Measured]) -> Measured | None:
+    return next((one for one in measured if one.entry.program == c_peer.PROGRAM), None)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=25, help="how often to go round all entries")
+    parser.add_argument(
+        "--no-build", dest="build", action="store_false", help="take the example as it is"
+    )
+    parser.add_argument(
+        "--no-write", dest="write", action="store_false", help="print, but leave docs as they are"
+    )
+    return parser.parse_args()
+
+
+def _tell(text: str) -> None:
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\x1b[K{text}")
+        sys.stderr.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""The core: timed inside Rust by the example `one_shift`, and through Python."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.speed.measure import Sample
+from benchmarks.speed.statement import Solution
+from drivetwin.driveline import FloatArray, Signal
+from drivetwin.network import Element, Output, Sine, Start
+
+ROOT = Path(__file__).resolve().parents[2]
+_EXAMPLE = "one_shift"
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A run of a network; the first outputs are the columns of its solution."""
+
+    elements: Sequence[Element]
+    inputs: Mapping[str, Signal | Sine]
+    start: Start
+    time: FloatArray
+    outputs: Sequence[Output]
+
+    def as_json(self) -> str:
+        """As the example reads it."""
+        samples = {
+            name: [one.time.tolist(), one.values.tolist()]
+            for name, one in self.inputs.items()
+            if isinstance(one, Signal)
+        }
+        sines = {
+            name: [one.offset, one.amplitude, one.frequency, one.phase]
+            for name, one in self.inputs.items()
+            if isinstance(one, Sine)
+        }
+        document: dict[str, Any] = {
+            "elements": list(self.elements),
+            "time": self.time.tolist(),
+            "samples": samples,
+            "sines": sines,
+            "speeds": list(self.start.speeds.items()),
+            "twists": list(self.start.twists.items()),
+            "locked": list(self.start.locked),
+            "outputs": [{kind: name} for kind, name in self.outputs],
+        }
+        return json.dumps(document)
+
+
+class Example:
+    """The compiled example."""
+
+    def __init__(self, folder: Path, *, build: bool) -> None:
+        """Build it, or take the one that is there. Raises CalledProcessError, FileNotFoundError."""
+        self.folder = folder
+        target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+        self.path = target / "release" / "examples" / _EXAMPLE
+        if build:
+            command = ["cargo", "build", "--release", "-p", "drivetwin-core", "--example", _EXAMPLE]
+            subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+        if not self.path.exists():
+            raise FileNotFoundError(self.path)
+
+    def store(self, name: str, scenario: Scenario) -> Path:
+        """Scenario as a file."""
+        path = self.folder / f"{name}.json"
+        path.write_text(scenario.as_json(), encoding="utf-8")
+        return path
+
+    def run(self, scenario: Path, repeats: int, which: str) -> Sample:
+        """Seconds of `which` (`prepared` or `whole`) runs, and the solution."""
+        command = [str(self.path), str(scenario), str(repeats)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+        result = json.loads(done.stdout)
+        if result["status"] != "completed":
+            raise RuntimeError(f"{scenario.name}: {result['status']}")
+        solution = Solution(np.array(result["columns"]), np.array(result["events"]))
+        return Sample(result[which], solution)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Instructions of one run: a figure that does not depend on what else the machine does."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.speed import c_peer
+from benchmarks.speed.core import Example, Scenario
+from benchmarks.speed.statement import SAMPLES, STEP, Inputs, Problem, start
+
+_TARGET = "haswell"
+"""What both are counted for: valgrind knows instructions up to AVX2."""
+_DRIVER = """
+#include <stdio.h>
+int shift_sim(const double*, const double*, const double*, int, double, int, double*, double*, int);
+static double numbers[{numbers}], out[4*{samples}], events[64];
+int main(int count, char **names) {{
+    FILE *file = count == 2 ? fopen(names[1], "rb") : 0;
+    if (!file || fread(numbers, sizeof(double), {numbers}, file) != {numbers}) return 1;
+    shift_sim(numbers, numbers + {first}, numbers + {inputs}, {steps}, {step}, 1, out, events, 64);
+    return 0;
+}}
+"""
+
+
+def instruction_table(
+    of: Problem, given: Inputs, example: Example, stated: Scenario, folder: Path
+) -> str:
+    """Both counts with their ratio, or why there is none."""
+    if shutil.which("valgrind") is None:
+        return "Not counted: valgrind is not installed.\n"
+    ours = count(
+        [str(example.path), str(example.store("counted", stated)), "0"], "*Plan*run*", folder
+    )
+    lines = [
+        "Counted by callgrind, which knows instructions up to AVX2.\n",
+        "| program | instructions of one shift | ratio |",
+        "|---|---|---|",
+    ]
+    if c_peer.SOURCE.exists():
+        theirs = count(_driver(of, given, folder), "shift_sim", folder)
+        lines.append(f"| {c_peer.PROGRAM}, 1 ms | {theirs:,} | 1 |")
+        lines.append(f"| drivetwin, network ready | {ours:,} | {ours / theirs:.3g} |")
+    else:
+        lines.append(f"| drivetwin, network ready | {ours:,} | |")
+    return "\n".join(lines) + "\n"
+
+
+def count(command: list[str], function: str, folder: Path) -> int:
+    """Instructions within a function and all that it calls."""
+    out = folder / "callgrind.out"
+    tool = ["valgrind", "--tool=callgrind", f"--toggle-collect={function}"]
+    subprocess.run(
+        [*tool, f"--callgrind-out-file={out}", *command], check=True, capture_output=True
+    )
+    lines = out.read_text("utf-8", errors="replace").splitlines()
+    return int(next(line for line in lines if line.startswith(("totals:", "summary:"))).split()[1])
+
+
+def _driver(of: Problem, given: Inputs, folder: Path) -> list[str]:
+    """A program that runs the C peer once."""
+    parts = [c_peer.parameters(of), np.array(start(of, given)), c_peer.samples_of(given).ravel()]
+    numbers = np.concatenate(parts)
+    data, source, program = (folder / name for name in ("numbers", "driver.c", "driver"))
+    data.write_bytes(numbers.tobytes())
+    text = _DRIVER.format(
+        numbers=numbers.size,
+        samples=SAMPLES,
+        first=parts[0].size,
+        inputs=parts[0].size + parts[1].size,
+        steps=SAMPLES - 1,
+        step=STEP,
+    )
+    source.write_text(text, encoding="ascii")
+    flags = ["-O3", f"-march={_TARGET}", str(source), str(c_peer.SOURCE), "-o", str(program), "-lm"]
+    subprocess.run(["gcc", *flags], check=True, capture_output=True)
+    return [str(program), str(data)]

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""The page of results: tables as text, for the terminal and for docs/benchmarks.md."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import scipy
+
+from benchmarks.speed.measure import Group, Measured, Skipped
+
+_HEAD = """# Benchmarks
+
+Written by `make bench`, which measures all entries in turns in one run: each round runs every entry
+once more (fast ones many times), so that all of them see the same machine. Times are medians of
+single runs, with the shortest behind; ratios are to the hand-written C program at one step per
+sample. Figures of other machines are not comparable, ratios roughly are.
+
+The problem is stated in `benchmarks/speed/statement.py`: a power-on upshift of a dual-clutch
+driveline, 1.5 s, 1 kHz inputs with ripple and noise, four events. Errors are against DOP853
+restarted at every sample and event (`benchmarks/speed/reference.py`): of T_o at every sample, and
+of the times of all events.
+"""
+_LEGEND = {
+    Group.SHIFT: (
+        "drivetwin simulates the general network; nothing in it is written for this problem. The\n"
+        "C program is written for nothing else. Programs that smooth friction find no events."
+    ),
+    Group.GENERAL: (
+        "Times inside Rust, network ready. Errors are against the same core at round-off\n"
+        "(`Accuracy(exact=True)`), for CoupledClutches against the reference solution."
+    ),
+    Group.DERIVATIVES: (
+        "Exact derivatives of all columns and event times, through the events; the call from\n"
+        "Python and the conversion of its arrays are part of the time."
+    ),
+}
+
+
+def page(
+    measured: Sequence[Measured],
+    skipped: Sequence[Skipped],
+    base: Measured | None,
+    extra: Mapping[str, str],
+) -> str:
+    """The whole page; `extra` are further sections by title."""
+    parts = [_HEAD, _machine()]
+    for group in Group:
+        rows = [one for one in measured if one.entry.group is group]
+        if rows:
+            parts += [f"## {group.value}\n", _LEGEND[group] + "\n", table(rows, base)]
+    parts += [f"## {title}\n\n{text}" for title, text in extra.items()]
+    if skipped:
+        listed = "\n".join(f"- {one.program}: {one.reason}" for one in skipped)
+        parts.append(f"## Not measured\n\n{listed}\n")
+    return "\n".join(parts)
+
+
+def table(rows: Sequence[Measured], base: Measured | None) -> str:
+    """Markdown table of entries."""
+    lines = [
+        "| program | setting | median ms | shortest ms | ratio to C | max error | events, s |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for one in rows:
+        ratio = "" if base is None else f"{one.median / base.median:.3g}"
+        quality = one.quality
+        error = "" if quality is None else f"{quality.error:.2g} {quality.unit}"
+        events = "" if quality is None or quality.events is None else f"{quality.events:.1g}"
+        times = f"{1e3 * one.median:.4g} | {1e3 * one.least:.4g}"
+        entry = one.entry
+        lines.append(
+            f"| {entry.program} | {entry.setting} | {times} | {ratio} | {error} | {events} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _machine() -> str:
+    found = _processor()
+    versions = (
+        f"Python {platform.python_version()}, NumPy {np.__version__}, SciPy {scipy.__version__}"
+    )
+    return f"Measured on: {found}, {platform.system()}; {versions}.\n"
+
+
+def _processor() -> str:
+    """Model name where the system tells it."""
+    try:
+        text = Path("/proc/cpuinfo").read_text("utf-8")
+    except OSError:
+        return platform.machine()
+    names = [line.partition(":")[2].strip() for line in text.splitlines() if "model name" in line]
+    return f"{len(names)} x {names[0]}" if names else platform.machine()
