@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-//! Time the run of any network: `one_shift SCENARIO.json REPEATS` prints, as JSON, the nanoseconds
-//! of every prepared run and of everything from the elements on, and what the last run gave. With
+//! Time the run of any network: `one_shift SCENARIO.json REPEATS` prints, as JSON, the seconds of
+//! every prepared run and of everything from the elements on, and what the last run gave. With
 //! zero repeats it runs once and nothing else, to count instructions.
 
 use drivetwin_core::model::{Driveline, Element};
