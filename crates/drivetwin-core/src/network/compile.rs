@@ -184,6 +184,13 @@ impl<T: Real> Network<T> {
         self.first_channel() + self.channels.len()
     }
 
+    /// Whether an input is itself a torque or the target of one that lags, not only a pressure.
+    pub fn is_driven_by(&self, input: usize) -> bool {
+        let position = self.first_input() + input;
+        self.lags.iter().any(|lag| lag.target == position)
+            || (0..self.node_torques.rows).any(|i| self.node_torques[(i, position)].re() != 0.0)
+    }
+
     /// A linear form over nodes, expressed over the independent speeds.
     pub fn over_speeds(&self, row: &Row<T>) -> Vec<T> {
         let n = &self.coordinates.speeds;

@@ -37,15 +37,11 @@ pub fn simulate_dual_clutch<T: Real>(
     options: (Settings, bool),
 ) -> Result<DualClutchRun<T>, SimulateError> {
     let network = Network::compile(&model.driveline())?;
-    let start = Start {
-        speeds: vec![
-            (ENGINE.into(), start.engine_speed),
-            (OUTPUT.into(), start.output_speed),
-            (WHEEL.into(), start.wheel_speed),
-        ],
-        twists: vec![(SHAFT.into(), start.twist)],
-        locked: start.locked.clone(),
-    };
+    run(&network, signals, &start.named(), grid, &dual_clutch_outputs(model), options)
+}
+
+/// The usual outputs, see [`DualClutchRun`].
+pub fn dual_clutch_outputs<T>(model: &DualClutch<T>) -> Vec<Output> {
     let mut outputs = vec![
         Output::Speed(ENGINE.into()),
         Output::Speed(OUTPUT.into()),
@@ -57,7 +53,22 @@ pub fn simulate_dual_clutch<T: Real>(
         outputs.push(Output::FrictionTorque(element.name.clone()));
         outputs.push(Output::Slip(element.name.clone()));
     }
-    run(&network, signals, &start, grid, &outputs, options)
+    outputs
+}
+
+impl<T: Real> DualClutchStart<T> {
+    /// The start by the names of the network.
+    pub fn named(&self) -> Start<T> {
+        Start {
+            speeds: vec![
+                (ENGINE.into(), self.engine_speed),
+                (OUTPUT.into(), self.output_speed),
+                (WHEEL.into(), self.wheel_speed),
+            ],
+            twists: vec![(SHAFT.into(), self.twist)],
+            locked: self.locked.clone(),
+        }
+    }
 }
 
 impl DualClutchStart<f64> {

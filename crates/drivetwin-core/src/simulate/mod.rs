@@ -2,6 +2,7 @@
 //! 4 A scenario in, a trajectory out.
 
 mod audit;
+mod batch;
 mod dual_clutch;
 mod run;
 mod sensitivity;
@@ -9,7 +10,10 @@ mod start;
 mod trajectory;
 
 pub use audit::EnergyAudit;
-pub use dual_clutch::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
+pub use batch::{Batch, Keep, Outcome, batch, dual_clutch_batch};
+pub use dual_clutch::{
+    DualClutchRun, DualClutchStart, dual_clutch_outputs, simulate_dual_clutch,
+};
 pub use run::{Plan, SimulateError, run};
 pub use sensitivity::{Sampled, Sensitivities, SensitivityError, dual_clutch_sensitivities};
 pub use start::{Start, StartError, State};

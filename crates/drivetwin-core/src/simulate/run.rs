@@ -2,6 +2,7 @@
 //! One run of a network over a time grid.
 
 use super::audit::Auditor;
+use super::batch::Keep;
 use super::start::{Start, StartError, State};
 use super::trajectory::{Output, Recorder, Target, Trajectory};
 use crate::network::{CompileError, Network};
@@ -60,31 +61,44 @@ impl<T: Real> Plan<T> {
         Ok(Self { inputs, grid: grid.to_vec(), targets, settings, audit })
     }
 
+    /// Numbers that a batch keeps of one run.
+    pub(super) fn kept(&self, keep: Keep<'_>) -> usize {
+        keep.size(self.targets.len(), self.grid.len())
+    }
+
+    /// A run that has not begun, and its empty columns.
+    pub(super) fn start<'r>(
+        &'r self,
+        network: &'r Network<T>,
+        start: &State<T>,
+    ) -> Result<(Integrator<'r, T>, Recorder<'r, T>), Status> {
+        let run = self.integrator(network, start)?;
+        Ok((run, Recorder::new(network, &self.targets, &self.grid)))
+    }
+
+    fn integrator<'r>(
+        &'r self,
+        network: &'r Network<T>,
+        start: &State<T>,
+    ) -> Result<Integrator<'r, T>, Status> {
+        Integrator::start(network, &self.inputs, self.settings, start.x.clone(), &start.locked)
+    }
+
     /// One run. If it fails on the way it ends with its status, and with NaN from there on.
     pub fn run(&self, network: &Network<T>, start: &State<T>) -> Trajectory<T> {
         let mut recorder = Recorder::new(network, &self.targets, &self.grid);
         let mut events = Vec::new();
         let mut balance = None;
-        let end = self.grid[self.grid.len() - 1];
         let mut integrate = || -> Result<(), Status> {
-            let State { x, locked } = start;
-            let mut run =
-                Integrator::start(network, &self.inputs, self.settings, x.clone(), locked)?;
-            let mut auditor = self.audit.then(|| Auditor::new(network, &run.x));
-            let outcome = loop {
-                match run.advance(&mut recorder) {
-                    Ok(Some(step)) => {
-                        let last = (step.start + step.length).re() >= end;
-                        recorder.sample(&run, &step, last);
-                        if let Some(auditor) = &mut auditor {
-                            auditor.add(&run, &step);
-                        }
-                    }
-                    Ok(None) => break Ok(()),
-                    Err(status) => break Err(status),
-                }
+            let mut run = self.integrator(network, start)?;
+            let outcome = if self.audit {
+                let mut auditor = Auditor::new(network, &run.x);
+                let outcome = recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
+                balance = Some(auditor.close(network, &run.x));
+                outcome
+            } else {
+                recorder.run_to_end(&mut run)
             };
-            balance = auditor.map(|auditor| auditor.close(network, &run.x));
             events = std::mem::take(&mut run.events);
             outcome
         };

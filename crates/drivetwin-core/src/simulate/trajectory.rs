@@ -7,7 +7,7 @@ use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
 use crate::network::{Network, Row};
 use crate::number::Real;
-use crate::solve::{BLOCK, Event, Integrator, RowState, Sink, Status, Step, Trail};
+use crate::solve::{BLOCK, Event, Integrator, Recording, RowState, Samples, Sink, Status, Step};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -131,6 +131,24 @@ impl<'g, T: Real> Recorder<'g, T> {
         }
     }
 
+    /// Run to the end and record.
+    pub fn run_to_end(&mut self, run: &mut Integrator<'_, T>) -> Result<(), Status> {
+        self.run_to_end_with(run, |_, _| {})
+    }
+
+    /// The same; `also` gets every step of the expansion.
+    pub fn run_to_end_with(
+        &mut self,
+        run: &mut Integrator<'_, T>,
+        mut also: impl FnMut(&Integrator<'_, T>, &Step<T>),
+    ) -> Result<(), Status> {
+        while let Some(step) = run.advance(self)? {
+            self.sample(run, &step, run.is_at_end());
+            also(run, &step);
+        }
+        Ok(())
+    }
+
     /// Columns at full length.
     pub fn finish(self) -> Vec<Vec<T>> {
         let length = self.grid.len();
@@ -143,11 +161,11 @@ impl<'g, T: Real> Recorder<'g, T> {
 }
 
 impl<T: Real> Sink<T> for Recorder<'_, T> {
-    fn passed<const N: usize, const A: usize>(
+    fn passed(
         &mut self,
         run: &Integrator<'_, T>,
         active: &[usize],
-        trail: &Trail<T, N, A>,
+        samples: &impl Samples<T>,
         (first, count): (usize, usize),
     ) {
         let mut picked = [0; BLOCK];
@@ -167,7 +185,7 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
             for &(position, c) in &*terms {
                 let out = values[from..].iter_mut().zip(&picked[..length]);
                 if position < states {
-                    out.for_each(|(v, &k)| *v += c * trail.states[k][position]);
+                    out.for_each(|(v, &k)| *v += c * samples.state(k, position));
                 } else if position < run.network.one() {
                     let input = position - inputs;
                     out.for_each(|(v, &k)| *v += c * run.input_at(first + k, input));
@@ -176,11 +194,17 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
                 } else {
                     let channel = position - run.network.first_channel();
                     if let Some(slot) = active.iter().position(|&j| j == channel) {
-                        out.for_each(|(v, &k)| *v += c * trail.torques[k][slot]);
+                        out.for_each(|(v, &k)| *v += c * samples.torque(k, slot));
                     }
                 }
             }
         }
+    }
+}
+
+impl Recording for Recorder<'_, f64> {
+    fn stepped(&mut self, run: &Integrator<'_, f64>, step: &Step<f64>, last: bool) {
+        self.sample(run, step, last);
     }
 }
 

@@ -168,6 +168,11 @@ impl<T: Real> Inputs<T> {
         (self.knots[i], self.knots[i + 1])
     }
 
+    /// Times of all knots, s.
+    pub fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
     /// Start of segment `i`, or the end of the last where `i` is their number [s].
     pub fn knot(&self, i: usize) -> f64 {
         self.knots[i]

@@ -189,8 +189,7 @@ impl<'a, T: Real> Integrator<'a, T> {
     /// Advance to the next input sample or event; `None` at the end of the inputs. Where the settings
     /// allow it, whole samples without events are passed first and handed to `sink`.
     pub fn advance(&mut self, sink: &mut impl Sink<T>) -> Result<Option<Step<T>>, Status> {
-        self.change_mode()?;
-        if !self.enter_segment()? {
+        if !self.take_up_next()? {
             return Ok(None);
         }
         if self.settings.sprint {
@@ -199,6 +198,17 @@ impl<'a, T: Real> Integrator<'a, T> {
                 return Ok(None);
             }
         }
+        self.expand_step().map(Some)
+    }
+
+    /// Change the mode after an event and enter the next segment; false at the end of the inputs.
+    pub(super) fn take_up_next(&mut self) -> Result<bool, Status> {
+        self.change_mode()?;
+        self.enter_segment()
+    }
+
+    /// One Taylor expansion: to the next input sample or event.
+    pub(super) fn expand_step(&mut self) -> Result<Step<T>, Status> {
         let end = self.inputs.span(self.segment).1;
         let remaining = (-self.t + end).re();
         let wish = remaining.min(self.settings.max_step);
@@ -225,12 +235,22 @@ impl<'a, T: Real> Integrator<'a, T> {
         self.t = if event.is_none() && h >= remaining { T::of(end) } else { start + length };
         self.released.iter_mut().for_each(|r| *r &= length.re() == 0.0);
         self.check_progress(length.re())?;
-        Ok(Some(Step { start, length }))
+        Ok(Step { start, length })
     }
 
     /// Time of a knot of the inputs, s; they have one more than segments.
     pub fn knot(&self, i: usize) -> f64 {
         self.inputs.knot(i)
+    }
+
+    /// Times of all knots, s.
+    pub fn knots(&self) -> &'a [f64] {
+        self.inputs.knots()
+    }
+
+    /// Whether the run may pass samples side by side with others of its kind.
+    pub fn can_sprint(&self) -> bool {
+        self.settings.sprint && self.x.len() <= 8
     }
 
     /// Value of an input at a knot.
@@ -243,7 +263,7 @@ impl<'a, T: Real> Integrator<'a, T> {
     }
 
     /// Whether the inputs end here.
-    pub(super) fn is_at_end(&self) -> bool {
+    pub fn is_at_end(&self) -> bool {
         self.t.re() >= self.inputs.knot(self.inputs.segments())
     }
 

@@ -43,21 +43,23 @@ pub struct Value<L> {
     pub mixed: L,
 }
 
-impl<T: Real> Law<T> {
+impl<L: Lane> Law<L> {
     /// No torque, whatever the argument.
     pub fn idle() -> Self {
-        let zero = T::zero_();
+        let zero = L::all(0.0);
         Self {
-            sign: T::of(1.0),
+            sign: L::all(1.0),
             normal: Line { input: 0, gain: zero, offset: zero },
             polynomial: [zero; 3],
             excess: zero,
             rate: zero,
-            from: T::of(f64::NEG_INFINITY),
-            to: T::of(f64::INFINITY),
+            from: L::all(f64::NEG_INFINITY),
+            to: L::all(f64::INFINITY),
         }
     }
+}
 
+impl<T: Real> Law<T> {
     /// The law of a channel in its present cell; `None` where it is not smooth over one argument.
     pub fn of(channel: &Channel<T>, cell: Cell) -> Option<Self> {
         let Cell::Moving { sign, piece } = cell else { return None };

@@ -8,8 +8,10 @@
 //! before its argument is known exactly.
 
 use super::law::Value;
-use super::operators::{CUBIC, Carried, Form, MAX_WATCHED, Operators, StepForm, Watched};
-use crate::number::{Lane, Values};
+use super::operators::{
+    CUBIC, Carried, Form, MAX_ACTIVE, MAX_WATCHED, Operators, StepForm, Watched,
+};
+use crate::number::{Lane, Pack, Values};
 
 /// Samples that are passed before they are handed on.
 pub const BLOCK: usize = 64;
@@ -23,17 +25,30 @@ pub trait Source<L> {
 /// Carried channels at the start of a sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Carry<L, const A: usize> {
-    argument: [L; A],
-    rate: [L; A],
-    value: [Value<L>; A],
+    /// Arguments.
+    pub argument: [L; A],
+    /// Their rates.
+    pub rate: [L; A],
+    /// Torques with their slopes.
+    pub value: [Value<L>; A],
 }
 
+/// Values of the watched guards at the start of a sample, and the sizes of their forms.
+pub type Guards<V> = [[V; 2]; MAX_WATCHED];
+
 /// Passed samples: states and carried torques at the start of each.
-pub struct Trail<L, const N: usize, const A: usize> {
+pub struct Trail<L, const N: usize> {
     /// States.
     pub states: [[L; N]; BLOCK],
     /// Torques of the carried channels.
-    pub torques: [[L; A]; BLOCK],
+    pub torques: [[L; MAX_ACTIVE]; BLOCK],
+}
+
+impl<L: Lane, const N: usize> Default for Trail<L, N> {
+    fn default() -> Self {
+        let zero = L::all(0.0);
+        Self { states: [[zero; N]; BLOCK], torques: [[zero; MAX_ACTIVE]; BLOCK] }
+    }
 }
 
 /// Largest cubic part of a channel over a sample, relative to its size.
@@ -51,13 +66,9 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
     op: &Operators<L, N>,
     (source, h): (&impl Source<L>, f64),
     (first, count): (usize, usize),
-    (x, carry): (&mut [L; N], &mut Carry<L, A>),
-    trail: &mut Trail<L, N, A>,
+    (x, carry, guards): (&mut [L; N], &mut Carry<L, A>, &mut Guards<L::Values>),
+    trail: &mut Trail<L, N>,
 ) -> (usize, u32) {
-    let mut guards = [[L::Values::all(1.0); 2]; MAX_WATCHED];
-    for (place, guard) in guards.iter_mut().enumerate().take(op.watched.len()) {
-        *guard = op.guard::<F, A>(place, source, (first, 0.0), (x, carry));
-    }
     for k in 0..count {
         let segment = first + k;
         if L::DERIVATIVES {
@@ -204,6 +215,21 @@ fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
 }
 
 impl<L: Lane, const N: usize> Operators<L, N> {
+    /// All guards at the start of a segment.
+    #[inline(always)]
+    pub fn guards<const F: bool, const A: usize>(
+        &self,
+        source: &impl Source<L>,
+        segment: usize,
+        at: (&[L; N], &Carry<L, A>),
+    ) -> Guards<L::Values> {
+        let mut guards = [[L::Values::all(1.0); 2]; MAX_WATCHED];
+        for (place, guard) in guards.iter_mut().enumerate().take(self.watched.len()) {
+            *guard = self.guard::<F, A>(place, source, (segment, 0.0), at);
+        }
+        guards
+    }
+
     /// A watched guard `elapsed` seconds into a segment, and the size of its form.
     #[inline(always)]
     fn guard<const F: bool, const A: usize>(
@@ -213,7 +239,7 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         (segment, elapsed): (usize, f64),
         (x, carry): (&[L; N], &Carry<L, A>),
     ) -> [L::Values; 2] {
-        let Watched { form, limit, both } = &self.watched[place];
+        let Watched { form, limit, side, .. } = &self.watched[place];
         let mut torque = form.constant.values();
         for drive in &self.drives {
             let [start, rate] = source.line(segment, drive.input);
@@ -228,14 +254,21 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         }
         let [start, rate] = limit.line::<F>(source, segment);
         let limit = rate.values().times(elapsed) + start.values();
-        [if *both { limit - torque.magnitude() } else { limit + torque }, torque.magnitude()]
+        let towards = (side.values() * torque).upper(-torque);
+        [limit - towards, torque.magnitude()]
     }
 }
 
 impl<L: Lane, const A: usize> Carry<L, A> {
+    /// Nothing carried.
+    pub fn zero() -> Self {
+        let none = L::all(0.0);
+        Self { argument: [none; A], rate: [none; A], value: [Value::zero(); A] }
+    }
+
     /// The torques.
     #[inline(always)]
-    pub fn torques<const N: usize>(&self, op: &Operators<L, N>, out: &mut [L; A]) {
+    pub fn torques<const N: usize>(&self, op: &Operators<L, N>, out: &mut [L; MAX_ACTIVE]) {
         for a in 0..A {
             out[a] = op.channels[a].law.sign * self.value[a].value;
         }
@@ -322,4 +355,43 @@ fn over_channels<L: Lane, const F: bool, const N: usize, const A: usize>(
         sum = form.channels[a].fma::<F>(values[a].value, sum);
     }
     sum
+}
+
+impl<const K: usize> Carry<Pack<K>, MAX_ACTIVE> {
+    /// The first `A` channels.
+    #[inline(always)]
+    pub fn first<const A: usize>(&self) -> Carry<Pack<K>, A> {
+        let mut first = Carry::zero();
+        for a in 0..A {
+            first.argument[a] = self.argument[a];
+            first.rate[a] = self.rate[a];
+            first.value[a] = self.value[a];
+        }
+        first
+    }
+
+    /// Replace the first `A` channels.
+    #[inline(always)]
+    pub fn set_first<const A: usize>(&mut self, first: &Carry<Pack<K>, A>) {
+        self.argument[..A].copy_from_slice(&first.argument);
+        self.rate[..A].copy_from_slice(&first.rate);
+        self.value[..A].copy_from_slice(&first.value);
+    }
+}
+
+impl<const K: usize, const A: usize> Carry<Pack<K>, A> {
+    /// Replace one run.
+    #[inline(always)]
+    pub fn take_lane(&mut self, lane: usize, from: &Self) {
+        for a in 0..A {
+            self.argument[a].0[lane] = from.argument[a].0[lane];
+            self.rate[a].0[lane] = from.rate[a].0[lane];
+            let (to, from) = (&mut self.value[a], &from.value[a]);
+            to.value.0[lane] = from.value.0[lane];
+            to.by_argument.0[lane] = from.by_argument.0[lane];
+            to.bend.0[lane] = from.bend.0[lane];
+            to.by_normal.0[lane] = from.by_normal.0[lane];
+            to.mixed.0[lane] = from.mixed.0[lane];
+        }
+    }
 }

@@ -22,12 +22,12 @@ pub const MAX_WATCHED: usize = 12;
 #[derive(Clone, Debug)]
 pub struct Operators<L, const N: usize> {
     /// Number of states.
-    states: usize,
+    pub states: usize,
     /// What a watched form may deviate from its chord within a sample, relative to its rise and to its
     /// size.
     pub bow: [L; 2],
     /// Signs of the carried channels.
-    signs: [L; MAX_ACTIVE],
+    pub signs: [L; MAX_ACTIVE],
     /// Columns of the transition matrix.
     pub transition: [[L; N]; N],
     /// What is there without state and inputs.
@@ -102,15 +102,18 @@ pub struct Carried<L, const N: usize> {
     pub law: Law<L>,
 }
 
-/// A guard: `limit(u) - |form|` where both signs are bounded, else `limit(u) + form`.
+/// A guard: `limit(u) - |form|` where both signs are bounded, else `limit(u) + form`. In lanes that do not
+/// watch it the limit is 1 and the form 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<L, const N: usize> {
     /// Torque or speed.
     pub form: Form<L, N>,
     /// Its limit, over an input.
     pub limit: Line<L>,
-    /// Whether both signs are bounded.
-    pub both: bool,
+    /// 1 where both signs are bounded, else -1.
+    pub side: L,
+    /// What is watched: the number of the friction element, or after these of a gear's power and speed.
+    pub id: usize,
 }
 
 /// `gain · u + offset`.
@@ -161,9 +164,11 @@ impl<T: Real, const N: usize> Operators<T, N> {
         let transition = std::array::from_fn(|j| std::array::from_fn(|i| s[0][i][j]));
         let constant = apply(&s[1], &forcing(network.one()));
         let drives = (0..network.mechanism.inputs.len())
-            .map(|input| (input, forcing(network.first_input() + input)))
-            .filter(|(_, force)| force.iter().any(|f| f.re() != 0.0))
-            .map(|(input, force)| Drive::new(input, [apply(&s[1], &force), apply(&s[2], &force)]))
+            .filter(|&input| network.is_driven_by(input))
+            .map(|input| {
+                let force = forcing(network.first_input() + input);
+                Drive::new(input, [apply(&s[1], &force), apply(&s[2], &force)])
+            })
             .collect();
         let mut signs = [T::zero_(); MAX_ACTIVE];
         signs.iter_mut().zip(laws).for_each(|(sign, law)| *sign = law.sign);
@@ -189,6 +194,7 @@ impl<T: Real, const N: usize> Operators<T, N> {
             });
             operators.carry(slot, (network, mode), (active, &moments), (argument, laws[slot]));
         }
+        // Inner loops exist for 0, 1, 2 and 4 channels.
         if operators.channels.len() == 3 {
             operators.channels.push(Carried::idle());
         }
@@ -240,7 +246,7 @@ impl<T: Real, const N: usize> Operators<T, N> {
         network: &Network<T>,
         active: &[usize],
         row: &[T],
-        (limit, both): (Line<T>, bool),
+        (id, limit, both): (usize, Line<T>, bool),
     ) {
         let place = self.watched.len();
         for drive in &mut self.drives {
@@ -248,16 +254,22 @@ impl<T: Real, const N: usize> Operators<T, N> {
                 row.get(network.first_input() + drive.input).map_or(T::zero_(), |&c| c);
         }
         let form = Form::over(network, (active, &self.signs), row);
-        self.watched.push(Watched { form, limit, both });
+        let side = T::of(if both { 1.0 } else { -1.0 });
+        self.watched.push(Watched { form, limit, side, id });
     }
 }
 
-impl<T: Real, const N: usize> Drive<T, N> {
-    fn new(input: usize, step: [[T; N]; 2]) -> Self {
-        let none = T::zero_();
+impl<L: Lane, const N: usize> Drive<L, N> {
+    fn new(input: usize, step: [[L; N]; 2]) -> Self {
+        Self { input, step, ..Self::idle() }
+    }
+
+    /// Without effect.
+    pub fn idle() -> Self {
+        let none = L::all(0.0);
         Self {
-            input,
-            step,
+            input: 0,
+            step: [[none; N]; 2],
             argument: [[none; 2]; MAX_ACTIVE],
             rate: [[none; 2]; MAX_ACTIVE],
             now: [none; MAX_ACTIVE],
@@ -267,22 +279,43 @@ impl<T: Real, const N: usize> Drive<T, N> {
     }
 }
 
-impl<T: Real, const N: usize> Carried<T, N> {
-    /// A channel without torque: inner loops exist for 0, 1, 2 and 4.
-    fn idle() -> Self {
-        let none = T::zero_();
+impl<L: Lane, const N: usize> Carried<L, N> {
+    /// Without torque.
+    pub fn idle() -> Self {
+        let none = L::all(0.0);
         let step_form =
             StepForm { state: [none; N], constant: none, cubics: [[none; CUBIC]; MAX_ACTIVE] };
-        let form = Form { state: [none; N], constant: none, channels: [none; MAX_ACTIVE] };
         Self {
             moments: [[none; N]; CUBIC],
             argument: [none; N],
             argument_end: step_form,
             rate_end: step_form,
-            rate: form,
-            second: form,
+            rate: Form::idle(),
+            second: Form::idle(),
             law: Law::idle(),
         }
+    }
+}
+
+impl<L: Lane, const N: usize> Watched<L, N> {
+    /// Never falls.
+    pub fn idle() -> Self {
+        Self { form: Form::idle(), limit: Line::idle(), side: L::all(1.0), id: 0 }
+    }
+}
+
+impl<L: Lane> Line<L> {
+    /// 1, whatever the input.
+    pub fn idle() -> Self {
+        Self { input: 0, gain: L::all(0.0), offset: L::all(1.0) }
+    }
+}
+
+impl<L: Lane, const N: usize> Form<L, N> {
+    /// Always zero.
+    fn idle() -> Self {
+        let none = L::all(0.0);
+        Self { state: [none; N], constant: none, channels: [none; MAX_ACTIVE] }
     }
 }
 

@@ -25,6 +25,18 @@ pub(super) enum AnySize<T> {
     Twelve(Operators<T, 12>),
 }
 
+impl AnySize<f64> {
+    /// The operators over `N` states, if these are they.
+    pub fn of_size<const N: usize>(&self) -> Option<&Operators<f64, N>> {
+        let any: &dyn std::any::Any = match self {
+            Self::Four(operators) => operators,
+            Self::Eight(operators) => operators,
+            Self::Twelve(operators) => operators,
+        };
+        any.downcast_ref()
+    }
+}
+
 /// Operators by mode, active channels with their branches, and step length.
 pub(super) type Cache<T> = HashMap<Key, Option<Arc<AnySize<T>>>>;
 
@@ -39,17 +51,48 @@ pub(super) struct Key {
     step: u64,
 }
 
+/// A sprint that is possible.
+pub(super) struct Ready<T> {
+    /// Operators of the present mode.
+    pub operators: Arc<AnySize<T>>,
+    /// Channels that are not off.
+    pub active: Vec<usize>,
+    /// Step length, s.
+    pub h: f64,
+    /// Samples ahead.
+    pub count: usize,
+}
+
 /// Takes samples that were passed in one mode.
 pub trait Sink<T> {
-    /// States and torques of the channels `active` at the start of each of `count` segments from
-    /// `first` on.
-    fn passed<const N: usize, const A: usize>(
+    /// Samples `(first, count)` with the channels `active`; see [`Samples`].
+    fn passed(
         &mut self,
         run: &Integrator<'_, T>,
         active: &[usize],
-        trail: &Trail<T, N, A>,
-        samples: (usize, usize),
+        samples: &impl Samples<T>,
+        range: (usize, usize),
     );
+}
+
+/// States and torques of the active channels at the start of samples, counted from the first.
+pub trait Samples<T> {
+    /// State `i` at sample `k`.
+    fn state(&self, k: usize, i: usize) -> T;
+
+    /// Torque of the active channel number `slot` at sample `k`.
+    fn torque(&self, k: usize, slot: usize) -> T;
+}
+
+impl<T: Real, const N: usize> Samples<T> for Trail<T, N> {
+    #[inline(always)]
+    fn state(&self, k: usize, i: usize) -> T {
+        self.states[k][i]
+    }
+    #[inline(always)]
+    fn torque(&self, k: usize, slot: usize) -> T {
+        self.torques[k][slot]
+    }
 }
 
 /// Fewest samples of equal length ahead that make operators worth while.
@@ -58,16 +101,7 @@ const WORTH_WHILE: usize = 8;
 impl<T: Real> Integrator<'_, T> {
     /// Advance over as many whole samples as possible.
     pub(super) fn sprint(&mut self, sink: &mut impl Sink<T>) {
-        let (from, to) = self.inputs.span(self.segment);
-        let h = to - from;
-        let count = self.inputs.equal_from(self.segment);
-        let at_start = self.t.re() == from && h > 0.0 && h <= self.settings.max_step;
-        if !at_start || count < WORTH_WHILE || !self.is_simple() {
-            return;
-        }
-        let on = |j: &usize| self.cells[*j] != Cell::Off;
-        let active: Vec<usize> = (0..self.cells.len()).filter(on).collect();
-        let Some(operators) = self.operators(&active, h) else { return };
+        let Some(Ready { operators, active, h, count }) = self.ready_to_sprint() else { return };
         let active = &active[..];
         match &*operators {
             AnySize::Four(operators) => self.pass(operators, active, (h, count), sink),
@@ -78,9 +112,29 @@ impl<T: Real> Integrator<'_, T> {
                 }
             }
         }
+        self.resume();
+    }
+
+    /// Take up the Taylor expansion where a sprint has ended.
+    pub(super) fn resume(&mut self) {
         if !self.is_at_end() {
             self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
         }
+    }
+
+    /// What a sprint from here on needs, if one is possible.
+    pub(super) fn ready_to_sprint(&mut self) -> Option<Ready<T>> {
+        let (from, to) = self.inputs.span(self.segment);
+        let h = to - from;
+        let count = self.inputs.equal_from(self.segment);
+        let at_start = self.t.re() == from && h > 0.0 && h <= self.settings.max_step;
+        if !at_start || count < WORTH_WHILE || !self.is_simple() {
+            return None;
+        }
+        let on = |j: &usize| self.cells[*j] != Cell::Off;
+        let active: Vec<usize> = (0..self.cells.len()).filter(on).collect();
+        let operators = self.operators(&active, h)?;
+        Some(Ready { operators, active, h, count })
     }
 
     /// Pass samples with operators of known size.
@@ -183,11 +237,12 @@ impl<T: Real> Integrator<'_, T> {
                     let position = position.expect("a stuck element belongs to the mode");
                     let torque = self.mode.stuck_torque.row(position);
                     let limit = load.map(|v| v * mu);
-                    operators.watch(self.network, active, torque, (limit, !row.one_way));
+                    operators.watch(self.network, active, torque, (j, limit, !row.one_way));
                 }
                 RowState::Slipping { sign } if !active.contains(&j) => {
                     let speed: Vec<T> = row.slip.iter().map(|&c| c * sign).collect();
-                    operators.watch(self.network, active, &speed, (constant(T::zero_()), false));
+                    let limit = load.map(|_| T::zero_());
+                    operators.watch(self.network, active, &speed, (j, limit, false));
                 }
                 _ => {}
             }
@@ -204,9 +259,10 @@ impl<T: Real> Integrator<'_, T> {
             let scaled = |row: &[T], by: f64| row.iter().map(|&c| c * by).collect::<Vec<T>>();
             let power = scaled(self.mode.gear_torque(self.network).row(i), sign * side);
             let limit = constant(-gear.loss.threshold() * side);
-            operators.watch(self.network, active, &power, (limit, false));
+            let id = self.rows.len() + 2 * i;
+            operators.watch(self.network, active, &power, (id, limit, false));
             let speed = scaled(&gear.speed, sign);
-            operators.watch(self.network, active, &speed, (constant(T::zero_()), false));
+            operators.watch(self.network, active, &speed, (id + 1, constant(T::zero_()), false));
         }
     }
 }
@@ -236,11 +292,11 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
         let mut x = [T::zero_(); N];
         x[..n].copy_from_slice(&run.x);
         let mut carry = Carry::<T, A>::start::<F, N>(operators, &source, run.segment, &x);
-        let mut trail =
-            Trail { states: [[T::zero_(); N]; BLOCK], torques: [[T::zero_(); A]; BLOCK] };
+        let mut guards = operators.guards::<F, A>(&source, run.segment, (&x, &carry));
+        let mut trail = Trail::default();
         while count > 0 {
             let samples = (run.segment, count.min(BLOCK));
-            let at = (&mut x, &mut carry);
+            let at = (&mut x, &mut carry, &mut guards);
             let (passed, fallen) =
                 march::<T, F, N, A>(operators, (&source, h), samples, at, &mut trail);
             sink.passed(run, active, &trail, (run.segment, passed));

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: MIT
+//! Many runs over the same samples: parameter sets on one scenario, or scenarios on one driveline.
+
+use super::dual_clutch::DualClutchStart;
+use super::run::{Plan, SimulateError};
+use super::start::State;
+use super::trajectory::Recorder;
+use crate::model::dual_clutch::DualClutch;
+use crate::network::Network;
+use crate::solve::{Event, EventKind, Integrator, Status, WIDTH, run_together};
+use rayon::prelude::*;
+
+/// What is kept of every run.
+#[derive(Clone, Copy, Debug)]
+pub enum Keep<'m> {
+    /// Every output on the grid: runs × outputs × grid.
+    Columns,
+    /// Every output at the end: runs × outputs.
+    Last,
+    /// Sum over the grid of the squared distances to measured columns (outputs × grid), of which NaN are
+    /// left out: runs × outputs.
+    Misfit(&'m [Vec<f64>]),
+}
+
+/// How one run of a batch ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// It ran; its status.
+    Ran(Status),
+    /// It could not be started.
+    Refused(SimulateError),
+}
+
+/// Result of a batch, in the order of the runs.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    /// What was kept; NaN for runs that failed.
+    pub values: Vec<f64>,
+    /// How each run ended.
+    pub outcomes: Vec<Outcome>,
+    /// Number of events of each run.
+    pub events: Vec<u32>,
+    /// Time of the last lock of each run, s; NaN without one.
+    pub last_lock: Vec<f64>,
+}
+
+/// A network and its start.
+pub type Prepared = (Network<f64>, State<f64>);
+
+/// Run `count` scenarios; `make` gives network and start of a run, `plan_of` its plan. Runs over the same
+/// knots go side by side; the result depends neither on that nor on the number of `threads`.
+pub fn batch<'p>(
+    count: usize,
+    plan_of: impl Fn(usize) -> &'p Plan<f64> + Sync,
+    make: impl Fn(usize) -> Result<Prepared, SimulateError> + Sync,
+    (keep, threads): (Keep<'_>, usize),
+) -> Batch {
+    let per_run = if count == 0 { 0 } else { plan_of(0).kept(keep) };
+    let mut values = vec![f64::NAN; count * per_run];
+    let runs = count.div_ceil(WIDTH);
+    let group = |(g, values): (usize, &mut [f64])| {
+        let first = g * WIDTH;
+        let members: Vec<usize> = (first..count.min(first + WIDTH)).collect();
+        side_by_side(&members, (&plan_of, &make), keep, values)
+    };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let mut all = || values.par_chunks_mut((WIDTH * per_run).max(1)).enumerate().map(group).collect();
+    let ends: Vec<Vec<End>> = match (per_run, pool) {
+        (0, _) => vec![Vec::new(); runs],
+        (_, Ok(pool)) => pool.install(all),
+        (_, Err(_)) => all(),
+    };
+    let mut result = Batch { values, outcomes: vec![], events: vec![], last_lock: vec![] };
+    for End { outcome, events, last_lock } in ends.into_iter().flatten() {
+        result.outcomes.push(outcome);
+        result.events.push(events);
+        result.last_lock.push(last_lock);
+    }
+    result
+}
+
+/// Simulate a dual-clutch driveline under many sets of the named parameters, `sets` runs × parameters.
+/// Names are those of [`DualClutch::parameter_mut`] and, after `start.`, of the start; others are left
+/// out.
+pub fn dual_clutch_batch(
+    model: &DualClutch<f64>,
+    start: &DualClutchStart<f64>,
+    plan: &Plan<f64>,
+    (parameters, sets): (&[&str], &[f64]),
+    options: (Keep<'_>, usize),
+) -> Batch {
+    let width = parameters.len();
+    let count = if width == 0 { 0 } else { sets.len() / width };
+    let make = |i: usize| {
+        let (mut model, mut start) = (model.clone(), start.clone());
+        for (name, &value) in parameters.iter().zip(&sets[i * width..][..width]) {
+            let place = match name.split_once('.') {
+                Some(("start", field)) => start.field_mut(field),
+                _ => model.parameter_mut(name),
+            };
+            if let Some(place) = place {
+                *place = value;
+            }
+        }
+        let network = Network::compile(&model.driveline())?;
+        let state = start.named().state(&network)?;
+        Ok((network, state))
+    };
+    batch(count, |_| plan, make, options)
+}
+
+/// How one run ended.
+#[derive(Clone, Debug)]
+struct End {
+    outcome: Outcome,
+    events: u32,
+    last_lock: f64,
+}
+
+impl End {
+    fn of(status: Status, events: &[Event<f64>]) -> Self {
+        let lock = events.iter().rfind(|event| event.kind == EventKind::Lock);
+        Self {
+            outcome: Outcome::Ran(status),
+            events: events.len() as u32,
+            last_lock: lock.map_or(f64::NAN, |event| event.time),
+        }
+    }
+}
+
+/// Run up to [`WIDTH`] scenarios, those over the same knots together.
+fn side_by_side<'p>(
+    members: &[usize],
+    (plan_of, make): (
+        &(impl Fn(usize) -> &'p Plan<f64> + Sync),
+        &(impl Fn(usize) -> Result<Prepared, SimulateError> + Sync),
+    ),
+    keep: Keep<'_>,
+    values: &mut [f64],
+) -> Vec<End> {
+    let prepared: Vec<Result<Prepared, SimulateError>> = members.iter().map(|&i| make(i)).collect();
+    let mut ends: Vec<End> = Vec::with_capacity(members.len());
+    let mut together = Vec::with_capacity(members.len());
+    for (&i, prepared) in members.iter().zip(&prepared) {
+        let nothing = End { outcome: Outcome::Ran(Status::Completed), events: 0, last_lock: f64::NAN };
+        ends.push(match prepared {
+            Err(error) => End { outcome: Outcome::Refused(error.clone()), ..nothing },
+            Ok((network, state)) => match plan_of(i).start(network, state) {
+                Err(status) => End { outcome: Outcome::Ran(status), ..nothing },
+                Ok(run) => {
+                    together.push((ends.len(), run));
+                    nothing
+                }
+            },
+        });
+    }
+    let per_run = values.len() / members.len();
+    while !together.is_empty() {
+        let knots = together[0].1.0.knots();
+        let states = together[0].1.0.x.len();
+        let fits = |run: &(Integrator<'_, f64>, Recorder<'_, f64>)| {
+            let same = std::ptr::eq(run.0.knots(), knots) || run.0.knots() == knots;
+            run.0.can_sprint() && same && run.0.x.len() == states
+        };
+        let (group, rest): (Vec<_>, Vec<_>) = if fits(&together[0].1) {
+            together.into_iter().partition(|(_, run)| fits(run))
+        } else {
+            let rest = together.split_off(1);
+            (together, rest)
+        };
+        let (places, mut runs): (Vec<usize>, Vec<_>) = group.into_iter().unzip();
+        let outcomes = if fits(&runs[0]) {
+            run_together(&mut runs)
+        } else {
+            runs.iter_mut().map(|(run, recorder)| recorder.run_to_end(run)).collect()
+        };
+        for ((place, outcome), (run, recorder)) in places.iter().zip(outcomes).zip(runs) {
+            let status = outcome.err().unwrap_or(Status::Completed);
+            if status == Status::Completed {
+                keep.reduce(&recorder.finish(), &mut values[place * per_run..][..per_run]);
+            }
+            ends[*place] = End::of(status, &run.events);
+        }
+        together = rest;
+    }
+    ends
+}
+
+impl Keep<'_> {
+    /// Numbers kept of a run with so many outputs and points.
+    pub(super) fn size(self, outputs: usize, points: usize) -> usize {
+        match self {
+            Self::Columns => outputs * points,
+            Self::Last | Self::Misfit(_) => outputs,
+        }
+    }
+
+    fn reduce(self, columns: &[Vec<f64>], out: &mut [f64]) {
+        match self {
+            Self::Columns => {
+                for (column, out) in columns.iter().zip(out.chunks_exact_mut(columns[0].len())) {
+                    out.copy_from_slice(column);
+                }
+            }
+            Self::Last => {
+                for (column, out) in columns.iter().zip(out) {
+                    *out = column[column.len() - 1];
+                }
+            }
+            Self::Misfit(measured) => {
+                for ((column, measured), out) in columns.iter().zip(measured).zip(out) {
+                    let known = column.iter().zip(measured).filter(|(_, m)| !m.is_nan());
+                    *out = known.map(|(c, m)| (c - m) * (c - m)).sum();
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: MIT
+//! Several runs over the same knots, side by side through the inner loop.
+//!
+//! Every lane owns the operators of its own mode; what a lane does not have is zero there, so that runs
+//! in different modes need no masks. A run in which a guard could fall leaves the formation, passes
+//! its event alone by Taylor expansion, and joins again at a later sample. No operation mixes lanes and
+//! every run does what it would do alone: results depend neither on the neighbours nor on their number.
+
+use super::inputs::Inputs;
+use super::integrator::{Integrator, Step};
+use super::lanes::{Task, dispatch};
+use super::march::{BLOCK, Carry, Guards, Source, Trail, march};
+use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
+use super::sprint::{Ready, Samples, Sink};
+use super::status::Status;
+use crate::number::{Lane, Pack};
+
+/// Runs in a formation: two vectors of the narrower sets, one of the widest.
+pub const WIDTH: usize = 8;
+
+type Lanes = Pack<WIDTH>;
+
+/// Takes samples and steps of one run.
+pub trait Recording: Sink<f64> {
+    /// A step of the Taylor expansion; `last` where the run ends with it.
+    fn stepped(&mut self, run: &Integrator<'_, f64>, step: &Step<f64>, last: bool);
+}
+
+/// One run and where it stands.
+struct Member<'r, 'a, S> {
+    run: &'r mut Integrator<'a, f64>,
+    sink: &'r mut S,
+    /// What it joins or has joined with; none once it has ended.
+    ready: Option<Ready<f64>>,
+    /// Segment at which its operators end.
+    until: usize,
+    joined: bool,
+    outcome: Result<(), Status>,
+}
+
+/// Run up to [`WIDTH`] integrators, all over the same knots and with as many states, to their ends.
+pub fn run_together<'a, S: Recording>(
+    runs: &mut [(Integrator<'a, f64>, S)],
+) -> Vec<Result<(), Status>> {
+    let mut members: Vec<Member<'_, 'a, S>> = runs
+        .iter_mut()
+        .map(|(run, sink)| {
+            let (ready, outcome) = (None, Ok(()));
+            let mut member = Member { run, sink, ready, until: 0, joined: false, outcome };
+            member.go_on(false);
+            member
+        })
+        .collect();
+    let states = members.first().map_or(0, |member| member.run.x.len());
+    match states {
+        0..=4 => Formation::<4>::new().march(&mut members),
+        _ => Formation::<8>::new().march(&mut members),
+    }
+    members.into_iter().map(|member| member.outcome).collect()
+}
+
+impl<S: Recording> Member<'_, '_, S> {
+    /// Pass samples alone until the formation can be joined; `step` where an expansion is due.
+    fn go_on(&mut self, step: bool) {
+        self.joined = false;
+        self.ready = None;
+        match self.alone(step) {
+            Ok(ready) => {
+                self.until = ready.as_ref().map_or(0, |ready| self.run.segment + ready.count);
+                self.ready = ready;
+            }
+            Err(status) => self.outcome = Err(status),
+        }
+    }
+
+    fn alone(&mut self, mut step: bool) -> Result<Option<Ready<f64>>, Status> {
+        loop {
+            if step {
+                let step = self.run.expand_step()?;
+                let last = self.run.is_at_end();
+                self.sink.stepped(self.run, &step, last);
+            }
+            if !self.run.take_up_next()? {
+                return Ok(None);
+            }
+            if let Some(ready) = self.run.ready_to_sprint() {
+                return Ok(Some(ready));
+            }
+            step = true;
+        }
+    }
+}
+
+/// Operators and states of all lanes, over at most `N` states.
+struct Formation<const N: usize> {
+    operators: Operators<Lanes, N>,
+    /// Carried channels by number, the union over the lanes, in order.
+    slots: Vec<usize>,
+    /// Watched guards by number, likewise.
+    watched: Vec<usize>,
+    x: [Lanes; N],
+    carry: Carry<Lanes, MAX_ACTIVE>,
+    guards: Guards<Lanes>,
+    trail: Box<Trail<Lanes, N>>,
+}
+
+impl<const N: usize> Formation<N> {
+    fn new() -> Self {
+        let zero = Lanes::all(0.0);
+        Self {
+            operators: Operators::idle(),
+            slots: Vec::new(),
+            watched: Vec::new(),
+            x: [zero; N],
+            carry: Carry::zero(),
+            guards: [[Lanes::all(1.0); 2]; MAX_WATCHED],
+            trail: Box::default(),
+        }
+    }
+
+    /// March until every member has ended.
+    fn march<S: Recording>(mut self, members: &mut [Member<'_, '_, S>]) {
+        let live = |member: &Member<'_, '_, S>| member.ready.is_some();
+        while let Some(segment) =
+            members.iter().filter(|m| live(m)).map(|m| m.run.segment).min()
+        {
+            let joining = self.join(members, segment);
+            let ahead = |m: &Member<'_, '_, S>| if m.joined { m.until } else { m.run.segment };
+            let until = members.iter().filter(|m| live(m)).map(ahead).min().unwrap_or(segment);
+            let samples = (segment, (until - segment).min(BLOCK));
+            let Some(h) = members.iter().find_map(|m| m.ready.as_ref().map(|ready| ready.h)) else {
+                break;
+            };
+            let inputs: [&Inputs<f64>; WIDTH] = std::array::from_fn(|lane| {
+                members[if lane < members.len() { lane } else { 0 }].run.inputs
+            });
+            let source = Together { inputs, shared: inputs.iter().all(|i| std::ptr::eq(*i, inputs[0])) };
+            let (passed, fallen) = self.pass((&source, h), samples, joining);
+            for (lane, member) in members.iter_mut().enumerate().filter(|(_, m)| m.joined) {
+                let fell = fallen >> lane & 1 == 1;
+                // Those that did not fall have passed the sample in which others did.
+                let count = passed + usize::from(fallen != 0 && !fell);
+                self.deliver(lane, member, (segment, count));
+                member.run.segment = segment + count;
+                if fell || member.run.segment == member.until {
+                    let x = if fell { &self.trail.states[passed] } else { &self.x };
+                    let x: [f64; N] = std::array::from_fn(|i| x[i].0[lane]);
+                    self.leave(lane, member, &x);
+                }
+            }
+        }
+    }
+
+    /// Take in the members that stand at `segment`; their lanes as bits.
+    fn join<S: Recording>(&mut self, members: &mut [Member<'_, '_, S>], segment: usize) -> u32 {
+        let mut joining = 0;
+        for (lane, member) in members.iter_mut().enumerate() {
+            if member.ready.is_some() && !member.joined && member.run.segment == segment {
+                member.joined = true;
+                joining |= 1 << lane;
+            }
+        }
+        if joining == 0 {
+            return 0;
+        }
+        let (mut slots, mut watched) = (Vec::new(), Vec::new());
+        for ready in members.iter().filter(|m| m.joined).filter_map(|m| m.ready.as_ref()) {
+            slots.extend(&ready.active);
+            watched.extend(operators_of::<N>(ready).watched.iter().map(|w| w.id));
+        }
+        let before = (self.slots.clone(), self.watched.clone());
+        for (union, all) in [(&mut self.slots, slots), (&mut self.watched, watched)] {
+            *union = all;
+            union.sort_unstable();
+            union.dedup();
+        }
+        let anew = before != (self.slots.clone(), self.watched.clone());
+        if anew {
+            self.operators = Operators::idle();
+            self.rearrange(&before.0, &before.1);
+        }
+        for (lane, member) in members.iter().enumerate().filter(|(_, m)| m.joined) {
+            if anew || joining >> lane & 1 == 1 {
+                let ready = member.ready.as_ref().expect("a member that has joined");
+                let places = (&self.slots[..], &self.watched[..], &ready.active[..]);
+                self.operators.set_lane(lane, operators_of::<N>(ready), places);
+            }
+            if joining >> lane & 1 == 1 {
+                for (x, &value) in self.x.iter_mut().zip(&member.run.x) {
+                    x.0[lane] = value;
+                }
+            }
+        }
+        joining
+    }
+
+    /// Carry and guards from the old places to the new ones.
+    fn rearrange(&mut self, slots: &[usize], watched: &[usize]) {
+        let (carry, guards) = (self.carry, self.guards);
+        self.carry = Carry::zero();
+        self.guards = [[Lanes::all(1.0); 2]; MAX_WATCHED];
+        for (to, id) in self.slots.iter().enumerate() {
+            if let Some(from) = slots.iter().position(|old| old == id) {
+                self.carry.argument[to] = carry.argument[from];
+                self.carry.rate[to] = carry.rate[from];
+                self.carry.value[to] = carry.value[from];
+            }
+        }
+        for (to, id) in self.watched.iter().enumerate() {
+            if let Some(from) = watched.iter().position(|old| old == id) {
+                self.guards[to] = guards[from];
+            }
+        }
+    }
+
+    /// Pass samples with the inner loop for the number of carried channels.
+    fn pass(
+        &mut self,
+        source: (&Together<'_>, f64),
+        samples: (usize, usize),
+        joining: u32,
+    ) -> (usize, u32) {
+        match self.slots.len() {
+            0 => dispatch(Pass::<N, 0> { formation: self, source, samples, joining }),
+            1 => dispatch(Pass::<N, 1> { formation: self, source, samples, joining }),
+            2 => dispatch(Pass::<N, 2> { formation: self, source, samples, joining }),
+            _ => dispatch(Pass::<N, MAX_ACTIVE> { formation: self, source, samples, joining }),
+        }
+    }
+
+    fn deliver<S: Recording>(
+        &self,
+        lane: usize,
+        member: &mut Member<'_, '_, S>,
+        samples: (usize, usize),
+    ) {
+        let active = &member.ready.as_ref().expect("a member that has joined").active;
+        let view = LaneView { trail: &self.trail, lane, places: self.places(active) };
+        member.sink.passed(member.run, active, &view, samples);
+    }
+
+    /// Slots of the channels of one lane.
+    fn places(&self, active: &[usize]) -> [usize; MAX_ACTIVE] {
+        let mut places = [0; MAX_ACTIVE];
+        for (place, id) in places.iter_mut().zip(active) {
+            *place = self.slots.iter().position(|slot| slot == id).unwrap_or(0);
+        }
+        places
+    }
+
+    /// Let a member go with its state `x` at the start of its segment.
+    fn leave<S: Recording>(
+        &mut self,
+        lane: usize,
+        member: &mut Member<'_, '_, S>,
+        x: &[f64; N],
+    ) {
+        let run = &mut *member.run;
+        let n = run.x.len();
+        run.x.copy_from_slice(&x[..n]);
+        run.t = run.inputs.knot(run.segment);
+        let ended = run.segment == run.inputs.segments();
+        if ended {
+            let active = member.ready.take().map_or_else(Vec::new, |ready| ready.active);
+            let mut torques = [Lanes::all(0.0); MAX_ACTIVE];
+            self.carry.torques(&self.operators, &mut torques);
+            let end = LastSample { x, torques, lane, places: self.places(&active) };
+            member.sink.passed(member.run, &active, &end, (member.run.segment, 1));
+            member.run.segment -= 1;
+            member.joined = false;
+        } else {
+            member.run.resume();
+            member.go_on(true);
+        }
+        self.operators.clear_lane(lane);
+        self.x.iter_mut().for_each(|x| x.0[lane] = 0.0);
+    }
+}
+
+fn operators_of<const N: usize>(ready: &Ready<f64>) -> &Operators<f64, N> {
+    ready.operators.of_size::<N>().expect("all members have as many states")
+}
+
+/// One call of the inner loop.
+struct Pass<'f, 's, const N: usize, const A: usize> {
+    formation: &'f mut Formation<N>,
+    source: (&'s Together<'s>, f64),
+    samples: (usize, usize),
+    joining: u32,
+}
+
+impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
+    type Output = (usize, u32);
+
+    #[inline(always)]
+    fn run<const F: bool>(self) -> (usize, u32) {
+        let Self { formation, source: (source, h), samples, joining } = self;
+        let Formation { operators, x, carry: kept, guards, trail, .. } = formation;
+        let mut carry = kept.first::<A>();
+        if joining != 0 {
+            let fresh = Carry::<Lanes, A>::start::<F, N>(operators, source, samples.0, x);
+            let first = operators.guards::<F, A>(source, samples.0, (x, &fresh));
+            for lane in (0..WIDTH).filter(|lane| joining >> lane & 1 == 1) {
+                carry.take_lane(lane, &fresh);
+                for (guard, first) in guards.as_flattened_mut().iter_mut().zip(first.as_flattened()) {
+                    guard.0[lane] = first.0[lane];
+                }
+            }
+        }
+        let at = (&mut *x, &mut carry, &mut *guards);
+        let outcome = march::<Lanes, F, N, A>(operators, (source, h), samples, at, trail);
+        kept.set_first(&carry);
+        outcome
+    }
+}
+
+/// The inputs of all lanes.
+struct Together<'a> {
+    inputs: [&'a Inputs<f64>; WIDTH],
+    /// Whether these are the same.
+    shared: bool,
+}
+
+impl Source<Lanes> for Together<'_> {
+    #[inline(always)]
+    fn line(&self, segment: usize, input: usize) -> [Lanes; 2] {
+        if self.shared {
+            return self.inputs[0].lines(segment)[input].map(Pack::all);
+        }
+        let mut line = [Pack([0.0; WIDTH]); 2];
+        for lane in 0..WIDTH {
+            let [start, rate] = self.inputs[lane].lines(segment)[input];
+            (line[0].0[lane], line[1].0[lane]) = (start, rate);
+        }
+        line
+    }
+}
+
+/// The samples of one lane.
+struct LaneView<'f, const N: usize> {
+    trail: &'f Trail<Lanes, N>,
+    lane: usize,
+    places: [usize; MAX_ACTIVE],
+}
+
+impl<const N: usize> Samples<f64> for LaneView<'_, N> {
+    #[inline(always)]
+    fn state(&self, k: usize, i: usize) -> f64 {
+        self.trail.states[k][i].0[self.lane]
+    }
+    #[inline(always)]
+    fn torque(&self, k: usize, slot: usize) -> f64 {
+        self.trail.torques[k][self.places[slot]].0[self.lane]
+    }
+}
+
+/// The end of one lane.
+struct LastSample<'f, const N: usize> {
+    x: &'f [f64; N],
+    torques: [Lanes; MAX_ACTIVE],
+    lane: usize,
+    places: [usize; MAX_ACTIVE],
+}
+
+impl<const N: usize> Samples<f64> for LastSample<'_, N> {
+    fn state(&self, _: usize, i: usize) -> f64 {
+        self.x[i]
+    }
+    fn torque(&self, _: usize, slot: usize) -> f64 {
+        self.torques[self.places[slot]].0[self.lane]
+    }
+}

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT
+//! Operators of several runs in the lanes of one set.
+
+use super::law::Law;
+use super::operators::{
+    CUBIC, Carried, Drive, Form, Line, MAX_ACTIVE, Operators, StepForm, Watched,
+};
+use crate::number::{Lane, Pack};
+
+/// Places in a formation: channels by number, watched guards by number, channels of one lane.
+pub(super) type Places<'p> = (&'p [usize], &'p [usize], &'p [usize]);
+
+impl<const K: usize, const N: usize> Operators<Pack<K>, N> {
+    /// Operators under which nothing moves and no guard falls.
+    pub fn idle() -> Self {
+        let zero = Pack::all(0.0);
+        Self {
+            states: 0,
+            bow: [zero; 2],
+            signs: [zero; MAX_ACTIVE],
+            transition: [[zero; N]; N],
+            constant: [zero; N],
+            drives: Vec::new(),
+            channels: vec![Carried::idle(); MAX_ACTIVE],
+            watched: Vec::new(),
+            loads: Vec::new(),
+        }
+    }
+
+    /// Put the operators of one run into a lane.
+    pub fn set_lane(&mut self, lane: usize, from: &Operators<f64, N>, places: Places<'_>) {
+        let (slots, watched, active) = places;
+        self.clear_lane(lane);
+        self.states = from.states;
+        put(&mut self.bow, &from.bow, lane);
+        put(self.transition.as_flattened_mut(), from.transition.as_flattened(), lane);
+        put(&mut self.constant, &from.constant, lane);
+        for (slot, id) in slots.iter().enumerate() {
+            if let Some(own) = active.iter().position(|j| j == id) {
+                let channel = &from.channels[own];
+                self.channels[slot].set_lane(lane, channel, |other| own_slot(places, other));
+            }
+        }
+        self.drives.resize_with(from.drives.len(), Drive::idle);
+        for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
+            drive.input = from.input;
+            put(drive.step.as_flattened_mut(), from.step.as_flattened(), lane);
+        }
+        self.set_drives_of_channels(lane, from, places);
+        self.watched.resize_with(watched.len(), Watched::idle);
+        for (place, id) in watched.iter().enumerate() {
+            let Some(own) = from.watched.iter().position(|w| w.id == *id) else { continue };
+            let source = &from.watched[own];
+            let watch = &mut self.watched[place];
+            watch.id = *id;
+            watch.form.set_lane(lane, &source.form, |other| own_slot(places, other));
+            watch.limit.set_lane(lane, &source.limit);
+            watch.side.0[lane] = source.side;
+            for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
+                drive.watched[place].0[lane] = from.watched[own];
+            }
+        }
+        self.loads.resize_with(from.loads.len(), Line::idle);
+        for (load, from) in self.loads.iter_mut().zip(&from.loads) {
+            load.set_lane(lane, from);
+        }
+    }
+
+    fn set_drives_of_channels(
+        &mut self,
+        lane: usize,
+        from: &Operators<f64, N>,
+        places: Places<'_>,
+    ) {
+        for slot in 0..places.0.len() {
+            let Some(own) = own_slot(places, slot) else { continue };
+            for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
+                put(&mut drive.argument[slot], &from.argument[own], lane);
+                put(&mut drive.rate[slot], &from.rate[own], lane);
+                drive.now[slot].0[lane] = from.now[own];
+                drive.second[slot].0[lane] = from.second[own];
+            }
+        }
+    }
+
+    /// Empty a lane.
+    pub fn clear_lane(&mut self, lane: usize) {
+        let clear = |lanes: &mut [Pack<K>]| lanes.iter_mut().for_each(|pack| pack.0[lane] = 0.0);
+        clear(&mut self.bow);
+        clear(self.transition.as_flattened_mut());
+        clear(&mut self.constant);
+        for drive in &mut self.drives {
+            clear(drive.step.as_flattened_mut());
+            clear(drive.argument.as_flattened_mut());
+            clear(drive.rate.as_flattened_mut());
+            clear(&mut drive.now);
+            clear(&mut drive.second);
+            clear(&mut drive.watched);
+        }
+        for channel in &mut self.channels {
+            channel.clear_lane(lane);
+        }
+        for watch in &mut self.watched {
+            clear(&mut watch.form.state);
+            clear(&mut watch.form.channels);
+            watch.form.constant.0[lane] = 0.0;
+            watch.side.0[lane] = 1.0;
+            (watch.limit.gain.0[lane], watch.limit.offset.0[lane]) = (0.0, 1.0);
+        }
+        for load in &mut self.loads {
+            (load.gain.0[lane], load.offset.0[lane]) = (0.0, 1.0);
+        }
+    }
+}
+
+/// Position in one run's operators of the channel in a slot of the formation.
+fn own_slot((slots, _, active): Places<'_>, slot: usize) -> Option<usize> {
+    let id = slots.get(slot)?;
+    active.iter().position(|j| j == id)
+}
+
+fn put<const K: usize>(to: &mut [Pack<K>], from: &[f64], lane: usize) {
+    for (pack, &value) in to.iter_mut().zip(from) {
+        pack.0[lane] = value;
+    }
+}
+
+impl<const K: usize, const N: usize> Carried<Pack<K>, N> {
+    fn set_lane(
+        &mut self,
+        lane: usize,
+        from: &Carried<f64, N>,
+        own: impl Fn(usize) -> Option<usize> + Copy,
+    ) {
+        put(self.moments.as_flattened_mut(), from.moments.as_flattened(), lane);
+        put(&mut self.argument, &from.argument, lane);
+        self.argument_end.set_lane(lane, &from.argument_end, own);
+        self.rate_end.set_lane(lane, &from.rate_end, own);
+        self.rate.set_lane(lane, &from.rate, own);
+        self.second.set_lane(lane, &from.second, own);
+        self.law.set_lane(lane, &from.law);
+    }
+
+    fn clear_lane(&mut self, lane: usize) {
+        let input = self.law.normal.input;
+        self.set_lane(lane, &Carried::idle(), |_| None);
+        self.law.normal.input = input;
+    }
+}
+
+impl<const K: usize, const N: usize> StepForm<Pack<K>, N> {
+    fn set_lane(
+        &mut self,
+        lane: usize,
+        from: &StepForm<f64, N>,
+        own: impl Fn(usize) -> Option<usize>,
+    ) {
+        put(&mut self.state, &from.state, lane);
+        self.constant.0[lane] = from.constant;
+        for (slot, cubic) in self.cubics.iter_mut().enumerate() {
+            put(cubic, &own(slot).map_or([0.0; CUBIC], |own| from.cubics[own]), lane);
+        }
+    }
+}
+
+impl<const K: usize, const N: usize> Form<Pack<K>, N> {
+    fn set_lane(
+        &mut self,
+        lane: usize,
+        from: &Form<f64, N>,
+        own: impl Fn(usize) -> Option<usize>,
+    ) {
+        put(&mut self.state, &from.state, lane);
+        self.constant.0[lane] = from.constant;
+        for (slot, channel) in self.channels.iter_mut().enumerate() {
+            channel.0[lane] = own(slot).map_or(0.0, |own| from.channels[own]);
+        }
+    }
+}
+
+impl<const K: usize> Law<Pack<K>> {
+    fn set_lane(&mut self, lane: usize, from: &Law<f64>) {
+        self.sign.0[lane] = from.sign;
+        self.normal.set_lane(lane, &from.normal);
+        put(&mut self.polynomial, &from.polynomial, lane);
+        self.excess.0[lane] = from.excess;
+        self.rate.0[lane] = from.rate;
+        self.from.0[lane] = from.from;
+        self.to.0[lane] = from.to;
+    }
+}
+
+impl<const K: usize> Line<Pack<K>> {
+    fn set_lane(&mut self, lane: usize, from: &Line<f64>) {
+        self.input = from.input;
+        self.gain.0[lane] = from.gain;
+        self.offset.0[lane] = from.offset;
+    }
+}
