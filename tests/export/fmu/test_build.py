@@ -23,7 +23,10 @@ from drivetwin.export.compiler import compile_library, native_platform
 from drivetwin.export.entries import entries_of, start_entries
 from drivetwin.export.fmu.build import BuildOptions, build_fmu, identifier
 from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.fmu.variables import INPUTS as FIRST_INPUT
+from drivetwin.export.fmu.variables import LOCKED, MODES, OUTPUTS, PARAMETERS, START
 from drivetwin.export.fmu.version import FmiVersion
+from drivetwin.export.parameters.files import read_parameters
 from drivetwin.stepped import stepped_run
 from drivetwin.stepping import InputKind
 from tests.export.cases import CASES, STEP, Case
@@ -31,9 +34,9 @@ from tests.export.cases import CASES, STEP, Case
 pytestmark = pytest.mark.skipif(
     native_platform() is None, reason="FMI names no platform like this one"
 )
-INPUTS = [1, 2, 3]
-SPEED, TORQUE, MODES = 10, 14, (30, 31)
-START_SPEED, LOCKED, STIFFNESS = 50, 41, 107
+INPUTS = [FIRST_INPUT, FIRST_INPUT + 1, FIRST_INPUT + 2]
+SPEED, TORQUE = OUTPUTS, OUTPUTS + 4
+START_SPEED, STIFFNESS = START, PARAMETERS + 7
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,14 @@ class Instance:
         setter = self.fmu.setReal if self.is_fmi2 else self.fmu.setFloat64
         setter(references, [float(value) for value in values])
 
+    def set_model(self, case: Case) -> None:
+        """Parameters and start of a case in place of the FMU's own."""
+        entries = entries_of(case.subject.model)
+        starts = start_entries(case.subject.start)
+        numbers = [PARAMETERS + i for i in range(len(entries))]
+        numbers += [START + i for i in range(len(starts))]
+        self.set(numbers, [one.value for one in (*entries, *starts)])
+
     def get(self, *references: int) -> list[float]:
         getter = self.fmu.getReal if self.is_fmi2 else self.fmu.getFloat64
         return list(getter(list(references)))
@@ -174,10 +185,12 @@ def test_every_reference_problem_as_the_core_has_it(built: Built, name: str) -> 
         assert np.abs(told[column] - expected).max() < 1e-9 * np.abs(expected).max()
 
 
-def test_inputs_with_their_rates_meet_the_tight_reference(built: Built, instance: Instance) -> None:
+@pytest.mark.parametrize("name", CASES)
+def test_inputs_with_their_rates_meet_the_tight_reference(instance: Instance, name: str) -> None:
     """FMI 2.0 interpolates inputs; FMI 3.0, which has no such rates, holds them."""
-    case = built.case
+    case = CASES[name]()
     subject = case.subject
+    instance.set_model(case)
     instance.initialize(case.inputs[0])
     told = instance.run(case, 0, case.time.size - 1)
     kind = InputKind.LINEAR if instance.is_fmi2 else InputKind.HOLD
@@ -257,6 +270,51 @@ def test_a_locked_element_that_is_none_is_refused(instance: Instance) -> None:
     with pytest.raises(FMICallException):
         setter([LOCKED], [7])
     assert any("not a value of this variable" in message for message in instance.messages)
+
+
+def test_calls_out_of_order_are_errors_and_no_crash(built: Built, instance: Instance) -> None:
+    case, fmu = built.case, instance.fmu
+    with pytest.raises(FMICallException):
+        fmu.doStep(0.0, 1e-3)
+    assert any("needs an initialized instance" in message for message in instance.messages)
+    instance.initialize(case.inputs[0])
+    for step in (-1e-3, float("nan"), float("inf")):
+        with pytest.raises(FMICallException):
+            fmu.doStep(0.0, step)
+    with pytest.raises(FMICallException):
+        fmu.deserializeFMUState(b"no state")
+    with pytest.raises(FMICallException):
+        instance.set([START_SPEED], [100.0])
+    fmu.doStep(0.0, 0.0)
+    assert instance.get(TORQUE) == pytest.approx([case.reference[0]], rel=1e-9)
+    get = fmu.getInteger if instance.is_fmi2 else fmu.getInt64
+    assert list(get([MODES, MODES + 1])) == [1, 0]
+
+
+def test_a_long_step_is_many_short_ones(built: Built, instance: Instance) -> None:
+    """A held input over 0.2 s, in one step and in two hundred."""
+    case, fmu = built.case, instance.fmu
+    instance.initialize(case.inputs[0])
+    instance.set(INPUTS, [900.0, 0.0, 5e5])
+    saved = fmu.getFMUState()
+    fmu.doStep(0.0, 0.2)
+    long = instance.get(SPEED, TORQUE)
+    fmu.setFMUState(saved)
+    for i in range(200):
+        fmu.doStep(i * 1e-3, 1e-3)
+    assert instance.get(SPEED, TORQUE) == pytest.approx(long, rel=1e-9)
+    fmu.freeFMUState(saved)
+
+
+def test_the_parameter_set_inside_names_what_can_be_tuned(built: Built, tmp_path: Path) -> None:
+    with zipfile.ZipFile(built.path) as archive:
+        archive.extract("resources/parameters.ssv", tmp_path)
+    told = read_parameters(tmp_path / "resources" / "parameters.ssv").scalars
+    description = fmpy.read_model_description(str(built.path))
+    tunable = {v.name: v for v in description.modelVariables if v.variability == "tunable"}
+    assert {one.name: one.value for one in told} == {
+        name: float(variable.start) for name, variable in tunable.items()
+    }
 
 
 def test_a_thousand_instances_at_once(built: Built, instance: Instance) -> None:
