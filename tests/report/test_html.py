@@ -15,6 +15,7 @@ import pytest
 
 from drivetwin.identify.result import Identification
 from drivetwin.report.html import render_report, report_sections, save_report
+from drivetwin.report.sections.blocks import FigureBlock
 from drivetwin.validate import with_fit
 from tests.report.sample import identification, log, validation
 
@@ -94,6 +95,16 @@ def test_sparse_identification_leaves_sections_out(found: Identification) -> Non
     assert "friction" not in titles
     assert "validation" not in titles
     assert render_report(sparse, log()).startswith("<!DOCTYPE html>")
+
+
+def test_several_shifts_are_shown_in_the_whole_log_first(found: Identification) -> None:
+    twice = replace(found, shifts=found.shifts * 2)
+    (whole, *_) = report_sections(twice, log())[1].blocks
+    assert isinstance(whole, FigureBlock)
+    assert len(whole.figure.layout.shapes) == 4
+    assert len(report_sections(found, log())[1].blocks) < len(
+        report_sections(twice, log())[1].blocks
+    )
 
 
 def _without_scripts(page: str) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from drivetwin.identify.result import Identification
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.figures.friction import friction_figure
+from drivetwin.report.figures.recording import log_figure, log_panels
 from drivetwin.report.figures.shift_phases import shift_panels, shift_phases
 from drivetwin.report.figures.validation import validation_figure, validation_panels
 from drivetwin.report.sections.blocks import (
@@ -33,6 +34,9 @@ PHASE_KEY = (
 def shift_section(found: Identification, log: ShiftLog) -> Section:
     """Measured signals with the detected phases, one figure per shift."""
     blocks: list[Block] = []
+    if len(found.shifts) > 1:
+        text = "The whole log; each button shows one shift of those that were used."
+        blocks.append(FigureBlock(log_figure(log, found.shifts), text, log_panels(log)))
     for shift in found.shifts:
         title = f"Shift {shift.start_gear}→{shift.end_gear}, {shift.kind.value}. "
         blocks.append(
