@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drivetwin.driveline import Stribeck
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dual_scenarios import paper_steps
 from drivetwin.dyno.dyno import run
@@ -137,8 +138,8 @@ def _aged(mu: float, P0: float) -> Scenario:
     base = paper_steps()
     (element,) = (each for each in base.model.elements if each.name == ELEMENT)
     law = element.friction
+    assert isinstance(law, Stribeck)
     factor = mu / float(law.at(np.array([SLIP]))[0])
-    assert hasattr(law, "mu_c")
     aged = replace(
         element,
         P0=P0,

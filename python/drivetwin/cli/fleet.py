@@ -39,54 +39,60 @@ fleet = typer.Typer(
 StoreFolder = Annotated[Path, typer.Argument(metavar="STORE", help="Folder of `fleet -o`.")]
 
 
+Logs = Annotated[
+    list[str] | None, typer.Argument(metavar="LOGS...", help="Files, folders and quoted globs.")
+]
+CardOrRules = Annotated[
+    Path, typer.Option("--vehicle", metavar="CARD|RULES", help="Vehicle card, or rules (TOML).")
+]
+StoreOption = Annotated[
+    Path, typer.Option("-o", "--output", metavar="STORE", help="Folder of the store.")
+]
+ListFile = Annotated[
+    Path | None,
+    typer.Option("--list", metavar="FILE", help="CSV with a column `path`, or a path a line."),
+]
+MethodOption = Annotated[
+    Method, typer.Option(metavar="METHOD", help="paper, integral or likelihood.")
+]
+Workers = Annotated[
+    int | None, typer.Option(min=1, help="Processes on this machine; one a core if not given.")
+]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Work on a Dask cluster, tcp://host:port.")
+]
+TimeLimit = Annotated[float, typer.Option(min=0.1, metavar="S", help="Time that one log may take.")]
+MemoryLimit = Annotated[
+    int, typer.Option(min=64, metavar="MIB", help="Memory that one worker may hold.")
+]
+Attempts = Annotated[
+    int, typer.Option(min=1, help="How often a log is tried that loses its worker.")
+]
+Retry = Annotated[bool, typer.Option("--retry", help="Try again what is in quarantine.")]
+Reports = Annotated[bool, typer.Option("--reports", help="Write the report of each log too.")]
+Traces = Annotated[
+    bool, typer.Option("--traces", help="Write simulation over measurement of each log too.")
+]
+Events = Annotated[bool, typer.Option("--json", help="Print one JSON event a line on stdout.")]
+
+
 @fleet.command(RUN)
 def run(
-    logs: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="LOGS...", help="Files, folders and quoted globs."),
-    ] = None,
-    vehicle: Annotated[
-        Path,
-        typer.Option("--vehicle", metavar="CARD|RULES", help="Vehicle card, or rules (TOML)."),
-    ] = ...,  # type: ignore[assignment]
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="STORE", help="Folder of the store.")
-    ] = ...,  # type: ignore[assignment]
-    listed: Annotated[
-        Path | None,
-        typer.Option("--list", metavar="FILE", help="CSV with a column `path`, or a path a line."),
-    ] = None,
-    method: Annotated[
-        Method, typer.Option(metavar="METHOD", help="paper, integral or likelihood.")
-    ] = DEFAULT_METHOD,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes on this machine; one a core if not given.")
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Work on a Dask cluster, tcp://host:port."),
-    ] = None,
-    time_limit: Annotated[
-        float, typer.Option(min=0.1, metavar="S", help="Time that one log may take.")
-    ] = 600.0,
-    memory_limit: Annotated[
-        int, typer.Option(min=64, metavar="MIB", help="Memory that one worker may hold.")
-    ] = 4096,
-    attempts: Annotated[
-        int, typer.Option(min=1, help="How often a log is tried that loses its worker.")
-    ] = 3,
-    retry: Annotated[
-        bool, typer.Option("--retry", help="Try again what is in quarantine.")
-    ] = False,
-    reports: Annotated[
-        bool, typer.Option("--reports", help="Write the report of each log too.")
-    ] = False,
-    traces: Annotated[
-        bool, typer.Option("--traces", help="Write simulation over measurement of each log too.")
-    ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON event a line on stdout.")
-    ] = False,
+    *,
+    logs: Logs = None,
+    vehicle: CardOrRules,
+    output: StoreOption,
+    listed: ListFile = None,
+    method: MethodOption = DEFAULT_METHOD,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    time_limit: TimeLimit = 600.0,
+    memory_limit: MemoryLimit = 4096,
+    attempts: Attempts = 3,
+    retry: Retry = False,
+    reports: Reports = False,
+    traces: Traces = False,
+    as_json: Events = False,
 ) -> None:
     """Identify all logs that the store does not hold yet.
 

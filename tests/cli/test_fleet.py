@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin fleet` from end to end: run, resume, report, estimate, query."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from benchmarks.fleet.made import make_fleet
+from drivetwin.cli import main
+from drivetwin.fleet.joint.observed import facts
+from drivetwin.fleet.rows import RowKind
+from drivetwin.fleet.store import Store
+
+COUNT = 8
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of a few made logs, one of them empty, with single reports and traces."""
+    folder = tmp_path_factory.mktemp("fleet")
+    make_fleet(folder / "logs", COUNT)
+    (folder / "logs" / "unit_07" / "empty_at_1.0_Mm.csv").write_bytes(b"")
+    command = ["fleet", str(folder / "logs"), "--vehicle", str(folder / "logs" / "rules.toml")]
+    command += ["-o", str(folder / "store"), "--method", "integral", "--workers", "1"]
+    assert main([*command, "--reports", "--traces"]) == 0
+    return folder
+
+
+def _run(fleet: Path, *more: str) -> int:
+    rules = str(fleet / "logs" / "rules.toml")
+    command = ["fleet", str(fleet / "logs"), "--vehicle", rules, "-o", str(fleet / "store")]
+    return main([*command, "--method", "integral", "--workers", "1", *more])
+
+
+def test_a_second_run_computes_nothing_and_tells_events(
+    fleet: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert _run(fleet, "--json") == 0
+    events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [event["event"] for event in events] == ["started", *(COUNT + 1) * ["log"], "summary"]
+    assert not any(event.get("computed") for event in events)
+    (bad,) = [event for event in events if event.get("state") == "bad"]
+    assert bad["path"].endswith("empty_at_1.0_Mm.csv")
+    assert bad["error"] == "FileFormatError"
+
+
+def test_the_store_holds_what_a_log_told(fleet: Path) -> None:
+    with Store(fleet / "store") as store:
+        kinds = set(store.rows().column("kind").to_pylist())
+        rows = store.rows(RowKind.PARAMETER).to_pylist()
+        known = facts(store)
+        shifts = store.table("shifts")
+    assert kinds >= {"parameter", "friction", "fit", "quality"}
+    values = {row["name"]: row for row in rows}
+    assert values["eta"]["value"] == pytest.approx(0.85, abs=0.01)
+    assert values["mu.B3"]["at"] == 50.0
+    assert values["P0.B3"]["free_std"] > values["P0.B3"]["std_noise"]
+    assert {fact.unit for _, fact in known.values()} == {f"{unit:02d}" for unit in range(COUNT)}
+    assert all(0.0 <= fact.fields["odometer_Mm"] <= 200.0 for _, fact in known.values())
+    assert [(row["start_gear"], row["end_gear"], row["state"]) for row in shifts] == COUNT * [
+        ("2", "3", "used")
+    ]
+
+
+def test_the_report_links_to_single_ones_with_one_library(
+    fleet: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fleet", "report", str(fleet / "store"), "--json"]) == 0
+    page = Path(json.loads(capsys.readouterr().out)["report"])
+    text = page.read_text("utf-8")
+    assert 'src="reports/plotly.js"' in text
+    assert "empty_at_1.0_Mm.csv" in text
+    assert len(text) < 1_000_000
+    singles = list((fleet / "store" / "reports").glob("*.html"))
+    assert len(singles) == COUNT
+    assert all('src="plotly.js"' in single.read_text("utf-8") for single in singles)
+    assert len(list((fleet / "store" / "traces").glob("*.parquet"))) == COUNT
+
+
+def test_estimates_are_told(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = str(fleet / "store")
+    assert main(["fleet", "estimate", store, "--parameter", "eta", "--json"]) == 0
+    (eta,) = json.loads(capsys.readouterr().out)["estimates"]
+    assert eta["ci95"][0] < 0.85 < eta["ci95"][1]
+    assert main(["fleet", "estimate", store]) == 0
+    out = capsys.readouterr().out
+    assert "mu.B3" in out
+    assert "odomet" in out
+
+
+def test_questions_are_answered(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = str(fleet / "store")
+    sql = "SELECT unit, odometer_Mm, value FROM parameters WHERE name = 'eta' ORDER BY unit"
+    assert main(["fleet", "query", store, sql, "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [row["unit"] for row in rows] == [f"{unit:02d}" for unit in range(COUNT)]
+    for name in ("answer.csv", "answer.parquet"):
+        assert main(["fleet", "query", store, sql, "-o", str(fleet / name)]) == 0
+        assert (fleet / name).stat().st_size > 100
+    for table in ("frictions", "fits", "qualities", "warnings", "rows", "files", "logs", "shifts"):
+        assert main(["fleet", "query", store, f"SELECT count(*) FROM {table}"]) == 0
+    capsys.readouterr()
+    assert main(["fleet", "query", store, "SELECT nothing", "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["error"]["type"] == "QueryError"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["fleet", "--vehicle", "x.toml", "-o", "y"], "no logs are named"),
+        (["fleet", "report", "nowhere"], "no store"),
+        (["fleet", "*.nothing", "--vehicle", "pyproject.toml", "-o", "y"], "rules"),
+    ],
+)
+def test_wrong_usage_is_told(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    assert says in capsys.readouterr().err
