@@ -128,6 +128,10 @@ class Part:
         """Change (n,) of the simulated samples by disturbances (N-1,) of inputs, by name."""
         return self._seen(point, self.response(point, run).to(disturbance))
 
+    def answer_to_force(self, point: Point, run: Trajectory, force: FloatArray) -> FloatArray:
+        """The same (n,) by torques (N-1, 4) on the speeds of engine, output and wheel."""
+        return self._seen(point, self.response(point, run).forced(force))
+
     def _seen(self, point: Point, z: FloatArray) -> FloatArray:
         """What the sensors see (n,) of disturbances z (N, 4) of the state."""
         model = self.structure.model(point)

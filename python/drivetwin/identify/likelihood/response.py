@@ -35,12 +35,14 @@ class Response:
     """Discrete linear response on a time grid of N points.
 
     `transition` (N-1, 4, 4) takes z from one point to the next; `drive` (N-1, 4) by input name is
-    the effect over a step of that input's disturbance; `step` (N-1,) [s].
+    the effect over a step of that input's disturbance; `step` (N-1,) [s]. `effect` (N-1, 4, 4) is
+    that of forces on the speeds, whatever makes them.
     """
 
     step: FloatArray
     transition: FloatArray
     drive: dict[str, FloatArray]
+    effect: FloatArray
 
     def to(self, disturbance: dict[str, FloatArray]) -> FloatArray:
         """z (N, 4) in answer to disturbances (N-1,) of inputs by name, from z = 0.
@@ -50,14 +52,23 @@ class Response:
         push = np.zeros_like(next(iter(self.drive.values())))
         for name, values in disturbance.items():
             push += self.drive[name] * values[:, None]
+        return self.pushed(push)
+
+    def forced(self, force: FloatArray) -> FloatArray:
+        """z (N, 4) in answer to forces (N-1, 4) on the speeds, the last column 0."""
+        return self.pushed(np.einsum("kij,kj->ki", self.effect, force))
+
+    def pushed(self, push: FloatArray) -> FloatArray:
+        """z (N, 4) with changes `push` (N-1, 4) over the steps, from z = 0."""
         start = np.zeros((1, STATES))
-        with np.errstate(over="ignore", invalid="ignore"):
-            z = solve_banded(
-                (2 * STATES - 1, 0),
-                self._banded,
-                np.vstack([start, push]).ravel(),
-                check_finite=False,
-            )
+        pushed = np.vstack([start, push])
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                z = solve_banded(
+                    (2 * STATES - 1, 0), self._banded, pushed.ravel(), check_finite=False
+                )
+        except np.linalg.LinAlgError:
+            return np.full_like(pushed, np.inf)
         return np.asarray(z.reshape(-1, STATES))
 
     @cached_property
@@ -110,7 +121,7 @@ def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
         transition[k] = jump @ transition[k]
     effect = mean @ inverse * step[:, None, None]
     drive = {name: np.einsum("kij,kj->ki", effect, f) for name, f in force.items()}
-    return Response(step, transition, drive)
+    return Response(step, transition, drive, effect)
 
 
 def observed(model: DualClutch, name: str) -> FloatArray:
