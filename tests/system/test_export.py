@@ -129,3 +129,42 @@ def test_c_sources_and_what_is_refused(
     arguments = ["export", str(twin), "--to", "c", "--shift", "3-2", "--log", str(log)]
     assert main([*arguments, "-o", str(tmp_path / "other")]) == 2
     assert "no shift 3-2" in capsys.readouterr().err
+
+
+def traces(arguments: list[str], path: Path) -> np.ndarray:
+    """Columns of `drivetwin simulate`."""
+    assert main(["simulate", *arguments, "-o", str(path)]) == 0
+    return np.genfromtxt(path, delimiter=",", skip_header=2)
+
+
+def test_an_edited_parameter_file_drives_the_simulation(
+    identified: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, twin = identified
+    exported = tmp_path / "twin.dcm"
+    assert main(["export", str(twin), "--to", "dcm", "-o", str(exported)]) == 0
+    given = [str(twin), str(log), "--parameters", str(exported)]
+    plain = traces([str(twin), str(log)], tmp_path / "plain.csv")
+    assert (traces(given, tmp_path / "same.csv") == plain).all()
+    lines = exported.read_text("ascii").splitlines()
+    place = lines.index("FESTWERT k_o") + 4
+    assert lines[place].startswith("  WERT ")
+    lines[place] = "  WERT 90000.0"
+    exported.write_text("\n".join(lines), "ascii")
+    capsys.readouterr()
+    softer = traces(given, tmp_path / "softer.csv")
+    assert "twin.dcm changes k_o" in capsys.readouterr().err
+    assert np.abs(softer[:, 1] - plain[:, 1]).max() > 50.0
+
+
+def test_a_modelica_package_holds_the_shift_of_the_log(
+    identified: tuple[Path, Path], tmp_path: Path
+) -> None:
+    log, twin = identified
+    path = tmp_path / "shift.mo"
+    arguments = ["--to", "modelica", "--log", str(log), "-o", str(path)]
+    assert main(["export", str(twin), *arguments]) == 0
+    text = path.read_text("utf-8")
+    assert "model Shift" in text
+    assert "w_rel = 0;" in text
+    assert text.count(";\n      ") > 1000

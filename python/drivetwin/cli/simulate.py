@@ -14,6 +14,7 @@ from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step
 from drivetwin.stepping import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
+    from drivetwin.twin import Twin
     from drivetwin.validate import Validation
 
 _SI = {"output_torque": "N*m", "input_speed": "rad/s", "output_speed": "rad/s"}
@@ -40,6 +41,14 @@ def simulate(
         InputKind,
         typer.Option("--input", help="Inputs between these steps; `hold` alone takes 1 ms."),
     ] = InputKind.LINEAR,
+    parameters: Annotated[
+        Path | None,
+        typer.Option(
+            "--parameters",
+            metavar="FILE",
+            help="Values in place of the twin's: an exported parameter file that was edited.",
+        ),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Simulate the shifts of a log with an identified model and compare.
@@ -56,7 +65,7 @@ def simulate(
     from drivetwin.validate import validate
     from drivetwin.vehicle.card import load_card
 
-    model = Twin.load(twin)
+    model = Twin.load(twin) if parameters is None else _edited(Twin.load(twin), parameters)
     with step(f"simulating {log.name}"):
         card = model.card() if vehicle is None else load_card(vehicle)
         recording = read_log(log, card, channels)
@@ -76,6 +85,18 @@ def simulate(
             note(f"warning: {warning}")
     if output is not None:
         say(f"wrote {output}")
+
+
+def _edited(twin: Twin, parameters: Path) -> Twin:
+    """The twin with the values of a parameter file, and what that changed on stderr."""
+    from drivetwin.export.parameters.files import read_parameters
+    from drivetwin.export.parameters.to_twin import updated
+
+    update = updated(twin, read_parameters(parameters))
+    typer.echo(f"{parameters.name} changes {', '.join(update.changed) or 'nothing'}", err=True)
+    if update.unknown:
+        typer.echo(f"not of this twin: {', '.join(update.unknown)}", err=True)
+    return update.twin
 
 
 def _document(run: Validation) -> dict[str, object]:

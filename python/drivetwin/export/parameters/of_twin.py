@@ -24,7 +24,7 @@ POINTS = 33
 """Points of a curve drawn from a law, denser towards zero slip where it bends: with the linings
 seen, linear interpolation between them stays within 0.1 % of μ."""
 
-_DESIGN = {
+DESIGN_FIELDS = {
     "i_c": ("1", "ratio between input gear and clutch (eq. 15)"),
     "i_out": ("1", "ratio between clutch and output (eq. 15)"),
     "gain": ("m^3", "friction surfaces x de-rating x area x effective radius (eq. 5)"),
@@ -32,12 +32,14 @@ _DESIGN = {
     "peak": ("1", "static over kinetic capacity at zero slip"),
     "drum_inertia": ("kg*m^2", "inertia that turns with the slip"),
 }
-_LAW = {
+"""Fields of a shift element that the card knows: unit and meaning."""
+LAW_FIELDS = {
     "mu_c": ("1", "friction coefficient at large slip"),
     "mu_s": ("1", "friction coefficient at zero slip"),
     "v_s": ("rad/s", "slip over which the difference decays"),
     "mu_v": ("s/rad", "rise of the friction coefficient with slip"),
 }
+"""Numbers of a friction law: unit and meaning."""
 
 
 def parameters_of(
@@ -52,7 +54,7 @@ def parameters_of(
 
     own = ParameterSet(
         name=one_line(twin.name),
-        scalars=(*_estimates(twin), *_gearing(twin), *_elements(twin), *_laws(twin)),
+        scalars=(*_estimates(twin), *_load(twin), *_gearing(twin), *_elements(twin), *_laws(twin)),
         curves=(*_friction(twin), *(() if converter is None else converter_curves(converter))),
         notes=tuple(one_line(note) for note in _notes(twin)),
     )
@@ -92,6 +94,16 @@ def _told(estimate: Estimate) -> str:
     return text if interval is None else f"{text}, 95 %: {interval[0]:.5g} .. {interval[1]:.5g}"
 
 
+def _load(twin: Twin) -> Iterator[Scalar]:
+    """How the load grows with speed, where the log showed that it does."""
+    if (law := twin.load_law) is not None:
+        over = ", over η" if law.over_eta else ""
+        text = f"load torque at the wheel per speed squared, from mean_speed on{over}"
+        yield Scalar("load.aero", law.aero, "N*m*s^2/rad^2", text)
+        text = "speed of the wheel at which the load is that of Tv_over_if"
+        yield Scalar("load.mean_speed", law.mean_speed, "rad/s", text)
+
+
 def _gearing(twin: Twin) -> Iterator[Scalar]:
     yield Scalar("i_in", twin.i_in, text="input gear")
     yield Scalar("i_f", twin.final_drive, text="final drive")
@@ -106,7 +118,7 @@ def _elements(twin: Twin) -> Iterator[Scalar]:
 
 
 def _design(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
-    for field, (unit, text) in _DESIGN.items():
+    for field, (unit, text) in DESIGN_FIELDS.items():
         key = f"{field}.{name}"
         told = twin.parameters.get(key)
         if told is None or told.value is None:
@@ -116,7 +128,7 @@ def _design(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
 def _laws(twin: Twin) -> Iterator[Scalar]:
     for name, curve in twin.friction.items():
         for field, value in (curve.stribeck or {}).items():
-            unit, text = _LAW[field]
+            unit, text = LAW_FIELDS[field]
             yield Scalar(f"{field}.{name}", value, unit, text)
 
 

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""Values from a parameter file back into a twin, as a calibration tool has left them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drivetwin.errors import InputError
+from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, parameters_of
+from drivetwin.export.parameters.spelling import dotted_name, flat_name
+from drivetwin.identify.result import Estimate, FrictionCurve, Verdict
+from drivetwin.parameters import spec_of
+
+if TYPE_CHECKING:
+    from drivetwin.twin import Twin
+
+METHOD = "parameter file"
+
+
+@dataclass(frozen=True)
+class Update:
+    """The twin with the values of a file; names that changed, and names that it does not know."""
+
+    twin: Twin
+    changed: tuple[str, ...]
+    unknown: tuple[str, ...]
+
+
+def updated(twin: Twin, parameters: ParameterSet) -> Update:
+    """Give a twin the values of a file that differ from its own, under drivetwin's own names.
+
+    What changes counts as a design value without interval. A parameter that the log could not tell
+    may be given. Raises InputError where both a friction curve and the numbers of its law changed.
+    """
+    own = parameters_of(twin)
+    spelled = _spellings(twin, own)
+    values = {one.name: one for one in own.entries}
+    changed: dict[str, Scalar | Curve] = {}
+    unknown = []
+    for entry in parameters.entries:
+        name = spelled.get(entry.name)
+        if name is None:
+            unknown.append(entry.name)
+        elif not _same(values.get(name), entry):
+            changed[name] = entry
+    made = twin
+    for name, entry in changed.items():
+        made = (
+            _with_curve(made, name, entry, changed)
+            if isinstance(entry, Curve)
+            else _with(made, name, entry.value)
+        )
+    if any(name in twin.covariance_ids for name in changed):
+        made = replace(made, covariance_ids=(), covariance=None)
+    return Update(made, tuple(changed), tuple(unknown))
+
+
+def _spellings(twin: Twin, own: ParameterSet) -> dict[str, str]:
+    """Own name by every way a format spells it, also of parameters without a value."""
+    names = [one.name for one in own.entries]
+    names += [name for name in twin.parameters if name not in names]
+    return {spell(name): name for spell in (flat_name, dotted_name, str) for name in names}
+
+
+def _same(own: Scalar | Curve | None, given: Scalar | Curve) -> bool:
+    if isinstance(own, Scalar) and isinstance(given, Scalar):
+        return own.value == given.value
+    if isinstance(own, Curve) and isinstance(given, Curve):
+        return (own.axis.points, own.values) == (given.axis.points, given.values)
+    return False
+
+
+def _with(twin: Twin, name: str, value: float) -> Twin:
+    """The twin with one number changed."""
+    field, _, element = name.partition(".")
+    if name == "i_in":
+        return replace(twin, i_in=value)
+    if name == "i_f":
+        return replace(twin, final_drive=value)
+    if name.startswith("ratio_"):
+        gear = name.removeprefix("ratio_")
+        return replace(twin, gears={**twin.gears, gear: replace(twin.gears[gear], ratio=value)})
+    if field == "load" and twin.load_law is not None:
+        changes: dict[str, Any] = {element: value}
+        return replace(twin, load_law=replace(twin.load_law, **changes))
+    if field in LAW_FIELDS:
+        return _with_law(twin, element, field, value)
+    if field in DESIGN_FIELDS and name not in twin.parameters:
+        changes = {field: value}
+        design = replace(twin.elements[element], **changes)
+        return replace(twin, elements={**twin.elements, element: design})
+    spec_of(name)
+    told = Estimate(name, value, None, Verdict.DESIGN, METHOD, reason="given by a parameter file")
+    return replace(twin, parameters={**twin.parameters, name: told})
+
+
+def _with_law(twin: Twin, element: str, field: str, value: float) -> Twin:
+    curve = twin.friction[element]
+    law = {**(curve.stribeck or {}), field: value}
+    changed = replace(curve, stribeck=law, method=METHOD, stribeck_covariance=None)
+    return replace(twin, friction={**twin.friction, element: changed})
+
+
+def _with_curve(twin: Twin, name: str, given: Curve, changed: dict[str, Scalar | Curve]) -> Twin:
+    element = name.removeprefix("mu.")
+    both = [field for field in LAW_FIELDS if f"{field}.{element}" in changed]
+    if both:
+        raise InputError(
+            f"both the friction curve of {element} and {', '.join(both)} of its law changed",
+            "change one of them and leave the other as it was exported",
+        )
+    slip, mu = np.array(given.axis.points), np.array(given.values)
+    nothing = np.zeros(0)
+    curve = FrictionCurve(slip, mu, mu, mu, nothing, nothing, None, METHOD)
+    return replace(twin, friction={**twin.friction, element: curve})

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""A parameter file that was edited becomes a twin with those values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.driveline import FrictionTable, Stribeck
+from drivetwin.errors import InputError
+from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.files import CODECS, ParameterFormat
+from drivetwin.export.parameters.of_twin import parameters_of
+from drivetwin.export.parameters.to_twin import updated
+from drivetwin.identify.result import LoadLaw, Verdict
+from tests.export.parameters.sample import twin
+from tests.report.sample import SHIFT
+
+
+def _edited(**values: float) -> ParameterSet:
+    """The exported set with other values, names with `__` for the dot."""
+    new = {name.replace("__", "."): value for name, value in values.items()}
+    content = parameters_of(twin())
+    return replace(
+        content,
+        scalars=tuple(replace(one, value=new.get(one.name, one.value)) for one in content.scalars),
+    )
+
+
+@pytest.mark.parametrize("kind", ParameterFormat)
+def test_a_file_as_it_was_exported_changes_nothing(kind: ParameterFormat) -> None:
+    codec, given = CODECS[kind], twin()
+    update = updated(given, codec.parse(codec.text(parameters_of(given)), "file"))
+    assert update.changed == update.unknown == ()
+    assert update.twin == given
+
+
+@pytest.mark.parametrize("kind", ParameterFormat)
+def test_edited_values_reach_the_simulation(kind: ParameterFormat) -> None:
+    edited = _edited(k_o=2e5, gain__B3=0.03, P0__B3=9e4, i_f=5.0, ratio_3=1.5, mu_c__B3=0.1)
+    codec = CODECS[kind]
+    update = updated(twin(), codec.parse(codec.text(edited), "file"))
+    assert set(update.changed) == {"k_o", "gain.B3", "P0.B3", "i_f", "ratio_3", "mu_c.B3"}
+    model, element = update.twin.dual_clutch(SHIFT), update.twin.dual_clutch(SHIFT).elements[1]
+    assert (model.k_o, model.i_f, element.gain, element.P0) == (2e5, 5.0, 0.03, 9e4)
+    assert isinstance(element.friction, Stribeck)
+    assert element.friction.mu_c == 0.1
+    assert update.twin.gear("3").ratio == 1.5
+    assert update.twin.parameters["k_o"].verdict is Verdict.DESIGN
+    assert update.twin.covariance is not None
+    assert updated(twin(), _edited(eta=0.9)).twin.covariance is None
+
+
+def test_an_edited_curve_becomes_the_law() -> None:
+    content = parameters_of(twin())
+    (curve,) = content.curves
+    raised = tuple(1.1 * mu for mu in curve.values)
+    update = updated(twin(), replace(content, curves=(replace(curve, values=raised),)))
+    law = update.twin.dual_clutch(SHIFT).elements[1].friction
+    assert isinstance(law, FrictionTable)
+    assert (law.slip, law.mu) == (curve.axis.points, raised)
+
+
+def test_a_curve_and_its_law_cannot_both_change() -> None:
+    edited = _edited(mu_s__B3=0.2)
+    (curve,) = edited.curves
+    assert isinstance(curve, Curve)
+    both = replace(edited, curves=(replace(curve, values=tuple(np.array(curve.values) * 1.1)),))
+    with pytest.raises(InputError, match="both the friction curve of B3 and mu_s"):
+        updated(twin(), both)
+
+
+def test_what_the_log_could_not_tell_may_be_given_and_other_names_are_told() -> None:
+    given = ParameterSet("t", (Scalar("te_delay", 0.01, "s"), Scalar("wheel_colour", 3.0)))
+    update = updated(twin(), given)
+    assert update.changed == ("te_delay",)
+    assert update.unknown == ("wheel_colour",)
+    assert update.twin.value("te_delay", 0.0) == 0.01
+
+
+def test_a_load_that_grows_with_speed_is_written_and_read() -> None:
+    given = replace(twin(), load_law=LoadLaw(aero=7.0, std=0.5, mean_speed=14.0))
+    content = parameters_of(given)
+    assert content["load.aero"].unit == "N*m*s^2/rad^2"
+    edited = tuple(
+        replace(one, value=9.0) if one.name == "load.aero" else one for one in content.scalars
+    )
+    update = updated(given, replace(content, scalars=edited))
+    assert update.changed == ("load.aero",)
+    assert update.twin.load_law == LoadLaw(aero=9.0, std=0.5, mean_speed=14.0)
