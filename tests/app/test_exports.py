@@ -13,6 +13,7 @@ import pytest
 from drivetwin.app.exports import Record, produce
 from drivetwin.app.identifying import Outcome
 from drivetwin.app.session import Session
+from drivetwin.app.views.export import RECORDS, TARGETS
 from drivetwin.app.work import Work
 from drivetwin.errors import InputError
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
@@ -35,6 +36,20 @@ def test_c_sources_come_as_an_archive(identified: Session, tmp_path: Path) -> No
     names = zipfile.ZipFile(io.BytesIO(product.content)).namelist()
     assert {"dt_twin.c", "dt_model.h"} <= set(names)
     assert produce(identified.work, Target.C, tmp_path) == product
+
+
+@pytest.mark.parametrize(
+    ("target", "says"), [(Target.MODELICA, b"Modelica."), (Target.FMU, b"modelDescription.xml")]
+)
+def test_models_of_the_shift(
+    identified: Session, tmp_path: Path, target: Target, says: bytes
+) -> None:
+    assert says in produce(identified.work, target, tmp_path).content
+
+
+def test_every_form_has_a_button() -> None:
+    assert set(TARGETS) == set(Target)
+    assert set(RECORDS) == set(Record)
 
 
 def test_own_files_are_read_back(identified: Session, tmp_path: Path) -> None:

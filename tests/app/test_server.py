@@ -14,8 +14,9 @@ import pytest
 from flask.testing import FlaskClient
 
 from drivetwin.app.folder import Folder
-from drivetwin.app.server import LIMITS, SESSION_HEADER, Start, build
+from drivetwin.app.server import SESSION_HEADER, Start, build
 from drivetwin.app.session import Session, Sessions
+from drivetwin.app.uploads import LIMITS
 from drivetwin.errors import DrivetwinError
 from tests.app.bad_files import TABLE, bad_files
 from tests.app.conftest import CARD

@@ -8,6 +8,7 @@ import zipfile
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from drivetwin.app import jobs
 from drivetwin.app.identifying import report_of
@@ -15,8 +16,10 @@ from drivetwin.app.work import Work
 from drivetwin.errors import InputError
 from drivetwin.export.targets import Target
 from drivetwin.identify.result import Identification
-from drivetwin.shifts.shift import Shift
-from drivetwin.twin import Twin
+
+if TYPE_CHECKING:
+    from drivetwin.export.fmu.experiment import Experiment
+    from drivetwin.export.subject import Subject
 
 REPORT_LIMIT = 120.0
 """Time [s] after which writing a report is given up."""
@@ -47,21 +50,38 @@ def produce(work: Work, wanted: Target | Record, scratch: Path) -> Product:
     stem = Path(work.log.name).stem if work.log is not None else "twin"
     if isinstance(wanted, Record):
         return Product(f"{stem}.{wanted.value}", _record(work, wanted, scratch))
-    twin, shift = work.require_twin(), work.require_shift()
     if wanted is Target.C:
-        return Product(f"{stem}.c.zip", _sources(twin, shift, scratch))
-    path = scratch / f"{stem}.{wanted.value}"
-    if wanted is Target.FMU:
-        from drivetwin.export.fmu.build import build_fmu
-        from drivetwin.export.subject import subject_of
-
-        build_fmu(subject_of(twin, (shift.start_gear, shift.end_gear)), path)
-    else:
-        from drivetwin.export.parameters.files import ParameterFormat, write_parameters
-        from drivetwin.export.parameters.of_twin import parameters_of
-
-        write_parameters(parameters_of(twin), path, ParameterFormat(wanted.value))
+        return Product(f"{stem}.c.zip", _sources(work, scratch))
+    path = scratch / f"{stem}.{wanted.ending}"
+    _write(work, wanted, path)
     return Product(path.name, _taken(path))
+
+
+def _write(work: Work, wanted: Target, path: Path) -> None:
+    match wanted:
+        case Target.FMU:
+            from drivetwin.export.fmu.build import BuildOptions, build_fmu
+
+            subject, experiment = _subject(work)
+            build_fmu(subject, path, BuildOptions(experiment=experiment))
+        case Target.MODELICA:
+            from drivetwin.export.modelica.dual_clutch import write_modelica
+
+            write_modelica(*_subject(work), path)
+        case _:
+            from drivetwin.export.parameters.files import ParameterFormat, write_parameters
+            from drivetwin.export.parameters.of_twin import parameters_of
+
+            content = parameters_of(work.require_twin())
+            write_parameters(content, path, ParameterFormat(wanted.value))
+
+
+def _subject(work: Work) -> tuple[Subject, Experiment | None]:
+    """The model of the shift that is shown, started as it was measured."""
+    from drivetwin.export.fmu.measured import measured_subject
+
+    twin, shift = work.require_twin(), work.require_shift()
+    return measured_subject(twin, work.require_log(), (shift.start_gear, shift.end_gear))
 
 
 def _record(work: Work, wanted: Record, scratch: Path) -> bytes:
@@ -96,14 +116,13 @@ def _evidence(work: Work) -> Identification:
     return found
 
 
-def _sources(twin: Twin, shift: Shift, scratch: Path) -> bytes:
+def _sources(work: Work, scratch: Path) -> bytes:
     """The C sources as one archive; equal twins give equal bytes."""
     from drivetwin.export.c import write_c
-    from drivetwin.export.subject import subject_of
 
     folder = scratch / "c"
     folder.mkdir(exist_ok=True)
-    paths = write_c(subject_of(twin, (shift.start_gear, shift.end_gear)), folder)
+    paths = write_c(_subject(work)[0], folder)
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in paths:

@@ -13,22 +13,16 @@ from dash import Dash
 from flask import Response, request
 from werkzeug.serving import BaseWSGIServer, make_server
 
-from drivetwin.app import jobs, uploads, workspace
+from drivetwin.app import jobs
 from drivetwin.app.folder import Folder
 from drivetwin.app.guard import protect, refusal
 from drivetwin.app.session import Sessions
+from drivetwin.app.uploads import LIMITS
 from drivetwin.app.views.page import build_page
 from drivetwin.app.work import Source
 from drivetwin.errors import RefusedError
 
 SESSION_HEADER = "X-Drivetwin-Session"
-LIMITS = {
-    "log": uploads.MAX_UPLOAD,
-    "card": uploads.MAX_TEXT,
-    "gearbox": uploads.MAX_TEXT,
-    "workspace": workspace.LARGEST,
-}
-"""Bytes that an upload may have, by what it is for."""
 
 
 @dataclass(frozen=True)

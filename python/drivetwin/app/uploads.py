@@ -15,10 +15,13 @@ from typing import IO
 
 from drivetwin.errors import RefusedError, Where
 
-MAX_UPLOAD = 200 * 2**20
-"""Bytes; ten minutes of 40 channels at 1 kHz in an MDF file. Larger logs are opened by path."""
-MAX_TEXT = 2 * 2**20
-"""Bytes of a card or workspace file."""
+LIMITS = {
+    "log": 200 * 2**20,  # ten minutes of 40 channels at 1 kHz; larger ones are opened by path
+    "card": 2 * 2**20,
+    "gearbox": 2 * 2**20,
+    "workspace": 20 * 2**20,  # three twins take some 0.3 MB
+}
+"""Bytes that an upload may have, by what it is for."""
 _CHUNK = 2**18
 _LONGEST_NAME = 200
 _FORMULA = re.compile(rb"""(?:^|[,;\t])[ ]*"?'?(?:[=@]|[+-](?=[A-Za-z(]|[^,;\t\r\n"]*[|!(]))""")

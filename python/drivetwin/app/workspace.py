@@ -15,6 +15,7 @@ from drivetwin.app.folder import Folder
 from drivetwin.app.identifying import Outcome
 from drivetwin.app.locks import Lock, LockKind
 from drivetwin.app.phases import Boundary
+from drivetwin.app.uploads import LIMITS
 from drivetwin.app.work import Source, Work
 from drivetwin.errors import RefusedError, Where
 from drivetwin.identify.method import Method
@@ -28,8 +29,7 @@ from drivetwin.results.version import program_version
 from drivetwin.tomlfile import StrictModel, key_path
 
 ENDING = ".workspace.json"
-LARGEST = 20 * 2**20
-"""Bytes of a workspace file; three twins take some 0.3 MB."""
+LARGEST = LIMITS["workspace"]
 
 
 class FileEntry(StrictModel):

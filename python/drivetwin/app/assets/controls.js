@@ -16,8 +16,8 @@
     set("message", { children: text, className: `message ${fault ? "fault" : "good"}` });
 
   async function send(button, file) {
-    const limit = Number(document.body.dataset[`limit${button.dataset.upload}`] || 0);
-    if (limit && file.size > limit) {
+    const limit = Number(button.dataset.limit);
+    if (file.size > limit) {
       const has = (file.size / 1e6).toFixed(0), may = (limit / 1e6).toFixed(0);
       say(`${file.name}: the file has ${has} MB, uploads may have ${may} MB`, true);
       return;
@@ -56,7 +56,7 @@
     picker.click();
   });
 
-  /* Phase boundaries are dragged; the arrow keys are for the number fields beside the figure. */
+  /* Colours of text in figures; traces keep theirs, which read on both grounds. */
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const inks = { true: "#dfe3e9", false: "#2a313b" };
 

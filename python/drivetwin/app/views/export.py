@@ -14,9 +14,10 @@ from drivetwin.app.session import Sessions
 from drivetwin.app.views.parts import hint, tell, told
 from drivetwin.export.targets import Target
 
-_TARGETS = {
+TARGETS = {
     Target.C: ("C sources", "C99 model of the shift for a controller, as an archive"),
     Target.FMU: ("FMU", "co-simulation, FMI 2.0, sources inside"),
+    Target.MODELICA: ("Modelica", "the shift in components of the Standard Library"),
     Target.SSV: ("SSV", "parameter values for SSP and FMUs"),
     Target.CDFX: ("CDFX", "calibration data, ASAM CDF"),
     Target.DCM: ("DCM", "calibration data, ETAS DAMOS"),
@@ -24,7 +25,7 @@ _TARGETS = {
     Target.JSON: ("JSON", "parameters with units and intervals"),
     Target.CSV: ("CSV", "parameters as a table"),
 }
-_RECORDS = {
+RECORDS = {
     Record.REPORT: ("Report", "one offline page with all evidence"),
     Record.TWIN: ("Twin", "twin.toml, for simulate, report and export"),
     Record.RESULT: ("Result", "result.json, for other programs"),
@@ -40,9 +41,9 @@ def layout() -> list[Component]:
             "change it."
         ),
         html.H3("The twin for other programs"),
-        _group({target.value: text for target, text in _TARGETS.items()}),
+        _group({target.value: text for target, text in TARGETS.items()}),
         html.H3("Files of drivetwin"),
-        _group({record.value: text for record, text in _RECORDS.items()}),
+        _group({record.value: text for record, text in RECORDS.items()}),
         dcc.Download(id="download"),
     ]
 

@@ -81,7 +81,7 @@ def _layout() -> Component:
             [html.H2(title), *view.layout()],
             id=f"view-{name}",
             hidden=name != _FIRST,
-            **attributes(aria_label=title),
+            **attributes(aria_label=f"{title} view"),
         )
         for name, (title, view) in VIEWS.items()
     ]

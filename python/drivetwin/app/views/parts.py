@@ -17,6 +17,7 @@ import plotly.graph_objects as go
 from dash import dcc, html, no_update, set_props
 from dash.development.base_component import Component
 
+from drivetwin.app.uploads import LIMITS
 from drivetwin.errors import DrivetwinError
 
 P = ParamSpec("P")
@@ -126,7 +127,11 @@ def button(text: str, id: Id, *, main: bool = False, **options: Any) -> Componen
 
 def upload_button(text: str, purpose: str, target: str) -> Component:
     """A button that lets the browser send a file; the store `target` then holds key and name."""
-    return html.Button(text, type="button", **attributes(data_upload=purpose, data_target=target))
+    return html.Button(
+        text,
+        type="button",
+        **attributes(data_upload=purpose, data_target=target, data_limit=str(LIMITS[purpose])),
+    )
 
 
 def table(
