@@ -82,6 +82,20 @@ fuzz-identify: $(venv)/.native ## 2,000 harmless and 2,000 damaged logs through 
 	$(bin)/python -m tests.fuzz.identified --count 2000
 	$(bin)/python -m tests.fuzz.identified --count 100 --method likelihood
 
+fleet_logs ?= 10000
+.PHONY: fleet
+fleet: $(venv)/.native ## a made fleet of fleet_logs=10000 logs, checked against its truth (an hour or two)
+	$(bin)/python -m benchmarks.fleet.acceptance $(fleet_logs) out/fleet
+
+fault_logs ?= 1000
+.PHONY: fleet-faults
+fleet-faults: $(venv)/.native ## killed workers and coordinators, a full disk, a lost scheduler: fault_logs=1000 logs each
+	FLEET_FAULT_LOGS=$(fault_logs) $(bin)/pytest -q --timeout 1800 tests/fleet/test_coordinator_faults.py tests/fleet/test_cluster.py
+
+.PHONY: fleet-scaling
+fleet-scaling: $(venv)/.native ## overhead, memory, two workers against one, Dask against processes
+	$(bin)/python -m benchmarks.fleet.scaling
+
 .PHONY: picture
 picture: $(venv)/.native ## draw the pictures of the documents (needs Chromium)
 	$(bin)/python -m tools.picture
