@@ -9,7 +9,7 @@
 use super::inputs::Inputs;
 use super::integrator::{Integrator, Step};
 use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Guards, Source, Trail, march};
+use super::march::{BLOCK, Carry, Guards, Sample, Source, Trail, march};
 use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
 use super::sprint::{Ready, Samples, Sink};
 use super::status::Status;
@@ -298,8 +298,9 @@ impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
         let Formation { operators, x, carry: kept, guards, trail, .. } = formation;
         let mut carry = kept.first::<A>();
         if joining != 0 {
-            let fresh = Carry::<Lanes, A>::start::<F, N>(operators, source, samples.0, x);
-            let first = operators.guards::<F, A>(source, samples.0, (x, &fresh));
+            let sample = source.sample(samples.0);
+            let fresh = Carry::<Lanes, A>::start::<F, N>(operators, &sample, x);
+            let first = operators.guards::<F, A>(&sample, (x, &fresh));
             for lane in (0..WIDTH).filter(|lane| joining >> lane & 1 == 1) {
                 carry.take_lane(lane, &fresh);
                 for (guard, first) in guards.as_flattened_mut().iter_mut().zip(first.as_flattened()) {
@@ -323,16 +324,18 @@ struct Together<'a> {
 
 impl Source<Lanes> for Together<'_> {
     #[inline(always)]
-    fn line(&self, segment: usize, input: usize) -> [Lanes; 2] {
+    fn read(&self, segment: usize, sample: &mut Sample<Lanes>) {
+        for (to, &[start, rate]) in sample.iter_mut().zip(self.inputs[0].lines(segment)) {
+            *to = [Pack::all(start), Pack::all(rate)];
+        }
         if self.shared {
-            return self.inputs[0].lines(segment)[input].map(Pack::all);
+            return;
         }
-        let mut line = [Pack([0.0; WIDTH]); 2];
-        for lane in 0..WIDTH {
-            let [start, rate] = self.inputs[lane].lines(segment)[input];
-            (line[0].0[lane], line[1].0[lane]) = (start, rate);
+        for (lane, inputs) in self.inputs.iter().enumerate() {
+            for (to, &[start, rate]) in sample.iter_mut().zip(inputs.lines(segment)) {
+                (to[0].0[lane], to[1].0[lane]) = (start, rate);
+            }
         }
-        line
     }
 }
 

@@ -16,10 +16,33 @@ use crate::number::{Lane, Pack, Values};
 /// Samples that are passed before they are handed on.
 pub const BLOCK: usize = 64;
 
+/// Most inputs of a network that is marched.
+pub const MAX_INPUTS: usize = 16;
+
+/// Value at the start of a sample and rate within it, of every input.
+pub type Sample<L> = [[L; 2]; MAX_INPUTS];
+
 /// Inputs of one run or several.
 pub trait Source<L> {
-    /// Value at the start of a segment and rate within it.
-    fn line(&self, segment: usize, input: usize) -> [L; 2];
+    /// Fill in the inputs of a segment.
+    fn read(&self, segment: usize, sample: &mut Sample<L>);
+
+    /// The inputs of a segment.
+    #[inline(always)]
+    fn sample(&self, segment: usize) -> Sample<L>
+    where
+        L: Lane,
+    {
+        let mut sample = [[L::all(0.0); 2]; MAX_INPUTS];
+        self.read(segment, &mut sample);
+        sample
+    }
+}
+
+/// Inputs have few enough numbers to need no check.
+#[inline(always)]
+pub fn input_of<L: Copy>(sample: &Sample<L>, input: usize) -> [L; 2] {
+    sample[input % MAX_INPUTS]
 }
 
 /// Carried channels at the start of a sample.
@@ -69,23 +92,24 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
     (x, carry, guards): (&mut [L; N], &mut Carry<L, A>, &mut Guards<L::Values>),
     trail: &mut Trail<L, N>,
 ) -> (usize, u32) {
+    let mut u = [[L::all(0.0); 2]; MAX_INPUTS];
     for k in 0..count {
-        let segment = first + k;
+        source.read(first + k, &mut u);
         if L::DERIVATIVES {
-            *carry = Carry::start::<F, N>(op, source, segment, x);
+            *carry = Carry::start::<F, N>(op, &u, x);
         }
         trail.states[k] = *x;
         carry.torques(op, &mut trail.torques[k]);
-        let mut least = step::<L, F, N, A>(op, (source, h), segment, (x, carry));
+        let mut least = step::<L, F, N, A>(op, (&u, h), (x, carry));
         for (place, guard) in guards.iter_mut().enumerate().take(op.watched.len()) {
-            let after = op.guard::<F, A>(place, source, (segment, h), (x, carry));
+            let after = op.guard::<F, A>(place, (&u, h), (x, carry));
             let rise = (guard[0] - after[0]).magnitude();
             let bow = op.bow[0].values() * rise + op.bow[1].values() * guard[1].upper(after[1]);
             least = least.lower(guard[0].lower(after[0]) - bow);
             *guard = after;
         }
         for load in &op.loads {
-            let [before, rate] = load.line::<F>(source, segment);
+            let [before, rate] = load.line::<F>(&u);
             let (before, rate) = (before.values(), rate.values());
             least = least.lower(before.lower_unless_idle(rate.times(h) + before));
         }
@@ -101,8 +125,7 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
 #[inline(always)]
 fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
     op: &Operators<L, N>,
-    (source, h): (&impl Source<L>, f64),
-    segment: usize,
+    (sample, h): (&Sample<L>, f64),
     (x, carry): (&mut [L; N], &mut Carry<L, A>),
 ) -> L::Values {
     let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
@@ -116,10 +139,10 @@ fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
         rate[a] = c.rate_end.constant;
         direct[a] = c.rate.constant;
         second[a] = c.second.constant;
-        lines[a] = c.law.normal.line::<F>(source, segment);
+        lines[a] = c.law.normal.line::<F>(sample);
     }
     for drive in &op.drives {
-        let [u, du] = source.line(segment, drive.input);
+        let [u, du] = input_of(sample, drive.input);
         let u_end = du.times(h) + u;
         for i in 0..N {
             end[i] = drive.step[0][i].fma::<F>(u, drive.step[1][i].fma::<F>(du, end[i]));
@@ -219,13 +242,12 @@ impl<L: Lane, const N: usize> Operators<L, N> {
     #[inline(always)]
     pub fn guards<const F: bool, const A: usize>(
         &self,
-        source: &impl Source<L>,
-        segment: usize,
+        sample: &Sample<L>,
         at: (&[L; N], &Carry<L, A>),
     ) -> Guards<L::Values> {
         let mut guards = [[L::Values::all(1.0); 2]; MAX_WATCHED];
         for (place, guard) in guards.iter_mut().enumerate().take(self.watched.len()) {
-            *guard = self.guard::<F, A>(place, source, (segment, 0.0), at);
+            *guard = self.guard::<F, A>(place, (sample, 0.0), at);
         }
         guards
     }
@@ -235,14 +257,13 @@ impl<L: Lane, const N: usize> Operators<L, N> {
     fn guard<const F: bool, const A: usize>(
         &self,
         place: usize,
-        source: &impl Source<L>,
-        (segment, elapsed): (usize, f64),
+        (sample, elapsed): (&Sample<L>, f64),
         (x, carry): (&[L; N], &Carry<L, A>),
     ) -> [L::Values; 2] {
         let Watched { form, limit, side, .. } = &self.watched[place];
         let mut torque = form.constant.values();
         for drive in &self.drives {
-            let [start, rate] = source.line(segment, drive.input);
+            let [start, rate] = input_of(sample, drive.input);
             let u = rate.values().times(elapsed) + start.values();
             torque = drive.watched[place].values().fma::<F>(u, torque);
         }
@@ -252,7 +273,7 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         for a in 0..A {
             torque = form.channels[a].values().fma::<F>(carry.value[a].value.values(), torque);
         }
-        let [start, rate] = limit.line::<F>(source, segment);
+        let [start, rate] = limit.line::<F>(sample);
         let limit = rate.values().times(elapsed) + start.values();
         let towards = (side.values() * torque).upper(-torque);
         [limit - towards, torque.magnitude()]
@@ -278,8 +299,7 @@ impl<L: Lane, const A: usize> Carry<L, A> {
     #[inline(always)]
     pub fn start<const F: bool, const N: usize>(
         op: &Operators<L, N>,
-        source: &impl Source<L>,
-        segment: usize,
+        sample: &Sample<L>,
         x: &[L; N],
     ) -> Self {
         let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
@@ -291,7 +311,7 @@ impl<L: Lane, const A: usize> Carry<L, A> {
                 out.argument[a] = argument[i].fma::<F>(x[i], out.argument[a]);
             }
             let m = out.argument[a];
-            let normal = law.normal.line::<F>(source, segment)[0];
+            let normal = law.normal.line::<F>(sample)[0];
             out.value[a] = law.at::<F>(m, law.stiction::<F>(m), normal);
         }
         for a in 0..A {
@@ -301,7 +321,7 @@ impl<L: Lane, const A: usize> Carry<L, A> {
                 rate = form.state[i].fma::<F>(x[i], rate);
             }
             for drive in &op.drives {
-                rate = drive.now[a].fma::<F>(source.line(segment, drive.input)[0], rate);
+                rate = drive.now[a].fma::<F>(input_of(sample, drive.input)[0], rate);
             }
             out.rate[a] = rate;
         }

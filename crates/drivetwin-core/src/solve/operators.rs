@@ -7,7 +7,7 @@
 //! `τ = sign · φ` over `m = sign · s`.
 
 use super::law::Law;
-use super::march::Source;
+use super::march::{Sample, input_of};
 use crate::network::{Mode, Network};
 use crate::number::{Lane, Real};
 
@@ -345,10 +345,10 @@ impl<L: Copy, const N: usize> Operators<L, N> {
 }
 
 impl<L: Lane> Line<L> {
-    /// Value at the start of a segment and rate within it.
+    /// Value at the start of a sample and rate within it.
     #[inline(always)]
-    pub fn line<const F: bool>(&self, source: &impl Source<L>, segment: usize) -> [L; 2] {
-        let [start, rate] = source.line(segment, self.input);
+    pub fn line<const F: bool>(&self, sample: &Sample<L>) -> [L; 2] {
+        let [start, rate] = input_of(sample, self.input);
         [self.gain.fma::<F>(start, self.offset), self.gain * rate]
     }
 }

@@ -7,7 +7,7 @@ use super::inputs::Inputs;
 use super::integrator::{Integrator, RowState};
 use super::lanes::{Task, dispatch};
 use super::law::{Law, line_of};
-use super::march::{BLOCK, Carry, Source, Trail, march};
+use super::march::{BLOCK, Carry, MAX_INPUTS, Sample, Source, Trail, march};
 use super::operators::{Line, MAX_ACTIVE, MAX_WATCHED, Operators};
 use crate::network::{Cell, GearState, ModeKey, Row};
 use crate::number::Real;
@@ -201,6 +201,7 @@ impl<T: Real> Integrator<'_, T> {
         let saturated = |row: &RowState| matches!(row, RowState::Saturated { .. });
         self.network.prescribed.is_empty()
             && self.inputs.is_sampled()
+            && self.network.mechanism.inputs.len() <= MAX_INPUTS
             && !self.mode.redundant
             && !self.blocked.contains(&true)
             && !self.released.contains(&true)
@@ -288,11 +289,12 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
     fn run<const F: bool>(self) {
         let Self { run, operators, active, steps: (h, mut count), sink } = self;
         let source = Lines(run.inputs);
+        let first = source.sample(run.segment);
         let n = run.x.len();
         let mut x = [T::zero_(); N];
         x[..n].copy_from_slice(&run.x);
-        let mut carry = Carry::<T, A>::start::<F, N>(operators, &source, run.segment, &x);
-        let mut guards = operators.guards::<F, A>(&source, run.segment, (&x, &carry));
+        let mut carry = Carry::<T, A>::start::<F, N>(operators, &first, &x);
+        let mut guards = operators.guards::<F, A>(&first, (&x, &carry));
         let mut trail = Trail::default();
         while count > 0 {
             let samples = (run.segment, count.min(BLOCK));
@@ -323,7 +325,9 @@ struct Lines<'a, T>(&'a Inputs<T>);
 
 impl<T: Real> Source<T> for Lines<'_, T> {
     #[inline(always)]
-    fn line(&self, segment: usize, input: usize) -> [T; 2] {
-        self.0.lines(segment)[input]
+    fn read(&self, segment: usize, sample: &mut Sample<T>) {
+        for (to, &line) in sample.iter_mut().zip(self.0.lines(segment)) {
+            *to = line;
+        }
     }
 }
