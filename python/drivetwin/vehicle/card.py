@@ -59,6 +59,7 @@ def load_card(path: Path) -> VehicleCard:
         sensors=_tolerances(file.sensors),
         channels={role: table.spec() for role, table in file.channels.items()},
         source=str(path),
+        known={} if file.eta is None else {"eta": file.eta.prior()},
     )
 
 

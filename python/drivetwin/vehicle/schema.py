@@ -172,6 +172,7 @@ class CardFile(StrictModel):
     loss_law: LossLaw = "paper"
     i_in: float = Field(default=1.0, gt=0)
     final_drive: float = Field(gt=0)
+    eta: PriorEntry | None = None
     gears: list[GearTable] = Field(min_length=2)
     elements: dict[str, ElementTable] = Field(min_length=1)
     inertia: InertiaTable

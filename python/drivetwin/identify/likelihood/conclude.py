@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,6 +34,8 @@ NO_SCALE = (
     "quantity over η; add an output-shaft torque sensor"
 )
 NO_AGE = "the engine torque moves too little for its age to show"
+WITH_ETA = "likelihood over η, times η from design"
+"""Method of a torque-like parameter of a log without an output torque, where η is on the card."""
 WITH_PRIOR = "likelihood with design prior"
 """Method of a parameter whose own design value took part in its estimate."""
 
@@ -66,7 +69,11 @@ def conclude(
         )
     }
     if not signals[0].scale_known:
-        estimates |= {name: _without_scale(name) for name in absolute_ids(signals)}
+        eta = drivelines[0].known.get("eta")
+        estimates |= {
+            name: _without_scale(name, eta, estimates.get(name + OVER_ETA))
+            for name in absolute_ids(signals)
+        }
     if "te_delay" not in fit.point.names and "te_delay" not in drivelines[0].known:
         estimates["te_delay"] = refused("te_delay", METHOD, NO_AGE)
     return Conclusions(
@@ -101,9 +108,23 @@ def _estimate(
     return judge(name, value, std, method, systematic, note)
 
 
-def _without_scale(name: str) -> Estimate:
-    """A torque-like parameter of a log without an output torque."""
-    return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
+def _without_scale(name: str, eta: PriorValue | None, ratio: Estimate | None) -> Estimate:
+    """A torque-like parameter of a log without an output torque.
+
+    Told only where η is known from design: the ratio times it, the spread of η as a systematic
+    part.
+    """
+    if eta is None:
+        return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
+    if ratio is None:
+        return designed(name, eta.value, eta.std, KNOWN)
+    if ratio.value is None or ratio.std_noise is None:
+        return replace(ratio, id=name)
+    spread = float(np.hypot(eta.value * (ratio.std_systematic or 0.0), eta.std * ratio.value))
+    value, noise = eta.value * ratio.value, eta.value * ratio.std_noise
+    if ratio.verdict is Verdict.DESIGN:
+        return replace(ratio, id=name, value=value, std_noise=float(np.hypot(noise, spread)))
+    return judge(name, value, noise, WITH_ETA, spread, ratio.reason)
 
 
 def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
@@ -113,14 +134,16 @@ def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
     if name == "J_out":
         return drivelines[0].J_out
     if name == "J_out" + OVER_ETA and drivelines[0].J_out is not None:
-        return over_eta(drivelines[0].J_out)
+        return over_eta(drivelines[0].J_out, drivelines[0])
     stem, _, element = name.partition(".")
     coupling = drivelines[0].couplings.get(element.removesuffix(OVER_ETA))
     if coupling is None or stem not in ("P0", "drum"):
         return None
     if stem == "P0":
         return coupling.P0
-    return over_eta(coupling.drum) if name.endswith(OVER_ETA) else coupling.drum
+    if name.endswith(OVER_ETA):
+        return over_eta(coupling.drum, drivelines[0])
+    return coupling.drum
 
 
 def _systematic(matrix: FloatArray, systematic: FloatArray) -> dict[int, float]:

@@ -34,7 +34,9 @@ MAX_STEPS = 40
 ROUGH_STEPS = 20
 """Steps after which a rough search ends: one that crawls prepares nothing."""
 REFRESHES = 3
-"""Points at which Q is formed anew: it settles in two, and may alternate about a kink after."""
+"""Least number of points at which Q is formed anew: near the minimum it settles in two."""
+CLOSE = 10.0
+"""Expected fall of Q from which on it is no longer formed anew: it may alternate about a kink."""
 
 ROUGH = 1e-3
 """Fall of Q relative to Q at which a search ends that only prepares the next one."""
@@ -71,15 +73,15 @@ def minimise(
 ) -> Found | None:
     """Search from `start`; None where the simulation fails there.
 
-    `refresh` gives Q anew at the first `REFRESHES` points, for a weighting that follows the point.
+    `refresh` gives Q anew at every point until the minimum is close, for a weighting that follows.
     A `rough` search ends where Q hardly falls any more. Not converged after `MAX_STEPS` says so;
     the values are then no estimate.
     """
     point = start.moved(np.clip(start.values, problem.lower, problem.upper))
-    damping, first = DAMPING, None
+    damping, first, settled = DAMPING, None, refresh is unchanged
     most = ROUGH_STEPS if rough else MAX_STEPS
     for iteration in range(most):
-        if iteration < REFRESHES:
+        if not settled:
             problem = refresh(problem, point)
         normal = problem.normal(point)
         if normal is None:
@@ -87,7 +89,7 @@ def minimise(
         expected = _expected(problem, point, normal)
         first = first or expected
         tell(_done(first, expected))
-        settled = iteration + 1 >= REFRESHES or refresh is unchanged
+        settled = settled or (iteration + 1 >= REFRESHES and expected < CLOSE)
         if expected < ENOUGH and settled:
             return Found(problem, point, normal, True, iteration)
         trial, fall, damping = _better(problem, point, normal, damping)

@@ -114,11 +114,12 @@ def problem_of(
     return Problem(tuple(parts), prior, lower, upper), point
 
 
-def over_eta(known: PriorValue) -> PriorValue:
-    """Design value of a torque-like quantity divided by an efficiency that is not known."""
-    value = known.value / PLAUSIBLE_ETA.value
-    spread = value * PLAUSIBLE_ETA.std / PLAUSIBLE_ETA.value
-    return PriorValue(value, float(np.hypot(known.std / PLAUSIBLE_ETA.value, spread)))
+def over_eta(quantity: PriorValue, driveline: Driveline) -> PriorValue:
+    """Design value of a torque-like quantity over the efficiency, as known from design or usual."""
+    eta = driveline.known.get("eta", PLAUSIBLE_ETA)
+    value = quantity.value / eta.value
+    spread = value * eta.std / eta.value
+    return PriorValue(value, float(np.hypot(quantity.std / eta.value, spread)))
 
 
 def mean_speed_of(signals: Sequence[ShiftSignals], i_f: float) -> float:
@@ -192,7 +193,7 @@ def _priors(
     found = {"te_delay": MomentumSettings().delay_prior}
     if drivelines[0].J_out is not None:
         known = drivelines[0].J_out
-        found["J_out"] = known if signals[0].scale_known else over_eta(known)
+        found["J_out"] = known if signals[0].scale_known else over_eta(known, drivelines[0])
     found |= known_unknowns(drivelines[0], signals[0].scale_known)
     step = signals[0].torque_resolution
     rounding = rounding_error(signals[0].engine_torque, step)
@@ -208,7 +209,7 @@ def _priors(
         for e in (d.offgoing, d.oncoming):
             found[f"{e.name}.P0"] = e.P0
         for e in d.couplings.values():
-            drum = e.drum if signals[0].scale_known else over_eta(e.drum)
+            drum = e.drum if signals[0].scale_known else over_eta(e.drum, d)
             found[f"{e.name}.drum"] = drum
         if d.offgoing.name not in shown:
             level = guess[f"{d.offgoing.name}.mu_c"]
