@@ -16,7 +16,7 @@ from tests.app.conftest import CARD, LOG
 
 
 def _open(place: Path, scratch: Path, **changes: object) -> Opened:
-    request = Request(place / LOG, LOG, place / CARD, **changes)  # type: ignore[arg-type]
+    request = Request(place / LOG, LOG, place / CARD, CARD, **changes)  # type: ignore[arg-type]
     found: Opened = call(open_log, request, scratch / "mapping.toml", limit=LONGEST)
     return found
 
@@ -62,7 +62,7 @@ def test_a_file_that_expands_beyond_memory_is_refused(
 ) -> None:
     path = tmp_path / "bomb.mat"
     path.write_bytes(bomb())  # type: ignore[operator]
-    request = Request(path, "bomb.mat", place / CARD)
+    request = Request(path, "bomb.mat", place / CARD, CARD)
     with pytest.raises(InputError) as caught:
         call(open_log, request, tmp_path / "mapping.toml", limit=LONGEST)
     assert str(caught.value)
@@ -75,3 +75,16 @@ def test_a_gearbox_card_is_named_by_its_label(tmp_path: Path) -> None:
         call(open_gearbox, path, "box.toml", limit=LONGEST)
     assert "box.toml" in str(caught.value)
     assert "a1b2c3" not in str(caught.value)
+
+
+def test_faults_of_an_upload_call_it_by_its_label(place: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a1b2c3"
+    path.write_text("name = 3\n")
+    for request, label in (
+        (Request(place / LOG, LOG, path, "card.toml"), "card.toml"),
+        (Request(path, "log.csv", place / CARD, CARD), "log.csv"),
+    ):
+        with pytest.raises(InputError) as caught:
+            call(open_log, request, tmp_path / "mapping.toml", limit=LONGEST)
+        assert label in str(caught.value)
+        assert "a1b2c3" not in str(caught.value)

@@ -7,13 +7,14 @@ A compressed file of a few kilobytes may claim gigabytes: then the child fails, 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from drivetwin.app.expansion import refuse_expansion
 from drivetwin.app.jobs import Emit
-from drivetwin.errors import CardError, DrivetwinError
+from drivetwin.errors import DrivetwinError, InputError
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.mapping import ChannelSpec, Mapped
 from drivetwin.logs.profile import read_mapping, write_mapping
@@ -48,12 +49,13 @@ class Opened:
 class Request:
     """What to open: files, and the channels as the user has corrected them.
 
-    `label` is the name that the log is called by in messages and results.
+    The labels are what the files are called in messages and results.
     """
 
     log: Path
     label: str
     card: Path
+    card_label: str
     mapping: Path | None = None
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
 
@@ -65,18 +67,20 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     those of the mapping become `fault`, so that it can be corrected.
     """
     bound_memory()
-    refuse_expansion(request.log, request.label, MEMORY)
-    card = load_card(request.card)
-    stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
-    stated = replace(stated, channels={**stated.channels, **request.channels})
-    looked = survey(request.log, card, stated)
+    labels = {request.log: request.label, request.card: request.card_label}
+    with _labelled(labels):
+        refuse_expansion(request.log, request.label, MEMORY)
+        card = load_card(request.card)
+        stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
+        stated = replace(stated, channels={**stated.channels, **request.channels})
+        looked = survey(request.log, card, stated)
     try:
-        log = read_log(request.log, card, _written(scratch, stated.channels, stated.options))
-        log = replace(log, source=request.label)
-        found = find_shifts(log, card)
-    except DrivetwinError as error:
-        text = str(error).replace(str(request.log), request.label)
-        emit(Opened(looked, card, fault=text))
+        with _labelled(labels):
+            mapping = _written(scratch, stated.channels, stated.options)
+            log = replace(read_log(request.log, card, mapping), source=request.label)
+            found = find_shifts(log, card)
+    except InputError as error:
+        emit(Opened(looked, card, fault=str(error)))
         return
     emit(Opened(looked, card, log, found))
 
@@ -84,10 +88,8 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
 def open_gearbox(emit: Emit, path: Path, label: str) -> None:
     """Read a gearbox card, called `label` in messages; emits it. Raises CardError."""
     bound_memory()
-    try:
+    with _labelled({path: label}):
         emit(load_gearbox(str(path)))
-    except DrivetwinError as error:
-        raise CardError(error.what, error.remedy, replace(error.where, file=label)) from None
 
 
 def bound_memory() -> None:
@@ -99,6 +101,19 @@ def bound_memory() -> None:
 
     held = int(status.read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (held + MEMORY, held + MEMORY))
+
+
+@contextmanager
+def _labelled(labels: Mapping[Path, str]) -> Iterator[None]:
+    """Errors call files by their labels: uploads stand under names of ours."""
+    try:
+        yield
+    except DrivetwinError as error:
+        what, file = error.what, error.where.file
+        for path, label in labels.items():
+            what = what.replace(str(path), label)
+            file = label if file == str(path) else file
+        raise InputError(what, error.remedy, replace(error.where, file=file)) from None
 
 
 def _written(path: Path, channels: Mapping[str, ChannelSpec], options: ReadOptions) -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import logging
+import socket
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from drivetwin.app.session import Sessions
 from drivetwin.app.uploads import LIMITS
 from drivetwin.app.views.page import build_page
 from drivetwin.app.work import Source
-from drivetwin.errors import RefusedError
+from drivetwin.errors import InputError, RefusedError
 
 SESSION_HEADER = "X-Drivetwin-Session"
 
@@ -53,10 +54,22 @@ def build(folder: Folder, start: Start, host: str = "127.0.0.1") -> tuple[Dash, 
 
 
 def listen(app: Dash, host: str, port: int) -> BaseWSGIServer:
-    """A server on `host` and `port` (0: any free one), not yet serving. Raises OSError."""
+    """A server on `host` and `port` (0: any free one), not yet serving.
+
+    Raises InputError where it cannot listen there.
+    """
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        bound = socket.create_server((host, port), family=family)
+    except (OSError, OverflowError) as fault:
+        raise InputError(
+            f"cannot listen on {host}, port {port}: {fault}",
+            "choose another --port, or 0 for any free one",
+        ) from None
     jobs.warm_up()
-    return make_server(host, port, app.server, threaded=True)
+    with bound:
+        return make_server(host, port, app.server, threaded=True, fd=bound.fileno())
 
 
 def _take_uploads(app: Dash, sessions: Sessions) -> None:

@@ -218,7 +218,12 @@ class Session:
         if work.log is None or work.card is None:
             raise InputError("no log is open", "open a log and its vehicle card first")
         request = reading.Request(
-            work.log.path, work.log.name, work.card.path, work.mapping, channels
+            log=work.log.path,
+            label=work.log.name,
+            card=work.card.path,
+            card_label=work.card.name,
+            mapping=work.mapping,
+            channels=channels,
         )
         scratch = self.scratch / "mapping.toml"
         opened: reading.Opened = jobs.call(

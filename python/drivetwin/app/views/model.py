@@ -42,7 +42,8 @@ from drivetwin.validate import Validation
 _KINDS = {kind.value: kind.value for kind in LockKind}
 _BOTH = """(a, b) => {
   const typed = dash_clientside.callback_context.triggered_id || {};
-  const value = Number(typed.part === "number" ? b : a);
+  const given = typed.part === "number" ? b : a;
+  const value = given === null || given === "" ? NaN : Number(given);
   const same = dash_clientside.no_update;
   return Number.isFinite(value) ? [value, value] : [same, same];
 }"""
