@@ -55,15 +55,21 @@ class Library:
             seconds.append(time.perf_counter() - begin)
         return Sample(seconds, Solution(columns.T.copy(), events[:count].copy()))
 
-    def batch(self, sets: FloatArray, of: Problem, given: Inputs, threads: int) -> FloatArray:
-        """Shaft torques (runs, samples) [N m] of parameter sets (runs, 21)."""
+    def batch(
+        self, sets: FloatArray, of: Problem, given: Inputs, how: tuple[int, int]
+    ) -> FloatArray:
+        """Shaft torques (runs, samples) [N m] of parameter sets (runs, 21).
+
+        `how` is the number of threads and of steps per sample.
+        """
+        threads, substeps = how
         torques = np.zeros((len(sets), SAMPLES))
         first, samples = np.array(start(of, given)), samples_of(given)
         self._library.shift_batch(
             _pointer(sets),
             len(sets),
             *(_pointer(first), _pointer(samples)),
-            *(SAMPLES - 1, ctypes.c_double(STEP), 1),
+            *(SAMPLES - 1, ctypes.c_double(STEP), substeps),
             *(_pointer(torques), threads),
         )
         return torques

@@ -19,7 +19,8 @@ from drivetwin.driveline import FloatArray, Signal
 from drivetwin.network import Element, Output, Sine, Start
 
 ROOT = Path(__file__).resolve().parents[2]
-_EXAMPLE = "one_shift"
+RUN, BATCH = "one_shift", "time_batch"
+"""The examples of the core that are timed."""
 
 
 @dataclass(frozen=True)
@@ -57,32 +58,50 @@ class Scenario:
         return json.dumps(document)
 
 
-class Example:
-    """The compiled example."""
+class Examples:
+    """The compiled examples."""
 
     def __init__(self, folder: Path, *, build: bool) -> None:
-        """Build it, or take the one that is there. Raises CalledProcessError, FileNotFoundError."""
+        """Build them, or take those that are there. Scenarios are stored in `folder`.
+
+        Raises CalledProcessError, FileNotFoundError.
+        """
         self.folder = folder
         target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-        self.path = target / "release" / "examples" / _EXAMPLE
+        self._programs = target / "release" / "examples"
         if build:
-            command = ["cargo", "build", "--release", "-p", "drivetwin-core", "--example", _EXAMPLE]
+            command = ["cargo", "build", "--release", "-p", "drivetwin-core"]
+            command += [part for name in (RUN, BATCH) for part in ("--example", name)]
             subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-        if not self.path.exists():
-            raise FileNotFoundError(self.path)
+        for name in (RUN, BATCH):
+            if not self.path(name).exists():
+                raise FileNotFoundError(self.path(name))
+
+    def path(self, name: str) -> Path:
+        """Program of an example."""
+        return self._programs / name
 
     def store(self, name: str, scenario: Scenario) -> Path:
         """Scenario as a file."""
+        return self.store_text(name, scenario.as_json())
+
+    def store_text(self, name: str, text: str) -> Path:
+        """Any JSON as a file."""
         path = self.folder / f"{name}.json"
-        path.write_text(scenario.as_json(), encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
         return path
 
     def run(self, scenario: Path, repeats: int, which: str) -> Sample:
         """Seconds of `which` (`prepared` or `whole`) runs, and the solution."""
-        command = [str(self.path), str(scenario), str(repeats)]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-        result = json.loads(done.stdout)
+        result = self.call(RUN, str(scenario), str(repeats))
         if result["status"] != "completed":
             raise RuntimeError(f"{scenario.name}: {result['status']}")
         solution = Solution(np.array(result["columns"]), np.array(result["events"]))
         return Sample(result[which], solution)
+
+    def call(self, name: str, *arguments: str) -> dict[str, Any]:
+        """What an example prints."""
+        command = [str(self.path(name)), *arguments]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+        result: dict[str, Any] = json.loads(done.stdout)
+        return result

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -24,6 +25,10 @@ def gearbox(
     gear: Annotated[
         str | None, typer.Option("--gear", metavar="GEAR", help="Show one gear in full.")
     ] = None,
+    modelica: Annotated[
+        Path | None,
+        typer.Option("--modelica", metavar="FILE.mo", help="Write it as a Modelica package."),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """List the gears of a gearbox with computed and published ratio; without CARD, the built-ins.
@@ -41,6 +46,8 @@ def gearbox(
             say("\n".join(names))
         return
     box = load_gearbox(card)
+    if modelica is not None:
+        _write_modelica(box, modelica)
     names = (gear,) if gear is not None else tuple(each.name for each in box.gears)
     gears = [gear_statics(box, name) for name in names]
     if as_json:
@@ -51,6 +58,15 @@ def gearbox(
         show(_speeds(gears[0]))
         show(_torques(gears[0]))
         say(f"Powers sum to zero within {gears[0].power_error:.1e} of the input power.")
+
+
+def _write_modelica(box: Gearbox, path: Path) -> None:
+    from drivetwin.export.modelica.model import package_text
+    from drivetwin.gearbox import network_elements
+    from drivetwin.results.atomic import write_text
+
+    ends = (box.input, box.output)
+    write_text(path, package_text(box.name, network_elements(box), note=box.name, ends=ends))
 
 
 def _ratios(box: Gearbox, gears: list[GearStatics]) -> Table:

@@ -32,7 +32,7 @@ def modelica_text(
     run = None
     if inputs is not None and time is not None:
         run = Run(inputs, network_start(subject.start), time)
-    return package_text(subject.name, network_of(subject.model), run, subject.note)
+    return package_text(subject.name, network_of(subject.model), run, note=subject.note)
 
 
 def write_modelica(subject: Subject, experiment: Experiment | None, path: Path) -> None:

@@ -20,6 +20,7 @@ from drivetwin.export.parameters.content import number
 from drivetwin.network import Element, Start
 
 MSL_VERSION = "4.0.0"
+_FLANGE = f"{ROTATIONAL}.Interfaces.Flange_a"
 _INPUT_FIELDS = ("input", "pressure", "throttle")
 _INTERVAL = 1e-3
 _TOLERANCE = 1e-8
@@ -35,11 +36,17 @@ class Run:
 
 
 def package_text(
-    name: str, elements: Sequence[Element], run: Run | None = None, note: str = ""
+    name: str,
+    elements: Sequence[Element],
+    run: Run | None = None,
+    *,
+    note: str = "",
+    ends: tuple[str, ...] = (),
 ) -> str:
     """Modelica package `name` with the model `Driveline` and, for a run, the model `Shift`.
 
-    Inputs of the driveline are `u_<input>`, in SI. Raises InputError for an element that has no
+    Inputs of the driveline are `u_<input>`, in SI; the nodes `ends` get flanges `flange_<node>` to
+    connect it by. Raises InputError for an element that has no
     Modelica form.
     """
     names = _names(elements)
@@ -50,7 +57,7 @@ def package_text(
         f"package {plain} {string(note or name)}",
         "  extends Modelica.Icons.Package;\n",
         *(HELPERS[helper] for helper in helpers),
-        _driveline(parts, names),
+        _driveline(parts, names, ends),
         *([] if run is None else [_shift(elements, parts, names, run)]),
         f'  annotation(uses(Modelica(version="{MSL_VERSION}")));',
         f"end {plain};",
@@ -71,8 +78,10 @@ def _inputs(element: Element) -> list[str]:
     return [str(part[key]) for part in (element, nested) for key in _INPUT_FIELDS if key in part]
 
 
-def _driveline(parts: Mapping[str, Part], names: Names) -> str:
+def _driveline(parts: Mapping[str, Part], names: Names, ends: tuple[str, ...]) -> str:
     components = [one for part in parts.values() for one in part.components]
+    flanges = {node: identifier(f"flange_{node}") for node in ends}
+    ports_of_nodes = [f"  {_FLANGE} {flange};" for flange in flanges.values()]
     ports = [
         f"  Modelica.Blocks.Interfaces.RealInput {plain} {string(name + ' [SI]')};"
         for name, plain in names.inputs.items()
@@ -81,13 +90,15 @@ def _driveline(parts: Mapping[str, Part], names: Names) -> str:
     fixed = Component(f"{ROTATIONAL}.Components.Fixed", "ground_")
     lines = [
         "model Driveline",
+        *ports_of_nodes,
         *ports,
         *(line for part in parts.values() for line in part.parameters),
         *(one.declaration() for one in components),
         *([fixed.declaration()] if GROUND in nodes else []),
         "equation",
         *(f"  {line}" for part in parts.values() for line in part.equations),
-        *(line for node, ends in nodes.items() for line in _connections(node, ends)),
+        *(line for node, members in nodes.items() for line in _connections(node, members)),
+        *(f"  connect({flange}, {nodes[node][0]});" for node, flange in flanges.items()),
         "end Driveline;\n",
     ]
     return "\n".join(f"  {line}" for line in lines)
