@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from drivetwin.identify.result import FloatArray
+if TYPE_CHECKING:
+    from drivetwin.identify.result import FloatArray
 
 
 @dataclass(frozen=True)
