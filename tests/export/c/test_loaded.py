@@ -230,7 +230,7 @@ def test_observer_tells_torque_friction_and_load_that_no_sensor_shows(
     ]
     torque = np.array([one.output_torque for one in told])
     error = np.sqrt(np.mean((torque - core.shaft_torque[1:])[100:] ** 2))
-    assert error < 0.05 * np.ptp(core.shaft_torque)
+    assert error < 0.02 * np.ptp(core.shaft_torque)
     assert told[-1].locked == 1
     assert abs(told[-1].scale[1] - 0.85) < 3.0 * told[-1].scale_std[1] + 0.02
     assert told[-1].scale_std[1] < 0.05

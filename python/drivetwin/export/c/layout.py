@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-CLUTCHES, ROWS, GUARDS, STATES, POINTS, OBSERVED = 2, 3, 4, 4, 64, 8
+CLUTCHES, ROWS, GUARDS, STATES, POINTS, OBSERVED = 2, 3, 4, 4, 64, 7
 
 
 class Precision(Enum):
@@ -66,10 +66,14 @@ def layout_of(precision: Precision) -> Layout:
         tuning=_structure(
             "Tuning",
             **_alike(real, "engine_speed", "output_speed", "engine_torque"),
-            **_alike(real, "held_torque", "scale", "load", "locked_slip"),
+            **_alike(real, "scale", "load", "locked_slip"),
         ),
         observer=_structure(
-            "Observer", x=real * OBSERVED, P=real * OBSERVED * OBSERVED, locked=integer
+            "Observer",
+            x=real * OBSERVED,
+            P=real * OBSERVED * OBSERVED,
+            locked=integer,
+            learning=integer,
         ),
         measured=_structure(
             "Measured", inputs=inputs, **_alike(real, "engine_speed", "output_speed")

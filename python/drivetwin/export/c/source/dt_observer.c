@@ -8,20 +8,22 @@
 #define N DT_OBSERVED
 #define MOVING 4             /* states with a law of motion; the others drift */
 #define NO_SLIP DT_C(0.02)   /* slip of a locked clutch that counts as measured, rad/s */
+#define CLEAR DT_C(3)        /* slip that is clear, over that of a locked clutch */
 #define FIRST_SCALE DT_C(0.3) /* what is not known of friction and load at first */
 #define FIRST_LOAD DT_C(0.3)
 #define LEAST_SCALE DT_C(0.2) /* friction below which no lining falls: torques of other origin */
 
-/* Torques per unit of what multiplies them, and the linear law of motion they give. */
+/* Clutch torques and accelerations as linear forms over the state, with what the inputs add. */
 typedef struct {
-    dt_real torque[DT_CLUTCHES][N]; /* clutch torque over the state */
+    dt_real torque[DT_CLUTCHES][N];
+    dt_real held[DT_CLUTCHES]; /* what the inputs add to the torque of a locked clutch */
     dt_real A[MOVING][N];
     dt_real b[MOVING];
+    dt_real drive[2]; /* accelerations per unit of engine torque */
 } law_of_motion;
 
 dt_tuning dt_usual_tuning(void) {
-    const dt_tuning usual = {DT_C(0.1), DT_C(0.05),  DT_C(20), DT_C(10000),
-                             DT_C(0.3), DT_C(2000), DT_C(1)};
+    const dt_tuning usual = {DT_C(0.1), DT_C(0.05), DT_C(20), DT_C(0.3), DT_C(2000), DT_C(1)};
     return usual;
 }
 
@@ -29,36 +31,7 @@ static dt_real normal_of(const dt_params *p, const dt_inputs *u, int j) {
     return dt_larger(p->clutch[j].gain * (u->pressure[j] - p->clutch[j].P0), DT_C(0));
 }
 
-/* What a clutch transmits at most without slip, by the friction known so far. */
-static dt_real static_capacity(const dt_params *p, const dt_observer *o, const dt_inputs *u,
-                               int j) {
-    const dt_friction *friction = &p->clutch[j].friction;
-    return o->x[DT_SCALE + j] * p->clutch[j].peak * dt_mu_rest(friction) * normal_of(p, u, j);
-}
-
-/* The pressed clutch whose measured slip is small and whose capacity suffices, -1: none. A locked
- * one stays so for longer. */
-static int locked_clutch(const dt_observer *o, const dt_mechanism *m, const dt_params *p,
-                         const dt_tuning *tuning, const dt_measured *now) {
-    const dt_real speeds[3] = {now->engine_speed, now->output_speed, DT_C(0)};
-    int locked = -1;
-    dt_real smallest = DT_C(0);
-    for (int j = 0; j < DT_CLUTCHES; ++j) {
-        const int before = j == o->locked;
-        const dt_real slip = dt_abs(dt_slip(m, j, speeds));
-        const dt_real bound = tuning->locked_slip * (before ? DT_C(2) : DT_C(1));
-        const dt_real capacity = static_capacity(p, o, &now->inputs, j);
-        const dt_real doubt = DT_C(2) * dt_sqrt(dt_larger(o->P[DT_HELD][DT_HELD], DT_C(0)));
-        const dt_real needed = before ? dt_abs(o->x[DT_HELD]) - doubt : DT_C(0);
-        const int holds = capacity > dt_larger(needed, DT_C(0)) && slip < bound;
-        if (holds && (locked < 0 || slip < smallest)) {
-            locked = j;
-            smallest = slip;
-        }
-    }
-    return locked;
-}
-
+/* Torques of clutches that do not hold. */
 static void set_torques(law_of_motion *law, const dt_mechanism *m, const dt_params *p,
                         const dt_observer *o, const dt_inputs *u) {
     for (int j = 0; j < DT_CLUTCHES; ++j) {
@@ -67,40 +40,96 @@ static void set_torques(law_of_motion *law, const dt_mechanism *m, const dt_para
         for (int i = 0; i < N; ++i) {
             law->torque[j][i] = DT_C(0);
         }
-        if (j == o->locked) {
-            law->torque[j][DT_HELD] = DT_C(1);
-        } else {
-            law->torque[j][DT_SCALE + j] = slip < DT_C(0) ? -capacity : capacity;
-        }
+        law->torque[j][DT_SCALE + j] = slip < DT_C(0) ? -capacity : capacity;
+        law->held[j] = DT_C(0);
     }
 }
 
+/* Take the torque out of one column of accelerations that keeps the slip of clutch j. */
+static dt_real hold(const dt_mechanism *m, int j, dt_real *engine, dt_real *output) {
+    const dt_real weight = dt_slip(m, j, m->share[j]);
+    const dt_real torque = (m->row[j][0] * *engine + m->row[j][1] * *output) / weight;
+    *engine -= m->share[j][0] * torque;
+    *output -= m->share[j][1] * torque;
+    return torque;
+}
+
 static void set_law(law_of_motion *law, const dt_mechanism *m, const dt_params *p,
-                    const dt_observer *o, const dt_inputs *u) {
+                    const dt_observer *o, const dt_inputs *u, int locked) {
     dt_real shaft[N] = {0};
     set_torques(law, m, p, o, u);
     shaft[DT_OUTPUT] = p->c_o;
     shaft[DT_WHEEL] = -p->c_o * p->i_f;
     shaft[DT_TWIST] = p->k_o;
     for (int i = 0; i < N; ++i) {
-        const dt_real engine = -m->row[0][0] * law->torque[0][i] - m->row[1][0] * law->torque[1][i];
-        const dt_real output =
-            -m->row[0][1] * law->torque[0][i] - m->row[1][1] * law->torque[1][i] - shaft[i];
+        dt_real engine = DT_C(0), output = -shaft[i];
+        for (int j = 0; j < DT_CLUTCHES; ++j) {
+            if (j != locked) {
+                engine -= m->row[j][0] * law->torque[j][i];
+                output -= m->row[j][1] * law->torque[j][i];
+            }
+        }
         law->A[DT_ENGINE][i] = m->inverse[0][0] * engine + m->inverse[0][1] * output;
         law->A[DT_OUTPUT][i] = m->inverse[1][0] * engine + m->inverse[1][1] * output;
         law->A[DT_WHEEL][i] = p->i_f * shaft[i] / p->J_v;
         law->A[DT_TWIST][i] = DT_C(0);
+        if (locked >= 0) {
+            law->torque[locked][i] = hold(m, locked, &law->A[DT_ENGINE][i], &law->A[DT_OUTPUT][i]);
+        }
     }
     law->A[DT_WHEEL][DT_LOAD] = DT_C(-1) / p->J_v;
     law->A[DT_TWIST][DT_OUTPUT] = DT_C(1);
     law->A[DT_TWIST][DT_WHEEL] = -p->i_f;
+    law->drive[0] = m->inverse[0][0] * m->efficiency;
+    law->drive[1] = m->inverse[1][0] * m->efficiency;
+    if (locked >= 0) {
+        law->held[locked] = u->engine_torque * hold(m, locked, &law->drive[0], &law->drive[1]);
+    }
     const dt_real wheel = o->x[DT_WHEEL];
     const dt_real drag = p->load_aero * wheel * dt_abs(wheel) +
                          (wheel < DT_C(0) ? -p->load_rolling : p->load_rolling);
-    law->b[DT_ENGINE] = m->inverse[0][0] * m->efficiency * u->engine_torque;
-    law->b[DT_OUTPUT] = m->inverse[1][0] * m->efficiency * u->engine_torque;
+    law->b[DT_ENGINE] = law->drive[0] * u->engine_torque;
+    law->b[DT_OUTPUT] = law->drive[1] * u->engine_torque;
     law->b[DT_WHEEL] = -drag / p->J_v;
     law->b[DT_TWIST] = DT_C(0);
+}
+
+static dt_real torque_of(const law_of_motion *law, const dt_observer *o, int j) {
+    dt_real torque = law->held[j];
+    for (int i = 0; i < N; ++i) {
+        torque += law->torque[j][i] * o->x[i];
+    }
+    return torque;
+}
+
+/* Whether the capacity of a clutch, as far as its friction is known, may carry what holds it. */
+static int may_hold(const dt_observer *o, const dt_mechanism *m, const dt_params *p,
+                    const dt_inputs *u, int j) {
+    law_of_motion law;
+    const int scale = DT_SCALE + j;
+    const dt_real most = o->x[scale] + DT_C(2) * dt_sqrt(dt_larger(o->P[scale][scale], DT_C(0)));
+    const dt_real friction = p->clutch[j].peak * dt_mu_rest(&p->clutch[j].friction);
+    set_law(&law, m, p, o, u, j);
+    return most * friction * normal_of(p, u, j) > dt_abs(torque_of(&law, o, j));
+}
+
+/* The pressed clutch whose measured slip is small and whose capacity may suffice, -1: none. A
+ * locked one stays so for longer. */
+static int locked_clutch(const dt_observer *o, const dt_mechanism *m, const dt_params *p,
+                         const dt_tuning *tuning, const dt_measured *now) {
+    const dt_real speeds[3] = {now->engine_speed, now->output_speed, DT_C(0)};
+    int locked = -1;
+    dt_real smallest = DT_C(0);
+    for (int j = 0; j < DT_CLUTCHES; ++j) {
+        const dt_real slip = dt_abs(dt_slip(m, j, speeds));
+        const dt_real bound = tuning->locked_slip * (j == o->locked ? DT_C(2) : DT_C(1));
+        if (slip < bound && (locked < 0 || slip < smallest) &&
+            may_hold(o, m, p, &now->inputs, j)) {
+            locked = j;
+            smallest = slip;
+        }
+    }
+    return locked;
 }
 
 /* Transition of the moving states over h, F = I + A h (I + A h/2 (I + A h/3)), and what the inputs
@@ -142,7 +171,7 @@ static void predict(dt_observer *o, const dt_mechanism *m, const dt_params *p,
                     const dt_tuning *tuning, const dt_inputs *u, dt_real h) {
     law_of_motion law;
     dt_real F[MOVING][N], added[MOVING], moved[MOVING][N], x[MOVING];
-    set_law(&law, m, p, o, u);
+    set_law(&law, m, p, o, u, o->locked);
     transition(&law, h, F, added);
     for (int i = 0; i < MOVING; ++i) {
         x[i] = added[i];
@@ -167,20 +196,36 @@ static void predict(dt_observer *o, const dt_mechanism *m, const dt_params *p,
             o->P[i][j] = o->P[j][i] = value;
         }
     }
-    const dt_real torque = tuning->engine_torque * m->efficiency;
     for (int i = 0; i < 2; ++i) { /* white over 10 ms */
-        o->P[i][i] += dt_square(torque * m->inverse[i][0]) * DT_C(0.01) * h;
-    }
-    o->P[DT_HELD][DT_HELD] += dt_square(tuning->held_torque) * h;
-    o->P[DT_LOAD][DT_LOAD] += dt_square(tuning->load) * h;
-    for (int j = 0; j < DT_CLUTCHES; ++j) {
-        if (j != o->locked && normal_of(p, u, j) > DT_C(0)) {
-            o->P[DT_SCALE + j][DT_SCALE + j] += dt_square(tuning->scale) * h;
+        for (int j = 0; j < 2; ++j) {
+            o->P[i][j] += dt_square(tuning->engine_torque) * law.drive[i] * law.drive[j] *
+                          DT_C(0.01) * h;
         }
+    }
+    o->P[DT_LOAD][DT_LOAD] += dt_square(tuning->load) * h;
+    if (o->learning >= 0) {
+        o->P[DT_SCALE + o->learning][DT_SCALE + o->learning] += dt_square(tuning->scale) * h;
     }
 }
 
-/* Take in one measured value of row * speeds, in the form that keeps the covariance positive. */
+/* The clutch that slips clearly while no other is pressed, -1: none. Friction is learnt from it
+ * alone: where a lock or break-away comes a moment before it is seen, or a second clutch carries
+ * torque, friction would have to explain what it does not cause. */
+static int learning_clutch(const dt_mechanism *m, const dt_params *p, const dt_tuning *tuning,
+                           const dt_measured *now) {
+    const dt_real speeds[3] = {now->engine_speed, now->output_speed, DT_C(0)};
+    int learning = -1, pressed = 0;
+    for (int j = 0; j < DT_CLUTCHES; ++j) {
+        if (normal_of(p, &now->inputs, j) > DT_C(0)) {
+            ++pressed;
+            learning = dt_abs(dt_slip(m, j, speeds)) > CLEAR * tuning->locked_slip ? j : -1;
+        }
+    }
+    return pressed == 1 ? learning : -1;
+}
+
+/* Take in one measured value of row * speeds, in the form that keeps the covariance positive for
+ * any gain. */
 static void correct(dt_observer *o, const dt_real row[2], dt_real value, dt_real std) {
     dt_real PH[N], gain[N];
     dt_real variance = dt_square(std), seen = DT_C(0);
@@ -190,7 +235,8 @@ static void correct(dt_observer *o, const dt_real row[2], dt_real value, dt_real
     variance += row[0] * PH[0] + row[1] * PH[1];
     seen = row[0] * o->x[0] + row[1] * o->x[1];
     for (int i = 0; i < N; ++i) {
-        gain[i] = PH[i] / variance;
+        const int is_scale = i >= DT_SCALE && i < DT_SCALE + DT_CLUTCHES;
+        gain[i] = is_scale && i != DT_SCALE + o->learning ? DT_C(0) : PH[i] / variance;
         o->x[i] += gain[i] * (value - seen);
     }
     for (int i = 0; i < N; ++i) {
@@ -204,26 +250,12 @@ static void correct(dt_observer *o, const dt_real row[2], dt_real value, dt_real
     }
 }
 
-/* A clutch that locks starts with the torque it slipped with, known to within its capacity. */
-static void take_up_lock(dt_observer *o, const dt_mechanism *m, const dt_params *p,
-                         const dt_inputs *u, int locked) {
-    const dt_real slip = dt_slip(m, locked, o->x);
-    const dt_real capacity = o->x[DT_SCALE + locked] * normal_of(p, u, locked) *
-                             dt_mu(&p->clutch[locked].friction, dt_abs(slip));
-    o->x[DT_HELD] = slip < DT_C(0) ? -capacity : capacity;
-    for (int i = 0; i < N; ++i) {
-        o->P[DT_HELD][i] = o->P[i][DT_HELD] = DT_C(0);
-    }
-    o->P[DT_HELD][DT_HELD] = dt_square(capacity) + DT_C(1);
-    o->locked = locked;
-}
-
 static void fill_estimates(dt_estimates *out, const dt_observer *o, const dt_mechanism *m,
                            const dt_params *p, const dt_inputs *u) {
     law_of_motion law;
     dt_real shaft[MOVING] = {DT_C(0), p->c_o, -p->c_o * p->i_f, p->k_o};
     dt_real variance = DT_C(0);
-    set_torques(&law, m, p, o, u);
+    set_law(&law, m, p, o, u, o->locked);
     out->output_torque = DT_C(0);
     for (int i = 0; i < MOVING; ++i) {
         out->output_torque += shaft[i] * o->x[i];
@@ -233,10 +265,7 @@ static void fill_estimates(dt_estimates *out, const dt_observer *o, const dt_mec
     }
     out->output_torque_std = dt_sqrt(dt_larger(variance, DT_C(0)));
     for (int j = 0; j < DT_CLUTCHES; ++j) {
-        out->clutch_torque[j] = DT_C(0);
-        for (int i = 0; i < N; ++i) {
-            out->clutch_torque[j] += law.torque[j][i] * o->x[i];
-        }
+        out->clutch_torque[j] = torque_of(&law, o, j);
         out->scale[j] = o->x[DT_SCALE + j];
         out->scale_std[j] = dt_sqrt(dt_larger(o->P[DT_SCALE + j][DT_SCALE + j], DT_C(0)));
         out->slip[j] = dt_slip(m, j, o->x);
@@ -253,7 +282,6 @@ void dt_observer_begin(dt_observer *observer, const dt_params *params, const dt_
                           now->output_speed,
                           now->output_speed / params->i_f,
                           load / params->i_f / params->k_o,
-                          DT_C(0),
                           DT_C(1),
                           DT_C(1),
                           load};
@@ -261,7 +289,6 @@ void dt_observer_begin(dt_observer *observer, const dt_params *params, const dt_
                             DT_C(1),
                             DT_C(0.1),
                             uncertain / params->i_f / params->k_o + DT_C(1e-3),
-                            DT_C(1),
                             FIRST_SCALE,
                             FIRST_SCALE,
                             uncertain};
@@ -271,7 +298,7 @@ void dt_observer_begin(dt_observer *observer, const dt_params *params, const dt_
             observer->P[i][j] = i == j ? dt_square(std[i]) : DT_C(0);
         }
     }
-    observer->locked = -1;
+    observer->locked = observer->learning = -1;
 }
 
 void dt_observer_resume(dt_observer *observer, const dt_params *params, const dt_measured *now) {
@@ -298,11 +325,8 @@ dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tu
     dt_mechanism m;
     dt_mechanism_of(&m, params,
                     params->loss_law == DT_DISSIPATIVE && now->inputs.engine_torque < DT_C(0));
-    const int locked = locked_clutch(observer, &m, params, tuning, now);
-    if (locked >= 0 && locked != observer->locked) {
-        take_up_lock(observer, &m, params, &now->inputs, locked);
-    }
-    observer->locked = locked;
+    observer->locked = locked_clutch(observer, &m, params, tuning, now);
+    observer->learning = learning_clutch(&m, params, tuning, now);
     const dt_real most = DT_C(1.001) * DT_C(DT_OBSERVER_SUBSTEP); /* 10 ms are ten, not eleven */
     int parts = 1;
     while (parts < DT_OBSERVER_SUBSTEPS && h > most * DT_C(parts)) {
@@ -314,8 +338,8 @@ dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tu
     const dt_real engine[2] = {DT_C(1), DT_C(0)}, output[2] = {DT_C(0), DT_C(1)};
     correct(observer, engine, now->engine_speed, tuning->engine_speed);
     correct(observer, output, now->output_speed, tuning->output_speed);
-    if (locked >= 0) {
-        correct(observer, m.row[locked], DT_C(0), NO_SLIP);
+    if (observer->locked >= 0) {
+        correct(observer, m.row[observer->locked], DT_C(0), NO_SLIP);
     }
     fill_estimates(estimates, observer, &m, params, &now->inputs);
     return DT_OK;

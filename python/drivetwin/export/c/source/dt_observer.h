@@ -3,10 +3,11 @@
  *  Torques that no sensor shows, from speeds and engine torque, with drift of friction and load.
  *
  *  An extended Kalman filter on the model's own mechanism. Its state is the four states of the
- *  model, the torque of a locked clutch (a random walk), the scale of each clutch's friction law
- *  (1: as identified) and the constant load at the wheel. Speeds are measured; that a locked clutch
- *  does not slip counts as a third measurement. A clutch counts as locked while its measured slip
- *  is small. SI units; no heap, no static mutable data, bounded loops.
+ *  model, the scale of each clutch's friction law (1: as identified) and the constant load at the
+ *  wheel. Speeds are measured; that a locked clutch does not slip counts as a third measurement.
+ *  A clutch counts as locked while its measured slip is small and its capacity may suffice.
+ *  Friction is learnt while one clutch alone is pressed and slips clearly. SI units; no heap, no
+ *  static mutable data, bounded loops.
  */
 #ifndef DT_OBSERVER_H
 #define DT_OBSERVER_H
@@ -17,20 +18,19 @@
 extern "C" {
 #endif
 
-#define DT_OBSERVED 8            /**< states of the filter */
+#define DT_OBSERVED 7            /**< states of the filter */
 #define DT_OBSERVER_SUBSTEP 1e-3 /**< longest prediction at once, s */
 #define DT_OBSERVER_SUBSTEPS 32  /**< most predictions in one call: calls every 32 ms or faster */
 
 /** Index of a state of the filter; the first four are those of the model. */
-enum { DT_HELD = 4, DT_SCALE = 5, DT_LOAD = 7 };
+enum { DT_SCALE = 4, DT_LOAD = 6 };
 
 /** Noise of sensors and of what drifts; standard deviations, all > 0. */
 typedef struct {
     dt_real engine_speed;  /**< noise of the sensor, rad/s */
     dt_real output_speed;  /**< noise of the sensor, rad/s */
     dt_real engine_torque; /**< error of the engine torque, N m, over 10 ms */
-    dt_real held_torque;   /**< drift of the torque of a locked clutch, N m over 1 s */
-    dt_real scale;         /**< drift of the friction scale of a slipping clutch, 1 over 1 s */
+    dt_real scale;         /**< drift of the friction scale while it is learnt, 1 over 1 s */
     dt_real load;          /**< drift of the load at the wheel, N m over 1 s */
     dt_real locked_slip;   /**< slip below which a pressed clutch counts as locked, rad/s */
 } dt_tuning;
@@ -40,6 +40,7 @@ typedef struct {
     dt_real x[DT_OBSERVED];
     dt_real P[DT_OBSERVED][DT_OBSERVED]; /**< covariance */
     int locked;                          /**< index of the locked clutch, -1: none */
+    int learning;                        /**< index of the clutch that tells friction, -1: none */
 } dt_observer;
 
 /** What is measured, and the inputs that were at work since the last call. */
