@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.output import JsonFlag, print_json, say, show, table_of
+from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
 from drivetwin.cli.synth import NoiseOption, ScenarioOption, SeedOption
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.identify.method import DEFAULT_METHOD, Method
@@ -49,7 +49,7 @@ def demo(
         print_json({"parameters": [row.document() for row in rows], "log": log, "report": report})
         return
     show(_table(rows, scenario))
-    say("± is the half width of the 95 % interval; the paper's method states none for its grids.")
+    note("± is the half width of the 95 % interval; the paper's method states none for its grids.")
     say(f"log, card and truth: {log.parent}")
     say(f"report: {report}")
 

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 
 from drivetwin.identify.result import FrictionCurve
 from drivetwin.report.candidates import Agreement, Trial
+from drivetwin.report.figures.friction import band
 from drivetwin.report.figures.stack import Curve, Panel, stacked
 from drivetwin.report.figures.validation import OUTPUTS
 from drivetwin.report.labels import parameter_label
@@ -86,18 +87,7 @@ def friction_overlay(
     figure = go.Figure()
     for name, curve in curves.items():
         style = candidate_style(order.index(name))
-        known = np.isfinite(curve.mu_lo) & np.isfinite(curve.mu_hi)
-        slip = curve.slip[known]
-        figure.add_scatter(
-            x=np.concatenate((slip, slip[::-1])),
-            y=np.concatenate((curve.mu_hi[known], curve.mu_lo[known][::-1])),
-            fill="toself",
-            fillcolor=style.fill,
-            line={"width": 0},
-            legendgroup=name,
-            showlegend=False,
-            hoverinfo="skip",
-        )
+        figure.add_trace(band(curve, style.fill, legendgroup=name, showlegend=False))
         figure.add_scatter(
             x=curve.slip,
             y=curve.mu,

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import plotly.graph_objects as go
 
@@ -26,18 +28,9 @@ def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
             name="points from the log",
             marker={"color": MEASURED, "size": 4, "opacity": 0.45},
         )
-    known = np.isfinite(curve.mu_lo) & np.isfinite(curve.mu_hi)
-    if known.any():
-        slip = curve.slip[known]
-        figure.add_scatter(
-            x=np.concatenate((slip, slip[::-1])),
-            y=np.concatenate((curve.mu_hi[known], curve.mu_lo[known][::-1])),
-            fill="toself",
-            fillcolor=_BAND,
-            line={"width": 0},
-            name="95 % band, sensors included",
-            hoverinfo="skip",
-        )
+    bounds = band(curve, _BAND, name="95 % band, sensors included")
+    if len(bounds.x):
+        figure.add_trace(bounds)
     figure.add_scatter(
         x=curve.slip,
         y=curve.mu,
@@ -62,6 +55,22 @@ def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
         )
     )
     return figure
+
+
+def band(curve: FrictionCurve, colour: str, **options: Any) -> go.Scatter:
+    """Area between the bounds of a curve, as far as they are known; empty where they are not."""
+    known = np.isfinite(curve.mu_lo) & np.isfinite(curve.mu_hi)
+    slip = curve.slip[known]
+    return go.Scatter(
+        x=np.concatenate((slip, slip[::-1])),
+        y=np.concatenate((curve.mu_hi[known], curve.mu_lo[known][::-1])),
+        mode="lines",
+        fill="toself",
+        fillcolor=colour,
+        line={"width": 0},
+        hoverinfo="skip",
+        **options,
+    )
 
 
 def _mu_range(curve: FrictionCurve) -> tuple[float, float]:
