@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
+from drivetwin.twin import Twin
 from tests.cli.conftest import Files
 
 
@@ -16,7 +17,8 @@ def test_suggestions_and_profile(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["examine", str(bench_files.log), "--vehicle", str(bench_files.card)]
-    assert main([*arguments, "--profile", "eta", "-o", str(tmp_path / "asked")]) == 0
+    more = ["--profile", "eta", "--friction", "falling", "--departures"]
+    assert main([*arguments, *more, "-o", str(tmp_path / "asked")]) == 0
     printed = capsys.readouterr().out
     assert "What would tell more" in printed
     assert "Profile likelihood of eta" in printed
@@ -26,6 +28,11 @@ def test_suggestions_and_profile(
     low, high = profile["ci95_profile"]
     assert low < profile["estimate"] < high
     assert max(profile["rise"]) > 3.84
+    friction = json.loads((tmp_path / "asked" / "friction.json").read_text())
+    curve = friction["friction"]["B3"]
+    assert Twin.load(tmp_path / "asked" / "twin.toml").friction["B3"].mu.tolist() == curve["mu"]
+    departures = json.loads((tmp_path / "asked" / "departures.json").read_text())
+    assert {one["kind"] for one in departures["departures"]} == {"drag", "pressure"}
 
 
 def test_an_unknown_parameter_writes_nothing(

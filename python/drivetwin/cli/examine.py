@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,17 +14,22 @@ import typer
 from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile
 from drivetwin.cli.numbers import shown
 from drivetwin.cli.output import JsonFlag, print_json, say, show, step, table_of
+from drivetwin.identify.shape.kind import Shape
 from drivetwin.parameters import spec_of
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from drivetwin.cli.pipeline import Outcome
     from drivetwin.identify.bootstrap import Bootstrap
     from drivetwin.identify.experiment.suggest import Suggestion
     from drivetwin.identify.profile import Profile
     from drivetwin.identify.result import Identification
+    from drivetwin.identify.shape.departures import Departure
+    from drivetwin.twin import Twin
 
 SUGGESTIONS, BOOTSTRAP = "suggestions.json", "bootstrap.json"
+FRICTION, DEPARTURES = "friction.json", "departures.json"
 
 
 def examine(
@@ -37,6 +44,17 @@ def examine(
         int, typer.Option(min=0, metavar="N", help="Fit N logs made from the fit with other noise.")
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap's noise.")] = 0,
+    friction: Annotated[
+        Shape | None,
+        typer.Option(help="Friction over slip as a curve of this shape, in place of Stribeck's."),
+    ] = None,
+    departures: Annotated[
+        bool,
+        typer.Option(
+            "--departures",
+            help="Drag of the open clutches; friction over pressure.",
+        ),
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Where the files go.")
     ] = None,
@@ -46,50 +64,107 @@ def examine(
 
     The log is identified by the likelihood method first. Always: the experiments that would narrow
     weak, not identifiable and least known parameters, with the interval to expect. On request:
-    profile likelihood, which needs no linearity, and parametric bootstrap.
+    profile likelihood, which needs no linearity, parametric bootstrap, friction of free or monotone
+    shape (with a twin that has it), and what departs from the friction law.
     """
     from drivetwin.cli.pipeline import run
-    from drivetwin.identify.bootstrap import bootstrap as repeat
-    from drivetwin.identify.experiment.suggest import suggest
     from drivetwin.identify.method import Method
-    from drivetwin.identify.profile import profile as profile_of
-    from drivetwin.results.doubts import bootstrap_text, profile_text, suggestions_text
 
     for name in profile or ():
         spec_of(name)
-    found = run(log, vehicle, channels, Method.LIKELIHOOD).found
-    with step("comparing experiments"):
-        suggestions = suggest(found)
-    texts = {SUGGESTIONS: suggestions_text(suggestions)}
-    tables = [_suggestions(suggestions, found)]
-    for name in profile or ():
-        with step(f"profile likelihood of {name}"):
-            one = profile_of(found, name)
-        texts[f"profile.{name}.json"] = profile_text(one)
-        tables.append(_profile(one, found))
-    if bootstrap:
-        with step(f"bootstrap of {bootstrap} fits"):
-            refits = repeat(found, bootstrap, seed)
-        texts[BOOTSTRAP] = bootstrap_text(refits)
-        tables.append(_bootstrap(refits, found))
-    files = () if output is None else _write(output, texts)
+    asked = Asked(tuple(profile or ()), bootstrap, seed, friction, departures)
+    outcome = run(log, vehicle, channels, Method.LIKELIHOOD)
+    answers = list(_answers(outcome, asked))
+    files = () if output is None else _write(output, answers)
     if as_json:
-        print_json({name: json.loads(text) for name, text in texts.items()})
+        print_json({one.file: json.loads(one.text) for one in answers})
         return
-    for table in tables:
-        show(table)
+    for one in answers:
+        show(one.table)
     for file in files:
         say(f"wrote {file}")
 
 
-def _write(folder: Path, texts: dict[str, str]) -> tuple[Path, ...]:
+@dataclass(frozen=True)
+class Asked:
+    """What is asked beside the experiments."""
+
+    profiles: tuple[str, ...]
+    bootstrap: int
+    seed: int
+    friction: Shape | None
+    departures: bool
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One answer as a file and as a table; `twin` is written beside where it has one."""
+
+    file: str
+    text: str
+    table: Table
+    twin: Twin | None = None
+
+
+def _answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
+    """Every answer, in the order in which they are printed."""
+    from drivetwin.identify.bootstrap import bootstrap
+    from drivetwin.identify.experiment.suggest import suggest
+    from drivetwin.identify.profile import profile
+    from drivetwin.identify.shape.departures import departures
+    from drivetwin.results import doubts
+
+    found = outcome.found
+    with step("comparing experiments"):
+        suggestions = suggest(found)
+    yield Answer(
+        SUGGESTIONS, doubts.suggestions_text(suggestions), _suggestions(suggestions, found)
+    )
+    for name in asked.profiles:
+        with step(f"profile likelihood of {name}"):
+            one = profile(found, name)
+        yield Answer(f"profile.{name}.json", doubts.profile_text(one), _profile(one, found))
+    if asked.bootstrap:
+        with step(f"bootstrap of {asked.bootstrap} fits"):
+            refits = bootstrap(found, asked.bootstrap, asked.seed)
+        yield Answer(BOOTSTRAP, doubts.bootstrap_text(refits), _bootstrap(refits, found))
+    if asked.friction is not None:
+        yield _friction(outcome, asked.friction)
+    if asked.departures:
+        with step("looking for what departs from the friction law"):
+            seen = departures(found)
+        yield Answer(DEPARTURES, doubts.departures_text(seen), _departures(seen))
+
+
+def _friction(outcome: Outcome, shape: Shape) -> Answer:
+    """Friction of a shape, with the twin that has it."""
+    from drivetwin.cli.tables import friction_table
+    from drivetwin.identify.shape.fit import shaped_friction
+    from drivetwin.results.doubts import friction_text
+    from drivetwin.twin import Twin
+
+    found = outcome.found
+    with step(f"fitting {shape} friction"):
+        one = shaped_friction(found, shape, outcome.card.sensors)
+    shaped = replace(found, friction={**found.friction, **one.curves})
+    twin = Twin.from_identification(shaped, outcome.card)
+    return Answer(FRICTION, friction_text(one), friction_table(one.curves), twin)
+
+
+def _write(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     """Write all files or none."""
+    from drivetwin.cli.pipeline import TWIN
     from drivetwin.cli.staging import staged
 
+    names: list[str] = []
     with staged(folder) as beside:
-        for name, text in texts.items():
-            (beside / name).write_text(text, encoding="utf-8", newline="\n")
-    return tuple(folder / name for name in texts)
+        for one in answers:
+            (beside / one.file).write_text(one.text, encoding="utf-8", newline="\n")
+            names.append(one.file)
+            if one.twin is not None:
+                one.twin.save(beside / TWIN)
+                names.append(TWIN)
+    return tuple(folder / name for name in names)
 
 
 def _around(value: float | None, half: float, unit: str) -> str:
@@ -142,4 +217,17 @@ def _bootstrap(one: Bootstrap, found: Identification) -> Table:
             f"{one.bias[k] / one.std[k]:+.2f} σ",
             shown(None, None, estimate.unit)[2],
         )
+    return table
+
+
+def _departures(found: tuple[Departure, ...]) -> Table:
+    from drivetwin.identify.shape.departures import UNITS
+
+    table = table_of(
+        "Departures from the friction law", "element", "departure", "value", "± (95 %)", "unit", "",
+        right=("value", "± (95 %)"),
+    )  # fmt: skip
+    for one in found:
+        value, half = f"{one.value:.2g}", f"{1.96 * one.std:.1g}"
+        table.add_row(one.element, one.kind, value, half, UNITS[one.kind], one.text)
     return table

@@ -60,7 +60,7 @@ def power_off_down() -> Scenario:
     demand = torque_steps(0.3, 0.2, (600.0, 1200.0, 300.0, 1000.0, 1300.0, 500.0, -150.0))
     offgoing = Program(((2.15, _MAIN), (2.25, 1.4e5), (2.35, 0.0)))
     oncoming = Program(
-        ((2.10, 0.0), (2.12, _KISS), (2.28, _KISS), (2.45, 2.6e5), (3.30, 2.8e5), (3.40, _MAIN))
+        ((2.10, 0.0), (2.12, _KISS), (2.28, _KISS), (2.45, 2.6e5), (2.72, 4.2e5), (2.90, _MAIN))
     )
     return _shift(
         ScenarioName.POWER_OFF_DOWN,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files of what was asked about an identification: suggestions, profiles, bootstrap; SI."""
+"""Files of what was asked about an identification: experiments, profiles and the like; SI."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from typing import Any
 from drivetwin.identify.bootstrap import Bootstrap
 from drivetwin.identify.experiment.suggest import Suggestion
 from drivetwin.identify.profile import Profile
+from drivetwin.identify.shape.departures import UNITS, Departure
+from drivetwin.identify.shape.fit import ShapedFriction
 from drivetwin.parameters import spec_of
+from drivetwin.results.records import FrictionRecord
 from drivetwin.results.result_file import plain
 
 
@@ -68,6 +71,31 @@ def bootstrap_text(one: Bootstrap) -> str:
         for k, name in enumerate(one.ids)
     }
     return _text({"seed": one.seed, "failed": one.failed, "parameters": parameters})
+
+
+def friction_text(one: ShapedFriction) -> str:
+    """`friction.json`: μ over slip of the shape asked for, by element, with its 95 % band."""
+    curves = {
+        name: FrictionRecord.of(curve).model_dump(mode="json") for name, curve in one.curves.items()
+    }
+    return _text({"shape": one.shape, "gain": one.gain, "bend": one.bend, "friction": curves})
+
+
+def departures_text(found: tuple[Departure, ...]) -> str:
+    """`departures.json`: drag of open clutches, and μ that goes with pressure or temperature."""
+    rows = [
+        {
+            "kind": one.kind,
+            "element": one.element,
+            "unit": UNITS[one.kind],
+            "value": one.value,
+            "std": one.std,
+            "plausible": one.plausible,
+            "text": one.text,
+        }
+        for one in found
+    ]
+    return _text({"departures": rows})
 
 
 def _text(content: dict[str, Any]) -> str:

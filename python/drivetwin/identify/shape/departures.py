@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: MIT
+"""What the friction law leaves out: drag of open clutches, and μ that goes with pressure or heat.
+
+    T_drag = d·s whatever the pressure        μ(s)·(1 + p·(P - P̄) + h·(θ - θ̄)) while slipping
+
+All are small, so that they act linearly about the minimum of the fit; with columns Z of what each
+does to the outputs and residuals r,
+
+    δ = S⁻¹ Zᵀ Σ⁻¹ r,   S = Zᵀ Σ⁻¹ Z - Zᵀ Σ⁻¹ J F⁻¹ Jᵀ Σ⁻¹ Z + prior
+
+which is the step of Gauss and Newton in all unknowns together. What is found is put back and the
+fit made again, until no more is found. Several shifts count together; within one, pressure and slip
+move together and tell little. Drag differs from contact friction by acting where the pressure is
+none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from drivetwin.driveline import ShiftElement, Trajectory
+from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
+from drivetwin.identify.likelihood.newton import minimise
+from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.profile import likelihood_of
+from drivetwin.identify.result import Identification
+from drivetwin.identify.signals import FloatArray, Sampled
+
+DRAG_SHARE = 0.1
+"""Plausible drag of an open clutch at the largest slip, as a share of the largest engine torque."""
+LEVEL_SHARE = 0.3
+"""Plausible change of μ over the pressures or temperatures seen."""
+SIGNIFICANT = 3.0
+"""Standard deviations from zero from which a departure counts as seen."""
+ROUNDS = 2
+"""How often what was found is put back."""
+TOLD = 0.5
+"""Share of what is plausible up to which a standard deviation says something."""
+
+
+class Kind(StrEnum):
+    """What departs from the law."""
+
+    DRAG = "drag"
+    PRESSURE = "pressure"
+    TEMPERATURE = "temperature"
+
+
+UNITS: Mapping[Kind, str] = {Kind.DRAG: "N*m*s/rad", Kind.PRESSURE: "1/Pa", Kind.TEMPERATURE: "1/K"}
+
+
+@dataclass(frozen=True)
+class Departure:
+    """One departure of one element: `value` and `std` in UNITS, `plausible` its prior's spread."""
+
+    kind: Kind
+    element: str
+    value: float
+    std: float
+    plausible: float
+
+    @property
+    def text(self) -> str:
+        """What the log says of it."""
+        if self.std > TOLD * self.plausible:
+            return "not told by this log"
+        if abs(self.value) > SIGNIFICANT * self.std:
+            return "seen"
+        return "none seen"
+
+
+@dataclass(frozen=True)
+class _Effect:
+    """A departure's torque over the steps (N-1,) by part, per unit."""
+
+    kind: Kind
+    element: str
+    torques: tuple[FloatArray, ...]
+    plausible: float
+
+
+def departures(found: Identification, temperature: Sampled | None = None) -> tuple[Departure, ...]:
+    """Departures of all elements of a likelihood identification.
+
+    `temperature` [K] is that of the oil over the log. Raises IdentificationError where the
+    identification is by another method.
+    """
+    fit, signals = likelihood_of(found)
+    largest = max(float(np.max(np.abs(s.engine_torque.values))) for s in signals)
+    total, step = np.zeros(0), _step(fit, largest, temperature)
+    for _ in range(ROUNDS):
+        total = step.values if total.size == 0 else total + step.values
+        again = _put_back(fit, step, total)
+        if again is None:
+            break
+        step = _step(again, largest, temperature, total)
+    std = np.sqrt(max(fit.chi2, 1.0) * np.diag(step.covariance))
+    return tuple(
+        Departure(e.kind, e.element, float(value), float(error), e.plausible)
+        for e, value, error in zip(step.effects, total, std, strict=True)
+    )
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What one step finds: `values` (q,) of the effects, and `columns` (n, q) of each part."""
+
+    effects: list[_Effect]
+    columns: list[FloatArray]
+    values: FloatArray
+    covariance: FloatArray
+
+
+def _step(
+    fit: LikelihoodFit,
+    largest: float,
+    temperature: Sampled | None,
+    known: FloatArray | None = None,
+) -> _Step:
+    """One step from the minimum; `known` (q,) has been put back already."""
+    effects = [e for e in _effects(fit, largest, temperature) if e.plausible > 0.0]
+    columns = [_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
+    size = len(effects)
+    own, cross = np.zeros((size, size)), np.zeros((len(fit.point.names), size))
+    precision = np.array([e.plausible for e in effects]) ** -2.0
+    pull = np.zeros(size) if known is None else -precision * known
+    for part, z, r, regressors in zip(
+        fit.problem.parts, columns, fit.normal.residuals, fit.normal.regressors, strict=True
+    ):
+        weighted = part.weighting.weighted(z)
+        own += z.T @ weighted
+        cross += regressors.T @ z
+        pull += weighted.T @ r
+    schur = own - cross.T @ covariance_of(fit.normal.information) @ cross
+    covariance = covariance_of(schur + np.diag(precision))
+    return _Step(effects, columns, covariance @ pull, covariance)
+
+
+def _put_back(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodFit | None:
+    """The fit with what the effects do to the outputs taken off the residuals; None if it fails."""
+    parts = tuple(
+        replace(part, returned=part.returned + z @ total)
+        for part, z in zip(fit.problem.parts, step.columns, strict=True)
+    )
+    found = minimise(replace(fit.problem, parts=parts), fit.point)
+    if found is None or not found.converged:
+        return None
+    return replace(fit, problem=found.problem, point=found.point, normal=found.normal)
+
+
+def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) -> Iterator[_Effect]:
+    """Every departure of every element."""
+    runs = [part.run(fit.point) for part in fit.problem.parts]
+    names = dict.fromkeys(e.name for part in fit.problem.parts for e in part.structure.elements)
+    for name in names:
+        seen = [
+            _Seen.of(part, run, fit, name)
+            for part, run in zip(fit.problem.parts, runs, strict=True)
+            if run is not None
+        ]
+        slip = tuple(one.slip for one in seen)
+        reach = max(float(np.max(np.abs(s))) for s in slip)
+        yield _Effect(Kind.DRAG, name, slip, DRAG_SHARE * largest / reach)
+        yield _level(Kind.PRESSURE, name, seen, [one.pressure for one in seen])
+        if temperature is not None:
+            yield _level(Kind.TEMPERATURE, name, seen, [temperature.at(one.middle) for one in seen])
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """One element in one part, over the steps (N-1,): slip, contact torque, pressure."""
+
+    middle: FloatArray
+    slip: FloatArray
+    contact: FloatArray
+    pressure: FloatArray
+
+    @classmethod
+    def of(cls, part: Part, run: Trajectory, fit: LikelihoodFit, name: str) -> _Seen:
+        """What the run shows of the element; contact counts while it slips."""
+        middle = 0.5 * (run.time[1:] + run.time[:-1])
+        model = part.structure.model(fit.point)
+        one = next((e for e in model.elements if e.name == name), None)
+        if one is None:
+            nothing = np.zeros(middle.size)
+            return cls(middle, nothing, nothing, nothing)
+        slip = 0.5 * (run.slip[name][1:] + run.slip[name][:-1])
+        signal = part.record.pressures[name]
+        above = np.maximum(np.interp(middle, signal.time, signal.values) - one.P0, 0.0)
+        contact = np.sign(slip) * one.friction.at(slip) * one.gain * above
+        slipping = np.minimum(np.abs(run.slip[name][1:]), np.abs(run.slip[name][:-1])) > 1e-6
+        return cls(middle, slip, np.where(slipping, contact, 0.0), above)
+
+
+def _level(kind: Kind, name: str, seen: list[_Seen], quantity: list[FloatArray]) -> _Effect:
+    """μ that goes with a quantity, about its mean while the element slips."""
+    weights = np.concatenate([np.abs(one.contact) for one in seen])
+    values = np.concatenate(quantity)
+    slipping = weights > 0.0
+    if not slipping.any() or np.ptp(values[slipping]) == 0.0:
+        return _Effect(kind, name, (), 0.0)
+    mean = float(np.average(values, weights=weights))
+    torques = tuple(one.contact * (part - mean) for one, part in zip(seen, quantity, strict=True))
+    return _Effect(kind, name, torques, LEVEL_SHARE / float(np.ptp(values[slipping])))
+
+
+def _columns(part: Part, fit: LikelihoodFit, effects: list[_Effect], place: int) -> FloatArray:
+    """Change (n, q) of the outputs of one part by a unit of each effect."""
+    run = part.run(fit.point)
+    assert run is not None
+    model = part.structure.model(fit.point)
+    columns = []
+    for effect in effects:
+        one = next((e for e in model.elements if e.name == effect.element), None)
+        force = np.zeros((run.time.size - 1, 4))
+        if one is not None:
+            force -= effect.torques[place][:, None] * _direction(one)
+        columns.append(part.answer_to_force(fit.point, run, force))
+    return np.column_stack(columns)
+
+
+def _direction(one: ShiftElement) -> FloatArray:
+    """Slip of an element as a row of the state (eq. 15)."""
+    return np.array([1.0 / one.i_c, -one.i_out, 0.0, 0.0])

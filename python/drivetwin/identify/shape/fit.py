@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: MIT
+"""Fit of μ of any shape: the likelihood's fit once more, with knots in place of the Stribeck law.
+
+How smooth the curve is, the log decides: of several standard deviations of the second differences
+of μ between knots the one of largest evidence is taken (Q and the log-determinants of information
+and prior, MacKay 1992).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.driveline import FrictionTable, Stribeck
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.likelihood.curves import POINTS
+from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
+from drivetwin.identify.likelihood.priors import spans
+from drivetwin.identify.likelihood.problem import Normal, Part, Problem
+from drivetwin.identify.likelihood.record import Record, record_of
+from drivetwin.identify.likelihood.tolerance import sensor_shifts
+from drivetwin.identify.likelihood.unknowns import LAW, Point
+from drivetwin.identify.profile import likelihood_of
+from drivetwin.identify.regression import Prior
+from drivetwin.identify.result import FrictionCurve, Identification
+from drivetwin.identify.shape.kind import Shape
+from drivetwin.identify.shape.monotone import shaped
+from drivetwin.identify.shape.structure import Shaped, Table
+from drivetwin.identify.signals import FloatArray, ShiftSignals, Span
+from drivetwin.vehicle.spec import SensorTolerance
+
+KNOTS = 12
+BENDS = (3e-4, 1e-3, 3e-3, 1e-2)
+"""Standard deviations of second differences of μ that are tried."""
+LEAST = 1e-3
+"""Least μ at a knot."""
+LEVEL = (0.12, 0.2)
+"""Wide prior of μ at every knot."""
+
+
+@dataclass(frozen=True)
+class ShapedFriction:
+    """Curves of friction by element with 95 % bands, sensors included.
+
+    `gain` is by how much Q of the free shape falls below that of the Stribeck law, `bend` the
+    smoothness that the log chose, `fit` what stands behind: the free shape, which a monotone one
+    changes in the curves alone.
+    """
+
+    shape: Shape
+    curves: Mapping[str, FrictionCurve]
+    gain: float
+    bend: float
+    fit: LikelihoodFit
+
+
+def shaped_friction(
+    found: Identification, shape: Shape, tolerances: Mapping[str, SensorTolerance]
+) -> ShapedFriction:
+    """Fit μ over slip as a curve of `shape` for every element that has a friction curve.
+
+    Raises IdentificationError where the identification is by another method or no fit converges.
+    """
+    base, signals = likelihood_of(found)
+    tables = {name: Table(_knots(curve)) for name, curve in found.friction.items()}
+    problem, start = _problem(base, signals, tables)
+    normal = problem.weighted_by(start).normal(start)
+    priors = {bend: _prior(problem.prior, start, tables, bend) for bend in BENDS}
+    best: LikelihoodFit | None = None
+    if normal is not None:
+        bend = min(BENDS, key=lambda one: _evidence(normal, problem.prior, priors[one], start))
+        best = nearest(replace(problem, prior=priors[bend]), start)
+    if best is None:
+        raise IdentificationError(
+            "the fit with friction of free shape does not converge",
+            "use the Stribeck law, which the identification has",
+        )
+    systematic = sum(
+        (np.outer(s, s) for s in sensor_shifts(best, tolerances).values()),
+        np.zeros_like(best.covariance),
+    )
+    gain = base.chi2 * base.problem.size - best.chi2 * best.problem.size
+    return ShapedFriction(
+        shape,
+        {
+            name: _curve(best, (name, table, shape), found.friction[name], systematic)
+            for name, table in tables.items()
+        },
+        gain,
+        bend,
+        best,
+    )
+
+
+def _knots(curve: FrictionCurve) -> FloatArray:
+    """Knots from no slip to the largest seen, even in the root of slip: denser where μ changes."""
+    return np.asarray(np.linspace(0.0, np.sqrt(curve.slip[-1]), KNOTS) ** 2, dtype=np.float64)
+
+
+def _problem(
+    base: LikelihoodFit,
+    signals: Sequence[ShiftSignals],
+    tables: Mapping[str, Table],
+) -> tuple[Problem, Point]:
+    """The problem with knots and drags in place of laws, and where its search starts."""
+    laws = {f"{name}.{key}" for name in tables for key in LAW}
+    kept = [k for k, name in enumerate(base.point.names) if name not in laws]
+    names = [base.point.names[k] for k in kept]
+    values = [float(base.point.values[k]) for k in kept]
+    for name, table in tables.items():
+        law = _law_of(base, name)
+        names += table.names(name)
+        values += law.at(table.knots).tolist()
+    point = Point(tuple(names), np.array(values))
+    parts = tuple(
+        _part(replace(part, record=_measured(part, s, span)), base, tables)
+        for part, s, span in zip(base.problem.parts, signals, spans(signals), strict=True)
+    )
+    size = point.values.size
+    lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
+    mean, precision = np.zeros(size), np.zeros((size, size))
+    lower[: len(kept)], upper[: len(kept)] = base.problem.lower[kept], base.problem.upper[kept]
+    for name, table in tables.items():
+        first = names.index(table.names(name)[0])
+        lower[first : first + table.knots.size] = LEAST
+    mean, precision = np.zeros(size), np.zeros((size, size))
+    mean[: len(kept)] = base.problem.prior.mean[kept]
+    precision[: len(kept), : len(kept)] = base.problem.prior.precision[np.ix_(kept, kept)]
+    return Problem(parts, Prior(mean, precision), lower, upper), point
+
+
+def _law_of(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
+    """Friction law of an element at the minimum."""
+    for part in base.problem.parts:
+        for one in part.structure.model(base.point).elements:
+            if one.name == name:
+                return one.friction
+    raise IdentificationError(
+        f"no shift of the fit has an element {name}", "identify the log again"
+    )
+
+
+def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
+    """The part with tables in place of laws."""
+    old = part.structure
+    laws = {f"{e.name}.{key}" for e in old.elements for key in LAW}
+    fixed = {**old.fixed, **{name: old.value(base.point, name) for name in laws}}
+    mine = {one.name: tables[one.name] for one in old.elements if one.name in tables}
+    structure = Shaped(old.driveline, old.loss_law, old.label, fixed, old.mean_speed, old.tie, mine)
+    return Part.unweighted(structure, part.record)
+
+
+def _measured(part: Part, signals: ShiftSignals, span: Span) -> Record:
+    """The record with its inputs as measured: those of a fit are the expected ones."""
+    record = record_of(signals, span)
+    means = any(out.window > 0.0 for out in part.record.outputs)
+    return record.averaged() if means else record
+
+
+def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) -> Prior:
+    """`base` with the level and the smoothness of every μ."""
+    level, spread = LEVEL
+    mean, precision = base.mean.copy(), base.precision.copy()
+    for name, table in tables.items():
+        first = point.names.index(table.names(name)[0])
+        part = slice(first, first + table.knots.size)
+        second = np.diff(np.eye(table.knots.size), 2, axis=0) / bend
+        on_mu = second.T @ second + np.eye(table.knots.size) / spread**2
+        precision[part, part], mean[part] = on_mu, level
+    return Prior(mean, precision)
+
+
+def _evidence(normal: Normal, without: Prior, prior: Prior, point: Point) -> float:
+    """-2·log-evidence of a prior, but for a constant, with Q expanded at `point`."""
+    gradient = normal.gradient - without.pull(point.values) + prior.pull(point.values)
+    information = normal.data + prior.precision
+    scale = np.sqrt(np.diag(information))
+    unit = information / np.outer(scale, scale)
+    step = np.linalg.lstsq(unit, -gradient / scale, rcond=1e-13)[0] / scale
+    fall = float(2.0 * step @ gradient + step @ information @ step)
+    known = np.flatnonzero(np.diag(prior.precision))
+    block = prior.precision[np.ix_(known, known)]
+    power = np.linalg.slogdet(unit)[1] + 2.0 * np.sum(np.log(scale))
+    return prior.cost(point.values) + fall + float(power - np.linalg.slogdet(block)[1])
+
+
+def _curve(
+    best: LikelihoodFit,
+    one: tuple[str, Table, Shape],
+    seen: FrictionCurve,
+    systematic: FloatArray,
+) -> FrictionCurve:
+    """μ between the knots over the slip range seen, with the band of noise and sensors."""
+    name, table, shape = one
+    first = best.point.names.index(table.names(name)[0])
+    part = slice(first, first + table.knots.size)
+    slip = np.linspace(float(seen.slip[0]), float(seen.slip[-1]), POINTS)
+    between = np.array([np.interp(slip, table.knots, row) for row in np.eye(table.knots.size)]).T
+    total = (best.covariance + systematic)[part, part]
+    at_knots, spread = shaped(shape, best.point.values[part], total)
+    mu = between @ at_knots
+    half = 1.96 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))
+    return replace(
+        seen,
+        slip=slip,
+        mu=mu,
+        mu_lo=mu - half,
+        mu_hi=mu + half,
+        stribeck=None,
+        stribeck_covariance=None,
+        method=f"likelihood, {shape} shape",
+    )

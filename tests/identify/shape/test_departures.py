@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""Drag that the dynamometer adds is found, and where there is none none is seen."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import drivetwin
+from drivetwin.cli.synth import write_run
+from drivetwin.driveline import FrictionTable, ShiftElement
+from drivetwin.dyno.actuators import Actuator, Program
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.identify.result import Identification
+from drivetwin.identify.shape.departures import Departure, Kind, departures
+from drivetwin.identify.signals import Sampled
+from tests.identify.asked import DURATION, RATE, stepped
+
+DRAG = {"B2": 0.6, "B3": 0.3}
+"""Viscous drag while open [N m s/rad]: some 30 N m each."""
+
+
+def _dragging() -> Identification:
+    """A log whose clutches drag: one element more beside each, at a constant pressure of 1 Pa."""
+    base = replace(paper_steps(), duration=DURATION)
+    base = replace(base, sensors=tuple(replace(s, rate=min(s.rate, RATE)) for s in base.sensors))
+    beside = tuple(
+        ShiftElement(
+            f"{e.name} drag", e.i_c, e.i_out, 1.0, 0.0,
+            FrictionTable((0.0, 200.0), (0.0, 200.0 * DRAG[e.name])),
+        )
+        for e in base.model.elements
+    )  # fmt: skip
+    constant = {e.name: Actuator(Program(((0.0, 1.0),)), 0.01, 0.02) for e in beside}
+    model = replace(base.model, elements=(*base.model.elements, *beside))
+    made = run(replace(base, model=model, actuators={**base.actuators, **constant}), seed=4)
+    with tempfile.TemporaryDirectory() as folder:
+        log_file, card_file, _ = write_run(Path(folder) / "log.csv", replace(made, scenario=base))
+        card = drivetwin.load_card(card_file)
+        log = drivetwin.read_log(log_file, card)
+        return drivetwin.identify_shifts(log, card, drivetwin.find_shifts(log, card))
+
+
+def _by(found: tuple[Departure, ...], kind: Kind) -> dict[str, Departure]:
+    return {one.element: one for one in found if one.kind is kind}
+
+
+def test_finds_the_drag_of_open_clutches() -> None:
+    told = _by(departures(_dragging()), Kind.DRAG)
+    for name, true in DRAG.items():
+        assert told[name].text == "seen"
+        assert told[name].value == pytest.approx(true, abs=3.5 * told[name].std)
+
+
+def test_sees_none_where_there_is_none() -> None:
+    for one in departures(stepped()):
+        assert one.text != "seen", one
+        assert abs(one.value) < 3.0 * one.std
+
+
+def test_a_steady_temperature_tells_nothing_and_a_moving_one_is_looked_at() -> None:
+    time = np.array([0.0, DURATION])
+    still = departures(stepped(), Sampled(time, np.full(2, 353.0)))
+    assert not _by(still, Kind.TEMPERATURE)
+    moving = _by(departures(stepped(), Sampled(time, np.array([340.0, 360.0]))), Kind.TEMPERATURE)
+    assert moving["B3"].std > 0.0
+    assert moving["B3"].text != "seen"

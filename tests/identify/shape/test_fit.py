@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""Friction of free shape follows the true law within its band; a falling one falls."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivetwin.dyno.scenarios import paper
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.shape.fit import BENDS, shaped_friction
+from drivetwin.identify.shape.kind import Shape
+from drivetwin.vehicle.spec import SensorTolerance
+from tests.identify.asked import by_the_paper, stepped
+
+
+def test_free_shape_holds_the_truth() -> None:
+    found = stepped()
+    one = shaped_friction(found, Shape.FREE, {})
+    curve = one.curves["B3"]
+    truth = paper().model.elements[1].friction.at(curve.slip)
+    inside = (truth >= curve.mu_lo) & (truth <= curve.mu_hi)
+    assert inside.mean() > 0.8
+    assert np.abs(curve.mu - truth).max() < 0.004
+    law = found.friction["B3"]
+    assert np.mean(curve.mu_hi - curve.mu_lo) > np.mean(law.mu_hi - law.mu_lo)
+    assert curve.stribeck is None
+    # The Stribeck law is the truth: a dozen knots gain no more than their number.
+    assert -3.0 < one.gain < 20.0
+    assert one.bend in BENDS
+
+
+def test_falling_shape_falls_and_sensors_widen_its_band() -> None:
+    tolerance = {"output_torque": SensorTolerance(gain=0.01)}
+    narrow, wide = (
+        shaped_friction(stepped(), Shape.FALLING, given).curves["B3"] for given in ({}, tolerance)
+    )
+    assert np.diff(narrow.mu).max() <= 1e-9
+    assert np.mean(wide.mu_hi - wide.mu_lo) > 1.5 * np.mean(narrow.mu_hi - narrow.mu_lo)
+
+
+def test_other_methods_are_refused() -> None:
+    with pytest.raises(IdentificationError, match="paper method"):
+        shaped_friction(by_the_paper(), Shape.FREE, {})
