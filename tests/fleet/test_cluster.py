@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import socket
 import subprocess
 import sys
@@ -19,11 +18,10 @@ import pytest
 from drivetwin.errors import SchedulerError
 from drivetwin.fleet.cluster import DaskPool
 from drivetwin.fleet.task import WorkerSpec
-from tests.fleet.test_coordinator_faults import undisturbed
+from tests.fleet.test_coordinator_faults import COUNT, takes_long, undisturbed
 from tests.fleet.toys import ROOT, contents, make_logs
 
 pytest.importorskip("distributed")
-COUNT = int(os.environ.get("FLEET_FAULT_LOGS", "40"))
 
 
 def free_port() -> int:
@@ -62,6 +60,7 @@ def worker(port: int) -> tuple[str, ...]:
     )  # fmt: skip
 
 
+@takes_long
 def test_a_scheduler_lost_and_restarted_costs_nothing(tmp_path: Path) -> None:
     logs = make_logs(tmp_path / "logs", COUNT, word="slow", spoilt=["bad"])
     store, port = tmp_path / "store", free_port()
@@ -75,7 +74,7 @@ def test_a_scheduler_lost_and_restarted_costs_nothing(tmp_path: Path) -> None:
         cluster.callback(run.kill)
         assert run.stdout is not None
         cluster.callback(run.stdout.close)
-        timer = threading.Timer(100.0, run.kill)
+        timer = threading.Timer(100.0 + 2.0 * COUNT, run.kill)
         cluster.callback(timer.cancel)
         timer.start()
         events = []

@@ -33,6 +33,13 @@ def test_a_folder_gives_its_logs_in_order(folder: Path) -> None:
     assert all(source.path.is_absolute() for source in sources)
 
 
+def test_a_store_among_the_logs_is_left_out(folder: Path) -> None:
+    (folder / "store" / "rows").mkdir(parents=True)
+    (folder / "store" / "index.sqlite").write_text("x")
+    (folder / "store" / "rows" / "all.parquet").write_text("x")
+    assert _names(Sources([str(folder)])) == ["3.CSV", "1.mf4", "2.csv"]
+
+
 def test_files_and_globs_may_be_anything(folder: Path) -> None:
     assert _names(Sources([str(folder / "6.json")])) == ["6.json"]
     assert _names(Sources([str(folder / "**" / "*.csv")])) == ["2.csv"]

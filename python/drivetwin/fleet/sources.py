@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivetwin.errors import InputError, Where
+from drivetwin.fleet.index import INDEX
 
 SUFFIXES = frozenset(
     (".csv", ".txt", ".tsv", ".dat", ".mf4", ".mdf", ".mat", ".parquet", ".asc", ".blf", ".log")
@@ -71,6 +72,9 @@ def _below(name: str) -> Iterator[Path]:
 
 def _walk(folder: Path) -> Iterator[Path]:
     for place, folders, files in os.walk(folder):
+        if INDEX in files:  # a store has Parquet files that are no logs
+            folders.clear()
+            continue
         folders[:] = sorted(each for each in folders if not each.startswith("."))
         for name in sorted(files):
             if not name.startswith(".") and Path(name).suffix.casefold() in SUFFIXES:

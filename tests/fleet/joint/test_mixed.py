@@ -16,12 +16,12 @@ RUNS = 24
 LEVEL, DRIFT, SPREAD, OWN_DRIFT = 0.118, -4e-3, 4e-3, 1e-3
 
 
-def deviations(seed: int, units: int = 30) -> FloatArray:
+def deviations(seed: int, units: int = 25) -> FloatArray:
     """True level and drift (units, 2) of each unit, less the fleet's."""
     return np.random.default_rng(1000 + seed).normal(0.0, [SPREAD, OWN_DRIFT], (units, 2))
 
 
-def made(seed: int, logs: int = 300, units: int = 30, factor: float = 1.0) -> Observations:
+def made(seed: int, logs: int = 200, units: int = 25, factor: float = 1.0) -> Observations:
     """Logs of known truth that scatter `factor` times as much as they state."""
     draws = np.random.default_rng(seed)
     unit = np.arange(logs) % units
@@ -77,8 +77,8 @@ def test_the_scatter_of_logs_is_found(factor: float) -> None:
 
 def test_without_units_it_is_weighted_least_squares() -> None:
     base = made(1)
-    noise = 0.5 * base.std * np.random.default_rng(0).standard_normal(300)
-    seen = replace(base, y=LEVEL + noise, unit=np.zeros(300, dtype=int), z=base.z[:, :0])
+    noise = 0.5 * base.std * np.random.default_rng(0).standard_normal(200)
+    seen = replace(base, y=LEVEL + noise, unit=np.zeros(200, dtype=int), z=base.z[:, :0])
     found = fit(seen)
     root = 1.0 / seen.std
     exact, *_ = np.linalg.lstsq(seen.x * root[:, None], seen.y * root, rcond=None)
@@ -87,7 +87,7 @@ def test_without_units_it_is_weighted_least_squares() -> None:
 
 
 def test_equal_units_have_no_spread() -> None:
-    seen = made(2)
+    seen = made(2, 300, 30)
     draws = np.random.default_rng(0)
     found = fit(replace(seen, y=LEVEL + seen.std * draws.standard_normal(300)))
     assert found.sigma[0] < 3e-4
