@@ -20,10 +20,12 @@ SHIFT_SIGMA = {"torque_start": 0.01, "inertia_start": 0.001, "lockup": 0.0005}
 
 @dataclass(frozen=True)
 class Knowledge:
-    """Standard deviations of the card's design values: Jo′ relative, P0 [Pa], both 0 for known."""
+    """Standard deviations of the card's design values, 0 for known: Jo′ relative, P0 [Pa], drums
+    [kg m^2]."""
 
     J_out: float = 0.0
     P0: float = 0.0
+    drum: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,8 @@ def realise(scenario: Scenario, seed: int, know: Knowledge, noise: float = 1.0) 
     couplings = {}
     for one in model.elements:
         P0 = PriorValue(one.P0 + know.P0 * float(rng.standard_normal()), know.P0)
-        drum = PriorValue(one.drum_inertia)
+        about = max(0.0, one.drum_inertia + know.drum * float(rng.standard_normal()))
+        drum = PriorValue(about, know.drum)
         couplings[one.name] = Coupling(one.name, 1.0 / one.i_c, one.i_out, one.gain, P0, drum)
     driveline = Driveline(
         model.i_f,

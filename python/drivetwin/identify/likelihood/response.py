@@ -49,6 +49,8 @@ class Response:
 
         Not finite where the run itself is unstable, as with a law that falls steeply with slip.
         """
+        if not self.finite:
+            return np.full((len(self.transition) + 1, STATES), np.nan)
         push = np.zeros_like(next(iter(self.drive.values())))
         for name, values in disturbance.items():
             push += self.drive[name] * values[:, None]

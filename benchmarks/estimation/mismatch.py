@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""What faults that nobody states do to the fit: shift of the mean against the same seeds without.
+
+The fit is told nothing of the fault. Its chi2 hardly moves; that is the point of the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.estimation.bench import Bench, Knowledge, realise
+from benchmarks.estimation.study import START_INERTIA, best_fit, told
+from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenarios import gearbox, throttle_steps
+from drivetwin.identify.inputs import disturbed
+from drivetwin.identify.integral import identify_shift
+from drivetwin.identify.signals import PriorValue
+
+SHOWN = ("eta", "J_prime_2", "J_out", "Tv_over_if", "J_vehicle", "k_o", "c_o", "mu at 30 rad/s")
+KNOW = Knowledge(J_out=0.1)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """`faulty` and `sound` are scenarios; `disturb` is a sensor role with its gain and offset."""
+
+    text: str
+    sound: Callable[[], Scenario]
+    faulty: Callable[[], Scenario]
+    disturb: tuple[str, float, float] = ("", 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Mean shift by parameter [%], of the delay [ms], and chi2 with and without the fault."""
+
+    fault: Fault
+    percent: dict[str, float]
+    delay: float
+    chi2: tuple[float, float]
+
+
+def late_torque() -> Scenario:
+    """`throttle_steps` with an engine torque that is 15 ms old."""
+    base = throttle_steps()
+    sensors = [replace(s, delay=0.015) if s.role == "engine_torque" else s for s in base.sensors]
+    return replace(base, sensors=tuple(sensors))
+
+
+FAULTS = (
+    Fault("drums of 0.05 kg m²", lambda: gearbox(0.0), lambda: gearbox(0.05)),
+    Fault("drums of 0.2 kg m²", lambda: gearbox(0.0), lambda: gearbox(0.2)),
+    Fault("pressure of B3 +20 kPa", throttle_steps, throttle_steps, ("pressure.B3", 0.0, 2e4)),
+    Fault("engine torque 15 ms late", throttle_steps, late_torque),
+    Fault("engine torque +3 %", throttle_steps, throttle_steps, ("engine_torque", 0.03, 0.0)),
+    Fault("output torque +1 %", throttle_steps, throttle_steps, ("output_torque", 0.01, 0.0)),
+)
+
+
+def shift_of(fault: Fault, count: int) -> Shift:
+    """The shift over `count` noise realisations."""
+    sound, faulty = [], []
+    for seed in range(count):
+        sound.append(_told(_drumless(realise(fault.sound(), seed, KNOW))))
+        bench = _drumless(realise(fault.faulty(), seed, KNOW))
+        faulty.append(_told(replace(bench, signals=disturbed(bench.signals, *fault.disturb))))
+    means = [
+        {n: float(np.mean([one[n] for one in runs])) for n in runs[0]} for runs in (sound, faulty)
+    ]
+    percent = {n: 100.0 * (means[1][n] / means[0][n] - 1.0) for n in SHOWN}
+    delay = 1e3 * (means[1]["te_delay"] - means[0]["te_delay"])
+    return Shift(fault, percent, delay, (means[0]["chi2"], means[1]["chi2"]))
+
+
+def _drumless(bench: Bench) -> Bench:
+    """The bench with a card that knows of no drums."""
+    driveline = bench.driveline
+    bare = {n: replace(c, drum=PriorValue(0.0)) for n, c in driveline.couplings.items()}
+    changed = replace(
+        driveline,
+        offgoing=bare[driveline.offgoing.name],
+        oncoming=bare[driveline.oncoming.name],
+        couplings=bare,
+    )
+    return replace(bench, driveline=changed)
+
+
+def _told(bench: Bench) -> dict[str, float]:
+    fit = best_fit(bench, identify_shift(bench.signals, bench.driveline, START_INERTIA))
+    return {**{n: value for n, (value, _) in told(fit, bench).items()}, "chi2": fit.chi2}
