@@ -55,8 +55,8 @@ def render_fleet(store: Store, found: Sequence[JointEstimate], library: str | No
     sections = [
         _overview(store),
         _parameters(found),
-        *_ageing(found),
         _odd(store, found),
+        _ageing(found),
         _friction(store),
         _failed(store),
         _settings(store),
@@ -168,20 +168,29 @@ def _remark(one: JointEstimate) -> str:
     return "; ".join(parts)
 
 
-def _ageing(found: Sequence[JointEstimate]) -> list[Section]:
-    """A section for each parameter: over the first field, and by unit."""
-    sections = []
-    for number, one in enumerate(found):
-        blocks: list[Block] = []
+def _ageing(found: Sequence[JointEstimate]) -> Section:
+    """Every parameter over the first field, and by unit; those that drift or differ first."""
+    several = len({one.rule for one in found}) > 1
+    blocks: list[Block] = []
+    for one in sorted(found, key=lambda one: not _tells(one)):
+        name = parameter_label(one.parameter) + (f" of {one.rule}" if several else "")
         if one.drifts:
-            text = "Every log; the shared line with its 95 % band. Dashed: a unit changed there."
+            text = f"{name}: every log; the shared line with its 95 % band."
+            if one.changes:
+                text += " Dashed: a unit changed there."
             blocks.append(FigureBlock(drift_figure(one), text))
         if len(one.units) > 1:
-            text = "How far each unit is from the shared value, with 95 % intervals."
+            text = f"{name}: how far each unit is from the shared value, with 95 % intervals."
             blocks.append(FigureBlock(units_figure(one), text))
-        title = f"{parameter_label(one.parameter)} of {one.rule}"
-        sections.append(Section(f"parameter-{number}", title, "", blocks))
-    return sections
+    return Section(
+        "ageing", "Ageing and units", "Parameters that drift or differ over units first.", blocks
+    )
+
+
+def _tells(one: JointEstimate) -> bool:
+    """Whether a parameter drifts, or differs over units, beyond its intervals."""
+    drifts = bool(one.drifts) and math.prod(one.drifts[0].ci95) > 0.0
+    return drifts or (one.spread_ci95 is not None and one.spread_ci95[0] > 0.0)
 
 
 def _odd(store: Store, found: Sequence[JointEstimate]) -> Section:
