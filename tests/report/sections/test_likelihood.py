@@ -11,8 +11,9 @@ import numpy as np
 from drivetwin.identify.likelihood.curves import curves_of
 from drivetwin.identify.result import Identification
 from drivetwin.report.html import render_report
-from drivetwin.report.sections.blocks import FigureBlock, TableBlock, Tone
+from drivetwin.report.sections.blocks import FigureBlock, TableBlock, TilesBlock, Tone
 from drivetwin.report.sections.likelihood import likelihood_sections
+from drivetwin.report.sections.trust import residual_score, trust_section
 from tests.identify.likelihood.made import bench, fitted
 from tests.report.sample import identification, log
 
@@ -65,3 +66,11 @@ def test_the_page_holds_them() -> None:
     page = render_report(found(), log())
     assert 'id="fit"' in page
     assert 'id="sensors"' in page
+
+
+def test_the_first_page_counts_the_tests() -> None:
+    passed, total = residual_score(found())
+    assert passed == total == 4 * 4
+    tiles = trust_section(found()).blocks[0]
+    assert isinstance(tiles, TilesBlock)
+    assert ("residual tests passed", "16 of 16") in [(one.label, one.value) for one in tiles.tiles]

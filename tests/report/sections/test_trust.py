@@ -84,3 +84,16 @@ def test_a_shared_remark_stands_once() -> None:
     rows = parameter_table(replace(found, estimates=shared)).rows
     remarks = {row[0].text: row[0].remark for row in rows}
     assert (remarks["η"], remarks["k_o"], remarks["J3"]) == ("poorly excited", "as for η", "")
+
+
+def test_the_question_is_answered_with_what_stands_against_it() -> None:
+    found = with_fit(identification(), [validation()])
+    text = trust_section(found).intro
+    assert text.startswith("With reservations: not every parameter is known well; there are warn")
+    sound = {
+        name: one for name, one in found.estimates.items() if one.verdict is Verdict.IDENTIFIED
+    }
+    clean = replace(found, estimates=sound, warnings=())
+    assert trust_section(clean).intro.startswith("Yes, within the range that the log covered.")
+    unseen = replace(clean, fit={})
+    assert "could not be simulated" in trust_section(unseen).intro

@@ -6,6 +6,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 
+from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.residuals import residual_tests
 from drivetwin.identify.result import Estimate, Identification, SignalFit, Verdict
 from drivetwin.parameters import spec_of
 from drivetwin.report.figures.parameters import interval_figure
@@ -63,7 +65,8 @@ def trust_section(found: Identification) -> Section:
 
 def _headline(found: Identification) -> str:
     count = _verdicts(found)
-    text = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)} parameters are identified"
+    identified = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)}"
+    text = f"{_answer(found)} {identified} parameters are identified"
     if count[Verdict.WEAK]:
         text += f", {count[Verdict.WEAK]} only weakly"
     if count[Verdict.NOT_IDENTIFIABLE]:
@@ -80,6 +83,35 @@ def _headline(found: Identification) -> str:
     return text
 
 
+def _answer(found: Identification) -> str:
+    """The answer in a word, with what stands against a plain yes."""
+    count, (passed, tests) = _verdicts(found), residual_score(found)
+    against = []
+    if not found.fit:
+        against.append("the model could not be simulated over the log")
+    elif any(_fit_tone(fits["all"]) is not Tone.GOOD for fits in found.fit.values()):
+        against.append("the simulation leaves too much of an output")
+    if passed < tests:
+        against.append("the residuals show an effect that the model lacks")
+    if count[Verdict.WEAK] or count[Verdict.NOT_IDENTIFIABLE]:
+        against.append("not every parameter is known well")
+    if found.warnings:
+        against.append("there are warnings")
+    if not against:
+        return "Yes, within the range that the log covered."
+    return f"With reservations: {'; '.join(against)}."
+
+
+def residual_score(found: Identification) -> tuple[int, int]:
+    """Tests of the likelihood's residuals: how many passed, of how many; (0, 0) without any."""
+    fit = found.evidence.get("likelihood")
+    if not isinstance(fit, LikelihoodFit):
+        return 0, 0
+    tests = [test for group in residual_tests(fit).values() for test in group]
+    total = sum(1 + len(test.correlation) for test in tests)
+    return total - sum(len(test.warnings) for test in tests), total
+
+
 def _verdicts(found: Identification) -> Counter[Verdict]:
     return Counter(estimate.verdict for estimate in found.estimates.values())
 
@@ -91,6 +123,10 @@ def _tiles(found: Identification) -> list[Tile]:
         if fit is not None:
             note = f"rmse {significant(fit.rmse * display.factor, 3)} {display.label}"
             tiles.append(Tile(f"fit of {label}", _percent(fit), _fit_tone(fit), note))
+    passed, tests = residual_score(found)
+    if tests:
+        tone = Tone.GOOD if passed == tests else Tone.DOUBTFUL
+        tiles.append(Tile("residual tests passed", f"{passed} of {tests}", tone, "see the fit"))
     count = _verdicts(found)
     complete = not count[Verdict.WEAK] and not count[Verdict.NOT_IDENTIFIABLE]
     tiles.append(
