@@ -102,6 +102,7 @@ def _check(log: ShiftLog, times: Mapping[Boundary, float]) -> None:
 def phase_figure(log: ShiftLog, shift: Shift) -> go.Figure:
     """The shift with a line at each boundary, to be dragged; the other shapes stay in place."""
     figure = shift_phases(log, shift)
+    figure.update_layout(xaxis={"uirevision": f"{shift.start_gear}-{shift.end_gear}"})
     for one, time in times_of(shift).items():
         outer = one in (Boundary.START, Boundary.END)
         figure.add_shape(

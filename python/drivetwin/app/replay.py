@@ -18,6 +18,7 @@ from drivetwin.report.decimate import focused
 from drivetwin.report.figures.stack import Curve, Panel, stacked
 from drivetwin.report.figures.validation import validation_panels
 from drivetwin.report.labels import parameter_label
+from drivetwin.report.sections.blocks import link_of
 from drivetwin.report.style import MUTED
 from drivetwin.report.units import Display, display_of
 from drivetwin.shifts.shift import Shift
@@ -118,7 +119,7 @@ def figure_of(identified: Validation, present: Validation) -> go.Figure:
     """Simulation over measurement; where parameters are changed also the one as identified."""
     panels = [_with_identified(panel, identified) for panel in validation_panels(present)]
     figure = stacked(panels, present.phases, height=_HEIGHT)
-    figure.update_layout(uirevision="kept")
+    figure.update_layout(uirevision=link_of(present.shift))
     return figure
 
 

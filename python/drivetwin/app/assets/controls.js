@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Selects hand over their value; upload buttons send a file; figures follow light and dark. */
+/* Selects hand over their value; upload buttons send a file. */
 "use strict";
 (() => {
   const idOf = (element) => (element.id.startsWith("{") ? JSON.parse(element.id) : element.id);
@@ -55,32 +55,4 @@
     picker.addEventListener("change", () => picker.files[0] && send(button, picker.files[0]));
     picker.click();
   });
-
-  /* Colours of text in figures; traces keep theirs, which read on both grounds. */
-  const dark = window.matchMedia("(prefers-color-scheme: dark)");
-  const inks = { true: "#dfe3e9", false: "#2a313b" };
-
-  function paint(plot) {
-    const ink = inks[dark.matches];
-    if (!plot.layout || (plot.layout.font || {}).color === ink) return;
-    const ground = dark.matches ? "#232a34" : "#ffffff";
-    const change = { "font.color": ink, "hoverlabel.bgcolor": ground, "hoverlabel.font.color": ink };
-    (plot.layout.updatemenus || []).forEach((_, index) => {
-      change[`updatemenus[${index}].bgcolor`] = ground;
-      change[`updatemenus[${index}].bordercolor`] = dark.matches ? "#475060" : "#c3cad4";
-      change[`updatemenus[${index}].font.color`] = ink;
-    });
-    window.Plotly.relayout(plot, change);
-  }
-  const paintAll = () => document.querySelectorAll(".js-plotly-plot").forEach(paint);
-  dark.addEventListener("change", paintAll);
-  const seen = new WeakSet();
-  new MutationObserver(() => {
-    document.querySelectorAll(".js-plotly-plot").forEach((plot) => {
-      if (seen.has(plot) || !plot.on) return;
-      seen.add(plot);
-      plot.on("plotly_afterplot", () => paint(plot));
-      paint(plot);
-    });
-  }).observe(document, { childList: true, subtree: true });
 })();
