@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.logs.damage import clipped, dropouts, missing, runs, spikes, stuck
+from drivetwin.logs.damage import (
+    clipped,
+    dropouts,
+    longest_rest,
+    missing,
+    runs,
+    spikes,
+    stuck,
+)
 from drivetwin.logs.shiftlog import FloatArray, Quantity
 
 TIME = np.arange(0.0, 4.0, 0.002)
@@ -156,3 +164,21 @@ def test_runs_cover_exactly_what_is_true(flags: list[bool]) -> None:
         assert start < end
         rebuilt[start:end] = True
     assert np.array_equal(rebuilt, mask)
+
+
+def test_a_coarse_torque_that_rests_too_long_is_noticed() -> None:
+    rng = np.random.default_rng(5)
+    time = np.linspace(0.0, 4.99, 500)
+    values = 11.0 * np.round((800.0 + 5.0 * rng.normal(size=500)) / 11.0)
+    assert longest_rest(time, values) is None
+    values[200:260] = values[200]
+    span = longest_rest(time, values)
+    assert span is not None
+    assert abs(span[0] - 2.0) < 0.06
+    assert abs(span[1] - 2.6) < 0.06
+
+
+def test_a_calculated_torque_without_jitter_may_rest() -> None:
+    time = np.linspace(0.0, 4.99, 500)
+    steps = np.repeat([200.0, 900.0, 500.0, 700.0, 300.0], 100)
+    assert longest_rest(time, steps) is None

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -33,6 +33,7 @@ def wave(count: int, rounding: float) -> FloatArray:
     return np.asarray(rounding * np.round(torque / rounding), dtype=np.float64)
 
 
+@settings(deadline=None)
 @given(period=st.integers(5, 40), data=st.data(), rounding=st.sampled_from([0.01, 1.0, 11.0, 25.0]))
 def test_every_update_is_found_and_no_other_sample(
     period: int, data: st.DataObject, rounding: float

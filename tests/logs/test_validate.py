@@ -184,3 +184,30 @@ def test_suction_asks_for_the_sign() -> None:
     with pytest.raises(PlausibilityError, match="goes down to -14 bar") as caught:
         check_channel(channel("pressure.B2", ramp(-14e5, 0.1e5), "bar"), "log.csv")
     assert 'channels.pressure.B2 = { source = "X", sign = -1 }' in caught.value.remedy
+
+
+@pytest.mark.parametrize("role", ["pressure.B3", "output_torque", "engine_torque"])
+def test_a_number_that_overflows_is_refused(role: str) -> None:
+    rng = np.random.default_rng(2)
+    size = 1e6 if role.startswith("pressure") else 2000.0
+    true = size * (0.5 + 0.4 * np.sin(np.linspace(0.0, 9.0, TIME.size)))
+    true = true + 1e-3 * size * rng.normal(size=TIME.size)
+    check_channel(channel(role, true), "log.csv")
+    with pytest.raises(DamagedChannelError, match="as a number that overflows does"):
+        check_channel(channel(role, np.mod(true, 0.7 * size)), "log.csv")
+
+
+def test_a_switched_pressure_does_not_overflow() -> None:
+    values = np.where(np.arange(TIME.size) < TIME.size // 2, 14e5, 0.0)
+    values = values + 4e3 * np.random.default_rng(1).normal(size=TIME.size)
+    assert check_channel(channel("pressure.B2", values), "log.csv").warnings == ()
+    noise = 4e3 * np.random.default_rng(1).normal(size=TIME.size)
+    assert check_channel(channel("pressure.B2", noise), "log.csv").warnings == ()
+
+
+def test_a_saturated_pressure_is_told() -> None:
+    true = 8e5 + 4e3 * np.random.default_rng(1).normal(size=TIME.size)
+    true = true + 3e5 * np.sin(np.linspace(0.0, 26.0, TIME.size))
+    checked = check_channel(channel("pressure.B2", np.minimum(true, 9.9e5)), "log.csv")
+    assert any("at one number" in text for text in checked.warnings)
+    assert np.count_nonzero(checked.channel.values == 9.9e5) < 3

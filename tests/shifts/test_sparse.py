@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivetwin.shifts.sparse import begun, ended
@@ -13,6 +13,7 @@ from drivetwin.shifts.sparse import begun, ended
 STEP = 0.02
 
 
+@settings(deadline=None)
 @given(
     start=st.floats(1.0, 1.02),
     duration=st.floats(0.25, 0.6),

@@ -47,6 +47,12 @@ _BEFORE, _RESTLESS, _ALIVE = 20, 5, 0.2
 this share of the usual size.
 """
 
+_JITTER = 0.3
+"""Least share of steps that move for a coarse signal to jitter."""
+
+_UNLIKELY = float(np.log(1e-9))
+"""Logarithm of the chance below which a rest is none of the jitter's own."""
+
 _DROP = 0.3
 """Least step into and out of a dropout as a share of the signal's level."""
 
@@ -155,6 +161,25 @@ def _restless(steps: FloatArray, usual: float) -> bool:
     """Tell whether successive steps are as large as usual and turn as noise does."""
     turns = np.count_nonzero(np.diff(np.sign(steps)))
     return bool(turns >= _RESTLESS and np.median(np.abs(steps)) > _ALIVE * usual)
+
+
+def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | None:
+    """Longest span [s] of one number, if a coarse signal that jitters would not rest so by chance.
+
+    The share of steps that move, besides long rests, tells how likely a rest of that length is.
+    """
+    still = np.diff(values) == 0.0
+    found = runs(still)
+    if not found:
+        return None
+    start, end = max(found, key=lambda run: run[1] - run[0])
+    long = sum(b - a for a, b in found if b - a >= _STUCK_SAMPLES)
+    others = still.size - long
+    moving = np.count_nonzero(~still)
+    if others < _ENOUGH or values[start] == 0.0 or moving < _JITTER * others:
+        return None
+    unlikely = (end - start) * np.log1p(-moving / others) if moving < others else -np.inf
+    return (float(time[start]), float(time[end])) if unlikely < _UNLIKELY else None
 
 
 def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:

@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
-from drivetwin.logs.damage import Damage, clipped, dropouts, missing, spikes, stuck
+from drivetwin.logs.damage import (
+    Damage,
+    clipped,
+    dropouts,
+    longest_rest,
+    missing,
+    spikes,
+    stuck,
+)
+from drivetwin.logs.held import find_raster, fresh_samples
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.logs.units import usual_units
 
@@ -39,6 +48,12 @@ LEAST_SUCTION = 1e5
 
 MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
 """Speed change [rad/s] and rate [rad/s2] that no shaft of a driveline shows between samples."""
+
+WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
+"""An overflow jumps by this share of the range, and by so many usual steps."""
+
+WRAP_BESIDE, WRAP_DRIFT = 5, 0.02
+"""So many samples before and after an overflow move against the jump by this share at least."""
 
 BAR = 1e5
 
@@ -97,7 +112,9 @@ def check_channel(channel: Channel, file: str) -> Checked:
     _check_magnitude(channel, where)
     _check_sign(channel, where)
     _check_jumps(channel, where)
+    _check_wraps(channel, where)
     warnings += _at_limit(channel)
+    warnings += _at_rest(channel)
     return Checked(channel, tuple(warnings))
 
 
@@ -121,6 +138,20 @@ def _at_limit(channel: Channel) -> list[str]:
     ]
 
 
+def _at_rest(channel: Channel) -> list[str]:
+    """Words for an engine torque that stays at one number where chance would have moved it."""
+    if channel.role != "engine_torque":
+        return []
+    fresh = fresh_samples(replace(channel, held=find_raster(channel) is not None))
+    span = longest_rest(fresh.time, fresh.values)
+    if span is None:
+        return []
+    return [
+        f"channel {channel.source_name!r}: one number from {span[0]:.6g} s to {span[1]:.6g} s, "
+        "though it jitters elsewhere; if it is stuck there, results that rest on it are wrong"
+    ]
+
+
 def _dropouts(channel: Channel) -> Damage | None:
     if channel.quantity not in (Quantity.SPEED, Quantity.TORQUE):
         return None
@@ -132,12 +163,25 @@ def _spikes(channel: Channel) -> Damage | None:
 
 
 def _stuck(channel: Channel) -> Damage | None:
-    measured = channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
-    return stuck(channel.time, channel.values, channel.quantity) if measured else None
+    """Stretches of one number; of an engine torque that a logger holds, in its fresh values."""
+    if channel.role == "engine_torque":
+        held = find_raster(channel) is not None
+        fresh = fresh_samples(replace(channel, held=held))
+        found = stuck(fresh.time, fresh.values, channel.quantity)
+        if found is None or not held:
+            return found
+        update = np.searchsorted(fresh.time, channel.time, side="right") - 1
+        return Damage(found.mask[np.clip(update, 0, None)], found.text)
+    return stuck(channel.time, channel.values, channel.quantity) if _measured(channel) else None
 
 
 def _clipped(channel: Channel) -> Damage | None:
-    return clipped(channel.time, channel.values) if channel.role in _MUST_VARY else None
+    return clipped(channel.time, channel.values) if _measured(channel) else None
+
+
+def _measured(channel: Channel) -> bool:
+    """Whether a sensor's noise is expected in a channel."""
+    return channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
 
 
 def _without(channel: Channel, damage: Damage | None, warnings: list[str]) -> Channel:
@@ -245,6 +289,33 @@ def _check_jumps(channel: Channel, where: Where) -> None:
             "another channel",
             Where(where.file, where.channel, float(channel.time[index])),
         )
+
+
+def _check_wraps(channel: Channel, where: Where) -> None:
+    """Refuse a torque or pressure that starts again at its other end and goes on as before.
+
+    That is a number that overflows; a signal that truly jumps does not go on in the direction that
+    it came from.
+    """
+    if channel.quantity not in (Quantity.TORQUE, Quantity.PRESSURE):
+        return
+    values, span = channel.values, float(np.ptp(channel.values))
+    near = WRAP_BESIDE
+    steps = np.abs(np.diff(values))
+    usual = float(np.median(steps[steps > 0.0])) if steps.any() else 0.0
+    jumps = np.flatnonzero(steps > max(WRAP_SHARE * span, WRAP_CONTRAST * usual))
+    for index in jumps[(jumps >= near) & (jumps < values.size - near - 1)]:
+        jump = float(values[index + 1] - values[index])
+        came = float(values[index] - values[index - near])
+        went = float(values[index + 1 + near] - values[index + 1])
+        least = WRAP_DRIFT * span
+        if min(-np.sign(jump) * came, -np.sign(jump) * went) > least:
+            raise DamagedChannelError(
+                f"goes on at {_show(float(values[index + 1]), channel.quantity)} after "
+                f"{_show(float(values[index]), channel.quantity)}, as a number that overflows does",
+                "export the channel with more bits or another scale, or cut the log there",
+                Where(where.file, where.channel, float(channel.time[index])),
+            )
 
 
 def _check_variation(channel: Channel, where: Where) -> None:

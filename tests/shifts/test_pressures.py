@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""One clutch that serves both gears is split where it is open; two elements stay as they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import MissingChannelError
+from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.shifts.pressures import one_clutch, shift_pressures
+from drivetwin.shifts.shift import Shift, ShiftKind
+
+TIME = np.linspace(0.0, 4.0, 401)
+PRESSURE = np.interp(TIME, [1.9, 2.1, 2.5, 2.8], [1e6, 0.0, 0.0, 8e5])
+SHIFT = Shift(
+    "2", "3", "K2", "K3", ShiftKind.POWER_ON_UP, (0.0, 2.0), (2.0, 2.0), (2.0, 2.7), (2.7, 4.0), 2.7
+)
+
+
+def _log(**columns: tuple[str, object]) -> ShiftLog:
+    channels = {}
+    for element, (column, values) in columns.items():
+        role = f"pressure.{element}"
+        channel = Channel(role, Quantity.PRESSURE, TIME, np.asarray(values), column, "Pa")
+        channels[role] = channel
+    return ShiftLog(channels, "made", "")
+
+
+def test_one_column_belongs_to_each_element_in_turn() -> None:
+    log = _log(K2=("P", PRESSURE), K3=("P", PRESSURE))
+    assert one_clutch(log, "K2", "K3")
+    parts = shift_pressures(log, SHIFT)
+    assert parts["K2"].values + parts["K3"].values == pytest.approx(PRESSURE)
+    assert parts["K2"].values[TIME > 2.4].max() == 0.0
+    assert parts["K3"].values[TIME < 2.2].max() == 0.0
+    assert parts["K3"].role == "pressure.K3"
+
+
+def test_two_columns_stay_as_they_are() -> None:
+    log = _log(K2=("P2", PRESSURE), K3=("P3", PRESSURE[::-1]))
+    assert not one_clutch(log, "K2", "K3")
+    parts = shift_pressures(log, SHIFT)
+    assert parts["K2"] is log.pressure("K2")
+    assert parts["K3"] is log.pressure("K3")
+
+
+def test_a_missing_pressure_is_named() -> None:
+    with pytest.raises(MissingChannelError, match=r"pressure\.K3"):
+        shift_pressures(_log(K2=("P2", PRESSURE)), SHIFT)
+    assert not one_clutch(_log(K2=("P2", PRESSURE)), "K2", "K3")
