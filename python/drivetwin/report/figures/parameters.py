@@ -19,12 +19,13 @@ _TICKS = [scale * 10.0**power for power in range(-4, 4) for scale in (1.0, 2.0, 
 def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     """Half width of the 95 % interval relative to the value, total and noise alone, log axis.
 
-    Parameters without an interval and design values are left out.
+    Parameters without an interval, design values, and times, which may be zero, are left out.
     """
     shown = [
         one
         for one in estimates.values()
         if one.verdict is not Verdict.DESIGN
+        and one.unit != "s"
         and half_width_percent(one.value, one.std_total) is not None
     ]
     figure = go.Figure()
