@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError, NoShiftError
+from drivetwin.identify.inputs import driveline_of
 from drivetwin.identify.integral import IntegralShift
+from drivetwin.identify.likelihood.conclude import WITH_ETA, conclude
 from drivetwin.identify.literal import PaperShift
 from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import identify
@@ -20,7 +22,7 @@ from drivetwin.logs.read import read_log
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.shifts.find import FoundShifts, find_shifts
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.spec import SensorTolerance, VehicleCard
+from drivetwin.vehicle.spec import Prior, SensorTolerance, VehicleCard
 
 ROOT = Path(__file__).parents[2]
 LOGS = ROOT.parent / "shared" / "logs"
@@ -185,3 +187,18 @@ def test_without_an_output_torque_ratios_are_told_and_absolute_values_refused() 
         assert abs(ratio.value - absolute / eta) < 4.0 * ratio.std_noise, name
     assert found.estimates["eta"].verdict is Verdict.NOT_IDENTIFIABLE
     assert found.friction["B3"].method == "likelihood, μ over η"
+    _check_efficiency_from_design(found, card)
+
+
+def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> None:
+    """With η on the card the absolute values are told, and η's spread is their systematic part."""
+    known = replace(card, known={"eta": Prior(0.9, 0.02)})
+    driveline = driveline_of(known, found.shifts[0])
+    fit, signals = found.evidence["likelihood"], found.evidence["signals"]
+    told = conclude(fit, signals, [driveline], {}, {}).estimates
+    ratio = found.estimates["J_vehicle_over_eta"]
+    assert ratio.value is not None
+    assert told["J_vehicle"].value == pytest.approx(0.9 * ratio.value)
+    assert told["J_vehicle"].std_systematic == pytest.approx(0.02 * ratio.value)
+    assert told["J_vehicle"].method == WITH_ETA
+    assert told["eta"].verdict is Verdict.DESIGN
