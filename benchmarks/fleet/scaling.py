@@ -79,6 +79,7 @@ def _run(logs: Path, function: str, workers: int, cluster: bool) -> None:
         summary = run_fleet(request)
         wall = perf_counter() - started
         assert summary.done + summary.bad == summary.files
+    # Only now the processes of a cluster have ended and count.
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     processor = sum(one.ru_utime + one.ru_stime for one in used)
     print(json.dumps(vars(Cost(wall, processor, used[0].ru_maxrss / 1024))))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 from typing import Any
@@ -91,4 +91,5 @@ def table(log: str, rows: Sequence[Row]) -> Any:
     """Arrow table of a log's rows, in their order."""
     import pyarrow as pa
 
-    return pa.Table.from_pylist([{"log": log, **asdict(row)} for row in rows], schema=schema())
+    columns = {name: [getattr(row, name) for row in rows] for name in schema().names[1:]}
+    return pa.table({"log": [log] * len(rows), **columns}, schema=schema())
