@@ -34,6 +34,18 @@ def test_time_left_follows_from_the_share_done() -> None:
     assert str(line) == "identifying, likelihood: 25 %, about 18 s left"
 
 
+def test_time_left_counts_down_between_two_shares() -> None:
+    clock = Clock()
+    line = Remaining("identifying", clock)
+    clock.now += 10.0
+    line.hear(0.5, "")
+    clock.now += 4.0
+    assert str(line) == "identifying: 50 %, about 6 s left"
+    line.hear(0.5, "")
+    clock.now += 30.0
+    assert str(line) == "identifying: 50 %, about 1 s left"
+
+
 def test_without_a_share_the_time_passed_is_shown() -> None:
     clock = Clock()
     line = Remaining("reading", clock)

@@ -21,20 +21,24 @@ class Remaining:
         self._start = clock()
         self._share = 0.0
         self._what = ""
+        self._end = self._start
 
     def hear(self, share: float, what: str) -> None:
         """Listener of the computation, see `drivetwin.progress`."""
+        if share > self._share:
+            now = self._clock()
+            self._end = now + (now - self._start) * (1.0 - share) / share
         self._share, self._what = share, what
 
     def __str__(self) -> str:
-        passed = self._clock() - self._start
-        if passed < _QUIET:
+        now = self._clock()
+        if now - self._start < _QUIET:
             return self._text
         doing = f"{self._text}, {self._what}" if self._what else self._text
         if not _EARLY <= self._share < 1.0:
-            return f"{doing}: {duration(passed)}"
-        left = passed * (1.0 - self._share) / self._share
-        return f"{doing}: {100.0 * self._share:.0f} %, about {duration(left)} left"
+            return f"{doing}: {duration(now - self._start)}"
+        left = duration(max(self._end - now, 0.0))
+        return f"{doing}: {100.0 * self._share:.0f} %, about {left} left"
 
 
 def duration(seconds: float) -> str:
