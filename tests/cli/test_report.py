@@ -63,3 +63,12 @@ def test_a_damaged_result_leaves_no_page(
     assert main(["report", *map(str, made), "-o", str(page)]) == 2
     assert "result.json" in capsys.readouterr().err
     assert not page.exists()
+
+
+def test_a_twin_alone_is_refused_with_a_remedy(
+    made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "page.html"
+    assert main(["report", str(made[0] / "twin.toml"), "-o", str(page)]) == 2
+    assert "name further twins, or logs" in capsys.readouterr().err
+    assert not page.exists()

@@ -45,7 +45,13 @@ def report(
             "name a folder that `drivetwin identify -o` wrote, its result.json or its twin.toml",
             Where(file=str(sources[0])),
         )
-    if len(sources) == 1 and made[0].suffix != ".toml":
+    if len(sources) == 1:
+        if made[0].suffix == ".toml":
+            raise InputError(
+                "a twin alone has nothing to be compared with",
+                "name further twins, or logs that it shall simulate",
+                Where(file=str(made[0])),
+            )
         _name_page(made[0], as_json=as_json)
         return
     _compare(made, logs, channels, output)
