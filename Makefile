@@ -102,7 +102,7 @@ picture: $(venv)/.native ## draw the pictures of the documents (needs Chromium)
 
 .PHONY: accuracy
 accuracy: $(venv)/.native ## Monte Carlo of the estimators against the bound, docs/accuracy.md (an hour)
-	$(bin)/python -m benchmarks.estimation
+	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.estimation
 
 .PHONY: fmt
 fmt: $(venv)/.dev ## format Rust and Python sources

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -53,15 +55,28 @@ def run_study(scenario: Scenario, know: Knowledge, count: int) -> Study:
     truth = truth_of(realise(scenario, 0, know, noise=0.0))
     samples: dict[str, dict[str, list[Sample]]] = {"integral": {}, "likelihood": {}}
     failures = dict.fromkeys(samples, 0)
-    for seed in range(count):
-        bench = realise(scenario, seed, know)
-        linear = identify_shift(bench.signals, bench.driveline, START_INERTIA)
-        _collect(samples["integral"], truth, _told_linearly(linear))
-        try:
-            _collect(samples["likelihood"], truth, told(best_fit(bench, linear), bench))
-        except IdentificationError:
-            failures["likelihood"] += 1
+    with ProcessPoolExecutor() as pool:
+        for linear, best in pool.map(partial(_fits, scenario, know), range(count)):
+            _collect(samples["integral"], truth, linear)
+            if best is None:
+                failures["likelihood"] += 1
+            else:
+                _collect(samples["likelihood"], truth, best)
     return Study(scenario.name, truth, bounds_of(scenario, know), samples, failures)
+
+
+_Told = dict[str, tuple[float, float]]
+
+
+def _fits(scenario: Scenario, know: Knowledge, seed: int) -> tuple[_Told, _Told | None]:
+    """What both methods tell of one realisation; None where the likelihood gives up."""
+    bench = realise(scenario, seed, know)
+    linear = identify_shift(bench.signals, bench.driveline, START_INERTIA)
+    try:
+        best = told(best_fit(bench, linear), bench)
+    except IdentificationError:
+        best = None
+    return _told_linearly(linear), best
 
 
 def best_fit(bench: Bench, linear: IntegralShift) -> LikelihoodFit:

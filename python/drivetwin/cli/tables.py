@@ -72,7 +72,8 @@ def friction_table(friction: Mapping[str, FrictionCurve]) -> Table:
     table = table_of(
         "Friction", "element", "slip rad/s", "μ", "95 %", right=("slip rad/s", "μ", "95 %")
     )
-    for element, curve in friction.items():
+    for name, curve in friction.items():
+        element = f"{name} (μ/η)" if curve.over_eta else name
         for place, index in enumerate((0, curve.slip.size // 2, curve.slip.size - 1)):
             band = (float(curve.mu_lo[index]), float(curve.mu_hi[index]))
             value, interval, _ = shown(float(curve.mu[index]), band, "1")

@@ -18,6 +18,9 @@ from drivetwin.shown import Shown
 
 FloatArray = NDArray[np.float64]
 
+OF_RATIO = ", μ over η"
+"""What follows the method of a curve where no output torque gives μ its scale."""
+
 _Z95 = 1.959963984540054
 
 
@@ -92,6 +95,11 @@ class FrictionCurve:
     stribeck: dict[str, float] | None
     method: str
     stribeck_covariance: FloatArray | None = None
+
+    @property
+    def over_eta(self) -> bool:
+        """Whether the curve is μ/η: no output torque gave μ its scale."""
+        return self.method.endswith(OF_RATIO)
 
 
 @dataclass(frozen=True)

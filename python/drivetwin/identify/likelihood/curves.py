@@ -12,12 +12,10 @@ from drivetwin.identify.friction import stribeck
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.unknowns import LAW
-from drivetwin.identify.result import FrictionCurve
+from drivetwin.identify.result import OF_RATIO, FrictionCurve
 from drivetwin.identify.signals import FloatArray
 
 METHOD = "likelihood"
-OF_RATIO = ", μ over η"
-"""What follows the method of a curve where no output torque gives μ its scale."""
 LOCKED = 1e-6
 """Slip [rad/s] below which a simulated element is locked."""
 POINTS = 60
