@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.speed import c_peer, cvode_peer, general, numba_peer, reference, scipy_peer, shift
 from benchmarks.speed.batch import batches
-from benchmarks.speed.core import ROOT, Examples, Scenario
+from benchmarks.speed.core import ROOT, Example, Scenario
 from benchmarks.speed.growth import curves
 from benchmarks.speed.instructions import instruction_table
 from benchmarks.speed.limits import limit_table
@@ -33,20 +33,20 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         _tell("building the example of the core")
-        examples = Examples(folder, build=options.build)
+        example = Example(folder, build=options.build)
         stated = shift.scenario_of(of, given)
-        entries, skipped = _entries(of, given, examples, stated)
+        entries, skipped = _entries(of, given, example, stated)
         measured = measure(entries, options.rounds, _tell)
         extra = {
             "What was set out to be reached": limit_table(measured),
-            "Many runs": batches(of, given, examples),
-            "Instructions": instruction_table(of, given, examples, stated, folder),
+            "Many runs": batches(of, given, folder),
+            "Instructions": instruction_table(of, given, example, stated, folder),
             "Growth": "Time of one run inside Rust, network ready, over the number of samples of "
             "inputs and outputs, of states, and of clutches that slip.\n\n"
             f"![Growth of the time of a run](img/{PICTURE.name})\n",
         }
         text = page(measured, skipped, _base(measured), extra)
-        picture = svg(curves(stated, examples))
+        picture = svg(curves(stated, example))
     _tell("")
     print(text)
     if options.write:
@@ -56,16 +56,16 @@ def main() -> int:
 
 
 def _entries(
-    of: Problem, given: Inputs, examples: Examples, stated: Scenario
+    of: Problem, given: Inputs, example: Example, stated: Scenario
 ) -> tuple[list[Entry], list[Skipped]]:
     judge = shift.judge(reference.read())
     found = [
-        c_peer.entries(of, given, judge, examples.folder),
-        shift.entries(of, given, judge, examples),
+        c_peer.entries(of, given, judge, example.folder),
+        shift.entries(of, given, judge, example),
         cvode_peer.entries(of, given, judge),
         scipy_peer.entries(of, given, judge),
         numba_peer.entries(of, given, judge),
-        general.entries(stated, examples),
+        general.entries(stated, example),
     ]
     skipped = [one for one in found if isinstance(one, Skipped)]
     return [entry for one in found if not isinstance(one, Skipped) for entry in one], skipped

@@ -3,36 +3,35 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
+import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from benchmarks.speed import c_peer, shift
-from benchmarks.speed.core import BATCH, Examples
-from benchmarks.speed.statement import BAR, SAMPLES, Inputs, Problem, start
+from benchmarks.speed.statement import BAR, Inputs, Problem, start
+from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
 from drivetwin.driveline import FloatArray
+from drivetwin.export.modelica.dual_clutch import ENGINE_TORQUE
 
 RUNS = 1000
-LIMIT = 10.0
-"""How many times as fast as the C program's batch on two threads."""
 _SPREAD = 0.05
 _VARIED = (0, 2, 3, 10, 11, 12, 13, 14, 17, 18, 19)
 """J_e, J_v, η, T_v, k, c, both gains, mu_s, mu_c, v_s in the order of the C program."""
-_PARAMETERS = (
-    *("J1", "J_v", "eta", "load.constant", "k_o", "c_o", "2.gain", "3.gain", "start.twist"),
-    *(f"{clutch}.{field}" for clutch in ("2", "3") for field in ("mu_s", "mu_c", "v_s")),
-)
 _THREADS = (1, 2)
-_ROUNDS, _REPEATS, _FINE_STEPS = 5, 3, 20
+_ROUNDS, _FINE_STEPS = 7, 20
+_MEMORY_RUNS = (10_000, 30_000)
+_USUAL_EVENTS = 10
+"""More events than this in one of these shifts are a clutch that chatters."""
 
 
 @dataclass
 class Rates:
-    """Runs per second of one program, pass by pass, by number of threads."""
+    """Times of the passes of one program over all sets [s], by number of threads."""
 
     program: str
     seconds: dict[int, list[float]]
@@ -42,86 +41,93 @@ class Rates:
         return RUNS / float(np.median(self.seconds[threads]))
 
 
-def sets(of: Problem) -> FloatArray:
+def parameter_sets(of: Problem, runs: int = RUNS) -> FloatArray:
     """Parameters (runs, 21) of a fixed seed, in the order of the C program."""
     noise = np.random.default_rng(1)
-    numbers = np.tile(c_peer.parameters(of), (RUNS, 1))
+    numbers = np.tile(c_peer.parameters(of), (runs, 1))
     for column in _VARIED:
-        numbers[:, column] *= 1.0 + _SPREAD * noise.standard_normal(RUNS)
+        numbers[:, column] *= 1.0 + _SPREAD * noise.standard_normal(runs)
     return numbers
 
 
-def batches(of: Problem, given: Inputs, examples: Examples) -> str:
-    """Runs per second and errors of each program, in turns."""
-    numbers = sets(of)
-    scenario = examples.store_text("batch", _scenario(of, given))
-    values = examples.store_text("sets", _sets(of, given, numbers))
+def simulated(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep, int]) -> Batch:
+    """All sets in drivetwin; `how` is what is kept and the number of threads."""
+    keep, threads = how
+    model, signals, begin = shift.model_of(of), shift.signals_of(given), shift.state_of(of, given)
+    torque = signals.pop(ENGINE_TORQUE)
+    measured = {"shaft_torque": np.zeros(given.time.size)} if keep is Keep.MISFIT else None
+    return simulate_batch(
+        model,
+        [Scenario(torque, signals, begin)],
+        given.time,
+        _named(of, given, sets),
+        keep=keep,
+        measured=measured,
+        threads=threads,
+    )
+
+
+def batches(of: Problem, given: Inputs, folder: Path) -> str:
+    """Runs per second, errors and memory, the programs in turns."""
+    sets, library = parameter_sets(of), _library(folder)
     ours = Rates(shift.PROGRAM, {threads: [] for threads in _THREADS})
     theirs = Rates(c_peer.PROGRAM, {threads: [] for threads in _THREADS})
-    library = _library(examples)
-    torques = np.zeros((0, SAMPLES))
     for _ in range(_ROUNDS):
         for threads in _THREADS:
-            arguments = (str(scenario), str(values), str(threads), str(_REPEATS))
-            found = examples.call(BATCH, *arguments)
-            ours.seconds[threads] += [1e-9 * ns for ns in found["ns"]]
-            torques = np.array(found["torque"], dtype=np.float64).reshape(RUNS, SAMPLES)
+            begin = time.perf_counter()
+            found = simulated(of, given, sets, (Keep.COLUMNS, threads))
+            ours.seconds[threads].append(time.perf_counter() - begin)
             if library is not None:
                 begin = time.perf_counter()
-                library.batch(numbers, of, given, (threads, 1))
+                rough = library.batch(sets, of, given, (threads, 1))
                 theirs.seconds[threads].append(time.perf_counter() - begin)
     if library is None:
-        return _table([ours], None)
-    exact = library.batch(numbers, of, given, (max(_THREADS), _FINE_STEPS))
-    rough = library.batch(numbers, of, given, (max(_THREADS), 1))
-    errors = [_errors(ours.program, torques, exact), _errors(theirs.program, rough, exact)]
-    return _table([theirs, ours], theirs) + "\n" + "\n".join([*_ERROR_HEAD, *errors]) + "\n"
+        return "\n".join([_table([ours], None), _memory()])
+    exact = library.batch(sets, of, given, (max(_THREADS), _FINE_STEPS))
+    lines = [
+        f"Errors of T_o over {RUNS} runs [N·m], against C at {_FINE_STEPS} steps per sample:\n",
+        "| program | median | 99 % | worst | failed | chattering |",
+        "|---|---|---|---|---|---|",
+        _errors(theirs.program, rough, exact, ""),
+        _errors(ours.program, found.values[:, 0], exact, str(_chattering(found))),
+        "",
+    ]
+    return "\n".join([_table([theirs, ours], theirs), *lines, _memory()])
 
 
-_ERROR_HEAD = (
-    f"Errors of T_o over {RUNS} runs [N·m], against C at {_FINE_STEPS} steps per sample:\n",
-    "| program | median | 99 % | worst | failed |",
-    "|---|---|---|---|---|",
-)
+def _chattering(found: Batch) -> int:
+    return int(np.count_nonzero(found.events > _USUAL_EVENTS))
 
 
-def _library(examples: Examples) -> c_peer.Library | None:
+def _library(folder: Path) -> c_peer.Library | None:
     if not c_peer.SOURCE.exists():
         return None
     try:
-        return c_peer.Library(examples.folder)
+        return c_peer.Library(folder)
     except (subprocess.CalledProcessError, FileNotFoundError):
         return None
 
 
-def _scenario(of: Problem, given: Inputs) -> str:
-    begin = asdict(shift.state_of(of, given))
-    signals = {name: one.values.tolist() for name, one in shift.signals_of(given).items()}
-    return json.dumps(
-        {
-            "model": asdict(shift.model_of(of)),
-            "time": given.time.tolist(),
-            "signals": signals,
-            "start": begin,
-        }
-    )
-
-
-def _sets(of: Problem, given: Inputs, numbers: FloatArray) -> str:
-    """The same sets under drivetwin's names; the C program starts all with one spring torque."""
-    spring = start(of, given)[3]
-    rows = []
-    for p in numbers:
-        gains = p[13:15] / BAR
-        law = [float(p[17]), float(p[18]), float(p[19])]
-        rows.append(
-            [
-                *(float(p[0] / p[3]), float(p[2]), float(p[3]), float(p[10])),
-                *(float(p[11]), float(p[12]), *gains.tolist(), spring / float(p[11])),
-                *(law + law),
-            ]
-        )
-    return json.dumps({"parameters": _PARAMETERS, "values": rows})
+def _named(of: Problem, given: Inputs, sets: FloatArray) -> dict[str, FloatArray]:
+    """The sets under drivetwin's names; all start with one torque of the shaft's spring."""
+    column = dict(enumerate(sets.T))
+    laws = {
+        f"{clutch}.{field}": column[place]
+        for clutch in ("2", "3")
+        for field, place in (("mu_s", 17), ("mu_c", 18), ("v_s", 19))
+    }
+    return {
+        "J1": column[0] / column[3],
+        "J_v": column[2],
+        "eta": column[3],
+        "load.constant": column[10],
+        "k_o": column[11],
+        "c_o": column[12],
+        "2.gain": column[13] / BAR,
+        "3.gain": column[14] / BAR,
+        "start.twist": start(of, given)[3] / column[11],
+        **laws,
+    }
 
 
 def _table(rates: Sequence[Rates], base: Rates | None) -> str:
@@ -133,9 +139,24 @@ def _table(rates: Sequence[Rates], base: Rates | None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _errors(program: str, torques: FloatArray, exact: FloatArray) -> str:
+def _errors(program: str, torques: FloatArray, exact: FloatArray, chattering: str) -> str:
     worst = np.abs(torques - exact).max(axis=1)
     known = worst[np.isfinite(worst)]
     levels = (np.median(known), np.quantile(known, 0.99), known.max())
     shown = " | ".join(f"{level:.2g}" for level in levels)
-    return f"| {program} | {shown} | {worst.size - known.size} |"
+    return f"| {program} | {shown} | {worst.size - known.size} | {chattering} |"
+
+
+def _memory() -> str:
+    """Bytes per run, from the largest memory of processes with few and with many runs."""
+    lines = ["Memory of a batch, per run:\n", "| kept | bytes per run |", "|---|---|"]
+    for keep, what in ((Keep.COLUMNS, "T_o at every sample"), (Keep.MISFIT, "misfit of T_o")):
+        few, many = (_peak(keep, runs) for runs in _MEMORY_RUNS)
+        per_run = (many - few) / (_MEMORY_RUNS[1] - _MEMORY_RUNS[0])
+        lines.append(f"| {what} | {per_run:,.0f} |")
+    return "\n".join(lines) + "\n"
+
+
+def _peak(keep: Keep, runs: int) -> int:
+    command = [sys.executable, "-m", "benchmarks.speed.memory", keep.value, str(runs)]
+    return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)

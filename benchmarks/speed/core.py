@@ -19,8 +19,7 @@ from drivetwin.driveline import FloatArray, Signal
 from drivetwin.network import Element, Output, Sine, Start
 
 ROOT = Path(__file__).resolve().parents[2]
-RUN, BATCH = "one_shift", "time_batch"
-"""The examples of the core that are timed."""
+_EXAMPLE = "one_shift"
 
 
 @dataclass(frozen=True)
@@ -58,50 +57,35 @@ class Scenario:
         return json.dumps(document)
 
 
-class Examples:
-    """The compiled examples."""
+class Example:
+    """The compiled example."""
 
     def __init__(self, folder: Path, *, build: bool) -> None:
-        """Build them, or take those that are there. Scenarios are stored in `folder`.
+        """Build it, or take the one that is there. Scenarios are stored in `folder`.
 
         Raises CalledProcessError, FileNotFoundError.
         """
         self.folder = folder
         target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-        self._programs = target / "release" / "examples"
+        self.path = target / "release" / "examples" / _EXAMPLE
         if build:
-            command = ["cargo", "build", "--release", "-p", "drivetwin-core"]
-            command += [part for name in (RUN, BATCH) for part in ("--example", name)]
+            command = ["cargo", "build", "--release", "-p", "drivetwin-core", "--example", _EXAMPLE]
             subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-        for name in (RUN, BATCH):
-            if not self.path(name).exists():
-                raise FileNotFoundError(self.path(name))
-
-    def path(self, name: str) -> Path:
-        """Program of an example."""
-        return self._programs / name
+        if not self.path.exists():
+            raise FileNotFoundError(self.path)
 
     def store(self, name: str, scenario: Scenario) -> Path:
         """Scenario as a file."""
-        return self.store_text(name, scenario.as_json())
-
-    def store_text(self, name: str, text: str) -> Path:
-        """Any JSON as a file."""
         path = self.folder / f"{name}.json"
-        path.write_text(text, encoding="utf-8")
+        path.write_text(scenario.as_json(), encoding="utf-8")
         return path
 
     def run(self, scenario: Path, repeats: int, which: str) -> Sample:
         """Seconds of `which` (`prepared` or `whole`) runs, and the solution."""
-        result = self.call(RUN, str(scenario), str(repeats))
+        command = [str(self.path), str(scenario), str(repeats)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+        result = json.loads(done.stdout)
         if result["status"] != "completed":
             raise RuntimeError(f"{scenario.name}: {result['status']}")
         solution = Solution(np.array(result["columns"]), np.array(result["events"]))
         return Sample(result[which], solution)
-
-    def call(self, name: str, *arguments: str) -> dict[str, Any]:
-        """What an example prints."""
-        command = [str(self.path(name)), *arguments]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-        result: dict[str, Any] = json.loads(done.stdout)
-        return result

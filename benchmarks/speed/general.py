@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.speed.core import Examples, Scenario
+from benchmarks.speed.core import Example, Scenario
 from benchmarks.speed.measure import Entry, Group, Judge, Quality
 from benchmarks.speed.shift import OUTPUTS, PROGRAM
 from benchmarks.speed.statement import STEP, Solution
@@ -32,7 +32,7 @@ _ADDED_DRAG = {"gain": 1e-3, "p0": 0.0, "peak": 1.0, "drum_inertia": 0.0}
 _COUPLED_OUTPUTS: tuple[Output, ...] = tuple(("speed", f"w{n}") for n in range(1, 5))
 
 
-def entries(shift: Scenario, examples: Examples) -> list[Entry]:
+def entries(shift: Scenario, example: Example) -> list[Entry]:
     """Eight and twelve states, CoupledClutches, a six-speed gearbox and its dual-clutch form."""
     cases = {
         EIGHT: with_shafts(shift, 2),
@@ -42,19 +42,19 @@ def entries(shift: Scenario, examples: Examples) -> list[Entry]:
     }
     judges = {COUPLED: _coupled_judge()}
     return [
-        _entry(examples, number, name, scenario, judges.get(name))
+        _entry(example, number, name, scenario, judges.get(name))
         for number, (name, scenario) in enumerate(cases.items())
     ]
 
 
 def _entry(
-    examples: Examples, number: int, name: str, scenario: Scenario, judge: Judge | None
+    example: Example, number: int, name: str, scenario: Scenario, judge: Judge | None
 ) -> Entry:
-    path = examples.store(f"general{number}", scenario)
+    path = example.store(f"general{number}", scenario)
     return Entry(
         PROGRAM,
         name,
-        lambda: examples.run(path, _REPEATS, "prepared"),
+        lambda: example.run(path, _REPEATS, "prepared"),
         judge or _against_exact(scenario),
         Group.GENERAL,
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.speed.core import Examples, Scenario
+from benchmarks.speed.core import Example, Scenario
 from benchmarks.speed.general import with_brakes, with_shafts
 from drivetwin.driveline import Signal
 
@@ -24,7 +24,7 @@ class Curve:
     decades: bool = False
 
 
-def curves(shift: Scenario, examples: Examples) -> list[Curve]:
+def curves(shift: Scenario, example: Example) -> list[Curve]:
     """Measured one after the other, inside Rust, network ready."""
     samples: dict[float, Scenario] = {
         rate * 1.5 + 1: resampled(shift, rate) for rate in (250, 500, 1000, 2000, 4000)
@@ -34,11 +34,11 @@ def curves(shift: Scenario, examples: Examples) -> list[Curve]:
     }
     clutches: dict[float, Scenario] = {2.0 + count: with_brakes(shift, count) for count in range(5)}
     return [
-        Curve("samples", _times("samples", samples, examples)),
-        Curve("states", _times("states", states, examples), decades=True),
+        Curve("samples", _times("samples", samples, example)),
+        Curve("states", _times("states", states, example), decades=True),
         Curve(
             "clutches, each new one with two states",
-            _times("clutches", clutches, examples),
+            _times("clutches", clutches, example),
             decades=True,
         ),
     ]
@@ -56,11 +56,11 @@ def resampled(shift: Scenario, rate: float) -> Scenario:
 
 
 def _times(
-    name: str, scenarios: Mapping[float, Scenario], examples: Examples
+    name: str, scenarios: Mapping[float, Scenario], example: Example
 ) -> tuple[tuple[float, float], ...]:
     points = []
     for size, scenario in scenarios.items():
-        path = examples.store(f"{name}{size:g}", scenario)
-        seconds = examples.run(path, _REPEATS, "prepared").seconds
+        path = example.store(f"{name}{size:g}", scenario)
+        seconds = example.run(path, _REPEATS, "prepared").seconds
         points.append((float(size), float(np.median(seconds))))
     return tuple(points)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.speed import c_peer
-from benchmarks.speed.core import RUN, Examples, Scenario
+from benchmarks.speed.core import Example, Scenario
 from benchmarks.speed.statement import SAMPLES, STEP, Inputs, Problem, start
 
 _TARGET = "haswell"
@@ -29,13 +29,13 @@ int main(int count, char **names) {{
 
 
 def instruction_table(
-    of: Problem, given: Inputs, examples: Examples, stated: Scenario, folder: Path
+    of: Problem, given: Inputs, example: Example, stated: Scenario, folder: Path
 ) -> str:
     """Both counts with their ratio, or why there is none."""
     if shutil.which("valgrind") is None:
         return "Not counted: valgrind is not installed.\n"
     ours = count(
-        [str(examples.path(RUN)), str(examples.store("counted", stated)), "0"], "*Plan*run*", folder
+        [str(example.path), str(example.store("counted", stated)), "0"], "*Plan*run*", folder
     )
     lines = [
         "Counted by callgrind, which knows instructions up to AVX2.\n",

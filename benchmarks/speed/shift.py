@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.speed.core import Examples, Scenario
+from benchmarks.speed.core import Example, Scenario
 from benchmarks.speed.measure import Entry, Group, Judge, Quality, timed
 from benchmarks.speed.statement import Inputs, Problem, Solution, start
 from drivetwin.driveline import (
@@ -99,9 +99,9 @@ def scenario_of(of: Problem, given: Inputs) -> Scenario:
     )
 
 
-def entries(of: Problem, given: Inputs, reference: Judge, examples: Examples) -> list[Entry]:
+def entries(of: Problem, given: Inputs, reference: Judge, example: Example) -> list[Entry]:
     """Four outputs on the 1 ms grid, with default settings."""
-    path = examples.store("shift", scenario_of(of, given))
+    path = example.store("shift", scenario_of(of, given))
     model, signals, begin = model_of(of), signals_of(given), state_of(of, given)
     torque = signals.pop(ENGINE_TORQUE)
 
@@ -112,11 +112,11 @@ def entries(of: Problem, given: Inputs, reference: Judge, examples: Examples) ->
         return sensitivities(model, torque, signals, begin, given.time, PARAMETERS)
 
     return [
-        Entry(PROGRAM, PREPARED, lambda: examples.run(path, _REPEATS, "prepared"), reference),
+        Entry(PROGRAM, PREPARED, lambda: example.run(path, _REPEATS, "prepared"), reference),
         Entry(
             PROGRAM,
             WHOLE,
-            lambda: examples.run(path, _REPEATS, "whole"),
+            lambda: example.run(path, _REPEATS, "whole"),
             reference,
         ),
         Entry(
