@@ -6,7 +6,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["gear_statics", "reduce_shift", "sensitivities", "simulate", "simulate_network"]
+__all__ = [
+    "gear_statics",
+    "linearise",
+    "reduce_shift",
+    "sensitivities",
+    "simulate",
+    "simulate_batch",
+    "simulate_network",
+]
 
 _Array = NDArray[np.float64]
 _Options = tuple[float, float, int | None, bool, bool]
@@ -33,6 +41,24 @@ def sensitivities(
     grid: _Array,
     options: tuple[float, Sequence[str]],
 ) -> tuple[_Array, list[tuple[float, str, str]], str, NDArray[np.float64], _Array]: ...
+def linearise(
+    driveline: str,
+    locked: Sequence[str],
+    slipping: Sequence[tuple[str, float, float]],
+    outputs: str,
+) -> tuple[list[_Array], list[str], list[str]]: ...
+def simulate_batch(
+    model: str,
+    scenarios: Sequence[
+        tuple[
+            Sequence[tuple[str, _Array, _Array]], tuple[float, float, float, float, Sequence[str]]
+        ]
+    ],
+    sets: tuple[Sequence[str], _Array],
+    grid: _Array,
+    measured: _Array,
+    options: tuple[str, str, int],
+) -> tuple[_Array, NDArray[np.uint32], _Array, list[tuple[int, str]]]: ...
 def simulate_network(
     driveline: str,
     outputs: str,

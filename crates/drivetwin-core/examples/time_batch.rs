@@ -61,12 +61,14 @@ fn main() {
     let outputs = [Output::ShaftTorque("output shaft".into())];
     let options = (Settings::default(), false);
     let plan = Plan::new(&network, &signals, &scenario.time, &outputs, options).expect("a plan");
+    let scenarios = [(plan, start)];
     let names: Vec<&str> = sets.parameters.iter().map(String::as_str).collect();
     let values: Vec<f64> = sets.values.into_iter().flatten().collect();
     let mut times = Vec::new();
     let run = || {
         let options = (Keep::Columns, threads);
-        dual_clutch_batch(&scenario.model, &start, &plan, (&names, &values), options)
+        dual_clutch_batch(&scenario.model, &scenarios, (&names, &values), options)
+            .expect("names of parameters")
     };
     let mut result = run();
     for _ in 0..repeats {

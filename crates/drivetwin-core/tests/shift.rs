@@ -6,10 +6,10 @@ mod common;
 use common::{paper_driveline, second_gear, upshift};
 use drivetwin_core::model::DualClutch;
 use drivetwin_core::model::mechanism::LossLaw;
+use drivetwin_core::number::Dual;
 use drivetwin_core::number::Real;
 use drivetwin_core::simulate::{DualClutchRun, simulate_dual_clutch};
 use drivetwin_core::solve::{EventKind, Settings, Signal, Status};
-use drivetwin_core::number::Dual;
 
 const SHAFT_TORQUE: usize = 4;
 

@@ -3,7 +3,9 @@
 
 use crate::plain::{Audit, Event, as_tuple, events_of};
 use drivetwin_core::model::DualClutch;
-use drivetwin_core::simulate::{DualClutchStart, dual_clutch_sensitivities, simulate_dual_clutch};
+use drivetwin_core::simulate::{
+    DualClutchStart, Trajectory, dual_clutch_sensitivities, simulate_dual_clutch,
+};
 use drivetwin_core::solve::{Settings, Signal};
 use numpy::{PyArray2, PyArray3, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -12,7 +14,7 @@ use pyo3::prelude::*;
 /// Name, times [s] and values of an input.
 type Samples<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
 /// Speeds of engine, output and wheel [rad/s], twist [rad], names of locked elements.
-type Start = (f64, f64, f64, f64, Vec<String>);
+pub type Start = (f64, f64, f64, f64, Vec<String>);
 /// Tolerance, longest step [s], fixed order, whether samples without events may be passed at once,
 /// whether to audit the energy.
 type Options = (f64, f64, Option<usize>, bool, bool);
@@ -88,17 +90,29 @@ pub fn sensitivities<'py>(
     Ok((
         PyArray2::from_vec2(py, &found.run.columns)?,
         events_of(&found.run),
-        found.run.status.to_string(),
+        status_of(&found.run),
         PyArray3::from_vec3(py, &found.columns)?,
         PyArray2::from_vec2(py, &found.events)?,
     ))
 }
 
-fn model_of(json: &str) -> PyResult<DualClutch<f64>> {
+/// The status, and what makes derivatives worthless.
+fn status_of(run: &Trajectory<f64>) -> String {
+    match &run.grazing {
+        Some((time, element)) => {
+            format!("{}; {element} grazes its event at {time:.9} s", run.status)
+        }
+        None => run.status.to_string(),
+    }
+}
+
+/// A driveline from its JSON.
+pub fn model_of(json: &str) -> PyResult<DualClutch<f64>> {
     serde_json::from_str(json).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
-fn start_of(start: Start) -> DualClutchStart<f64> {
+/// The start as the core takes it.
+pub fn start_of(start: Start) -> DualClutchStart<f64> {
     let (engine_speed, output_speed, wheel_speed, twist, locked) = start;
     DualClutchStart { engine_speed, output_speed, wheel_speed, twist, locked }
 }

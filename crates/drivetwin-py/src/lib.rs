@@ -3,8 +3,10 @@
 //!
 //! Private to the package; the Python modules of the same names are its face.
 
+mod batch;
 mod dual_clutch;
 mod gearbox;
+mod linear;
 mod network;
 mod plain;
 
@@ -15,6 +17,8 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(dual_clutch::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(dual_clutch::sensitivities, module)?)?;
+    module.add_function(wrap_pyfunction!(batch::simulate_batch, module)?)?;
+    module.add_function(wrap_pyfunction!(linear::linearise, module)?)?;
     module.add_function(wrap_pyfunction!(network::simulate_network, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::reduce_shift, module)?)?;

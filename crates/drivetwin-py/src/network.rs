@@ -64,7 +64,7 @@ pub fn simulate_network<'py>(
 }
 
 /// Read the elements one by one, so that a fault names its element.
-fn parse(elements: &str) -> PyResult<Driveline<f64>> {
+pub fn parse(elements: &str) -> PyResult<Driveline<f64>> {
     let refuse = |name: &str, e: serde_json::Error| PyValueError::new_err(format!("{name}: {e}"));
     let all: Vec<serde_json::Value> =
         serde_json::from_str(elements).map_err(|e| refuse("elements", e))?;

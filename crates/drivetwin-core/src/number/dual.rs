@@ -63,11 +63,13 @@ impl<const P: usize> Sub for Dual<P> {
     }
 }
 
+#[expect(clippy::suspicious_arithmetic_impl, reason = "the product rule is a sum")]
 impl<const P: usize> Mul for Dual<P> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        self.zip(o, self.re * o.re, |a, b| self.re * b + a * o.re)
+        let product_rule = |a, b| self.re * b + a * o.re;
+        self.zip(o, self.re * o.re, product_rule)
     }
 }
 

@@ -145,7 +145,7 @@ impl Values for f64 {
     }
     #[inline(always)]
     fn fallen(self) -> u32 {
-        u32::from(!(self > 0.0))
+        u32::from(self <= 0.0 || self.is_nan())
     }
 }
 

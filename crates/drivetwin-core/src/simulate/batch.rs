@@ -3,6 +3,7 @@
 
 use super::dual_clutch::DualClutchStart;
 use super::run::{Plan, SimulateError};
+use super::sensitivity::SensitivityError;
 use super::start::State;
 use super::trajectory::Recorder;
 use crate::model::dual_clutch::DualClutch;
@@ -64,7 +65,8 @@ pub fn batch<'p>(
         side_by_side(&members, (&plan_of, &make), keep, values)
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let mut all = || values.par_chunks_mut((WIDTH * per_run).max(1)).enumerate().map(group).collect();
+    let mut all =
+        || values.par_chunks_mut((WIDTH * per_run).max(1)).enumerate().map(group).collect();
     let ends: Vec<Vec<End>> = match (per_run, pool) {
         (0, _) => vec![Vec::new(); runs],
         (_, Ok(pool)) => pool.install(all),
@@ -79,34 +81,40 @@ pub fn batch<'p>(
     result
 }
 
-/// Simulate a dual-clutch driveline under many sets of the named parameters, `sets` runs × parameters.
-/// Names are those of [`DualClutch::parameter_mut`] and, after `start.`, of the start; others are left
-/// out.
+/// Simulate a dual-clutch driveline under `sets` of the named parameters (runs × parameters), in one
+/// scenario or in one for every run: `scenarios` are plans and starts, run i takes that of its number or
+/// the only one. Names are those of [`DualClutch::parameter_mut`] and, after `start.`, of the start.
 pub fn dual_clutch_batch(
     model: &DualClutch<f64>,
-    start: &DualClutchStart<f64>,
-    plan: &Plan<f64>,
+    scenarios: &[(Plan<f64>, DualClutchStart<f64>)],
     (parameters, sets): (&[&str], &[f64]),
     options: (Keep<'_>, usize),
-) -> Batch {
+) -> Result<Batch, SensitivityError> {
     let width = parameters.len();
-    let count = if width == 0 { 0 } else { sets.len() / width };
-    let make = |i: usize| {
-        let (mut model, mut start) = (model.clone(), start.clone());
-        for (name, &value) in parameters.iter().zip(&sets[i * width..][..width]) {
+    let count = sets.len().checked_div(width).unwrap_or(scenarios.len());
+    let place = |model: &mut DualClutch<f64>, start: &mut DualClutchStart<f64>, i: usize| {
+        for (k, &name) in parameters.iter().enumerate() {
             let place = match name.split_once('.') {
                 Some(("start", field)) => start.field_mut(field),
                 _ => model.parameter_mut(name),
             };
-            if let Some(place) = place {
-                *place = value;
-            }
+            *place.ok_or(name)? = sets[i * width + k];
         }
+        Ok::<(), &str>(())
+    };
+    if count > 0 {
+        place(&mut model.clone(), &mut scenarios[0].1.clone(), 0)
+            .map_err(|name| SensitivityError::Unknown { name: name.to_owned() })?;
+    }
+    let scenario = |i: usize| &scenarios[i % scenarios.len()];
+    let make = |i: usize| {
+        let (mut model, mut start) = (model.clone(), scenario(i).1.clone());
+        place(&mut model, &mut start, i).expect("names that the first run has");
         let network = Network::compile(&model.driveline())?;
         let state = start.named().state(&network)?;
         Ok((network, state))
     };
-    batch(count, |_| plan, make, options)
+    Ok(batch(count, |i| &scenario(i).0, make, options))
 }
 
 /// How one run ended.
@@ -142,7 +150,8 @@ fn side_by_side<'p>(
     let mut ends: Vec<End> = Vec::with_capacity(members.len());
     let mut together = Vec::with_capacity(members.len());
     for (&i, prepared) in members.iter().zip(&prepared) {
-        let nothing = End { outcome: Outcome::Ran(Status::Completed), events: 0, last_lock: f64::NAN };
+        let nothing =
+            End { outcome: Outcome::Ran(Status::Completed), events: 0, last_lock: f64::NAN };
         ends.push(match prepared {
             Err(error) => End { outcome: Outcome::Refused(error.clone()), ..nothing },
             Ok((network, state)) => match plan_of(i).start(network, state) {

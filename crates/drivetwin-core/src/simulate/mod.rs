@@ -4,6 +4,7 @@
 mod audit;
 mod batch;
 mod dual_clutch;
+mod linear;
 mod run;
 mod sensitivity;
 mod start;
@@ -11,9 +12,8 @@ mod trajectory;
 
 pub use audit::EnergyAudit;
 pub use batch::{Batch, Keep, Outcome, batch, dual_clutch_batch};
-pub use dual_clutch::{
-    DualClutchRun, DualClutchStart, dual_clutch_outputs, simulate_dual_clutch,
-};
+pub use dual_clutch::{DualClutchRun, DualClutchStart, dual_clutch_outputs, simulate_dual_clutch};
+pub use linear::{Linear, Slipping, linearise};
 pub use run::{Plan, SimulateError, run};
 pub use sensitivity::{Sampled, Sensitivities, SensitivityError, dual_clutch_sensitivities};
 pub use start::{Start, StartError, State};

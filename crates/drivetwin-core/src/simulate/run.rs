@@ -22,6 +22,11 @@ pub enum SimulateError {
     /// The start or the outputs.
     #[error(transparent)]
     Start(#[from] StartError),
+    /// Efficiencies that leave the motion undetermined.
+    #[error(
+        "a gear of the driveline is self-locking: its efficiency leaves the motion undetermined"
+    )]
+    Undetermined,
     /// The grid.
     #[error("the time grid must be finite and increase, with at least two points (point {index})")]
     Grid {
@@ -88,18 +93,20 @@ impl<T: Real> Plan<T> {
     pub fn run(&self, network: &Network<T>, start: &State<T>) -> Trajectory<T> {
         let mut recorder = Recorder::new(network, &self.targets, &self.grid);
         let mut events = Vec::new();
-        let mut balance = None;
+        let (mut balance, mut grazing) = (None, None);
         let mut integrate = || -> Result<(), Status> {
             let mut run = self.integrator(network, start)?;
             let outcome = if self.audit {
                 let mut auditor = Auditor::new(network, &run.x);
-                let outcome = recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
+                let outcome =
+                    recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
                 balance = Some(auditor.close(network, &run.x));
                 outcome
             } else {
                 recorder.run_to_end(&mut run)
             };
             events = std::mem::take(&mut run.events);
+            grazing = run.grazing.take();
             outcome
         };
         let status = integrate().err().unwrap_or(Status::Completed);
@@ -107,7 +114,7 @@ impl<T: Real> Plan<T> {
         let elements =
             frictions.chain(network.losses.iter().map(|gear| gear.element.clone())).collect();
         let (time, columns) = (self.grid.clone(), recorder.finish());
-        Trajectory { time, columns, elements, events, status, audit: balance }
+        Trajectory { time, columns, elements, events, status, grazing, audit: balance }
     }
 }
 

@@ -3,9 +3,10 @@
 
 use super::dual_clutch::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
 use super::run::SimulateError;
+use super::trajectory::Trajectory;
 use crate::model::dual_clutch::DualClutch;
 use crate::number::{Dual, Real};
-use crate::solve::{Settings, Signal};
+use crate::solve::{Event, Settings, Signal};
 use thiserror::Error;
 
 /// Parameters that one pass differentiates for.
@@ -54,21 +55,36 @@ pub fn dual_clutch_sensitivities(
     grid: &[f64],
     (settings, parameters): (Settings, &[&str]),
 ) -> Result<Sensitivities, SensitivityError> {
-    let plain: Vec<_> = signals
-        .iter()
-        .map(|&(name, times, values, delay)| (name, Signal::Samples { times, values, delay }))
-        .collect();
-    let run = simulate_dual_clutch(model, &plain, start, grid, (settings, false))?;
     let (mut columns, mut events) = (Vec::new(), Vec::new());
-    for group in parameters.chunks(LANES) {
+    let mut run = None;
+    // Without parameters one pass for the values.
+    for k in 0..parameters.len().div_ceil(LANES).max(1) {
+        let group = &parameters[k * LANES..parameters.len().min((k + 1) * LANES)];
         let dual = differentiated(model, signals, start, grid, (settings, group))?;
+        run.get_or_insert_with(|| values_of(&dual));
         for lane in 0..group.len() {
             let column = |c: &Vec<Derived>| c.iter().map(|value| value.eps[lane]).collect();
             columns.push(dual.columns.iter().map(column).collect());
             events.push(dual.events.iter().map(|e| e.time.eps[lane]).collect());
         }
     }
+    let run = run.expect("at least one pass");
     Ok(Sensitivities { run, columns, events })
+}
+
+/// The run without its derivatives.
+fn values_of(run: &DualClutchRun<Derived>) -> DualClutchRun<f64> {
+    let column = |c: &Vec<Derived>| c.iter().map(Real::re).collect();
+    let event = |e: &Event<Derived>| Event { time: e.time.re, element: e.element, kind: e.kind };
+    Trajectory {
+        time: run.time.clone(),
+        columns: run.columns.iter().map(column).collect(),
+        elements: run.elements.clone(),
+        events: run.events.iter().map(event).collect(),
+        status: run.status.clone(),
+        grazing: run.grazing.clone(),
+        audit: run.audit,
+    }
 }
 
 fn differentiated(

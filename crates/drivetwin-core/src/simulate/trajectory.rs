@@ -64,6 +64,25 @@ impl Output {
     }
 }
 
+impl Target {
+    /// The target over the basis; `friction` gives the row of a friction torque. An angle counts as its
+    /// rate.
+    pub(super) fn row(
+        self,
+        network: &Network<f64>,
+        friction: impl Fn(usize) -> Vec<f64>,
+    ) -> Vec<f64> {
+        let mut row = vec![0.0; network.basis()];
+        let target = if let Self::Angle(node) = self { Self::Speed(node) } else { self };
+        match Column::of(network, target) {
+            Column::Linear(terms) => terms.iter().for_each(|&(position, c)| row[position] += c),
+            Column::Friction(j) => row = friction(j),
+            Column::Angle(..) => unreachable!("an angle counts as its rate"),
+        }
+        row
+    }
+}
+
 /// A target of one network over its basis.
 enum Column<T> {
     /// Linear form over the basis: position and coefficient of its terms.
@@ -88,6 +107,8 @@ pub struct Trajectory<T> {
     pub events: Vec<Event<T>>,
     /// How the run ended.
     pub status: Status,
+    /// Time [s] and element of the first event that only grazed its guard: no derivatives after it.
+    pub grazing: Option<(f64, String)>,
     /// Energy balance, where asked for.
     pub audit: Option<EnergyAudit>,
 }

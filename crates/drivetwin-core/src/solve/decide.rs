@@ -214,7 +214,9 @@ impl<T: Real> Integrator<'_, T> {
                     (-capacities[j].re(), f64::INFINITY)
                 }
                 Row::Friction(j) => (-capacities[j].re(), capacities[j].re()),
-                Row::Gear(g) => self.gear_bounds(g, form(mode.gear_torque(self.network).row(g), basis).re()),
+                Row::Gear(g) => {
+                    self.gear_bounds(g, form(mode.gear_torque(self.network).row(g), basis).re())
+                }
             };
             let (excess, sign) =
                 if torque > high { (torque - high, 1.0) } else { (low - torque, -1.0) };

@@ -121,9 +121,7 @@ impl<const N: usize> Formation<N> {
     /// March until every member has ended.
     fn march<S: Recording>(mut self, members: &mut [Member<'_, '_, S>]) {
         let live = |member: &Member<'_, '_, S>| member.ready.is_some();
-        while let Some(segment) =
-            members.iter().filter(|m| live(m)).map(|m| m.run.segment).min()
-        {
+        while let Some(segment) = members.iter().filter(|m| live(m)).map(|m| m.run.segment).min() {
             let joining = self.join(members, segment);
             let ahead = |m: &Member<'_, '_, S>| if m.joined { m.until } else { m.run.segment };
             let until = members.iter().filter(|m| live(m)).map(ahead).min().unwrap_or(segment);
@@ -134,7 +132,8 @@ impl<const N: usize> Formation<N> {
             let inputs: [&Inputs<f64>; WIDTH] = std::array::from_fn(|lane| {
                 members[if lane < members.len() { lane } else { 0 }].run.inputs
             });
-            let source = Together { inputs, shared: inputs.iter().all(|i| std::ptr::eq(*i, inputs[0])) };
+            let source =
+                Together { inputs, shared: inputs.iter().all(|i| std::ptr::eq(*i, inputs[0])) };
             let (passed, fallen) = self.pass((&source, h), samples, joining);
             for (lane, member) in members.iter_mut().enumerate().filter(|(_, m)| m.joined) {
                 let fell = fallen >> lane & 1 == 1;
@@ -249,12 +248,7 @@ impl<const N: usize> Formation<N> {
     }
 
     /// Let a member go with its state `x` at the start of its segment.
-    fn leave<S: Recording>(
-        &mut self,
-        lane: usize,
-        member: &mut Member<'_, '_, S>,
-        x: &[f64; N],
-    ) {
+    fn leave<S: Recording>(&mut self, lane: usize, member: &mut Member<'_, '_, S>, x: &[f64; N]) {
         let run = &mut *member.run;
         let n = run.x.len();
         run.x.copy_from_slice(&x[..n]);
@@ -303,7 +297,8 @@ impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
             let first = operators.guards::<F, A>(&sample, (x, &fresh));
             for lane in (0..WIDTH).filter(|lane| joining >> lane & 1 == 1) {
                 carry.take_lane(lane, &fresh);
-                for (guard, first) in guards.as_flattened_mut().iter_mut().zip(first.as_flattened()) {
+                for (guard, first) in guards.as_flattened_mut().iter_mut().zip(first.as_flattened())
+                {
                     guard.0[lane] = first.0[lane];
                 }
             }

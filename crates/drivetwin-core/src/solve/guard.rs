@@ -44,12 +44,13 @@ pub struct Watch<'a, T> {
     pub gears: &'a [GearState],
 }
 
-/// The earliest fall within `h` [s], refined so that the time carries derivatives.
+/// The earliest fall within `h` [s], refined so that the time carries derivatives, and whether it
+/// grazes.
 pub fn earliest<T: Real>(
     watch: &Watch<'_, T>,
     expansion: &Expansion<T>,
     h: f64,
-) -> Option<(T, Cause)> {
+) -> Option<(T, Cause, bool)> {
     let mut best: Option<(f64, Series<T>, Cause)> = None;
     let mut consider = |series: Series<T>, cause: Cause| {
         let horizon = best.as_ref().map_or(h, |b| b.0);
@@ -71,7 +72,10 @@ pub fn earliest<T: Real>(
             consider(border, Cause::Border(i, next));
         }
     }
-    best.map(|(t, series, cause)| (refined(&series, expansion.order, t), cause))
+    best.map(|(t, series, cause)| {
+        let order = expansion.order;
+        (refined(&series, order, t), cause, grazes(&series, order, (t, h)))
+    })
 }
 
 fn friction_guards<T: Real>(
@@ -183,6 +187,24 @@ fn combined<T: Real>(a: &Series<T>, b: &Series<T>, sign: f64) -> Series<T> {
         *o = a + b * sign;
     }
     out
+}
+
+/// Depth below zero, relative to the size of the guard, that counts as a mere touch.
+const GRAZING: f64 = 1e-6;
+
+/// Whether a guard falls so flatly that its parabola dips below zero by next to nothing: the event, and
+/// with it everything after, then hangs on round-off and has no usable derivative.
+fn grazes<T: Real>(guard: &Series<T>, order: usize, (t, h): (f64, f64)) -> bool {
+    let g: Series<f64> = guard.map(|c| c.re());
+    let (fall, mut bend, mut size, mut power) = (slope(&g, order, t), 0.0, 0.0, 1.0);
+    for k in (2..=order).rev() {
+        bend = bend * t + g[k] * (k * (k - 1)) as f64;
+    }
+    for c in &g[..=order] {
+        size += c.abs() * power;
+        power *= h;
+    }
+    t > 0.0 && bend > 0.0 && fall * fall < 2.0 * bend * GRAZING * size
 }
 
 /// One Newton step over the number type: the time of the event then carries its derivatives,

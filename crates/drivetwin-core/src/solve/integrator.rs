@@ -115,6 +115,8 @@ pub struct Integrator<'a, T> {
     pub expansion: Expansion<T>,
     /// Events so far.
     pub events: Vec<Event<T>>,
+    /// Time [s] and element of the first event that only grazed its guard.
+    pub grazing: Option<(f64, String)>,
     pub(super) t: T,
     pub(super) cells: Vec<Cell>,
     pub(super) released: Vec<bool>,
@@ -155,6 +157,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             rows: vec![RowState::Open; frictions],
             expansion: Expansion::new(network),
             events: Vec::new(),
+            grazing: None,
             t: T::of(t),
             cells: vec![Cell::Off; network.channels.len()],
             released: vec![false; frictions + network.losses.len()],
@@ -221,16 +224,19 @@ impl<'a, T: Real> Integrator<'a, T> {
         }
         let stalled = self.stalled >= MAX_STALLED;
         let event = match stalled {
-            true => Some((T::of(h.min(NUDGE)), Cause::Stalled)),
+            true => Some((T::of(h.min(NUDGE)), Cause::Stalled, false)),
             false => earliest(&self.watch(&mode), &self.expansion, h),
         };
         let start = self.t;
         let length = match event {
-            Some((at, _)) => at,
+            Some((at, ..)) => at,
             None if h >= remaining => -self.t + end,
             None => T::of(h),
         };
-        self.pending = event.map(|(_, cause)| cause);
+        self.pending = event.map(|(_, cause, _)| cause);
+        if let (Some((at, cause, true)), None) = (event, &self.grazing) {
+            self.grazing = Some(((start + at).re(), self.culprit(cause)));
+        }
         self.expansion.state_at(length, &mut self.x);
         self.t = if event.is_none() && h >= remaining { T::of(end) } else { start + length };
         self.released.iter_mut().for_each(|r| *r &= length.re() == 0.0);

@@ -79,7 +79,7 @@ const MAX_CUBIC: f64 = 2e-4;
 /// Largest distance over which stiction is moved by its series, relative to its decay.
 const MAX_MOVE: f64 = 0.05;
 /// Largest change of a channel by the correction, relative to its size.
-const MAX_CORRECTION: f64 = 1e-4;
+const MAX_CORRECTION: f64 = 1e-6;
 
 /// Pass up to `count` (at most [`BLOCK`]) samples from segment `first`. Returns how many were passed
 /// and, as bits, the runs of which a guard could have fallen within the next one. State and carry are
@@ -194,7 +194,8 @@ fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
     let mut value = start;
     let mut least = L::Values::all(1.0);
     for a in 0..A {
-        argument[a] = over_cubics::<L, F, N, A, 0, 3>(&channels[a].argument_end, &cubics, argument[a]);
+        argument[a] =
+            over_cubics::<L, F, N, A, 0, 3>(&channels[a].argument_end, &cubics, argument[a]);
         rate[a] = over_cubics::<L, F, N, A, 0, 3>(&channels[a].rate_end, &cubics, rate[a]);
         let (law, normal) = (&channels[a].law, lines[a][1].times(h) + lines[a][0]);
         let (stiction, moved) = law.moved_stiction::<F>(near[a].1, argument[a] - near[a].0);
@@ -224,7 +225,8 @@ fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
         carry.value[a] = corrected;
     }
     for a in 0..A {
-        carry.rate[a] = rate[a] + over_channels::<L, F, N, A>(&channels[a].rate, &carry.value, direct[a]);
+        carry.rate[a] =
+            rate[a] + over_channels::<L, F, N, A>(&channels[a].rate, &carry.value, direct[a]);
         let law = &channels[a].law;
         // Between its ends the argument stays within these values (Bernstein's form of the cubic).
         let (m0, m3) = (before.0[a].values(), carry.argument[a].values());
@@ -335,7 +337,14 @@ fn pair<L: Lane, const F: bool>(coefficients: &[L; 2], (u, du): (L, L), sum: L) 
 }
 
 #[inline(always)]
-fn add_moments<L: Lane, const F: bool, const N: usize, const A: usize, const FROM: usize, const TO: usize>(
+fn add_moments<
+    L: Lane,
+    const F: bool,
+    const N: usize,
+    const A: usize,
+    const FROM: usize,
+    const TO: usize,
+>(
     op: &Operators<L, N>,
     cubics: &[[L; CUBIC]; A],
     end: &mut [L; N],
@@ -350,7 +359,14 @@ fn add_moments<L: Lane, const F: bool, const N: usize, const A: usize, const FRO
 }
 
 #[inline(always)]
-fn over_cubics<L: Lane, const F: bool, const N: usize, const A: usize, const FROM: usize, const TO: usize>(
+fn over_cubics<
+    L: Lane,
+    const F: bool,
+    const N: usize,
+    const A: usize,
+    const FROM: usize,
+    const TO: usize,
+>(
     form: &StepForm<L, N>,
     cubics: &[[L; CUBIC]; A],
     sum: L,

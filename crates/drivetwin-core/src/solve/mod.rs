@@ -22,9 +22,9 @@ mod status;
 mod transition;
 
 pub use expansion::Expansion;
+pub use formation::{Recording, WIDTH, run_together};
 pub use inputs::{InputError, Inputs, Signal};
 pub use integrator::{Event, EventKind, Integrator, RowState, Settings, Step};
-pub use formation::{Recording, WIDTH, run_together};
 pub use march::BLOCK;
 pub use sprint::{Samples, Sink};
 pub use status::Status;

@@ -186,8 +186,17 @@ impl<T: Real, const N: usize> Operators<T, N> {
             .collect();
         // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
         let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
-        let mut operators =
-            Self { states: n, bow, signs, transition, constant, drives, channels: vec![], watched: vec![], loads: vec![] };
+        let mut operators = Self {
+            states: n,
+            bow,
+            signs,
+            transition,
+            constant,
+            drives,
+            channels: vec![],
+            watched: vec![],
+            loads: vec![],
+        };
         for (slot, &j) in active.iter().enumerate() {
             let argument: [T; N] = std::array::from_fn(|i| {
                 network.channels[j].arguments[0].get(i).map_or(T::zero_(), |&c| c * signs[slot])

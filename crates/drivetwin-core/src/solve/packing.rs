@@ -164,12 +164,7 @@ impl<const K: usize, const N: usize> StepForm<Pack<K>, N> {
 }
 
 impl<const K: usize, const N: usize> Form<Pack<K>, N> {
-    fn set_lane(
-        &mut self,
-        lane: usize,
-        from: &Form<f64, N>,
-        own: impl Fn(usize) -> Option<usize>,
-    ) {
+    fn set_lane(&mut self, lane: usize, from: &Form<f64, N>, own: impl Fn(usize) -> Option<usize>) {
         put(&mut self.state, &from.state, lane);
         self.constant.0[lane] = from.constant;
         for (slot, channel) in self.channels.iter_mut().enumerate() {

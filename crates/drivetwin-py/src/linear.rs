@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+//! The linear system about an operating point; see `drivetwin.linear`.
+
+use crate::dual_clutch::model_of;
+use crate::network::parse;
+use drivetwin_core::network::Network;
+use drivetwin_core::network::linalg::Matrix;
+use drivetwin_core::simulate::{Output, Slipping, linearise as linearised};
+use numpy::PyArray2;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// A, B, C, D and the names of states and inputs.
+type System<'py> = ([Bound<'py, PyArray2<f64>>; 4], Vec<String>, Vec<String>);
+
+/// Linearise a driveline, given as JSON: that of a dual clutch or a list of elements. Slipping elements
+/// are name, slip [rad/s] and pressure [Pa].
+#[pyfunction]
+pub fn linearise<'py>(
+    py: Python<'py>,
+    driveline: &str,
+    locked: Vec<String>,
+    slipping: Vec<(String, f64, f64)>,
+    outputs: &str,
+) -> PyResult<System<'py>> {
+    let refuse = |e: &dyn std::fmt::Display| PyValueError::new_err(e.to_string());
+    let elements = match driveline.trim_start().starts_with('[') {
+        true => parse(driveline)?,
+        false => model_of(driveline)?.driveline(),
+    };
+    let outputs: Vec<Output> = serde_json::from_str(outputs).map_err(|e| refuse(&e))?;
+    let network = Network::compile(&elements).map_err(|e| refuse(&e))?;
+    let slipping: Vec<Slipping> = slipping
+        .into_iter()
+        .map(|(element, slip, pressure)| Slipping { element, slip, pressure })
+        .collect();
+    let system = linearised(&network, &locked, &slipping, &outputs).map_err(|e| refuse(&e))?;
+    let array = |m: &Matrix<f64>| {
+        let rows: Vec<Vec<f64>> = (0..m.rows).map(|i| m.row(i).to_vec()).collect();
+        PyArray2::from_vec2(py, &rows)
+    };
+    let matrices = [array(&system.a)?, array(&system.b)?, array(&system.c)?, array(&system.d)?];
+    Ok((matrices, system.states, system.inputs))
+}

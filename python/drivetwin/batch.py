@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""Many runs of a dual-clutch driveline: parameter sets in one scenario, or many scenarios.
+
+Runs over the same samples go side by side through the vector units and over all cores. A run's
+result depends neither on its neighbours nor on the number of threads.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin import _native
+from drivetwin.driveline import DualClutch, FloatArray, Signal, State, as_json
+from drivetwin.errors import InputError
+
+
+class Keep(StrEnum):
+    """What is kept of every run, so that memory fits the question."""
+
+    COLUMNS = "columns"  # every output on the grid
+    LAST = "last"  # every output at the end
+    MISFIT = "misfit"  # per output the sum over the grid of (simulated - measured)^2
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Inputs and start of a run; `pressures` [Pa, gauge] by element name."""
+
+    engine_torque: Signal
+    pressures: Mapping[str, Signal]
+    start: State
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Result of a batch, runs in the order given.
+
+    `values`: (runs, outputs, time) for COLUMNS, (runs, outputs) otherwise, SI; NaN for runs that
+    failed, whose reason stands in `failed` by number. `events` (runs,) counts the changes of
+    friction mode; `last_lock` (runs,) is the time of the last lock-up [s], NaN without one.
+    """
+
+    values: FloatArray
+    events: NDArray[np.uint32]
+    last_lock: FloatArray
+    failed: Mapping[int, str]
+
+
+OUTPUTS: Mapping[str, Mapping[str, str]] = {
+    "engine_speed": {"speed": "engine"},
+    "output_speed": {"speed": "output"},
+    "wheel_speed": {"speed": "wheel"},
+    "twist": {"twist": "output shaft"},
+    "shaft_torque": {"shaft_torque": "output shaft"},
+}
+
+
+def simulate_batch(
+    model: DualClutch,
+    scenarios: Sequence[Scenario],
+    time: FloatArray,
+    parameters: Mapping[str, FloatArray] | None = None,
+    *,
+    outputs: Sequence[str] = ("shaft_torque",),
+    keep: Keep = Keep.COLUMNS,
+    measured: Mapping[str, FloatArray] | None = None,
+    threads: int = 0,
+) -> Batch:
+    """Simulate on `time` (n,) [s] once per set of `parameters`, or once per scenario.
+
+    `parameters` maps names as in `driveline.sensitivities` (but for delays) to their values
+    (runs,); with several scenarios there must be one for every run. Outputs are the names of
+    OUTPUTS, and `torque.<element>` or `slip.<element>`. `measured` (n,) per output is what MISFIT
+    compares with; NaN samples are left out. `threads` 0 takes all cores.
+    Raises InputError for unknown names, differing lengths or an inconsistent description.
+    """
+    sets = {name: np.asarray(v, dtype=np.float64) for name, v in (parameters or {}).items()}
+    counts = {len(values) for values in sets.values()}
+    runs = counts.pop() if sets else len(scenarios)
+    if counts or (len(scenarios) != 1 and len(scenarios) != runs) or not runs:
+        lengths = sorted({len(values) for values in sets.values()})
+        raise InputError(
+            f"{len(scenarios)} scenarios and parameters of {lengths} values make no batch",
+            "give every parameter as many values, and one scenario or as many",
+        )
+    table = np.stack(list(sets.values()), axis=1) if sets else np.empty((0, 0))
+    kept_of = [_output(name) for name in outputs]
+    target = [
+        np.asarray((measured or {}).get(name, np.full(len(time), np.nan))) for name in outputs
+    ]
+    if keep is Keep.MISFIT and any(len(t) != len(time) for t in target):
+        raise InputError("a measured column is not as long as the time", "sample it on the time")
+    try:
+        values, events, last_lock, failed = _native.simulate_batch(
+            as_json(asdict(model)),
+            [_plain(scenario) for scenario in scenarios],
+            (list(sets), np.ascontiguousarray(table)),
+            np.ascontiguousarray(time, dtype=np.float64),
+            np.ascontiguousarray(target, dtype=np.float64),
+            (keep.value, json.dumps(kept_of), threads),
+        )
+    except ValueError as error:
+        raise InputError(str(error), "correct the model, its inputs or the names") from error
+    shape = (runs, len(outputs), len(time)) if keep is Keep.COLUMNS else (runs, len(outputs))
+    return Batch(values.reshape(shape), events, last_lock, dict(failed))
+
+
+def _output(name: str) -> Mapping[str, str]:
+    kind, _, element = name.partition(".")
+    if element and kind in ("torque", "slip"):
+        return {"friction_torque" if kind == "torque" else "slip": element}
+    if name not in OUTPUTS:
+        known = ", ".join([*OUTPUTS, "torque.<element>", "slip.<element>"])
+        raise InputError(f"output {name!r} is unknown", f"choose from {known}")
+    return OUTPUTS[name]
+
+
+def _plain(
+    scenario: Scenario,
+) -> tuple[list[tuple[str, FloatArray, FloatArray]], tuple[float, float, float, float, list[str]]]:
+    signals = {"engine torque": scenario.engine_torque, **scenario.pressures}
+    columns = [
+        (name, np.ascontiguousarray(s.time + s.delay), np.ascontiguousarray(s.values, np.float64))
+        for name, s in signals.items()
+    ]
+    s = scenario.start
+    return columns, (s.engine_speed, s.output_speed, s.wheel_speed, s.twist, list(s.locked))

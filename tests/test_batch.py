@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: MIT
+"""Batches: each run what it is alone, whatever runs beside it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
+from drivetwin.driveline import (
+    Accuracy,
+    DualClutch,
+    FloatArray,
+    RoadLoad,
+    ShiftElement,
+    Signal,
+    State,
+    Stribeck,
+    simulate,
+)
+from drivetwin.errors import InputError
+
+FRICTION = Stribeck(mu_c=0.12, mu_s=0.145, v_s=6.0, mu_v=1e-4)
+MODEL = DualClutch(
+    J1=20.6,
+    J2e=0.0,
+    eta=0.85,
+    loss_law="paper",
+    i_in=1.0,
+    J_out=1.5,
+    i_f=6.0,
+    J_v=6000.0,
+    k_o=1.8e5,
+    c_o=240.0,
+    load=RoadLoad(constant=13800.0),
+    elements=(
+        ShiftElement("B2", 1.4, 1.6, 2.9e-2, 8e4, FRICTION),
+        ShiftElement("B3", 0.95, 1.6, 4.7e-2, 8e4, FRICTION),
+    ),
+)
+TIME = np.arange(1001) * 1e-3
+START = State(185.0, 185 / 2.24, 185 / 2.24 / 6, 0.0133, ("B2",))
+
+
+def scenario(seed: int = 0) -> Scenario:
+    """An upshift with noise on its signals."""
+    rng = np.random.default_rng(seed)
+    torque = np.interp(TIME, [0, 0.4, 0.5, 0.8, 1], [1400, 1400, 1150, 1250, 1400])
+    off = np.interp(TIME, [0, 0.2, 0.25, 0.3, 0.4], [10, 10, 6.5, 5, 0])
+    on = np.interp(TIME, [0, 0.15, 0.2, 0.25, 0.4, 0.7, 1], [0, 0, 1, 1, 6, 6.5, 10])
+    noisy = on + (on > 0) * 0.01 * rng.standard_normal(len(TIME))
+    pressures = {"B2": Signal(TIME, off * 1e5), "B3": Signal(TIME, np.maximum(noisy, 0) * 1e5)}
+    return Scenario(Signal(TIME, torque + 6 * rng.standard_normal(len(TIME))), pressures, START)
+
+
+def sets(runs: int, seed: int = 1) -> dict[str, FloatArray]:
+    """Values spread by 5 %."""
+    rng = np.random.default_rng(seed)
+    nominal = {"eta": 0.85, "J1": 20.6, "k_o": 1.8e5, "B3.mu_c": 0.12, "B3.gain": 4.7e-2}
+    return {k: v * (1 + 0.05 * rng.standard_normal(runs)) for k, v in nominal.items()}
+
+
+def alone(values: Mapping[str, float], *, exact: bool = False) -> FloatArray:
+    """Shaft torque of one set by itself."""
+    off, on = MODEL.elements
+    friction = dataclasses.replace(FRICTION, mu_c=values["B3.mu_c"])
+    on = dataclasses.replace(on, gain=values["B3.gain"], friction=friction)
+    plain = {k: values[k] for k in ("eta", "J1", "k_o")}
+    model = dataclasses.replace(MODEL, elements=(off, on), **plain)
+    s = scenario()
+    accuracy = Accuracy(exact=exact)
+    return simulate(
+        model, s.engine_torque, s.pressures, s.start, TIME, accuracy=accuracy
+    ).shaft_torque
+
+
+def test_every_run_is_bit_for_bit_what_it_is_alone() -> None:
+    values = sets(19)
+    batch = simulate_batch(MODEL, [scenario()], TIME, values)
+    assert not batch.failed
+    for i in range(19):
+        one = alone({k: float(v[i]) for k, v in values.items()})
+        np.testing.assert_array_equal(batch.values[i, 0], one)
+
+
+def test_runs_stay_close_to_the_exact_solution() -> None:
+    values = sets(40)
+    batch = simulate_batch(MODEL, [scenario()], TIME, values)
+    errors = [
+        np.abs(batch.values[i, 0] - alone({k: float(v[i]) for k, v in values.items()}, exact=True))
+        for i in range(40)
+    ]
+    worst = np.max(errors, axis=1)
+    assert np.median(worst) <= 0.005
+    assert worst.max() <= 0.2
+    assert (batch.events <= 6).all()
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.permutations(range(11)), st.integers(1, 3), st.integers(1, 11))
+def test_order_threads_and_company_do_not_matter(
+    order: list[int], threads: int, count: int
+) -> None:
+    values = sets(11)
+    whole = simulate_batch(MODEL, [scenario()], TIME, values, threads=1)
+    chosen = order[:count]
+    part = {k: v[chosen] for k, v in values.items()}
+    mixed = simulate_batch(MODEL, [scenario()], TIME, part, threads=threads)
+    np.testing.assert_array_equal(mixed.values, whole.values[chosen])
+    np.testing.assert_array_equal(mixed.last_lock, whole.last_lock[chosen])
+
+
+def test_scenarios_on_one_model_are_what_they_are_alone() -> None:
+    scenarios = [scenario(seed) for seed in range(10)]
+    batch = simulate_batch(MODEL, scenarios, TIME, outputs=["engine_speed", "torque.B3"])
+    for s, values in zip(scenarios, batch.values, strict=True):
+        run = simulate(MODEL, s.engine_torque, s.pressures, s.start, TIME)
+        np.testing.assert_allclose(values[0], run.engine_speed, rtol=1e-14)
+        np.testing.assert_allclose(values[1], run.clutch_torque["B3"], rtol=1e-14)
+
+
+def test_what_is_kept_follows_from_the_columns() -> None:
+    values = sets(9)
+    full = simulate_batch(MODEL, [scenario()], TIME, values)
+    last = simulate_batch(MODEL, [scenario()], TIME, values, keep=Keep.LAST)
+    np.testing.assert_array_equal(last.values[:, 0], full.values[:, 0, -1])
+    measured = full.values[0, 0].copy()
+    measured[100:200] = np.nan
+    misfit = simulate_batch(
+        MODEL,
+        [scenario()],
+        TIME,
+        values,
+        keep=Keep.MISFIT,
+        measured={"shaft_torque": measured},
+    )
+    expected = np.nansum((full.values[:, 0] - measured) ** 2, axis=1)
+    np.testing.assert_allclose(misfit.values[:, 0], expected, rtol=1e-12)
+    assert misfit.values[0, 0] == 0.0
+
+
+def failing() -> Batch:
+    values = sets(10)
+    values["J1"][3] = -1.0
+    return simulate_batch(MODEL, [scenario()], TIME, values)
+
+
+def test_a_failed_run_keeps_its_place_and_its_neighbours() -> None:
+    batch, whole = failing(), simulate_batch(MODEL, [scenario()], TIME, sets(10))
+    assert list(batch.failed) == [3]
+    assert "J1" in batch.failed[3]
+    assert np.isnan(batch.values[3]).all()
+    others = [i for i in range(10) if i != 3]
+    np.testing.assert_array_equal(batch.values[others], whole.values[others])
+
+
+def test_lengths_and_names_must_fit() -> None:
+    with pytest.raises(InputError, match="batch"):
+        simulate_batch(MODEL, [scenario()] * 2, TIME, sets(3))
+    with pytest.raises(InputError, match="nonsense"):
+        simulate_batch(MODEL, [scenario()], TIME, {"nonsense": np.ones(2)})
+    with pytest.raises(InputError, match="shaft_torque"):
+        simulate_batch(MODEL, [scenario()], TIME, sets(2), outputs=["angle"])
