@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: MIT
+"""Which elements show their friction: those that slip under pressure for long."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin.identify.likelihood.carriers import SLIDES, all_carriers, carriers
+from drivetwin.identify.signals import Sampled, ShiftSignals
+from tests.identify.synthetic import Run
+
+
+def _held(signals: ShiftSignals, seconds: float) -> ShiftSignals:
+    """The same with the off-going element's pressure held so long after break-away."""
+    off = signals.pressures["B2"]
+    until = signals.shift.inertia_phase[0] + seconds
+    values = np.where(off.time < until, 4e5, 0.0)
+    return replace(signals, pressures={**signals.pressures, "B2": Sampled(off.time, values, 7e3)})
+
+
+def test_the_on_coming_element_alone_where_the_other_vents(stepped: Run) -> None:
+    signals, driveline = stepped.signals(), stepped.truth.driveline()
+    assert carriers(signals, driveline) == ("B3",)
+    assert carriers(_held(signals, 0.5 * SLIDES), driveline) == ("B3",)
+
+
+def test_both_where_the_off_going_one_slips_under_pressure(stepped: Run) -> None:
+    signals, driveline = stepped.signals(), stepped.truth.driveline()
+    slow = _held(signals, 2.0 * SLIDES)
+    assert carriers(slow, driveline) == ("B3", "B2")
+    assert all_carriers([signals, slow], [driveline, driveline]) == ("B3", "B2")
