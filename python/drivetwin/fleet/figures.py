@@ -55,7 +55,7 @@ def drift_figure(one: JointEstimate) -> go.Figure:
         layout(
             380,
             xaxis=axis(drift.field),
-            yaxis=axis(f"{parameter_label(one.parameter)} [{display.label}]"),
+            yaxis=axis(f"{parameter_label(one.parameter)} [{display.label}]", exponentformat="e"),
             hovermode="closest",
         )
     )
@@ -122,7 +122,10 @@ def units_figure(one: JointEstimate) -> go.Figure:
                 showticklabels=few,
                 tickfont={"size": 9},
             ),
-            yaxis=axis(f"deviation of {parameter_label(one.parameter)} [{display.label}]"),
+            yaxis=axis(
+                f"deviation of {parameter_label(one.parameter)} [{display.label}]",
+                exponentformat="e",  # a prefix μ would be taken for friction
+            ),
             hovermode="closest",
         )
     )
