@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -61,11 +62,17 @@ def workbench(
         )
     if browser:
         typer.launch(address)
+    signal.signal(signal.SIGTERM, _end)
     try:
         server.serve_forever()
     finally:
         server.server_close()
         sessions.close()
+
+
+def _end(*_: object) -> None:
+    """End as after Ctrl-C: jobs stopped, temporary files removed."""
+    raise SystemExit(0)
 
 
 def _require_dash() -> None:

@@ -18,6 +18,7 @@ from drivetwin.app.views.parts import (
     announce,
     button,
     choice,
+    due_id,
     field,
     graph,
     hint,
@@ -26,7 +27,6 @@ from drivetwin.app.views.parts import (
     table,
     tell,
     told,
-    topic_id,
 )
 from drivetwin.report.figures.channels import channels_figure
 
@@ -50,7 +50,7 @@ def register(app: Dash, sessions: Sessions) -> None:
 
     @app.callback(
         Output("channels-content", "children"),
-        Input(topic_id(Topic.LOG), "data"),
+        Input(due_id("channels"), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )

@@ -10,7 +10,7 @@ from dash.development.base_component import Component
 
 from drivetwin.app.session import Sessions
 from drivetwin.app.views.blocks import shown
-from drivetwin.app.views.parts import Topic, button, hint, notes, told, topic_id
+from drivetwin.app.views.parts import button, due_id, hint, notes, told
 from drivetwin.app.work import Work
 from drivetwin.identify.method import Method
 from drivetwin.report.candidates import Candidate
@@ -41,7 +41,7 @@ def register(app: Dash, sessions: Sessions) -> None:
 
     @app.callback(
         Output("compare-content", "children"),
-        Input(topic_id(Topic.RESULTS), "data"),
+        Input(due_id("compare"), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )

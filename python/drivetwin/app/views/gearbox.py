@@ -15,12 +15,12 @@ from drivetwin.app.views.parts import (
     announce,
     button,
     choice,
+    due_id,
     field,
     hint,
     row,
     table,
     told,
-    topic_id,
     upload_button,
 )
 from drivetwin.gearbox import Gearbox, builtin_gearboxes
@@ -79,7 +79,7 @@ def register(app: Dash, sessions: Sessions) -> None:
 
     @app.callback(
         Output("gearbox-content", "children"),
-        Input(topic_id(Topic.GEARBOX), "data"),
+        Input(due_id("gearbox"), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )

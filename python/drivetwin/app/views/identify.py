@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
 
 from dash import Dash, Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
@@ -19,6 +18,7 @@ from drivetwin.app.views.parts import (
     announce,
     button,
     choice,
+    due_id,
     hint,
     notes,
     row,
@@ -127,22 +127,30 @@ def _register_progress(app: Dash, sessions: Sessions) -> None:
         return f"{job.share:.3f}", f"{job.text or 'starting'} · {job.elapsed:.0f} s"
 
     @app.callback(
-        Output("identify-content", "children"),
         Output("tick", "disabled"),
         Output("progress-box", "hidden"),
         Output("identify", "disabled"),
         Output("cancel", "disabled"),
         Input(topic_id(Topic.RESULTS), "data"),
-        Input(topic_id(Topic.PHASES), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )
     @told
-    def show(_results: int, _phases: int, key: str) -> tuple[Any, ...]:
+    def follow_on(_: int, key: str) -> tuple[bool, bool, bool, bool]:
+        """Look at the job for as long as there is one."""
+        busy = sessions.get(key).job is not None
+        return not busy, not busy, busy, not busy
+
+    @app.callback(
+        Output("identify-content", "children"),
+        Input(due_id("identify"), "data"),
+        State("session", "data"),
+        prevent_initial_call=True,
+    )
+    @told
+    def show(_: str, key: str) -> list[Component]:
         """What is known so far."""
-        session = sessions.get(key)
-        busy = session.job is not None
-        return _content(session.work), not busy, not busy, busy, not busy
+        return _content(sessions.get(key).work)
 
 
 def _content(work: Work) -> list[Component]:

@@ -15,6 +15,7 @@ from drivetwin.app.views.parts import (
     acted,
     announce,
     button,
+    due_id,
     field,
     hint,
     notes,
@@ -22,7 +23,6 @@ from drivetwin.app.views.parts import (
     table,
     tell,
     told,
-    topic_id,
     upload_button,
 )
 from drivetwin.app.work import Source
@@ -104,7 +104,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         Output("card-path", "value"),
         Output("log-names", "children"),
         Output("card-names", "children"),
-        Input(topic_id(Topic.LOG), "data"),
+        Input(due_id("log"), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )

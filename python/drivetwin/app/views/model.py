@@ -21,6 +21,7 @@ from drivetwin.app.views.parts import (
     badge,
     button,
     choice,
+    due_id,
     field,
     graph,
     hint,
@@ -28,7 +29,6 @@ from drivetwin.app.views.parts import (
     table,
     tell,
     told,
-    topic_id,
 )
 from drivetwin.app.work import Work
 from drivetwin.errors import MissingParameterError
@@ -76,7 +76,7 @@ def register(app: Dash, sessions: Sessions) -> None:
 def _register_bench(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Output("model-content", "children"),
-        Input(topic_id(Topic.LIVE), "data"),
+        Input(due_id("model"), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )
@@ -167,7 +167,7 @@ def _register_sliders(app: Dash, sessions: Sessions) -> None:
 def _register_locks(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Output("locks-content", "children"),
-        Input(topic_id(Topic.RESULTS), "data"),
+        Input(due_id("model"), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )

@@ -20,7 +20,7 @@ from drivetwin.app.views import (
     phases,
     workspace,
 )
-from drivetwin.app.views.parts import Topic, announce, attributes, told, topic_id
+from drivetwin.app.views.parts import Topic, announce, attributes, due_id, told, topic_id
 
 if TYPE_CHECKING:
     from drivetwin.app.server import Start
@@ -37,6 +37,22 @@ VIEWS = {
     "workspace": ("Workspace", workspace),
 }
 _FIRST = "log"
+_TOPICS = {
+    "log": (Topic.LOG,),
+    "channels": (Topic.LOG,),
+    "phases": (Topic.PHASES,),
+    "identify": (Topic.RESULTS, Topic.PHASES),
+    "model": (Topic.RESULTS, Topic.LIVE),
+    "compare": (Topic.RESULTS,),
+    "gearbox": (Topic.GEARBOX,),
+    "workspace": (Topic.LOG,),
+}
+"""What each view shows of a session."""
+_DUE = """(hidden, ...rest) => {
+  const drawn = rest.pop();
+  const present = rest.join(" ").trim();
+  return hidden || !present || present === drawn ? dash_clientside.no_update : present;
+}"""
 _INDEX = """<!DOCTYPE html>
 <html lang="en">
   <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}</head>
@@ -56,6 +72,7 @@ def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
     app.index_string = _INDEX
     app.layout = _layout
     _switch_views(app)
+    _draw_what_is_shown(app)
     _enter(app, sessions, start)
     _show_status(app, sessions)
     for _, view in VIEWS.values():
@@ -89,6 +106,7 @@ def _layout() -> Component:
         [
             dcc.Store(id="session", storage_type="session"),
             *(dcc.Store(id=topic_id(topic)) for topic in Topic),
+            *(dcc.Store(id=due_id(name)) for name in _TOPICS),
             navigation,
             html.Main(
                 [
@@ -110,6 +128,18 @@ def _switch_views(app: Dash) -> None:
         *(Output(f"nav-{name}", "aria-current") for name in VIEWS),
         *(Input(f"nav-{name}", "n_clicks") for name in VIEWS),
     )
+
+
+def _draw_what_is_shown(app: Dash) -> None:
+    """A view is drawn when it is looked at: all of them at once would keep the browser busy."""
+    for name, topics in _TOPICS.items():
+        app.clientside_callback(  # type: ignore[no-untyped-call]
+            _DUE,
+            Output(due_id(name), "data"),
+            Input(f"view-{name}", "hidden"),
+            *(Input(topic_id(topic), "data") for topic in topics),
+            State(due_id(name), "data"),
+        )
 
 
 def _enter(app: Dash, sessions: Sessions, start: Start) -> None:

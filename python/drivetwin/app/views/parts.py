@@ -57,6 +57,11 @@ def topic_id(topic: Topic) -> str:
     return f"topic-{topic}"
 
 
+def due_id(view: str) -> str:
+    """Id of the store that changes when a view has to be drawn: it is shown, and out of date."""
+    return f"due-{view}"
+
+
 def announce(topic: Topic) -> None:
     """Redraw, after the present callback, what shows a topic or follows from it."""
     for one in _CONCERNED[topic]:

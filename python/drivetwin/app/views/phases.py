@@ -17,6 +17,7 @@ from drivetwin.app.views.parts import (
     announce,
     button,
     choice,
+    due_id,
     field,
     graph,
     hint,
@@ -25,7 +26,6 @@ from drivetwin.app.views.parts import (
     table,
     tell,
     told,
-    topic_id,
 )
 from drivetwin.app.work import Work
 from drivetwin.report.sections.story import PHASE_KEY
@@ -54,7 +54,7 @@ def register(app: Dash, sessions: Sessions) -> None:
 def _register_figure(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Output("phases-content", "children"),
-        Input(topic_id(Topic.PHASES), "data"),
+        Input(due_id("phases"), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )

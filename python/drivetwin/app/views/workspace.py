@@ -12,12 +12,12 @@ from drivetwin.app.views.parts import (
     acted,
     announce,
     button,
+    due_id,
     field,
     hint,
     row,
     tell,
     told,
-    topic_id,
     upload_button,
 )
 from drivetwin.app.workspace import ENDING
@@ -68,7 +68,7 @@ def register(app: Dash, sessions: Sessions) -> None:
 
     @app.callback(
         Output("workspace-names", "children", allow_duplicate=True),
-        Input(topic_id(Topic.LOG), "data"),
+        Input(due_id("workspace"), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )
