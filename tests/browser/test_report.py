@@ -111,6 +111,7 @@ def test_everything_can_be_done_by_keyboard(page: Page, report: Path) -> None:
     assert np.ptp(nearer) == pytest.approx((end - start) / 2)
 
 
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_nobody_is_locked_out(browser: Browser, report: Path, pictures: Path, scheme: Any) -> None:
     for path in (report, report.with_name("comparison.html")):

@@ -38,7 +38,7 @@ class Watch:
 
 def grave_findings(page: Page) -> list[str]:
     """Findings of axe-core that are serious or critical, one line each."""
-    found: dict[str, Any] = Axe().run(page)
+    found: dict[str, Any] = Axe().run(page, options={"resultTypes": ["violations"]})
     return [
         f"{one['impact']}: {one['id']}, {one['help']}: {one['nodes'][0]['html'][:200]}"
         for one in found["violations"]
