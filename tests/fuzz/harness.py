@@ -23,7 +23,7 @@ LONGEST = 10.0
 MOST_MEMORY = 1_000_000_000
 """Bytes that one case may add."""
 
-PATIENCE = 12.0
+PATIENCE = 30.0
 """A case that has not answered after so many times LONGEST on a busy machine hangs."""
 
 Prepare = Callable[[Path], Callable[[int], str]]

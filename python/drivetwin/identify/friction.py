@@ -253,7 +253,7 @@ def momentum_friction(
 ) -> FrictionFit:
     """Fit the Stribeck law and P0 of the on-coming element; `free`: off-going element vented [s].
 
-    Raises IdentificationError where the inertia phase is too short.
+    Raises IdentificationError where the inertia phase is too short, or friction comes out negative.
     """
     spans = _spans(signals, driveline, free, settings)
     equations = _Equations(signals, driveline, momentum, spans, settings)
@@ -283,6 +283,11 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
     mu_points = sign * torque / (equations.element.gain * above)
     grid = np.linspace(float(slip.min()), float(slip.max()), 60)
     mu, slopes = stribeck(fit.theta, grid)
+    if float(mu.min()) <= 0.0 or float(fit.theta[MU_C]) <= 0.0:
+        raise IdentificationError(
+            f"the friction of {equations.element.name} comes out as μ = {float(mu.min()):.3g}",
+            "torques, pressures and speeds contradict each other: check signs, units and delays",
+        )
     std = np.sqrt(np.einsum("pn,pq,qn->n", slopes, fit.covariance[:4, :4], slopes))
     v_s = float(np.exp(fit.theta[LOG_V]))
     law = {
