@@ -17,7 +17,7 @@ from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import scenario_of
 
-RATE = 300.0
+RATE = 400.0
 """Hz of the logger: less than usual, so that six identifications take less time."""
 KINDS = {
     ScenarioName.POWER_ON_DOWN: "power-on downshift",
