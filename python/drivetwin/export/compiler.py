@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import shutil
+import struct
 import subprocess
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 from itertools import islice
+from os.path import relpath
 from pathlib import Path
 
 from drivetwin.errors import DrivetwinError, MissingExtraError
@@ -47,24 +49,29 @@ def compile_library(
     `platform` None builds for this machine by the compiler found (`cc`, `gcc`, `clang`), by zig
     without one. Raises CompilerError with the compiler's words, MissingExtraError without zig.
     """
-    includes = sorted({str(path.parent) for path in sources})
+    folder = target.parent
+    # Names relative to the target: whole paths would end up in some of the formats.
+    includes = sorted({relpath(path.parent, folder) for path in sources})
+    windows = target.suffix == ".dll"
     command = [
         *_compiler(platform),
         *("-std=c99", "-O2", "-g0", "-ffp-contract=off", "-shared"),
-        *([] if target.suffix == ".dll" else ["-fPIC"]),
+        *(["-s"] if windows else ["-fPIC"]),
         *(f"-D{name}" for name in defines),
-        *(f"-I{folder}" for folder in includes),
-        *map(str, sources),
-        *("-o", str(target)),
-        *([] if target.suffix == ".dll" else ["-lm"]),
+        *(f"-I{include}" for include in includes),
+        *(relpath(path, folder) for path in sources),
+        *("-o", target.name),
+        *([] if windows else ["-lm"]),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
     if done.returncode != 0:
         raise CompilerError(
             f"{command[0]} cannot build {target.name}: {done.stderr.strip()[:500]}",
             "check the compiler with a small program, or install the extra: "
             'pip install "drivetwin[fmu]"',
         )
+    if windows:
+        _clear_times(target)
 
 
 def native_compiler() -> tuple[str, ...]:
@@ -83,3 +90,25 @@ def _compiler(platform: Platform | None) -> list[str]:
         )
     target = [] if platform is None else ["-target", _ZIG_TARGETS[platform]]
     return [sys.executable, "-m", "ziglang", "cc", *target]
+
+
+def _clear_times(library: Path) -> None:
+    """Set the times in a Windows library to zero, so that the same sources give the same bytes.
+
+    They stand in the COFF header and in the export directory; formats by the PE specification.
+    """
+    data = bytearray(library.read_bytes())
+    (header,) = struct.unpack_from("<I", data, 0x3C)
+    (sections,) = struct.unpack_from("<H", data, header + 6)
+    (optional_length,) = struct.unpack_from("<H", data, header + 20)
+    optional = header + 24
+    (exports,) = struct.unpack_from("<I", data, optional + 112)
+    places = [header + 8]
+    for i in range(sections):
+        entry = optional + optional_length + 40 * i
+        size, address, _, offset = struct.unpack_from("<IIII", data, entry + 8)
+        if address <= exports < address + size:
+            places.append(offset + exports - address + 4)
+    for place in places:
+        struct.pack_into("<I", data, place, 0)
+    library.write_bytes(bytes(data))
