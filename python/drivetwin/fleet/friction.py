@@ -3,41 +3,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
-from drivetwin.identify.result import FrictionCurve
+from drivetwin.identify.result import FloatArray, FrictionCurve
 
-_BINS = 40
+_POINTS = 40
 _LEAST = 5
-"""Points that a slip must have."""
+"""Logs that must reach a slip."""
 
 
 def fleet_friction(store: Store) -> dict[str, FrictionCurve]:
     """Median μ over slip of each element, and the band from 2.5 to 97.5 % of all logs' curves."""
     import pyarrow.compute as pc
 
-    rows = store.rows(RowKind.FRICTION).select(["name", "value", "at"])
+    rows = store.rows(RowKind.FRICTION).select(["log", "name", "value", "at"])
     found = {}
     for element in sorted(set(rows.column("name").to_pylist())):
         picked = rows.filter(pc.equal(rows.column("name"), element))
-        curve = _curve(*(np.asarray(picked.column(name)) for name in ("at", "value")))
+        logs, slip, mu = (np.asarray(picked.column(name)) for name in ("log", "at", "value"))
+        ends = np.flatnonzero(logs[1:] != logs[:-1]) + 1
+        curves = list(zip(np.split(slip, ends), np.split(mu, ends), strict=True))
+        curve = _curve(curves)
         if curve is not None:
             found[element] = curve
     return found
 
 
-def _curve(
-    slip: np.ndarray[tuple[int], np.dtype[np.float64]],
-    mu: np.ndarray[tuple[int], np.dtype[np.float64]],
-) -> FrictionCurve | None:
-    edges = np.linspace(slip.min(), slip.max(), _BINS + 1)
-    place = np.clip(np.digitize(slip, edges) - 1, 0, _BINS - 1)
-    bins = [k for k in range(_BINS) if np.count_nonzero(place == k) >= _LEAST]
-    if len(bins) < 2:
+def _curve(curves: Sequence[tuple[FloatArray, FloatArray]]) -> FrictionCurve | None:
+    """Percentiles over the curves (slip, μ) at slips that enough of them reach."""
+    grid = np.linspace(
+        min(slip[0] for slip, _ in curves), max(slip[-1] for slip, _ in curves), _POINTS
+    )
+    table = np.array([np.interp(grid, slip, mu, left=np.nan, right=np.nan) for slip, mu in curves])
+    reached = np.count_nonzero(np.isfinite(table), axis=0) >= _LEAST
+    if np.count_nonzero(reached) < 2:
         return None
-    middle = np.array([0.5 * (edges[k] + edges[k + 1]) for k in bins])
-    low, median, high = np.array([np.percentile(mu[place == k], [2.5, 50.0, 97.5]) for k in bins]).T
+    low, median, high = np.nanpercentile(table[:, reached], [2.5, 50.0, 97.5], axis=0)
     empty = np.empty(0)
-    return FrictionCurve(middle, median, low, high, empty, empty, None, "median of all logs")
+    return FrictionCurve(grid[reached], median, low, high, empty, empty, None, "median of all logs")

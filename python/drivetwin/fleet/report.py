@@ -8,6 +8,8 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from drivetwin.fleet.figures import drift_figure, unit_label, units_figure
 from drivetwin.fleet.friction import fleet_friction
 from drivetwin.fleet.joint.estimate import joint_estimates
@@ -157,15 +159,24 @@ def _between(ci95: Interval, factor: float) -> str:
 
 def _remark(one: JointEstimate) -> str:
     parts = list(one.notes)
+    own = float(np.median(one.points.std))
     if one.drifts and math.prod(one.drifts[0].ci95) > 0.0:
-        parts.append("drifts")
-    if one.spread_ci95 is not None and one.spread_ci95[0] > 0.0:
-        parts.append("units differ")
+        whole = abs(one.drifts[0].slope) * float(np.ptp(one.points.reading))
+        parts.append("drifts" + _small(whole, own))
+    if one.spread is not None and one.spread_ci95 is not None and one.spread_ci95[0] > 0.0:
+        parts.append("units differ" + _small(one.spread, own))
     if one.left_out:
         parts.append(f"{one.left_out} logs tell nothing of it")
     if one.excess > 1.5:
         parts.append(f"logs scatter {one.excess:.1f} times as much as they state")
     return "; ".join(parts)
+
+
+def _small(size: float, own: float) -> str:
+    """What to say of an effect that is real but less than one log's own error `own`."""
+    if size >= own:
+        return ""
+    return ", by less than one log's own error: an error of the method may look like that"
 
 
 def _ageing(found: Sequence[JointEstimate]) -> Section:
@@ -234,7 +245,7 @@ def _odd(store: Store, found: Sequence[JointEstimate]) -> Section:
 def _with_error(one: JointEstimate, value: float, std: float) -> str:
     display = display_of(one.si_unit)
     text, half = with_uncertainty(value * display.factor, 1.96 * std * display.factor)
-    return f"{text} ± {half} {display.label}"
+    return f"{text} ± {half} {display.label}".removesuffix(" –")
 
 
 def _single(store: Store, log: str) -> str:
