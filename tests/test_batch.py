@@ -43,7 +43,7 @@ MODEL = DualClutch(
         ShiftElement("B3", 0.95, 1.6, 4.7e-2, 8e4, FRICTION),
     ),
 )
-TIME = np.arange(1001) * 1e-3
+TIME: FloatArray = np.linspace(0.0, 1.0, 1001)
 START = State(185.0, 185 / 2.24, 185 / 2.24 / 6, 0.0133, ("B2",))
 
 
@@ -70,8 +70,9 @@ def alone(values: Mapping[str, float], *, exact: bool = False) -> FloatArray:
     off, on = MODEL.elements
     friction = dataclasses.replace(FRICTION, mu_c=values["B3.mu_c"])
     on = dataclasses.replace(on, gain=values["B3.gain"], friction=friction)
-    plain = {k: values[k] for k in ("eta", "J1", "k_o")}
-    model = dataclasses.replace(MODEL, elements=(off, on), **plain)
+    model = dataclasses.replace(
+        MODEL, elements=(off, on), eta=values["eta"], J1=values["J1"], k_o=values["k_o"]
+    )
     s = scenario()
     accuracy = Accuracy(exact=exact)
     return simulate(
@@ -131,14 +132,7 @@ def test_what_is_kept_follows_from_the_columns() -> None:
     np.testing.assert_array_equal(last.values[:, 0], full.values[:, 0, -1])
     measured = full.values[0, 0].copy()
     measured[100:200] = np.nan
-    misfit = simulate_batch(
-        MODEL,
-        [scenario()],
-        TIME,
-        values,
-        keep=Keep.MISFIT,
-        measured={"shaft_torque": measured},
-    )
+    misfit = simulate_batch(MODEL, [scenario()], TIME, values, keep=[measured])
     expected = np.nansum((full.values[:, 0] - measured) ** 2, axis=1)
     np.testing.assert_allclose(misfit.values[:, 0], expected, rtol=1e-12)
     assert misfit.values[0, 0] == 0.0
@@ -164,5 +158,7 @@ def test_lengths_and_names_must_fit() -> None:
         simulate_batch(MODEL, [scenario()] * 2, TIME, sets(3))
     with pytest.raises(InputError, match="nonsense"):
         simulate_batch(MODEL, [scenario()], TIME, {"nonsense": np.ones(2)})
+    with pytest.raises(InputError, match="measured"):
+        simulate_batch(MODEL, [scenario()], TIME, sets(2), keep=[TIME[1:]])
     with pytest.raises(InputError, match="shaft_torque"):
         simulate_batch(MODEL, [scenario()], TIME, sets(2), outputs=["angle"])

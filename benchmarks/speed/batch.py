@@ -50,19 +50,17 @@ def parameter_sets(of: Problem, runs: int = RUNS) -> FloatArray:
     return numbers
 
 
-def simulated(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep, int]) -> Batch:
-    """All sets in drivetwin; `how` is what is kept and the number of threads."""
+def simulated(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep | None, int]) -> Batch:
+    """All sets in drivetwin; `how` is what is kept (None: a misfit) and the number of threads."""
     keep, threads = how
     model, signals, begin = shift.model_of(of), shift.signals_of(given), shift.state_of(of, given)
     torque = signals.pop(ENGINE_TORQUE)
-    measured = {"shaft_torque": np.zeros(given.time.size)} if keep is Keep.MISFIT else None
     return simulate_batch(
         model,
         [Scenario(torque, signals, begin)],
         given.time,
         _named(of, given, sets),
-        keep=keep,
-        measured=measured,
+        keep=keep or [np.zeros(given.time.size)],
         threads=threads,
     )
 
@@ -149,14 +147,17 @@ def _errors(program: str, torques: FloatArray, exact: FloatArray, chattering: st
 
 def _memory() -> str:
     """Bytes per run, from the largest memory of processes with few and with many runs."""
+    if not Path("/proc/self/status").exists():
+        return "Memory is measured on Linux only.\n"
     lines = ["Memory of a batch, per run:\n", "| kept | bytes per run |", "|---|---|"]
-    for keep, what in ((Keep.COLUMNS, "T_o at every sample"), (Keep.MISFIT, "misfit of T_o")):
+    for keep, what in ((Keep.COLUMNS, "T_o at every sample"), (None, "misfit of T_o")):
         few, many = (_peak(keep, runs) for runs in _MEMORY_RUNS)
         per_run = (many - few) / (_MEMORY_RUNS[1] - _MEMORY_RUNS[0])
         lines.append(f"| {what} | {per_run:,.0f} |")
     return "\n".join(lines) + "\n"
 
 
-def _peak(keep: Keep, runs: int) -> int:
-    command = [sys.executable, "-m", "benchmarks.speed.memory", keep.value, str(runs)]
+def _peak(keep: Keep | None, runs: int) -> int:
+    what = keep.value if keep else "misfit"
+    command = [sys.executable, "-m", "benchmarks.speed.memory", what, str(runs)]
     return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)

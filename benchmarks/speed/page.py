@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -83,7 +84,8 @@ def _machine() -> str:
     versions = (
         f"Python {platform.python_version()}, NumPy {np.__version__}, SciPy {scipy.__version__}"
     )
-    return f"Measured on: {found}, {platform.system()}; {versions}.\n"
+    load = f"load average {os.getloadavg()[1]:.1f}" if hasattr(os, "getloadavg") else "load unknown"
+    return f"Measured on: {found}, {platform.system()}, {load}; {versions}.\n"
 
 
 def _processor() -> str:

@@ -25,7 +25,6 @@ class Keep(StrEnum):
 
     COLUMNS = "columns"  # every output on the grid
     LAST = "last"  # every output at the end
-    MISFIT = "misfit"  # per output the sum over the grid of (simulated - measured)^2
 
 
 @dataclass(frozen=True)
@@ -68,16 +67,16 @@ def simulate_batch(
     parameters: Mapping[str, FloatArray] | None = None,
     *,
     outputs: Sequence[str] = ("shaft_torque",),
-    keep: Keep = Keep.COLUMNS,
-    measured: Mapping[str, FloatArray] | None = None,
+    keep: Keep | Sequence[FloatArray] = Keep.COLUMNS,
     threads: int = 0,
 ) -> Batch:
     """Simulate on `time` (n,) [s] once per set of `parameters`, or once per scenario.
 
     `parameters` maps names as in `driveline.sensitivities` (but for delays) to their values
     (runs,); with several scenarios there must be one for every run. Outputs are the names of
-    OUTPUTS, and `torque.<element>` or `slip.<element>`. `measured` (n,) per output is what MISFIT
-    compares with; NaN samples are left out. `threads` 0 takes all cores.
+    OUTPUTS, and `torque.<element>` or `slip.<element>`. Instead of what to keep, one measured
+    column (n,) per output may be given: kept is then the sum of the squared distances to it, over
+    its samples that are not NaN. `threads` 0 takes all cores.
     Raises InputError for unknown names, differing lengths or an inconsistent description.
     """
     sets = {name: np.asarray(v, dtype=np.float64) for name, v in (parameters or {}).items()}
@@ -90,24 +89,27 @@ def simulate_batch(
             "give every parameter as many values, and one scenario or as many",
         )
     table = np.stack(list(sets.values()), axis=1) if sets else np.empty((0, 0))
-    kept_of = [_output(name) for name in outputs]
-    target = [
-        np.asarray((measured or {}).get(name, np.full(len(time), np.nan))) for name in outputs
-    ]
-    if keep is Keep.MISFIT and any(len(t) != len(time) for t in target):
-        raise InputError("a measured column is not as long as the time", "sample it on the time")
+    wanted = [_output(name) for name in outputs]
+    kept = keep.value if isinstance(keep, Keep) else "misfit"
+    measured = np.empty((0, 0)) if isinstance(keep, Keep) else np.asarray(keep, dtype=np.float64)
+    if kept == "misfit" and measured.shape != (len(outputs), len(time)):
+        raise InputError(
+            f"measured columns {measured.shape} do not fit {len(outputs)} outputs on {len(time)}"
+            " points of time",
+            "give one column per output, sampled on the time",
+        )
     try:
         values, events, last_lock, failed = _native.simulate_batch(
             as_json(asdict(model)),
             [_plain(scenario) for scenario in scenarios],
             (list(sets), np.ascontiguousarray(table)),
             np.ascontiguousarray(time, dtype=np.float64),
-            np.ascontiguousarray(target, dtype=np.float64),
-            (keep.value, json.dumps(kept_of), threads),
+            np.ascontiguousarray(measured),
+            (kept, json.dumps(wanted), threads),
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
-    shape = (runs, len(outputs), len(time)) if keep is Keep.COLUMNS else (runs, len(outputs))
+    shape = (runs, len(outputs), len(time))[: 3 if keep is Keep.COLUMNS else 2]
     return Batch(values.reshape(shape), events, last_lock, dict(failed))
 
 

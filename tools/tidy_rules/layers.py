@@ -32,6 +32,8 @@ PYTHON_LAYERS = (
             "shown",
             "parameters",
             "driveline",
+            "batch",
+            "linear",
             "network",
             "tomlfile",
             "_native",

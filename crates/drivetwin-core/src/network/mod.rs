@@ -20,6 +20,7 @@ mod error;
 pub mod linalg;
 mod mode;
 pub mod reduction;
+pub mod smooth;
 pub mod statics;
 
 pub use cell::Cell;

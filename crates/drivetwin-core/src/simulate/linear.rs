@@ -2,7 +2,7 @@
 //! The linear system of a driveline about an operating point in one friction mode.
 
 use super::run::SimulateError;
-use super::start::find;
+use super::start::{StartError, find};
 use super::trajectory::Output;
 use crate::model::mechanism::Normal;
 use crate::network::linalg::Matrix;
@@ -51,28 +51,8 @@ pub fn linearise(
     let capacity = vec![1.0; network.frictions.len()];
     let key = ModeKey::new(stuck.into_iter(), &[]);
     let mode = network.mode(key, &capacity).ok_or(SimulateError::Undetermined)?;
-    // Channels over states and inputs.
     let width = network.first_rate();
-    let mut channels = Matrix::<f64>::zeros(network.channels.len(), width);
-    for point in slipping {
-        let j = element(&point.element)?;
-        let row = &network.frictions[j];
-        let sign = if point.slip < 0.0 { -1.0 } else { 1.0 };
-        let (normal, input) = match row.normal {
-            Normal::Pressure { input, gain, p0 } => {
-                ((gain * (point.pressure - p0)).max(0.0), Some((input, gain)))
-            }
-            Normal::Constant(normal) => (normal, None),
-        };
-        let cell = Cell::Moving { sign, piece: piece_of(network, j, point.slip.abs()) };
-        let partials = network.channels[j].partials(cell, point.slip, normal);
-        for (entry, &c) in channels.row_mut(j).iter_mut().zip(&row.slip) {
-            *entry += partials[1] * c;
-        }
-        if let Some((input, gain)) = input.filter(|_| normal > 0.0) {
-            channels[(j, network.first_input() + input)] += partials[2] * gain;
-        }
-    }
+    let channels = channel_slopes(network, slipping)?;
     let over = |row: &[f64]| -> Vec<f64> {
         let mut out = row[..width].to_vec();
         for (j, &c) in row[network.first_channel()..].iter().enumerate() {
@@ -109,6 +89,38 @@ pub fn linearise(
         linear.d.row_mut(i).copy_from_slice(&row[n..]);
     }
     Ok(linear)
+}
+
+fn element(network: &Network<f64>, name: &str) -> Result<usize, StartError> {
+    find("friction element", name, network.frictions.iter().map(|f| &f.element))
+}
+
+/// Slopes of the slipping elements' torques over states and inputs, channels × (states, inputs).
+fn channel_slopes(
+    network: &Network<f64>,
+    slipping: &[Slipping],
+) -> Result<Matrix<f64>, StartError> {
+    let mut channels = Matrix::<f64>::zeros(network.channels.len(), network.first_rate());
+    for point in slipping {
+        let j = element(network, &point.element)?;
+        let row = &network.frictions[j];
+        let sign = if point.slip < 0.0 { -1.0 } else { 1.0 };
+        let (normal, input) = match row.normal {
+            Normal::Pressure { input, gain, p0 } => {
+                ((gain * (point.pressure - p0)).max(0.0), Some((input, gain)))
+            }
+            Normal::Constant(normal) => (normal, None),
+        };
+        let cell = Cell::Moving { sign, piece: piece_of(network, j, point.slip.abs()) };
+        let partials = network.channels[j].partials(cell, point.slip, normal);
+        for (entry, &c) in channels.row_mut(j).iter_mut().zip(&row.slip) {
+            *entry += partials[1] * c;
+        }
+        if let Some((input, gain)) = input.filter(|_| normal > 0.0) {
+            channels[(j, network.first_input() + input)] += partials[2] * gain;
+        }
+    }
+    Ok(channels)
 }
 
 fn piece_of(network: &Network<f64>, j: usize, slip: f64) -> usize {

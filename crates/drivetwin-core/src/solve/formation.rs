@@ -9,10 +9,11 @@
 use super::inputs::Inputs;
 use super::integrator::{Integrator, Step};
 use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Guards, Sample, Source, Trail, march};
+use super::march::{BLOCK, Carry, Guards, Source, Trail, march};
 use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
 use super::sprint::{Ready, Samples, Sink};
 use super::status::Status;
+use crate::network::smooth::Sample;
 use crate::number::{Lane, Pack};
 
 /// Runs in a formation: two vectors of the narrower sets, one of the widest.

@@ -13,12 +13,12 @@ mod guard;
 mod inputs;
 mod integrator;
 mod lanes;
-mod law;
 mod march;
 mod operators;
 mod packing;
 mod sprint;
 mod status;
+mod step;
 mod transition;
 
 pub use expansion::Expansion;

@@ -6,8 +6,7 @@
 //! channel there and its rate are linear in x, u, u', a. Channels count in their direction of motion:
 //! `τ = sign · φ` over `m = sign · s`.
 
-use super::law::Law;
-use super::march::{Sample, input_of};
+use crate::network::smooth::{Law, Line};
 use crate::network::{Mode, Network};
 use crate::number::{Lane, Real};
 
@@ -116,17 +115,6 @@ pub struct Watched<L, const N: usize> {
     pub id: usize,
 }
 
-/// `gain · u + offset`.
-#[derive(Clone, Copy, Debug)]
-pub struct Line<L> {
-    /// Index of the input.
-    pub input: usize,
-    /// Over the input.
-    pub gain: L,
-    /// At zero.
-    pub offset: L,
-}
-
 /// A square matrix by rows.
 type Square<T, const N: usize> = [[T; N]; N];
 
@@ -163,27 +151,19 @@ impl<T: Real, const N: usize> Operators<T, N> {
         let s = integrals(&a, h, terms(reach));
         let transition = std::array::from_fn(|j| std::array::from_fn(|i| s[0][i][j]));
         let constant = apply(&s[1], &forcing(network.one()));
-        let drives = (0..network.mechanism.inputs.len())
-            .filter(|&input| network.is_driven_by(input))
-            .map(|input| {
-                let force = forcing(network.first_input() + input);
-                Drive::new(input, [apply(&s[1], &force), apply(&s[2], &force)])
-            })
-            .collect();
+        let drive = |input: usize| {
+            let force = forcing(network.first_input() + input);
+            Drive::new(input, [apply(&s[1], &force), apply(&s[2], &force)])
+        };
+        let inputs = 0..network.mechanism.inputs.len();
+        let drives = inputs.filter(|&input| network.is_driven_by(input)).map(drive).collect();
         let mut signs = [T::zero_(); MAX_ACTIVE];
         signs.iter_mut().zip(laws).for_each(|(sign, law)| *sign = law.sign);
-        let moments: Vec<[[T; N]; CUBIC]> = active
+        let forces = active
             .iter()
-            .enumerate()
-            .map(|(slot, &j)| {
-                let force = forcing(network.first_channel() + j).map(|f| f * signs[slot]);
-                let mut weight = 1.0;
-                std::array::from_fn(|k| {
-                    weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
-                    apply(&s[k + 1], &force).map(|v| v * weight)
-                })
-            })
-            .collect();
+            .zip(signs)
+            .map(|(&j, sign)| forcing(network.first_channel() + j).map(|f| f * sign));
+        let moments: Vec<[[T; N]; CUBIC]> = forces.map(|force| moments(&s, &force, h)).collect();
         // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
         let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
         let mut operators = Self {
@@ -313,13 +293,6 @@ impl<L: Lane, const N: usize> Watched<L, N> {
     }
 }
 
-impl<L: Lane> Line<L> {
-    /// 1, whatever the input.
-    pub fn idle() -> Self {
-        Self { input: 0, gain: L::all(0.0), offset: L::all(1.0) }
-    }
-}
-
 impl<L: Lane, const N: usize> Form<L, N> {
     /// Always zero.
     fn idle() -> Self {
@@ -353,21 +326,17 @@ impl<L: Copy, const N: usize> Operators<L, N> {
     }
 }
 
-impl<L: Lane> Line<L> {
-    /// Value at the start of a sample and rate within it.
-    #[inline(always)]
-    pub fn line<const F: bool>(&self, sample: &Sample<L>) -> [L; 2] {
-        let [start, rate] = input_of(sample, self.input);
-        [self.gain.fma::<F>(start, self.offset), self.gain * rate]
-    }
-}
-
-impl<L: Copy> Line<L> {
-    /// The same line over another number.
-    #[inline(always)]
-    pub fn map<M>(&self, f: impl Fn(L) -> M) -> Line<M> {
-        Line { input: self.input, gain: f(self.gain), offset: f(self.offset) }
-    }
+/// Response of the state at the end to a force `e (t/h)^k`, for k = 0 .. 3.
+fn moments<T: Real, const N: usize>(
+    s: &[Square<T, N>; CUBIC + 1],
+    force: &[T; N],
+    h: f64,
+) -> [[T; N]; CUBIC] {
+    let mut weight = 1.0;
+    std::array::from_fn(|k| {
+        weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
+        apply(&s[k + 1], force).map(|v| v * weight)
+    })
 }
 
 /// A form over the states, differentiated: over the basis.

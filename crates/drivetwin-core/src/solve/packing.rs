@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! Operators of several runs in the lanes of one set.
 
-use super::law::Law;
-use super::operators::{
-    CUBIC, Carried, Drive, Form, Line, MAX_ACTIVE, Operators, StepForm, Watched,
-};
+use super::operators::{CUBIC, Carried, Drive, Form, MAX_ACTIVE, Operators, StepForm, Watched};
+use crate::network::smooth::{Law, Line};
 use crate::number::{Lane, Pack};
 
 /// Places in a formation: channels by number, watched guards by number, channels of one lane.

@@ -6,9 +6,9 @@
 use super::inputs::Inputs;
 use super::integrator::{Integrator, RowState};
 use super::lanes::{Task, dispatch};
-use super::law::{Law, line_of};
-use super::march::{BLOCK, Carry, MAX_INPUTS, Sample, Source, Trail, march};
-use super::operators::{Line, MAX_ACTIVE, MAX_WATCHED, Operators};
+use super::march::{BLOCK, Carry, Source, Trail, march};
+use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
+use crate::network::smooth::{Law, Line, MAX_INPUTS, Sample, line_of};
 use crate::network::{Cell, GearState, ModeKey, Row};
 use crate::number::Real;
 use std::collections::HashMap;

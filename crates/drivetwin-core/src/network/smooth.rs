@@ -1,12 +1,35 @@
 // SPDX-License-Identifier: MIT
-//! The laws of smooth channels in one form, as the inner loop evaluates them.
+//! The laws of smooth channels and of normal loads in one form, as the inner loop over samples evaluates
+//! them.
 
-use super::operators::Line;
+use super::cell::Cell;
+use super::channel::{self, Channel};
 use crate::model::FrictionLaw;
 use crate::model::mechanism::Normal;
-use crate::network::channel;
-use crate::network::{Cell, Channel};
 use crate::number::{Lane, Real};
+
+/// Most inputs of a network that is marched.
+pub const MAX_INPUTS: usize = 16;
+
+/// Value at the start of a sample and rate within it, of every input.
+pub type Sample<L> = [[L; 2]; MAX_INPUTS];
+
+/// Inputs have few enough numbers to need no check.
+#[inline(always)]
+pub fn input_of<L: Copy>(sample: &Sample<L>, input: usize) -> [L; 2] {
+    sample[input % MAX_INPUTS]
+}
+
+/// `gain · u + offset`.
+#[derive(Clone, Copy, Debug)]
+pub struct Line<L> {
+    /// Index of the input.
+    pub input: usize,
+    /// Over the input.
+    pub gain: L,
+    /// At zero.
+    pub offset: L,
+}
 
 /// `τ = N(u) · μ(m)`, `μ(m) = c0 + c1 m + c2 m² + excess · exp(-rate m)` over `m = sign · s` between `from`
 /// and `to`: a friction torque over the slip, or `c2 · s|s|` with N = 1. The channel is `φ = sign · τ`.
@@ -151,5 +174,27 @@ impl<L: Lane> Value<L> {
             by_normal: self.mixed.fma::<F>(ds, self.by_normal),
             ..*self
         }
+    }
+}
+
+impl<L: Lane> Line<L> {
+    /// 1, whatever the input.
+    pub fn idle() -> Self {
+        Self { input: 0, gain: L::all(0.0), offset: L::all(1.0) }
+    }
+
+    /// Value at the start of a sample and rate within it.
+    #[inline(always)]
+    pub fn line<const F: bool>(&self, sample: &Sample<L>) -> [L; 2] {
+        let [start, rate] = input_of(sample, self.input);
+        [self.gain.fma::<F>(start, self.offset), self.gain * rate]
+    }
+}
+
+impl<L: Copy> Line<L> {
+    /// The same line over another number.
+    #[inline(always)]
+    pub fn map<M>(&self, f: impl Fn(L) -> M) -> Line<M> {
+        Line { input: self.input, gain: f(self.gain), offset: f(self.offset) }
     }
 }

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: MIT
+//! One sample: the torques of slipping elements as cubics, predicted and corrected.
+
+use super::march::Carry;
+use super::operators::{CUBIC, Carried, Form, Operators, StepForm};
+use crate::network::smooth::{Sample, Value, input_of};
+use crate::number::{Lane, Values};
+
+/// Largest cubic part of a channel over a sample, relative to its size.
+const MAX_CUBIC: f64 = 2e-4;
+/// Largest distance over which stiction is moved by its series, relative to its decay.
+const MAX_MOVE: f64 = 0.05;
+/// Largest change of a channel by the correction, relative to its size.
+const MAX_CORRECTION: f64 = 1e-6;
+
+/// What a sample leads to, as far as it is known.
+struct Sampling<L: Lane, const N: usize, const A: usize> {
+    /// State at the end.
+    end: [L; N],
+    /// Arguments at the end, and the part of their rates there that comes from the state.
+    argument: [L; A],
+    rate: [L; A],
+    /// The part of these rates that comes from the inputs.
+    direct: [L; A],
+    /// Second derivatives of the arguments at the start.
+    second: [L; A],
+    /// Normal loads at the start and their rates.
+    normal: [[L; 2]; A],
+    /// Cubics of the torques.
+    cubics: [[L; CUBIC]; A],
+    /// Torques at the end.
+    value: [Value<L>; A],
+    /// Least guard so far.
+    least: L::Values,
+}
+
+/// Pass one sample; returns the least guard of the carried channels.
+#[inline(always)]
+pub fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
+    op: &Operators<L, N>,
+    (sample, h): (&Sample<L>, f64),
+    (x, carry): (&mut [L; N], &mut Carry<L, A>),
+) -> L::Values {
+    let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
+    // Stiction at about the end, early: nothing waits for the exponential then.
+    let mut near = [(L::all(0.0), L::all(0.0)); A];
+    for a in 0..A {
+        let about = carry.rate[a].times(h) + carry.argument[a];
+        near[a] = (about, channels[a].law.stiction::<F>(about));
+    }
+    let mut sampling = Sampling::known::<F>(op, channels, (sample, h), x);
+    sampling.predict::<F>(op, channels, (carry, &near), h);
+    sampling.correct::<F>(op, channels, carry, h);
+    *x = sampling.end;
+    sampling.least
+}
+
+impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
+    /// What state and inputs alone lead to.
+    #[inline(always)]
+    fn known<const F: bool>(
+        op: &Operators<L, N>,
+        channels: &[Carried<L, N>; A],
+        (sample, h): (&Sample<L>, f64),
+        x: &[L; N],
+    ) -> Self {
+        let none = L::all(0.0);
+        let mut s = Self {
+            end: op.constant,
+            argument: [none; A],
+            rate: [none; A],
+            direct: [none; A],
+            second: [none; A],
+            normal: [[none; 2]; A],
+            cubics: [[none; CUBIC]; A],
+            value: [Value::zero(); A],
+            least: L::Values::all(1.0),
+        };
+        for a in 0..A {
+            let c = &channels[a];
+            s.argument[a] = c.argument_end.constant;
+            s.rate[a] = c.rate_end.constant;
+            s.direct[a] = c.rate.constant;
+            s.second[a] = c.second.constant;
+            s.normal[a] = c.law.normal.line::<F>(sample);
+        }
+        for drive in &op.drives {
+            let [u, du] = input_of(sample, drive.input);
+            let u_end = du.times(h) + u;
+            for i in 0..N {
+                s.end[i] = drive.step[0][i].fma::<F>(u, drive.step[1][i].fma::<F>(du, s.end[i]));
+            }
+            for a in 0..A {
+                s.argument[a] = pair::<L, F>(&drive.argument[a], (u, du), s.argument[a]);
+                s.rate[a] = pair::<L, F>(&drive.rate[a], (u, du), s.rate[a]);
+                s.direct[a] = drive.now[a].fma::<F>(u_end, s.direct[a]);
+                s.second[a] = drive.second[a].fma::<F>(u, drive.now[a].fma::<F>(du, s.second[a]));
+            }
+        }
+        for j in 0..op.columns() {
+            for i in 0..N {
+                s.end[i] = op.transition[j][i].fma::<F>(x[j], s.end[i]);
+            }
+            for a in 0..A {
+                let c = &channels[a];
+                s.argument[a] = c.argument_end.state[j].fma::<F>(x[j], s.argument[a]);
+                s.rate[a] = c.rate_end.state[j].fma::<F>(x[j], s.rate[a]);
+                s.second[a] = c.second.state[j].fma::<F>(x[j], s.second[a]);
+            }
+        }
+        s
+    }
+
+    /// The cubics by value, rate and second derivative at the start, and the end they lead to; `near`
+    /// holds stiction at arguments close to those at the end.
+    #[inline(always)]
+    fn predict<const F: bool>(
+        &mut self,
+        op: &Operators<L, N>,
+        channels: &[Carried<L, N>; A],
+        (carry, near): (&Carry<L, A>, &[(L, L); A]),
+        h: f64,
+    ) {
+        for a in 0..A {
+            let v = &carry.value[a];
+            let slope = v.by_argument.fma::<F>(carry.rate[a], v.by_normal * self.normal[a][1]);
+            (self.cubics[a][0], self.cubics[a][1]) = (v.value, slope.times(h));
+        }
+        for a in 0..A {
+            let mut second = self.second[a];
+            for b in 0..A {
+                let cubic = &self.cubics[b];
+                second = channels[a].second.channels[b].fma::<F>(cubic[0], second);
+                second = channels[a].rate.channels[b].times(1.0 / h).fma::<F>(cubic[1], second);
+            }
+            let (v, ds) = (&carry.value[a], carry.rate[a]);
+            let mixed = v.mixed * self.normal[a][1];
+            let turn = v.bend.fma::<F>(ds, mixed + mixed);
+            self.cubics[a][2] = v.by_argument.fma::<F>(second, turn * ds).times(0.5 * h * h);
+        }
+        add_moments::<L, F, N, A, 0, 3>(op, &self.cubics, &mut self.end);
+        for a in 0..A {
+            let Carried { argument_end, rate_end, law, .. } = &channels[a];
+            let cubics = &self.cubics;
+            self.argument[a] =
+                over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, self.argument[a]);
+            self.rate[a] = over_cubics::<L, F, N, A, 0, 3>(rate_end, cubics, self.rate[a]);
+            let normal = self.normal[a][1].times(h) + self.normal[a][0];
+            let distance = self.argument[a] - near[a].0;
+            let (stiction, moved) = law.moved_stiction::<F>(near[a].1, distance);
+            self.value[a] = law.at::<F>(self.argument[a], stiction, normal);
+            let guard = L::Values::all(MAX_MOVE) - moved.values().magnitude();
+            self.least = self.least.lower(guard);
+        }
+    }
+
+    /// The cubics through the predicted end, the end they lead to, and the channels there.
+    #[inline(always)]
+    fn correct<const F: bool>(
+        &mut self,
+        op: &Operators<L, N>,
+        channels: &[Carried<L, N>; A],
+        carry: &mut Carry<L, A>,
+        h: f64,
+    ) {
+        let mut change = [[L::all(0.0); CUBIC]; A];
+        for a in 0..A {
+            let (v, cubic) = (&self.value[a], &self.cubics[a]);
+            let form = &channels[a].rate;
+            let ds = self.rate[a] + over_channels::<L, F, N, A>(form, &self.value, self.direct[a]);
+            let slope = v.by_argument.fma::<F>(ds, v.by_normal * self.normal[a][1]).times(h);
+            let rise = v.value - cubic[0];
+            let bent = rise.times(3.0) - cubic[1].times(2.0) - slope;
+            change[a][2] = bent - cubic[2];
+            change[a][3] = cubic[1] + slope - rise.times(2.0);
+        }
+        add_moments::<L, F, N, A, 2, 4>(op, &change, &mut self.end);
+        let before = (carry.argument, carry.rate);
+        for a in 0..A {
+            let Carried { argument_end, rate_end, .. } = &channels[a];
+            let ds = over_cubics::<L, F, N, A, 2, 4>(argument_end, &change, L::all(0.0));
+            self.rate[a] = over_cubics::<L, F, N, A, 2, 4>(rate_end, &change, self.rate[a]);
+            let corrected = self.value[a].moved::<F>(ds);
+            let size = carry.value[a].value.values().magnitude() + L::Values::all(1.0);
+            let correction = (corrected.value - self.value[a].value).values().magnitude();
+            let guard = size.times(MAX_CUBIC) - change[a][3].values().magnitude();
+            self.least = self.least.lower(guard).lower(size.times(MAX_CORRECTION) - correction);
+            self.value[a] = corrected;
+            carry.argument[a] = self.argument[a] + ds;
+        }
+        carry.value = self.value;
+        for a in 0..A {
+            let Carried { rate, law, .. } = &channels[a];
+            carry.rate[a] =
+                self.rate[a] + over_channels::<L, F, N, A>(rate, &carry.value, self.direct[a]);
+            // Between its ends the argument stays within these (Bernstein's form of the cubic).
+            let (m0, m3) = (before.0[a].values(), carry.argument[a].values());
+            let m1 = before.1[a].values().times(h / 3.0) + m0;
+            let m2 = m3 - carry.rate[a].values().times(h / 3.0);
+            let (low, high) = (m0.lower(m1).lower(m2.lower(m3)), m0.upper(m1).upper(m2.upper(m3)));
+            let guard = (low - law.from.values()).lower(law.to.values() - high);
+            self.least = self.least.lower(guard);
+        }
+    }
+}
+
+#[inline(always)]
+fn pair<L: Lane, const F: bool>(coefficients: &[L; 2], (u, du): (L, L), sum: L) -> L {
+    coefficients[0].fma::<F>(u, coefficients[1].fma::<F>(du, sum))
+}
+
+#[inline(always)]
+fn add_moments<
+    L: Lane,
+    const F: bool,
+    const N: usize,
+    const A: usize,
+    const FROM: usize,
+    const TO: usize,
+>(
+    op: &Operators<L, N>,
+    cubics: &[[L; CUBIC]; A],
+    end: &mut [L; N],
+) {
+    for a in 0..A {
+        for k in FROM..TO {
+            for i in 0..N {
+                end[i] = op.channels[a].moments[k][i].fma::<F>(cubics[a][k], end[i]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn over_cubics<
+    L: Lane,
+    const F: bool,
+    const N: usize,
+    const A: usize,
+    const FROM: usize,
+    const TO: usize,
+>(
+    form: &StepForm<L, N>,
+    cubics: &[[L; CUBIC]; A],
+    sum: L,
+) -> L {
+    let mut sum = sum;
+    for a in 0..A {
+        for k in FROM..TO {
+            sum = form.cubics[a][k].fma::<F>(cubics[a][k], sum);
+        }
+    }
+    sum
+}
+
+#[inline(always)]
+pub fn over_channels<L: Lane, const F: bool, const N: usize, const A: usize>(
+    form: &Form<L, N>,
+    values: &[Value<L>; A],
+    sum: L,
+) -> L {
+    let mut sum = sum;
+    for a in 0..A {
+        sum = form.channels[a].fma::<F>(values[a].value, sum);
+    }
+    sum
+}
