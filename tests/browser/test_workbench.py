@@ -251,7 +251,8 @@ def test_each_view_is_accessible_in_light_and_dark(
             _view(page, name)
             page.wait_for_timeout(300)
             page.screenshot(path=pictures / f"workbench-{name}-{scheme}.png")
-            findings[scheme, name] = grave_findings(page)
+            only = () if scheme == "light" else ("color-contrast",)
+            findings[scheme, name] = grave_findings(page, *only)
     assert {place: found for place, found in findings.items() if found} == {}
 
 

@@ -36,9 +36,10 @@ class Watch:
         self.faults.append(f"error: {error}")
 
 
-def grave_findings(page: Page) -> list[str]:
-    """Findings of axe-core that are serious or critical, one line each."""
-    found: dict[str, Any] = Axe().run(page, options={"resultTypes": ["violations"]})
+def grave_findings(page: Page, *rules: str) -> list[str]:
+    """Findings of axe-core that are serious or critical, one line each; by some `rules` or all."""
+    only = {"runOnly": list(rules)} if rules else {}
+    found: dict[str, Any] = Axe().run(page, options={"resultTypes": ["violations"], **only})
     return [
         f"{one['impact']}: {one['id']}, {one['help']}: {one['nodes'][0]['html'][:200]}"
         for one in found["violations"]
