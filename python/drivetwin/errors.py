@@ -126,3 +126,7 @@ class QueryError(InputError):
 
 class RefusedError(InputError):
     """A path, upload or request that the workbench does not accept."""
+
+
+class CompilerError(DrivetwinError):
+    """A C compiler refuses the sources of an export; the text quotes it."""

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.errors import MissingExtraError
+from drivetwin.errors import CompilerError, MissingExtraError
 from drivetwin.export import compiler
-from drivetwin.export.compiler import CompilerError, compile_library
+from drivetwin.export.compiler import compile_library
 from drivetwin.export.platforms import Platform
 
 

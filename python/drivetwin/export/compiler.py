@@ -13,12 +13,8 @@ from itertools import islice
 from os.path import relpath
 from pathlib import Path
 
-from drivetwin.errors import DrivetwinError, MissingExtraError
+from drivetwin.errors import CompilerError, MissingExtraError
 from drivetwin.export.platforms import Platform
-
-
-class CompilerError(DrivetwinError):
-    """A C compiler is missing or refuses the sources."""
 
 
 _ZIG_TARGETS = {
