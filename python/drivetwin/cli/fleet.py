@@ -118,9 +118,12 @@ def run(
         WorkerSpec(limits=Limits(time_limit, memory_limit * 2**20)),
         Wishes(attempts, retry, reports, traces),
     )
-    signal.signal(signal.SIGTERM, _as_interrupt)
-    with watching(as_json=as_json) as tell:
-        summary = run_fleet(request, tell)
+    before = signal.signal(signal.SIGTERM, _as_interrupt)
+    try:
+        with watching(as_json=as_json) as tell:
+            summary = run_fleet(request, tell)
+    finally:
+        signal.signal(signal.SIGTERM, before)
     if not as_json:
         _print_summary(summary, output)
     if not summary.complete:
