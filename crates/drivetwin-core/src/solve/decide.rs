@@ -315,7 +315,8 @@ impl<T: Real> Integrator<'_, T> {
         }
         for i in 0..trial.gears.len() {
             let rolling = matches!(trial.gears[i], GearState::Rolling { .. });
-            self.blocked[i] = rolling && self.held_by_others(&trial, Row::Gear(i));
+            let watched = rolling && self.network.losses[i].loss.is_directional();
+            self.blocked[i] = watched && self.held_by_others(&trial, Row::Gear(i));
         }
         self.record_changes(&trial);
         self.rows = trial.rows;

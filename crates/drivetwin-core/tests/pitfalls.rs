@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+//! What goes wrong in fast clutch simulators (guards at sample ends, a frozen neighbour, drifting locks,
+//! creeping lock-up), each as a case of its own: default accuracy against round-off accuracy.
+
+mod common;
+
+use common::{clutch, compile, inertia, shaft, start, torque};
+use drivetwin_core::model::elements::{Clutch, Element};
+use drivetwin_core::model::{FrictionLaw, Stribeck};
+use drivetwin_core::network::Network;
+use drivetwin_core::simulate::{Output, Start, Trajectory, run};
+use drivetwin_core::solve::{EventKind, Settings, Signal, Status};
+
+type Column = (&'static str, Vec<f64>);
+
+fn both(
+    network: &Network<f64>,
+    time: &[f64],
+    columns: &[Column],
+    start: &Start<f64>,
+    output: &Output,
+) -> [Trajectory<f64>; 2] {
+    [Settings::default(), Settings::exact()].map(|settings| {
+        let signals: Vec<(&str, Signal<'_, f64>)> =
+            columns.iter().map(|(name, values)| (*name, Signal::samples(time, values))).collect();
+        let outputs = std::slice::from_ref(output);
+        let run = run(network, &signals, start, time, outputs, (settings, false)).unwrap();
+        assert_eq!(run.status, Status::Completed);
+        run
+    })
+}
+
+fn samples(h: f64, count: usize) -> Vec<f64> {
+    (0..=count).map(|i| i as f64 * h).collect()
+}
+
+fn stribeck(name: &str, a: &str, b: &str) -> Clutch<f64> {
+    let law = Stribeck { mu_c: 0.12, mu_s: 0.16, v_s: 3.0, mu_v: 1e-4 };
+    Clutch { friction: FrictionLaw::Stribeck(law), ..clutch(name, a, b) }
+}
+
+fn kinds(run: &Trajectory<f64>) -> Vec<EventKind> {
+    run.events.iter().map(|event| event.kind).collect()
+}
+
+fn worst(runs: &[Trajectory<f64>; 2]) -> f64 {
+    let pairs = runs[0].columns[0].iter().zip(&runs[1].columns[0]);
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// 1: a locked slip that drifts by round-off ends in loops of break-away and lock.
+#[test]
+fn a_long_lock_stays_one_lock_with_exactly_no_slip() {
+    let time = samples(1e-3, 5000);
+    let elements = vec![
+        inertia("a", 2.0),
+        inertia("b", 7.0),
+        torque("a", "T"),
+        Element::Clutch(clutch("C", "a", "b")),
+    ];
+    let pull: Vec<f64> = time.iter().map(|t| 40.0 * (9.0 * t).sin()).collect();
+    let columns = [("T", pull), ("P C", vec![100.0; time.len()])];
+    let begin = start(&[("a", 60.0), ("b", 0.0)], &[]);
+    for run in both(&compile(elements), &time, &columns, &begin, &Output::Slip("C".into())) {
+        assert_eq!(kinds(&run), [EventKind::Lock]);
+        let locked = time.iter().zip(&run.columns[0]).filter(|(t, _)| **t > run.events[0].time);
+        assert!(locked.map(|(_, slip)| slip.abs()).fold(0.0, f64::max) < 1e-10);
+    }
+}
+
+/// 2: the torque changes its sign and the clutch empties within one sample: each sign has its guard.
+#[test]
+fn a_holding_torque_that_changes_sign_breaks_away_when_its_own_bound_is_reached() {
+    let time = samples(1e-3, 40);
+    let elements = vec![
+        inertia("a", 1.0),
+        inertia("b", 1.0),
+        torque("a", "T"),
+        Element::Clutch(clutch("C", "a", "b")),
+    ];
+    // Within the sample the clutch carries T/2 = 50 - 150 s and can carry 100 - 110 s: s = 15/26.
+    let step = |k: usize, before: f64, after: f64| if k <= 20 { before } else { after };
+    let columns = [
+        ("T", (0..=40).map(|k| step(k, 100.0, -200.0)).collect()),
+        ("P C", (0..=40).map(|k| step(k, 100.0, -10.0)).collect()),
+    ];
+    let begin = start(&[("a", 0.0), ("b", 0.0)], &["C"]);
+    for run in both(&compile(elements), &time, &columns, &begin, &Output::Slip("C".into())) {
+        assert_eq!(kinds(&run), [EventKind::BreakAway, EventKind::Vent]);
+        assert!(
+            (run.events[0].time - (0.020 + 1e-3 * 15.0 / 26.0)).abs() < 1e-12,
+            "{:?}",
+            run.events
+        );
+    }
+}
+
+/// 3: with the other clutch's torque frozen over the step the order is lost while both slip.
+#[test]
+fn the_fourth_order_holds_while_two_clutches_slip() {
+    let error = |h: f64| {
+        let time = samples(h, (0.24 / h).round() as usize);
+        let elements = vec![
+            inertia("a", 0.4),
+            inertia("b", 0.5),
+            inertia("c", 3.0),
+            torque("a", "T"),
+            Element::Clutch(stribeck("C", "a", "b")),
+            Element::Clutch(stribeck("D", "b", "c")),
+        ];
+        let ramp = |from: f64, rise: f64| time.iter().map(|t| from + rise * t).collect::<Vec<_>>();
+        let columns =
+            [("T", ramp(38.0, 0.0)), ("P C", ramp(300.0, 20.0)), ("P D", ramp(300.0, 0.0))];
+        let begin = start(&[("a", 60.0), ("b", 52.0), ("c", 46.0)], &[]);
+        let runs = both(&compile(elements), &time, &columns, &begin, &Output::Speed("b".into()));
+        assert!(runs.iter().all(|run| run.events.is_empty()));
+        worst(&runs)
+    };
+    let (coarse, fine) = (error(8e-3), error(4e-3));
+    assert!(coarse > 1e-9, "nothing to measure: {coarse:.1e}");
+    assert!(fine < coarse / 10.0, "{coarse:.1e} at 8 ms, {fine:.1e} at 4 ms");
+}
+
+/// 4: with μ falling over slip the motion creeps into lock under negative damping.
+#[test]
+fn a_creeping_lock_is_found_in_time() {
+    let time = samples(1e-3, 1500);
+    let elements = vec![
+        inertia("a", 1.5),
+        inertia("b", 0.3),
+        inertia("c", 9.0),
+        shaft("b", "c", 2.0e3, 1.0),
+        torque("a", "T"),
+        Element::Clutch(stribeck("C", "a", "b")),
+    ];
+    let columns =
+        [("T", vec![50.0; time.len()]), ("P C", time.iter().map(|t| 520.0 + 30.0 * t).collect())];
+    let begin = start(&[("a", 12.0), ("b", 0.0), ("c", 0.0)], &[]);
+    let runs = both(&compile(elements), &time, &columns, &begin, &Output::Speed("a".into()));
+    assert_eq!(kinds(&runs[0]), kinds(&runs[1]));
+    assert!(kinds(&runs[0]).contains(&EventKind::Lock), "{:?}", runs[0].events);
+    for (quick, exact) in runs[0].events.iter().zip(&runs[1].events) {
+        assert!((quick.time - exact.time).abs() < 1e-6, "{quick:?} against {exact:?}");
+    }
+    assert!(worst(&runs) < 1e-4);
+}
+
+/// 5: a torque that exceeds the capacity between two samples and is back at the next.
+#[test]
+fn an_excursion_within_one_sample_breaks_away() {
+    // Half a swing of the shaft fits one sample; its torque peaks in the middle.
+    let (stiffness, member) = (8.0e3, 2.0);
+    let omega = (stiffness / member * (1.0 + member / 1e6_f64)).sqrt();
+    let h = 0.5 * std::f64::consts::PI / omega;
+    let time = samples(h, 40);
+    let elements = vec![
+        inertia("a", 1e6),
+        inertia("b", member),
+        shaft("a", "b", stiffness, 0.0),
+        Element::Clutch(clutch("C", "ground", "a")),
+    ];
+    let peak = 100.0;
+    // At the samples the torque is at most cos(π/4) of its peak.
+    let phase = 0.25 * std::f64::consts::PI;
+    let mut begin = start(&[("a", 0.0), ("b", peak / stiffness * omega * phase.sin())], &["C"]);
+    begin.twists = vec![("shaft a b".into(), peak / stiffness * phase.cos())];
+    let columns = [("P C", vec![0.9 * peak; time.len()])];
+    let runs = both(&compile(elements), &time, &columns, &begin, &Output::Slip("C".into()));
+    for run in &runs {
+        assert_eq!(run.events[0].kind, EventKind::BreakAway, "{:?}", run.events);
+        assert!(run.events[0].time < 4.0 * h);
+    }
+    assert!((runs[0].events[0].time - runs[1].events[0].time).abs() < 1e-7);
+}
