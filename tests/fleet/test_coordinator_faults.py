@@ -113,10 +113,10 @@ def small_disk(folder: Path, size: int) -> Iterator[None]:
 
 def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(tmp_path: Path) -> None:
     logs = make_logs(tmp_path / "logs", COUNT)
-    disk = tmp_path / "disk"
-    with small_disk(disk, 1_500_000):
+    disk, size = tmp_path / "disk", 1_000_000 + 30_000 * COUNT
+    with small_disk(disk, size):
         store, ballast = disk / "store", disk / "ballast"
-        ballast.write_bytes(bytes(1_350_000))
+        ballast.write_bytes(bytes(size - 150_000))
         with pytest.raises(StoreError, match=r"No space|full") as told:
             run_toys(logs, store)
         assert "make room" in told.value.remedy or "free space" in told.value.remedy
