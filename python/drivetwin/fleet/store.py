@@ -16,6 +16,7 @@ from drivetwin.fleet import parts
 from drivetwin.fleet.index import INDEX, RUN_COLUMNS, Index
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.task import GO_ON, Outcome, State, Task
+from drivetwin.logs.extras import require
 
 _LOCK = "coordinator.lock"
 REPORTS, TRACES = "reports", "traces"
@@ -24,10 +25,12 @@ REPORTS, TRACES = "reports", "traces"
 class Store:
     """A store, open for the one coordinator (`write`) or for any number of readers.
 
-    Raises StoreError where it is in use, not writable, no store, or of a newer format.
+    Raises StoreError where it is in use, not writable, no store, or of a newer format, and
+    MissingExtraError without pyarrow.
     """
 
     def __init__(self, folder: Path, *, write: bool = False) -> None:
+        require("pyarrow", "fleet", "a fleet's store", folder)
         self.folder = folder.absolute()
         self._lock: sqlite3.Connection | None = None
         if write:
