@@ -14,7 +14,7 @@ import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fit import LikelihoodFit, fit
+from drivetwin.identify.likelihood.fit import LikelihoodFit, fit, nearest
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
@@ -43,30 +43,45 @@ def choose(
     problem, start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
     notes = []
     with part(0.0, 0.6):
-        best = fit(problem, start, shifts)
-    with part(0.6, 0.8):
+        best, means = _fit_either(problem, start, shifts)
+    with part(0.6, 1.0):
         if _grows(best):
             notes.append(_growth(best))
         else:
             problem, start = problem_of(signals, drivelines, loss_law, guess)
+            problem = problem.averaged() if means else problem
             best = fit(problem, _taken(start, best.point), shifts)
-    with part(0.8, 1.0):
-        means = _with_means(problem, best, shifts) if problem.slow else None
-    if means is not None:
-        best = means
+    if means:
         notes.append("slow speeds are taken as means over their period: that fits better")
     return best, tuple(notes)
 
 
-def _with_means(
-    problem: Problem, best: LikelihoodFit, shifts: Sequence[Shift]
-) -> LikelihoodFit | None:
-    """The fit with slow speeds as means over their period; None where that leaves more."""
+def _fit_either(
+    problem: Problem, start: Point, shifts: Sequence[Shift]
+) -> tuple[LikelihoodFit, bool]:
+    """The fit that leaves less, and whether slow speeds are means over their period in it.
+
+    Raises IdentificationError where neither converges.
+    """
+    if not problem.slow:
+        return fit(problem, start, shifts), False
+    kinds = {False: problem, True: problem.averaged()}
+    likely = min(kinds, key=lambda means: kinds[means].cost(start) / kinds[means].size)
+    best = _tried(kinds[likely], start, shifts)
+    if best is None:
+        return fit(kinds[not likely], start, shifts), not likely
+    other = nearest(kinds[not likely], best.point)
+    if other is not None and other.chi2 < best.chi2:
+        return other, not likely
+    return best, likely
+
+
+def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit | None:
+    """The first plausible minimum; None where there is none."""
     try:
-        means = fit(problem.averaged(), best.point, shifts, thorough=False)
+        return fit(problem, start, shifts, thorough=False)
     except IdentificationError:
         return None
-    return means if means.chi2 < best.chi2 else None
 
 
 def _grows(best: LikelihoodFit) -> bool:
