@@ -11,6 +11,7 @@ from drivetwin.identify.bootstrap import FEWEST, bootstrap
 from tests.identify.asked import stepped
 
 
+@pytest.mark.timeout(300)
 def test_spread_agrees_with_the_covariance() -> None:
     """Of ten refits a standard deviation is known to a quarter; over nine parameters together the
     ratio to that of the covariance is near one."""

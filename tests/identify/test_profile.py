@@ -1,25 +1,53 @@
 # SPDX-License-Identifier: MIT
-"""The profile of a parameter that acts nearly linearly is a parabola about the estimate."""
+"""The profile is the least cost with a parameter held: a parabola where all acts linearly."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError, InputError
-from drivetwin.identify.profile import profile
+from drivetwin.identify.likelihood.newton import minimise
+from drivetwin.identify.profile import likelihood_of, profile
 from tests.identify.asked import by_the_paper, stepped
 
 
-@pytest.mark.parametrize("name", ["eta", "J_prime_3"])
-def test_agrees_with_the_covariance(name: str) -> None:
-    """One is an unknown of the fit, the other follows from two of them."""
-    one = profile(stepped(), name)
+def test_of_a_parameter_that_acts_linearly_is_that_of_the_covariance() -> None:
+    one = profile(stepped(), "eta")
     half = 0.5 * (one.linear[1] - one.linear[0])
     assert one.interval == pytest.approx(one.linear, abs=0.1 * half)
     distance = (one.values - one.estimate) / (half / 1.96)
     assert one.rise == pytest.approx(distance**2, rel=0.15, abs=0.3)
     assert one.rise[np.argmin(np.abs(distance))] == 0.0
+
+
+def test_is_the_least_cost_with_the_parameter_held() -> None:
+    """Jo′ acts through the locks, not quite linearly; held by a hard prior Q is searched anew."""
+    one = profile(stepped(), "J_out")
+    fit, _ = likelihood_of(stepped())
+    place = fit.point.names.index("J_out")
+    for k in (1, -2):
+        held = replace(fit.problem, prior=fit.problem.prior.held(place, float(one.values[k])))
+        start = fit.point.values.copy()
+        start[place] = one.values[k]
+        found = minimise(held, fit.point.moved(start))
+        assert found is not None
+        data = found.normal.cost - held.prior.cost(found.point.values)
+        least = data + fit.problem.prior.cost(found.point.values)
+        rise = (least - fit.normal.cost) / max(fit.chi2, 1.0)
+        assert one.rise[k] == pytest.approx(rise, abs=0.1)
+
+
+def test_rises_to_both_sides_of_a_parameter_of_several_unknowns() -> None:
+    one = profile(stepped(), "J_prime_3")
+    middle = int(np.argmin(one.rise))
+    assert np.all(np.diff(one.rise[middle:]) > 0.0)
+    assert np.all(np.diff(one.rise[: middle + 1]) < 0.0)
+    assert one.interval[0] < one.estimate < one.interval[1]
+    width = (one.interval[1] - one.interval[0]) / (one.linear[1] - one.linear[0])
+    assert width == pytest.approx(1.0, abs=0.2)
 
 
 @pytest.mark.parametrize(("name", "match"), [("k_x", "choose one of eta"), ("P0.B2", "design")])
