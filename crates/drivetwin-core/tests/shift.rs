@@ -15,10 +15,8 @@ const SHAFT_TORQUE: usize = 4;
 
 fn shift<T: Real>(model: &DualClutch<T>, weak: f64, settings: Settings) -> DualClutchRun<T> {
     let signals = upshift(weak);
-    let lifted: Vec<Vec<T>> =
-        signals.iter().map(|s| s.2.iter().map(|&v| T::of(v)).collect()).collect();
     let borrowed: Vec<(&str, Signal<'_, T>)> =
-        signals.iter().zip(&lifted).map(|(s, v)| (s.0, Signal::samples(&s.1, v))).collect();
+        signals.iter().map(|s| (s.0, Signal::samples(&s.1, &s.2))).collect();
     let grid = signals[0].1.clone();
     simulate_dual_clutch(model, &borrowed, &second_gear(), &grid, (settings, true)).unwrap()
 }

@@ -96,8 +96,6 @@ fn differentiated(
 ) -> Result<DualClutchRun<Derived>, SensitivityError> {
     let mut model = model.lifted::<Derived>();
     let mut start = start.lifted::<Derived>();
-    let lifted: Vec<Vec<Derived>> =
-        signals.iter().map(|s| s.2.iter().map(|&v| Derived::of(v)).collect()).collect();
     let mut delays: Vec<Derived> = signals.iter().map(|s| Derived::of(s.3)).collect();
     for (lane, &name) in parameters.iter().enumerate() {
         let place = match name.split_once('.') {
@@ -112,8 +110,8 @@ fn differentiated(
     }
     let inputs: Vec<_> = signals
         .iter()
-        .zip(lifted.iter().zip(&delays))
-        .map(|(s, (values, &delay))| (s.0, Signal::Samples { times: s.1, values, delay }))
+        .zip(&delays)
+        .map(|(s, &delay)| (s.0, Signal::Samples { times: s.1, values: s.2, delay }))
         .collect();
     Ok(simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?)
 }

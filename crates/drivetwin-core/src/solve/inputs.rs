@@ -12,7 +12,7 @@ pub enum Signal<'a, T> {
         /// Times, s.
         times: &'a [f64],
         /// Values, SI.
-        values: &'a [T],
+        values: &'a [f64],
         /// The input at time t is the sample of time t - delay, s. Derivatives with respect to it are
         /// exact for signals without jumps.
         delay: T,
@@ -32,7 +32,7 @@ pub enum Signal<'a, T> {
 
 impl<'a, T: Real> Signal<'a, T> {
     /// Samples without delay.
-    pub fn samples(times: &'a [f64], values: &'a [T]) -> Self {
+    pub fn samples(times: &'a [f64], values: &'a [f64]) -> Self {
         Self::Samples { times, values, delay: T::zero_() }
     }
 }
@@ -42,7 +42,9 @@ impl<'a, T: Real> Signal<'a, T> {
 pub struct Inputs<T> {
     knots: Vec<f64>,
     /// Value at the start of a segment and rate within it, segments × inputs; unused for sines.
-    lines: Vec<[T; 2]>,
+    lines: Vec<[f64; 2]>,
+    /// Derivatives of the delays: numbers of value zero.
+    shifts: Vec<T>,
     sines: Vec<Option<Sine<T>>>,
     /// For every segment the number of segments of its length from it on.
     equal: Vec<u32>,
@@ -119,11 +121,11 @@ impl<T: Real> Inputs<T> {
         signals: &[(&str, Signal<'_, T>)],
         (start, end): (f64, f64),
     ) -> Result<Self, InputError> {
-        let mut jumps = Vec::new();
-        let mut sines = Vec::new();
+        let (mut jumps, mut sines, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
         for &(name, signal) in signals {
             match signal {
                 Signal::Samples { times, values, delay } => {
+                    shifts.push(delay - delay.re());
                     let delay = delay.re();
                     check(name, times, values, (start - delay, end - delay))?;
                     let twice = times.windows(2).filter(|w| w[0] == w[1]);
@@ -133,6 +135,7 @@ impl<T: Real> Inputs<T> {
                 Signal::Sine { offset, amplitude, frequency, phase } => {
                     let omega = 2.0 * std::f64::consts::PI * frequency;
                     sines.push(Some((offset, amplitude, omega, phase)));
+                    shifts.push(T::zero_());
                 }
             }
         }
@@ -143,19 +146,24 @@ impl<T: Real> Inputs<T> {
             for ((_, signal), cursor) in signals.iter().zip(&mut cursors) {
                 lines.push(match signal {
                     Signal::Samples { times, values, delay } => {
-                        line(times, values, *delay, (span[0], span[1]), cursor)
+                        line(times, values, delay.re(), (span[0], span[1]), cursor)
                     }
-                    Signal::Sine { offset, .. } => [*offset, T::zero_()],
+                    Signal::Sine { .. } => [0.0; 2],
                 });
             }
         }
         let equal = equal_lengths(&knots);
-        Ok(Self { knots, lines, sines, equal })
+        Ok(Self { knots, lines, shifts, sines, equal })
     }
 
     /// Number of segments from `i` on, itself included, that are as long as it.
     pub fn equal_from(&self, i: usize) -> usize {
         self.equal[i] as usize
+    }
+
+    /// Number of inputs.
+    pub fn count(&self) -> usize {
+        self.sines.len()
     }
 
     /// Number of segments between knots.
@@ -189,19 +197,29 @@ impl<T: Real> Inputs<T> {
         grid.iter().all(|&t| knots.any(|&knot| knot == t))
     }
 
-    /// Value at the start of segment `i` and rate within it, of every input.
-    pub fn lines(&self, i: usize) -> &[[T; 2]] {
+    /// Value at the start of segment `i` and rate within it, of every input, without derivatives.
+    pub fn lines(&self, i: usize) -> &[[f64; 2]] {
         &self.lines[i * self.sines.len()..(i + 1) * self.sines.len()]
+    }
+
+    /// Value of an input at the start of segment `i` and its rate: with a later signal it falls by its
+    /// rate.
+    #[inline(always)]
+    pub fn line(&self, i: usize, input: usize) -> [T; 2] {
+        let [start, rate] = self.lines[i * self.sines.len() + input];
+        let shift = self.shifts[input];
+        let start = if T::DERIVATIVES { T::of(start) - shift * rate } else { T::of(start) };
+        [start, T::of(rate)]
     }
 
     /// Taylor coefficients of every input at `t` within segment `i`.
     pub fn expand(&self, i: usize, t: T, out: &mut [Series<T>]) {
         let elapsed = t - self.knots[i];
-        let lines = &self.lines[i * self.sines.len()..];
-        for ((series, sine), &[start, rate]) in out.iter_mut().zip(&self.sines).zip(lines) {
+        for (input, (series, sine)) in out.iter_mut().zip(&self.sines).enumerate() {
             match sine {
                 Some(sine) => *series = sine_series(sine, t),
                 None => {
+                    let [start, rate] = self.line(i, input);
                     series[0] = start + rate * elapsed;
                     series[1] = rate;
                 }
@@ -241,10 +259,10 @@ fn sine_series<T: Real>(&(offset, amplitude, omega, phase): &Sine<T>, t: T) -> S
     })
 }
 
-fn check<T: Real>(
+fn check(
     name: &str,
     times: &[f64],
-    values: &[T],
+    values: &[f64],
     (start, end): (f64, f64),
 ) -> Result<(), InputError> {
     let name = name.to_owned();
@@ -259,7 +277,7 @@ fn check<T: Real>(
     if let Some(index) = (0..times.len()).find(|&i| !ordered(i)) {
         return Err(InputError::Time { name, index });
     }
-    if let Some(index) = values.iter().position(|v| !v.re().is_finite()) {
+    if let Some(index) = values.iter().position(|v| !v.is_finite()) {
         return Err(InputError::Value { name, index });
     }
     let (from, to) = (times[0], times[times.len() - 1]);
@@ -312,21 +330,21 @@ fn merge_knots(sorted: &[f64], jumps: &[f64], (start, end): (f64, f64)) -> Vec<f
 /// Value at the start of a segment and rate within it. The samples' interval is found by the
 /// middle of the segment, so that round-off of the knots cannot pick a neighbour; `cursor` remembers
 /// it for the segments that follow.
-fn line<T: Real>(
+fn line(
     times: &[f64],
-    values: &[T],
-    delay: T,
+    values: &[f64],
+    delay: f64,
     (from, to): (f64, f64),
     cursor: &mut usize,
-) -> [T; 2] {
-    let middle = 0.5 * (from + to) - delay.re();
+) -> [f64; 2] {
+    let middle = 0.5 * (from + to) - delay;
     while *cursor < times.len() && times[*cursor] <= middle {
         *cursor += 1;
     }
     let next = *cursor;
     if next == 0 || next == times.len() {
-        return [values[next.saturating_sub(1)], T::zero_()];
+        return [values[next.saturating_sub(1)], 0.0];
     }
     let rate = (values[next] - values[next - 1]) / (times[next] - times[next - 1]);
-    [values[next - 1] + rate * (-delay + (from - times[next - 1])), rate]
+    [values[next - 1] + rate * (from - times[next - 1] - delay), rate]
 }

@@ -262,9 +262,9 @@ impl<'a, T: Real> Integrator<'a, T> {
     /// Value of an input at a knot.
     pub fn input_at(&self, i: usize, input: usize) -> T {
         if i < self.inputs.segments() {
-            return self.inputs.lines(i)[input][0];
+            return self.inputs.line(i, input)[0];
         }
-        let [start, rate] = self.inputs.lines(i - 1)[input];
+        let [start, rate] = self.inputs.line(i - 1, input);
         start + rate * (self.inputs.knot(i) - self.inputs.knot(i - 1))
     }
 

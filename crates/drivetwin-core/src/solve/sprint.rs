@@ -326,8 +326,8 @@ struct Lines<'a, T>(&'a Inputs<T>);
 impl<T: Real> Source<T> for Lines<'_, T> {
     #[inline(always)]
     fn read(&self, segment: usize, sample: &mut Sample<T>) {
-        for (to, &line) in sample.iter_mut().zip(self.0.lines(segment)) {
-            *to = line;
+        for input in 0..self.0.count().min(MAX_INPUTS) {
+            sample[input] = self.0.line(segment, input);
         }
     }
 }
