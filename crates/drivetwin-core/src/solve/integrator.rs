@@ -101,6 +101,11 @@ const PROGRESS_WINDOW: usize = 1000;
 /// Least advance over a window of events, s; below lies Zeno behaviour.
 const MIN_PROGRESS: f64 = 1e-7;
 
+/// Steps over which a run must advance by at least [`MIN_ADVANCE`].
+const STEP_WINDOW: usize = 10_000;
+/// Least advance over a window of steps, s; below, the motion is too stiff or has blown up.
+const MIN_ADVANCE: f64 = 1e-3;
+
 /// A run in progress.
 pub struct Integrator<'a, T> {
     /// Network.
@@ -136,6 +141,8 @@ pub struct Integrator<'a, T> {
     pub(super) pending: Option<Cause>,
     stalled: usize,
     window: (usize, f64),
+    /// Steps since, and time of, the last look at the advance.
+    steps: (usize, f64),
 }
 
 impl<'a, T: Real> Integrator<'a, T> {
@@ -177,6 +184,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             pending: None,
             stalled: 0,
             window: (0, t),
+            steps: (0, t),
         };
         let locked: Vec<Row> = locked.iter().map(|&j| Row::Friction(j)).collect();
         run.take_up(&locked)?;
@@ -325,6 +333,13 @@ impl<'a, T: Real> Integrator<'a, T> {
         let time = self.t.re();
         if !self.x.iter().all(|v| v.re().is_finite()) {
             return Err(Status::NotFinite { time });
+        }
+        self.steps.0 += 1;
+        if self.steps.0 == STEP_WINDOW {
+            if time - self.steps.1 < MIN_ADVANCE {
+                return Err(Status::StepTooSmall { time });
+            }
+            self.steps = (0, time);
         }
         let Some(cause) = self.pending else {
             self.stalled = 0;
