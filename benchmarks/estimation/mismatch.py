@@ -15,6 +15,7 @@ from benchmarks.estimation.bench import Bench, Knowledge, realise
 from benchmarks.estimation.study import START_INERTIA, best_fit, told
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import gearbox, throttle_steps
+from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.integral import identify_shift
 from drivetwin.identify.signals import PriorValue
@@ -35,10 +36,13 @@ class Fault:
 
 @dataclass(frozen=True)
 class Shift:
-    """Mean shift by parameter [%], of the delay [ms], and chi2 with and without the fault."""
+    """Mean shift by parameter [%], of the delay [ms], and chi2 without and with the fault.
+
+    `percent` is None where the fit with the fault finds no plausible minimum and says so.
+    """
 
     fault: Fault
-    percent: dict[str, float]
+    percent: dict[str, float] | None
     delay: float
     chi2: tuple[float, float]
 
@@ -66,7 +70,10 @@ def shift_of(fault: Fault, count: int) -> Shift:
     for seed in range(count):
         sound.append(_told(_drumless(realise(fault.sound(), seed, KNOW))))
         bench = _drumless(realise(fault.faulty(), seed, KNOW))
-        faulty.append(_told(replace(bench, signals=disturbed(bench.signals, *fault.disturb))))
+        try:
+            faulty.append(_told(replace(bench, signals=disturbed(bench.signals, *fault.disturb))))
+        except IdentificationError:
+            return Shift(fault, None, 0.0, (sound[0]["chi2"], 0.0))
     means = [
         {n: float(np.mean([one[n] for one in runs])) for n in runs[0]} for runs in (sound, faulty)
     ]

@@ -41,6 +41,11 @@ def _faults(shifts: Sequence[Shift]) -> list[str]:
     head = ("fault", *SHOWN, "te_delay", "chi2")
     lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for one in shifts:
+        if one.percent is None:
+            lines.append(
+                f"| {one.fault.text} | refused: no plausible minimum |" + " |" * len(SHOWN)
+            )
+            continue
         cells = [f"{one.percent[name]:+.2f}" for name in SHOWN]
         chi2 = f"{one.chi2[0]:.3f} → {one.chi2[1]:.3f}"
         lines.append(f"| {' | '.join([one.fault.text, *cells, f'{one.delay:+.2f}', chi2])} |")

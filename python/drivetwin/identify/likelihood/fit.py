@@ -32,7 +32,7 @@ RESTARTS: tuple[tuple[float, float], ...] = (
 )
 """Factors on shaft stiffness and friction level: what a wrong minimum hangs on."""
 HOPELESS = 100.0
-"""Q per sample after the stages above which neither the full fit nor another start is tried."""
+"""Q per sample after the stages above which the full fit is not tried."""
 PLAUSIBLE = 2.0
 """Q per sample above which a minimum is taken for a wrong one."""
 
@@ -108,9 +108,10 @@ def _attempts(
             for name in start.names
         ]
         near = staged(problem, start.moved(start.values * np.array(factor)), shifts)
-        if near is not None and near.normal.cost > HOPELESS * problem.size:
-            return
-        yield None if near is None else nearest(problem, near.point)
+        if near is None or near.normal.cost > HOPELESS * problem.size:
+            yield None
+        else:
+            yield nearest(problem, near.point)
 
 
 def nearest(problem: Problem, start: Point) -> LikelihoodFit | None:

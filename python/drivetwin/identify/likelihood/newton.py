@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.retraction import ahead
@@ -57,10 +58,16 @@ class Found:
 
 def step_of(matrix: FloatArray, gradient: FloatArray, damping: float = 0.0) -> FloatArray:
     """-(matrix + damping·diag)⁻¹·gradient (p,), scaled; directions without information stay."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scale = _scale(matrix)
     unit = matrix / np.outer(scale, scale)
     unit[np.diag_indices_from(unit)] += damping
     return np.asarray(-np.linalg.lstsq(unit, gradient / scale, rcond=1e-13)[0] / scale, dtype=float)
+
+
+def _scale(matrix: FloatArray) -> FloatArray:
+    """Root of the diagonal (p,); 1 where there is no information."""
+    diagonal = np.diag(matrix)
+    return np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
 
 
 def unchanged(problem: Problem, _: Point) -> Problem:
@@ -124,24 +131,22 @@ def _better(
 
 
 def _step(problem: Problem, point: Point, normal: Normal, damping: float) -> FloatArray:
-    """Step (p,) that stays within the bounds.
+    """Step (p,) to the least expanded Q within the bounds.
 
-    An unknown that would leave them goes as far as its bound, and the others are solved for again
-    with that known: cut alone it would undo what those that nearly compensate it gain.
+    Cut at a bound one unknown would undo what those that nearly compensate it gain, so the bounds
+    are part of the least-squares problem (Stark and Parker 1995).
     """
     room = np.array([problem.lower, problem.upper]) - point.values
-    free = ~((room[0] >= 0.0) & (normal.gradient > 0.0))
-    free &= ~((room[1] <= 0.0) & (normal.gradient < 0.0))
-    step = np.zeros(point.values.size)
-    while free.any():
-        pull = normal.gradient[free] + normal.information[np.ix_(free, ~free)] @ step[~free]
-        trial = step_of(normal.information[np.ix_(free, free)], pull, damping)
-        kept = np.clip(trial, *room[:, free])
-        step[free] = kept
-        if np.array_equal(kept, trial):
-            break
-        free[free] = kept == trial
-    return step
+    step = step_of(normal.information, normal.gradient, damping)
+    if np.all((step >= room[0]) & (step <= room[1])):
+        return step
+    scale = _scale(normal.information)
+    unit = normal.information / np.outer(scale, scale)
+    power, directions = np.linalg.eigh(unit + damping * np.eye(scale.size))
+    root = np.sqrt(np.maximum(power, 1e-13 * power[-1]))
+    target = -(directions.T @ (normal.gradient / scale)) / root
+    found = lsq_linear(root[:, None] * directions.T, target, room * scale, method="bvls")
+    return np.asarray(np.clip(found.x / scale, *room))
 
 
 def _expected(problem: Problem, point: Point, normal: Normal) -> float:

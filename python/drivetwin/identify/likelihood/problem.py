@@ -163,6 +163,8 @@ class Part:
         if run is None:
             return self
         noise = self.weighting.input_noise(self.residual(run))
+        if not noise:
+            return self
         age = self.structure.value(point, "te_delay")
         record = measured.less(noise, age)
         part = replace(self, record=record)
@@ -277,6 +279,8 @@ class Problem:
             data += slopes.T @ weighted[:, 1:]
             residuals.append(residual)
             regressors.append(weighted[:, 1:])
+        if not np.all(np.isfinite(data)):
+            return None
         data = 0.5 * (data + data.T)
         information = data + self.prior.precision
         return Normal(cost, gradient, information, data, tuple(residuals), tuple(regressors))
