@@ -145,7 +145,8 @@ def _step(problem: Problem, point: Point, normal: Normal, damping: float) -> Flo
     power, directions = np.linalg.eigh(unit + damping * np.eye(scale.size))
     root = np.sqrt(np.maximum(power, 1e-13 * power[-1]))
     target = -(directions.T @ (normal.gradient / scale)) / root
-    found = lsq_linear(root[:, None] * directions.T, target, room * scale, method="bvls")
+    bounds = (room[0] * scale, room[1] * scale)
+    found = lsq_linear(root[:, None] * directions.T, target, bounds, method="bvls")
     return np.asarray(np.clip(found.x / scale, *room))
 
 
