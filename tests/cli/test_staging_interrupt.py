@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -56,7 +57,9 @@ def test_while_the_last_file_is_written_keeps_the_old_ones(
 
 def test_as_a_signal_to_the_running_program(bench_files: Files, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "drivetwin", *identify(bench_files, tmp_path / "out")]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as program:
+    # Programs started in the background inherit an interrupt that is ignored.
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heed) as program:
         time.sleep(1.2)
         program.send_signal(signal.SIGINT)
         _, message = program.communicate(timeout=30)

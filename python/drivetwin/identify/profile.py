@@ -11,13 +11,14 @@ point; its steps obey q(θ) = v by a Lagrange multiplier.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.identify.likelihood.derived import parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.newton import minimise
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.result import Identification
@@ -66,7 +67,7 @@ def profile(found: Identification, parameter: str) -> Profile:
         raise InputError(
             f"the fit has no parameter {parameter!r}", f"choose one of {', '.join(told)}"
         )
-    held = _Held(fit, signals, list(told).index(parameter))
+    held = _Held(fit, signals, list(told).index(parameter), parameter)
     if held.std == 0.0:
         raise InputError(
             f"{parameter} is known from design and does not move",
@@ -101,11 +102,12 @@ def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftS
 
 @dataclass(frozen=True)
 class _Held:
-    """A fit with one parameter to be held, by its place among the reported ones."""
+    """A fit with one parameter to be held, by its place among the reported ones and its name."""
 
     fit: LikelihoodFit
     signals: Sequence[ShiftSignals]
     place: int
+    parameter: str
 
     def value(self, point: Point) -> float:
         """The parameter at `point`."""
@@ -137,7 +139,8 @@ def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
     distance = 0.0
     while distance < FURTHEST and (distance < REACH or found[-1][1] < RISE):
         distance += STEP
-        reached = _least(held, point, estimate + sign * distance * std)
+        value = estimate + sign * distance * std
+        reached = _polished(held, _least(held, point, value), value)
         if reached is None:
             break
         point, cost = reached
@@ -159,6 +162,24 @@ def _least(held: _Held, start: Point, value: float) -> tuple[Point, float] | Non
         step = _constrained(normal, held.row(point), value - held.value(point))
         point = _within(problem, point, step)
     return point, problem.cost(point)
+
+
+def _polished(
+    held: _Held, reached: tuple[Point, float] | None, value: float
+) -> tuple[Point, float] | None:
+    """The same or a lower point, where the parameter is itself an unknown of the fit: locks make
+    kinks in Q, at which the plain steps can stop early."""
+    problem = held.fit.problem
+    if reached is None or held.parameter not in held.fit.point.names:
+        return reached
+    place = held.fit.point.names.index(held.parameter)
+    prior = problem.prior.held(place, value)
+    found = minimise(replace(problem, prior=prior), reached[0])
+    if found is None:
+        return reached
+    point = found.point
+    cost = found.normal.cost - prior.cost(point.values) + problem.prior.cost(point.values)
+    return (point, cost) if cost < reached[1] else reached
 
 
 def _constrained(normal: Normal, row: FloatArray, wanted: float) -> FloatArray:
