@@ -109,15 +109,6 @@ impl<T: Real> Normal<T> {
 }
 
 impl<T: Real> Channel<T> {
-    /// Whether [`Channel::partials`] covers the law.
-    pub fn is_smooth(&self) -> bool {
-        match &self.law {
-            Law::Friction { mu, .. } => matches!(mu, FrictionLaw::Stribeck(_)),
-            Law::Quadratic(_) => true,
-            Law::Map { .. } | Law::Converter { .. } | Law::Regions(_) => false,
-        }
-    }
-
     /// For smooth laws the torque φ at argument s and normal load N, and its partial derivatives:
     /// `φ' = φ_s s' + φ_N N'`.
     pub fn partials(&self, cell: Cell, s: T, normal: T) -> [T; 3] {
