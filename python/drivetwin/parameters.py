@@ -27,7 +27,8 @@ class ParameterSpec:
     lower: float
     upper: float
     suffix: str = ""
-    """`gear` or `element` where one value exists for each, else empty."""
+    """`gear`, `element` or `log` where one value exists for each, else empty. Of one log alone the
+    id is the stem itself; of several fitted together the number of the log, from 1, follows."""
     weak_above: float = 0.25
 
 
@@ -44,7 +45,7 @@ _SPECS = (
     ),
     ParameterSpec("J_out", "Jo′", "kg*m^2", "output side before the shaft (eq. 7)", 0.0, 1e4),
     ParameterSpec("J_vehicle", "J3", "kg*m^2", "vehicle inertia at the wheel (eq. 9, 11)", 0, 1e7),
-    ParameterSpec("Tv_over_if", "Tv/if", "N*m", "load torque over final drive", -1e6, 1e6),
+    ParameterSpec("Tv_over_if", "Tv/if", "N*m", "load torque over final drive", -1e6, 1e6, "log"),
     ParameterSpec("k_o", "k_o", "N*m/rad", "output shaft stiffness (eq. 8, 14)", 0.0, 1e9),
     ParameterSpec("c_o", "c_o", "N*m*s/rad", "output shaft damping (eq. 8, 14)", 0.0, 1e7),
     ParameterSpec("f_d", "f_d", "Hz", "frequency of the lock-up oscillation", 0.0, 1e3, "gear"),
@@ -54,7 +55,7 @@ _SPECS = (
     ParameterSpec(
         "drum", "I_d", "kg*m^2", "drum that runs with the slip (THEORY §2)", 0.0, 1e4, "element"
     ),
-    ParameterSpec("te_delay", "τ_e", "s", "age of a fresh engine torque value", -1.0, 1.0),
+    ParameterSpec("te_delay", "τ_e", "s", "age of a fresh engine torque value", -1.0, 1.0, "log"),
 )
 
 SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}
@@ -66,7 +67,7 @@ torque tells of it."""
 
 
 def spec_of(parameter_id: str) -> ParameterSpec:
-    """Return the declaration behind an id such as `J_prime_2`, `P0.B3`, `eta` or `k_o_over_eta`.
+    """Return the declaration behind an id: `J_prime_2`, `P0.B3`, `te_delay.1`, `k_o_over_eta`.
 
     Raises InputError for an id that no declaration covers.
     """
@@ -76,9 +77,21 @@ def spec_of(parameter_id: str) -> ParameterSpec:
     if parameter_id in SPECS:
         return SPECS[parameter_id]
     for spec in _SPECS:
-        separator = {"gear": "_", "element": "."}.get(spec.suffix)
+        separator = {"gear": "_", "element": ".", "log": "."}.get(spec.suffix)
         if separator and parameter_id.startswith(spec.stem + separator):
             return spec
     raise InputError(
         f"unknown parameter id {parameter_id!r}", f"use one of {', '.join(sorted(SPECS))}"
     )
+
+
+def log_of(parameter_id: str) -> tuple[str, int]:
+    """The id without the number of its log, and that number; 0 where it has none.
+
+    Raises InputError for an id that no declaration covers.
+    """
+    ending = OVER_ETA if parameter_id.endswith(OVER_ETA) else ""
+    stem, _, number = parameter_id.removesuffix(ending).partition(".")
+    if spec_of(parameter_id).suffix != "log" or not number.isdecimal():
+        return parameter_id, 0
+    return stem + ending, int(number)

@@ -283,11 +283,6 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
     mu_points = sign * torque / (equations.element.gain * above)
     grid = np.linspace(float(slip.min()), float(slip.max()), 60)
     mu, slopes = stribeck(fit.theta, grid)
-    if float(mu.min()) <= 0.0 or float(fit.theta[MU_C]) <= 0.0:
-        raise IdentificationError(
-            f"the friction of {equations.element.name} comes out as μ = {float(mu.min()):.3g}",
-            "torques, pressures and speeds contradict each other: check signs, units and delays",
-        )
     std = np.sqrt(np.einsum("pn,pq,qn->n", slopes, fit.covariance[:4, :4], slopes))
     v_s = float(np.exp(fit.theta[LOG_V]))
     law = {
@@ -296,6 +291,12 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
         "v_s": v_s,
         "mu_v": float(fit.theta[MU_V]),
     }
+    least = min(float(mu.min()), law["mu_c"], law["mu_s"])
+    if least <= 0.0:
+        raise IdentificationError(
+            f"the friction of {equations.element.name} comes out as μ = {least:.3g}",
+            "torques, pressures and speeds contradict each other: check signs, units and delays",
+        )
     to_law = np.array([[1.0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, v_s], [0, 0, 1, 0]])
     curve = FrictionCurve(
         slip=grid,

@@ -121,6 +121,8 @@ class ShiftSignals:
     shift: Shift
     torque_resolution: float = field(default=0.0)
     """Rounding step of the engine torque [N m]; 0 where none shows."""
+    log: int = 0
+    """Number of the log, from 1, where several are fitted together; 0: there is one only."""
 
     @property
     def output_gaps(self) -> tuple[Span, ...]:

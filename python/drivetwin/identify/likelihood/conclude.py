@@ -16,7 +16,7 @@ from drivetwin.identify.conclude import (
     low_gear_notes,
 )
 from drivetwin.identify.likelihood.curves import METHOD, curves_of
-from drivetwin.identify.likelihood.derived import absolute_ids, parameters, slopes
+from drivetwin.identify.likelihood.derived import absolute_ids, of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.null_space import null_directions
 from drivetwin.identify.likelihood.priors import over_eta
@@ -26,13 +26,14 @@ from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
 from drivetwin.identify.uncertainty import correlation, designed, judge, refused
-from drivetwin.parameters import OVER_ETA
+from drivetwin.parameters import OVER_ETA, spec_of
 from drivetwin.vehicle.spec import SensorTolerance
 
 NO_SCALE = (
     "without an output torque sensor all torques share one unknown scale; what is told is the "
     "quantity over η; add an output-shaft torque sensor"
 )
+AGE = "te_delay"
 NO_AGE = "the engine torque moves too little for its age to show"
 WITH_ETA = "likelihood over η, times η from design"
 """Method of a torque-like parameter of a log without an output torque, where η is on the card."""
@@ -74,8 +75,10 @@ def conclude(
             name: _without_scale(name, eta, estimates.get(name + OVER_ETA))
             for name in absolute_ids(signals)
         }
-    if "te_delay" not in fit.point.names and "te_delay" not in drivelines[0].known:
-        estimates["te_delay"] = refused("te_delay", METHOD, NO_AGE)
+    for one in (part.structure for part in fit.problem.parts):
+        if one.unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
+            name = of_log(AGE, one.log)
+            estimates[name] = refused(name, METHOD, NO_AGE)
     return Conclusions(
         estimates,
         curves_of(fit, linear, systematic),
@@ -129,8 +132,11 @@ def _without_scale(name: str, eta: PriorValue | None, ratio: Estimate | None) ->
 
 def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
     """What is known beforehand of a parameter itself, where anything is."""
-    if name in drivelines[0].known:
-        return drivelines[0].known[name]
+    spec = spec_of(name)
+    ending = OVER_ETA if name.endswith(OVER_ETA) else ""
+    known = drivelines[0].known.get(spec.stem + ending if spec.suffix == "log" else name)
+    if known is not None:
+        return known
     if name == "J_out":
         return drivelines[0].J_out
     if name == "J_out" + OVER_ETA and drivelines[0].J_out is not None:

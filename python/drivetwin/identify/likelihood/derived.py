@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import Point, Structure
+from drivetwin.identify.likelihood.unknowns import OWN, Point, Structure
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.parameters import OVER_ETA, spec_of
 
@@ -33,7 +33,8 @@ def parameters(problem: Problem, point: Point, signals: Sequence[ShiftSignals]) 
         for gear, ratio in ((s.shift.start_gear, d.i_before), (s.shift.end_gear, d.i_after)):
             J_out = structure.value(point, "J_out")
             values[f"J_prime_{gear}"] = structure.value(point, "J_e") + J_out / ratio**2
-    values |= {name: first.value(point, name) for name in DIRECT}
+    for name in DIRECT:
+        values |= {of_log(name, one.log): one.value(point, name) for one in structures}
     for structure, s in zip(structures, signals, strict=True):
         f_d, zeta = oscillation(structure, point)
         values |= {f"f_d_{s.shift.end_gear}": f_d, f"zeta_{s.shift.end_gear}": zeta}
@@ -42,6 +43,11 @@ def parameters(problem: Problem, point: Point, signals: Sequence[ShiftSignals]) 
     for element in structures[0].driveline.drums:
         values[f"drum.{element.name}"] = first.value(point, f"{element.name}.drum")
     return values if signals[0].scale_known else _over_eta(values)
+
+
+def of_log(name: str, log: int) -> str:
+    """Id of a parameter in one of several logs, numbered from 1; the `name` itself if shared."""
+    return f"{name}.{log}" if log and name in OWN else name
 
 
 def _over_eta(values: dict[str, float]) -> dict[str, float]:
@@ -56,8 +62,9 @@ def _over_eta(values: dict[str, float]) -> dict[str, float]:
 def absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
     """Ids that a log without an output torque cannot tell."""
     gears = dict.fromkeys(g for s in signals for g in (s.shift.start_gear, s.shift.end_gear))
-    others = tuple(stem for stem in TORQUE_LIKE if stem in DIRECT)
-    return ("eta", *(f"J_prime_{gear}" for gear in gears), *others)
+    logs = dict.fromkeys(s.log for s in signals)
+    others = [of_log(stem, log) for stem in TORQUE_LIKE if stem in DIRECT for log in logs]
+    return ("eta", *(f"J_prime_{gear}" for gear in gears), *dict.fromkeys(others))
 
 
 def oscillation(structure: Structure, point: Point) -> tuple[float, float]:

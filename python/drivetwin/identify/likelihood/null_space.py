@@ -26,7 +26,7 @@ def null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
     keep = [k for k, name in enumerate(names) if name.split(".")[-1] in NAMED]
     rest = [k for k in range(len(names)) if k not in keep]
     size = np.abs(fit.point.values[keep])
-    relative = _reduced(fit.normal.data, keep, rest) * np.outer(size, size)
+    relative = reduced(fit.normal.data, keep, rest) * np.outer(size, size)
     power, directions = np.linalg.eigh(relative)
     texts = []
     for value, direction in zip(power, directions.T, strict=True):
@@ -42,7 +42,7 @@ def null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
     return tuple(text.strip() for text in texts)
 
 
-def _reduced(matrix: FloatArray, keep: list[int], rest: list[int]) -> FloatArray:
+def reduced(matrix: FloatArray, keep: list[int], rest: list[int]) -> FloatArray:
     """Information on `keep` with the `rest` unknown (Schur complement), scaled on the way."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     unit = matrix / np.outer(scale, scale)

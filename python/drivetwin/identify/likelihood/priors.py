@@ -8,7 +8,7 @@ those of the linear friction fit.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from drivetwin.identify.likelihood.unknowns import (
     TE_OFFSET,
     Point,
     Structure,
+    own_of,
 )
 from drivetwin.identify.momentum import DELAY_STD_MAX, MomentumSettings, rounding_error
 from drivetwin.identify.regression import Prior
@@ -44,6 +45,7 @@ from drivetwin.identify.signals import (
     Span,
 )
 from drivetwin.parameters import SPECS
+from drivetwin.shifts.shift import Shift
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
     "te_delay": (-0.5 * LATEST, LATEST),
@@ -73,31 +75,34 @@ def problem_of(
     loss_law: LossLaw,
     guess: Mapping[str, float],
 ) -> tuple[Problem, Point]:
-    """The fit of all shifts of a log, and where its search starts.
+    """The fit of all shifts of one log or of several, and where its search starts.
 
     `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
     start of each shift's run is read from the first samples. The age of the engine torque is held
-    where no torque step shows it. Raises IdentificationError where a
-    shift holds too little.
+    where no torque step shows it. Shifts of one log stand together. Raises IdentificationError
+    where a shift holds too little.
     """
+    logs = tuple(dict.fromkeys(s.log for s in signals))
+    guess = _with_own(guess, logs)
     priors = _priors(signals, drivelines, guess)
-    every = (*COMMON, *_laws(signals, drivelines), *_fills(drivelines))
+    every = (*_of_each(COMMON, logs), *_laws(signals, drivelines), *_fills(drivelines))
     names = [n for n in every if not _is_known(priors.get(n))]
     inertias = gear_inertias(signals, drivelines)
     tie = tie_of(inertias)
-    untold = {
-        "eta": not signals[0].scale_known,
-        "te_delay": not all(shows_age(s.engine_torque) for s in signals),
-        "J_e": tie is not None,
-    }
-    names = [n for n in names if not untold.get(n, False)]
-    names += [n for n in (TE_OFFSET, AERO) if n in priors]
+    still = [s for s in signals if not shows_age(s.engine_torque)]
+    ages = {own_of(s.log).get("te_delay", "te_delay") for s in still}
+    untold = {"eta": not signals[0].scale_known, "J_e": tie is not None}
+    names = [n for n in names if not untold.get(n, n in ages)]
+    names += [n for n in _of_each((TE_OFFSET, AERO), logs) if n in priors]
     fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_known(p)}
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
         label = f"start{k}"
         record = record_of(s, span)
-        structure = Structure(d, loss_law, label, fixed, mean_speed_of(signals, d.i_f), tie)
+        same = [one for one in signals if one.log == s.log]
+        own = {name: fixed[n] for name, n in own_of(s.log).items() if n in fixed}
+        speed = mean_speed_of(same, d.i_f)
+        structure = Structure(d, loss_law, label, fixed | own, speed, tie, s.log)
         parts.append(Part.unweighted(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
@@ -112,6 +117,17 @@ def problem_of(
     prior = Prior.independent(len(point.names), entries)
     prior = with_gear_inertias(prior, point, fixed, inertias)
     return Problem(tuple(parts), prior, lower, upper), point
+
+
+def _of_each(names: Sequence[str], logs: Sequence[int]) -> list[str]:
+    """The names with those that each log has of its own once for each."""
+    return list(dict.fromkeys(own_of(log).get(name, name) for name in names for log in logs))
+
+
+def _with_own(guess: Mapping[str, float], logs: Sequence[int]) -> dict[str, float]:
+    """The guess with a value for what each log has of its own; one given by that name stays."""
+    own = {n: guess[name] for log in logs for name, n in own_of(log).items() if name in guess}
+    return own | dict(guess)
 
 
 def over_eta(quantity: PriorValue, driveline: Driveline) -> PriorValue:
@@ -145,9 +161,14 @@ def spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
     """Span [s] of the log that each shift accounts for; no sample is counted twice.
 
     A gear between two shifts is divided in its middle: each run then starts in a gear that is
-    surely held, and ends before the next shift's pressures act.
+    surely held, and ends before the next shift's pressures act. Each log stands by itself.
     """
-    shifts = [s.shift for s in signals]
+    groups = groupby(signals, key=lambda s: s.log)
+    return tuple(span for _, group in groups for span in divided([s.shift for s in group]))
+
+
+def divided(shifts: Sequence[Shift]) -> tuple[Span, ...]:
+    """The span [s] that each shift of one log accounts for, as in `spans`."""
     middles = [0.5 * (max(a.after[0], b.before[0]) + b.before[1]) for a, b in pairwise(shifts)]
     starts = [shifts[0].before[0], *middles]
     ends = [*middles, shifts[-1].after[1]]
@@ -195,10 +216,12 @@ def _priors(
         known = drivelines[0].J_out
         found["J_out"] = known if signals[0].scale_known else over_eta(known, drivelines[0])
     found |= known_unknowns(drivelines[0], signals[0].scale_known)
-    step = signals[0].torque_resolution
-    rounding = rounding_error(signals[0].engine_torque, step)
-    if rounding > 0.0:
-        found[TE_OFFSET] = PriorValue(0.0, rounding)
+    for s in signals:
+        own = own_of(s.log)
+        found |= {own[name]: found[name] for name in own if name in found}
+        rounding = rounding_error(s.engine_torque, s.torque_resolution)
+        if rounding > 0.0:
+            found.setdefault(own.get(TE_OFFSET, TE_OFFSET), PriorValue(0.0, rounding))
     if AERO in guess:
         found[AERO] = PriorValue(0.0, AERO_SPREAD)
     law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)}

@@ -112,10 +112,11 @@ class Part:
         The rate is that of the torque without noise: jitter has no age, and would seem to show one.
         """
         found = {}
-        if "te_delay" in point.names:
-            found["te_delay"] = self.record.torque_rate(point["te_delay"])
-        if TE_OFFSET in point.names:
-            found[TE_OFFSET] = np.full(self.record.time.size - 1, -1.0)
+        age, offset = self.structure.unknown("te_delay"), self.structure.unknown(TE_OFFSET)
+        if age in point.names:
+            found[age] = self.record.torque_rate(point[age])
+        if offset in point.names:
+            found[offset] = np.full(self.record.time.size - 1, -1.0)
         return found
 
     def response(self, point: Point, run: Trajectory) -> Response:
@@ -188,8 +189,9 @@ class Part:
         """Engine torque as it acts: read, less its mean error, moved back by its age."""
         signal = self.record.engine_torque
         values = signal.values
-        if TE_OFFSET in point.names:
-            values = values - point[TE_OFFSET]
+        offset = self.structure.unknown(TE_OFFSET)
+        if offset in point.names:
+            values = values - point[offset]
         delay = self.structure.value(point, "te_delay")
         return Signal(signal.time, values, -delay)
 

@@ -24,6 +24,8 @@ TE_OFFSET = "te_offset"
 """Mean rounding error of the engine torque [N m]: what is read is the truth plus this."""
 AERO = "aero"
 """Part of the load that grows with the square of the wheel speed [N m s^2/rad^2]."""
+OWN = ("Tv_over_if", "te_delay", TE_OFFSET)
+"""Unknowns that each of several logs has of its own: road, logger and rounding differ."""
 LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
 NO_LAW = (0.1, 0.1, 1.0, 0.0)
 """Any friction law, for an element without pressure."""
@@ -46,6 +48,14 @@ class Point:
         return Point(self.names, values)
 
 
+def own_of(log: int) -> dict[str, str]:
+    """Unknown by name that stands for each of `OWN` in one of several logs, numbered from 1.
+
+    Empty for log 0, the only one.
+    """
+    return {name: f"log{log}.{name}" for name in OWN} if log else {}
+
+
 @dataclass(frozen=True)
 class Tie:
     """A known `inertia` J′ [kg m^2] of the gear of `ratio` i: Je = J′ - Jo′/i²."""
@@ -61,6 +71,7 @@ class Structure:
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
     start unknowns of this shift. `mean_speed` is that of the wheel over the log [rad/s], at which
     T_v/i_f holds where the load grows with the speed. A `tie` takes the place of the unknown J_e.
+    `log` is the number of the log among several, 0 where it is the only one.
     """
 
     driveline: Driveline
@@ -69,6 +80,7 @@ class Structure:
     fixed: Mapping[str, float]
     mean_speed: float
     tie: Tie | None = None
+    log: int = 0
 
     @property
     def elements(self) -> tuple[Coupling, Coupling]:
@@ -85,7 +97,12 @@ class Structure:
         """Value of an unknown, free, fixed or tied."""
         if name == "J_e" and self.tie is not None:
             return self.tie.inertia - self.value(point, "J_out") / self.tie.ratio**2
-        return point[name] if name in point.names else self.fixed[name]
+        free = self.unknown(name)
+        return point[free] if free in point.names else self.fixed[name]
+
+    def unknown(self, name: str) -> str:
+        """Name of the unknown that stands for `name` in this shift's log."""
+        return own_of(self.log).get(name, name)
 
     def model(self, point: Point) -> DualClutch:
         """The model to be simulated at `point`."""
@@ -155,7 +172,7 @@ class Structure:
             "J_e": (("J1", 1.0 / eta),),
             "J_out": (("J_out", 1.0), ("J1", by_tie)),
             "J_vehicle": (("J_v", 1.0),),
-            "Tv_over_if": (("load.constant", i_f),),
+            self.unknown("Tv_over_if"): (("load.constant", i_f),),
             AERO: (("load.aero", 1.0), ("load.constant", -(self.mean_speed**2))),
             "k_o": (("k_o", 1.0),),
             "c_o": (("c_o", 1.0),),

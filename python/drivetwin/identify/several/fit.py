@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: MIT
+"""Several logs of one vehicle in one likelihood.
+
+One mechanism with the fit of one log: its problem takes the shifts of all logs. What belongs to
+the driveline is one unknown for all; load, age and rounding of the engine torque are unknowns of
+each log (unknowns.py), noise levels are found log by log. So a design prior counts once, and a
+sensor's gain or offset error, the same in all logs, is not averaged out: its shift of the common
+minimum is summed over all parts (tolerance.py). Each log is fitted alone first: that finds what is
+wrong with one of them, and the common fit starts from the mean of all weighted by information.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError, InputError, Where
+from drivetwin.identify.conclude import Conclusions
+from drivetwin.identify.inputs import driveline_of
+from drivetwin.identify.likelihood.conclude import conclude
+from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
+from drivetwin.identify.likelihood.unknowns import AERO, OWN, START, own_of
+from drivetwin.identify.likelihood.variants import choose
+from drivetwin.identify.method import Method
+from drivetwin.identify.pipeline import Shifts, identify
+from drivetwin.identify.result import Estimate, Identification
+from drivetwin.identify.several.consistency import Consistency, consistency
+from drivetwin.identify.several.judge import judged, pooled_curves
+from drivetwin.identify.signals import FloatArray
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.parameters import log_of
+from drivetwin.progress import part
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import VehicleCard
+
+ALONE = 0.6
+"""Share of the time that the fits of single logs take."""
+
+
+@dataclass(frozen=True)
+class LogShare:
+    """One log of a fit of several: `number` from 1, as in parameter ids such as `te_delay.1`.
+
+    `alone` is what the log tells by itself, by parameter id without the number. T_v/i_f of the log
+    holds at `mean_speed` of the wheel [rad/s].
+    """
+
+    number: int
+    source: str
+    sha256: str
+    shifts: tuple[Shift, ...]
+    alone: Mapping[str, Estimate]
+    mean_speed: float
+
+
+@dataclass(frozen=True)
+class Several:
+    """The logs of a fit of several, and whether they agree on what they share."""
+
+    logs: tuple[LogShare, ...]
+    consistency: Consistency
+
+
+def identify_several(
+    logs: Sequence[ShiftLog], card: VehicleCard, shifts: Sequence[Shifts]
+) -> Identification:
+    """Identify one driveline from two or more logs, by the likelihood of all their shifts.
+
+    `evidence["several"]` holds a Several; ids of what a log has of its own end in its number.
+    Raises InputError for logs that cannot be joined (the same twice, channels that do not fit),
+    IdentificationError where one log alone, or all together, cannot be fitted, and what `identify`
+    raises.
+    """
+    _refuse_unlike(logs)
+    alone = []
+    for k, (log, found) in enumerate(zip(logs, shifts, strict=True)):
+        with part(ALONE * k / len(logs), ALONE * (k + 1) / len(logs), f"log {k + 1} alone"):
+            alone.append(_by_itself(log, card, found))
+    signals = [replace(s, log=k) for k, one in enumerate(alone, 1) for s in one.evidence["signals"]]
+    drivelines = [driveline_of(card, s.shift) for s in signals]
+    with part(ALONE, 0.95, "all logs together"):
+        try:
+            fit, notes = choose(signals, drivelines, card.loss_law, start_of(alone))
+        except IdentificationError as fault:
+            raise IdentificationError(
+                f"{len(logs)} logs can each be explained, but not by one set of parameters: "
+                f"{fault.what}",
+                "compare what each tells alone with `drivetwin report`, and leave out the one of "
+                "another vehicle, load or temperature",
+            ) from fault
+    told = conclude(fit, signals, drivelines, pooled_curves(alone), card.sensors)
+    tested = consistency(fit, signals, told.friction)
+    shares = tuple(
+        _share(k, log, one, fit) for k, (log, one) in enumerate(zip(logs, alone, strict=True), 1)
+    )
+    read = [f"{Path(log.source).name}: {text}" for log in logs for text in log.warnings]
+    return _joined(
+        alone,
+        replace(told, warnings=(*read, *told.warnings, *notes)),
+        {"likelihood": fit, "signals": tuple(signals), "several": Several(shares, tested)},
+    )
+
+
+def _refuse_unlike(logs: Sequence[ShiftLog]) -> None:
+    """Raise InputError where logs cannot stand in one fit."""
+    for k, one in enumerate(logs):
+        for other in logs[:k]:
+            if _same(one, other):
+                raise InputError(
+                    f"the same recording as {other.source}: counted twice, its noise would seem "
+                    "smaller than it is",
+                    "name each log once",
+                    Where(file=one.source),
+                )
+    without = [log.source for log in logs if "output_torque" not in log]
+    if without and len(without) < len(logs):
+        raise InputError(
+            f"{', '.join(without)} without an output torque among logs that have one: the former "
+            "tell all torques over η, the latter tell them as they are",
+            "map the sensor as `output_torque`, or identify the two kinds apart",
+            Where(file=without[0]),
+        )
+
+
+def _same(one: ShiftLog, other: ShiftLog) -> bool:
+    """Whether two logs are one recording, be it in two formats."""
+    if one.sha256 == other.sha256:
+        return True
+    common = [role for role in one.channels if role in other]
+    return bool(common) and all(
+        np.array_equal(one[role].values, other[role].values) for role in common
+    )
+
+
+def _by_itself(log: ShiftLog, card: VehicleCard, shifts: Shifts) -> Identification:
+    """The log alone. Raises IdentificationError where the likelihood does not carry it."""
+    found = identify(log, card, shifts)
+    if found.method is not Method.LIKELIHOOD:
+        raise IdentificationError(
+            f"the likelihood does not explain this log by itself: {found.warnings[0]}",
+            "leave it out, or look at what `drivetwin identify` says of it alone",
+            Where(file=log.source),
+        )
+    return found
+
+
+def start_of(alone: Sequence[Identification]) -> dict[str, float]:
+    """A value for every unknown of the common fit: the mean of the logs, weighted by information.
+
+    What a log has of its own stands under its number, and what no log left free is as fixed in the
+    first that has it.
+    """
+    fits: list[LikelihoodFit] = [one.evidence["likelihood"] for one in alone]
+    values: dict[str, float] = {}
+    for k, fit in enumerate(fits, 1):
+        structures = [part.structure for part in fit.problem.parts]
+        told = dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
+        told = {**structures[0].fixed, **told}
+        own = {name: told.pop(name) for name in OWN if name in told}
+        values |= {own_of(k)[name]: value for name, value in own.items()}
+        values = own | told | values
+    values |= _mean([_shared(fit) for fit in fits])
+    starts = {f"start{k}.{key}" for k in range(len(values)) for key in START}
+    return {name: value for name, value in values.items() if name not in starts | {AERO}}
+
+
+_Told = tuple[list[str], FloatArray, FloatArray]
+
+
+def _shared(fit: LikelihoodFit) -> _Told:
+    """Names, values (s,) and information (s, s) of what a log shares with others."""
+    starts = {f"{part.structure.label}.{key}" for part in fit.problem.parts for key in START}
+    keep = [k for k, name in enumerate(fit.point.names) if name not in {*starts, *OWN, AERO}]
+    names = [fit.point.names[k] for k in keep]
+    return names, fit.point.values[keep], covariance_of(fit.covariance[np.ix_(keep, keep)])
+
+
+def _mean(told: Sequence[_Told]) -> dict[str, float]:
+    """Mean of the unknowns of several fits, weighted by information."""
+    names = list(dict.fromkeys(name for one in told for name in one[0]))
+    information, pull = np.zeros((len(names), len(names))), np.zeros(len(names))
+    for known, values, weight in told:
+        place = [names.index(name) for name in known]
+        information[np.ix_(place, place)] += weight
+        pull[place] += weight @ values
+    mean = covariance_of(information) @ pull
+    return dict(zip(names, mean.tolist(), strict=True))
+
+
+def _share(number: int, log: ShiftLog, alone: Identification, fit: LikelihoodFit) -> LogShare:
+    mine = next(part for part in fit.problem.parts if part.structure.log == number)
+    return LogShare(
+        number, log.source, log.sha256, alone.shifts, alone.estimates, mine.structure.mean_speed
+    )
+
+
+def _joined(
+    alone: Sequence[Identification], told: Conclusions, evidence: dict[str, Any]
+) -> Identification:
+    """One identification of all logs; what stands behind each log by itself is joined."""
+    several: Several = evidence["several"]
+    told = judged(told, several.consistency)
+    names = [Path(share.source).name for share in several.logs]
+    agreed = (several.consistency.text,) if several.consistency.agree else ()
+    paper = tuple(one for each in alone for one in each.evidence["paper"])
+    integral = tuple(one for each in alone for one in each.evidence["integral"])
+    first = alone[0]
+    return replace(
+        first,
+        estimates=told.estimates,
+        friction=told.friction,
+        shifts=tuple(shift for one in alone for shift in one.shifts),
+        rejected=tuple(one for each in alone for one in each.rejected),
+        validity=_covered(alone),
+        inputs={name: digest for one in alone for name, digest in one.inputs.items()},
+        evidence={"paper": paper, "integral": integral, **evidence},
+        warnings=told.warnings,
+        assumptions=(
+            f"{', '.join(names)} are of one vehicle in one state: they share all parameters but "
+            "load and age of the engine torque",
+            *agreed,
+            *first.assumptions,
+        ),
+        correlation_ids=told.correlation_ids,
+        correlation=told.correlation,
+        load=told.load,
+    )
+
+
+def _covered(alone: Sequence[Identification]) -> dict[str, tuple[float, float]]:
+    """Ranges that any log saw."""
+    names = dict.fromkeys(name for one in alone for name in one.validity)
+    spans = {name: [one.validity[name] for one in alone if name in one.validity] for name in names}
+    return {
+        name: (min(low for low, _ in each), max(high for _, high in each))
+        for name, each in spans.items()
+    }
+
+
+def of_one_log(found: Identification, number: int) -> Identification:
+    """What a fit of several logs says of one of them: its own values under their plain ids.
+
+    For a twin that is to simulate this log; of the shifts only its own are in it.
+    """
+    several: Several = found.evidence["several"]
+    share = several.logs[number - 1]
+    mine = {
+        name: plain
+        for name in dict.fromkeys((*found.estimates, *found.correlation_ids))
+        for plain, log in (log_of(name),)
+        if log in (0, number)
+    }
+    place = [k for k, name in enumerate(found.correlation_ids) if name in mine]
+    correlation = None if found.correlation is None else found.correlation[np.ix_(place, place)]
+    return replace(
+        found,
+        estimates={
+            mine[name]: replace(one, id=mine[name])
+            for name, one in found.estimates.items()
+            if name in mine
+        },
+        shifts=share.shifts,
+        correlation_ids=tuple(mine[found.correlation_ids[k]] for k in place),
+        correlation=correlation,
+        load=None if found.load is None else replace(found.load, mean_speed=share.mean_speed),
+    )
