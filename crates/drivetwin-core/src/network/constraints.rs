@@ -69,8 +69,7 @@ fn complete<T: Real>(
     independent: &[usize],
     dependent: &[usize],
 ) -> Option<Matrix<T>> {
-    let columns = |index: &[usize]| c.transposed().select_rows(index).transposed();
-    let tied = solve(&columns(dependent), &columns(independent)).ok()?;
+    let tied = solve(&c.select_columns(dependent), &c.select_columns(independent)).ok()?;
     let mut map = Matrix::zeros(c.cols, independent.len());
     for (j, &node) in independent.iter().enumerate() {
         map[(node, j)] = T::of(1.0);
@@ -91,17 +90,9 @@ fn dependent_nodes<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<usize> {
     };
     let (mut order, heavy): (Vec<usize>, Vec<usize>) =
         (0..m.nodes.len()).partition(|&i| massless(i));
-    let by_node = c.transposed();
-    let mut chosen: Vec<usize> = Vec::new();
     order.extend(heavy);
-    for node in order {
-        let mut trial = chosen.clone();
-        trial.push(node);
-        if independent_rows(&by_node.select_rows(&trial)).len() == trial.len() {
-            chosen = trial;
-        }
-    }
-    chosen
+    let by_node = c.transposed().select_rows(&order);
+    independent_rows(&by_node).into_iter().map(|i| order[i]).collect()
 }
 
 /// Elements of a smallest set of dependent rows.

@@ -36,11 +36,8 @@ impl<T: Real> Matrix<T> {
     pub fn times(&self, other: &Self) -> Self {
         let mut out = Self::zeros(self.rows, other.cols);
         for i in 0..self.rows {
-            for k in 0..self.cols {
-                let a = self[(i, k)];
-                for j in 0..other.cols {
-                    out[(i, j)] += a * other[(k, j)];
-                }
+            for (k, &a) in self.row(i).iter().enumerate() {
+                out.row_mut(i).iter_mut().zip(other.row(k)).for_each(|(sum, &b)| *sum += a * b);
             }
         }
         out
@@ -62,6 +59,17 @@ impl<T: Real> Matrix<T> {
         let mut out = Self::zeros(index.len(), self.cols);
         for (i, &k) in index.iter().enumerate() {
             out.row_mut(i).copy_from_slice(self.row(k));
+        }
+        out
+    }
+
+    /// The columns named by `index`, in that order.
+    pub fn select_columns(&self, index: &[usize]) -> Self {
+        let mut out = Self::zeros(self.rows, index.len());
+        for i in 0..self.rows {
+            for (to, &k) in out.row_mut(i).iter_mut().zip(index) {
+                *to = self[(i, k)];
+            }
         }
         out
     }
@@ -130,17 +138,20 @@ pub fn independent_rows<T: Real>(a: &Matrix<T>) -> Vec<usize> {
 pub fn least_norm<T: Real>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
     let Orthogonalised { kept, q, l } = orthogonalised(a);
     let mut y = b.select_rows(&kept);
+    let mut x = Matrix::zeros(a.cols, b.cols);
     for i in 0..kept.len() {
-        for j in 0..i {
-            for c in 0..y.cols {
-                let known = y[(j, c)];
-                y[(i, c)] -= l[(i, j)] * known;
-            }
+        let (known, rest) = y.data.split_at_mut(i * b.cols);
+        let row = &mut rest[..b.cols];
+        for (j, known) in known.chunks_exact(b.cols.max(1)).enumerate() {
+            row.iter_mut().zip(known).for_each(|(v, &k)| *v -= l[(i, j)] * k);
         }
         let inverse = l[(i, i)].recip();
-        y.row_mut(i).iter_mut().for_each(|v| *v *= inverse);
+        row.iter_mut().for_each(|v| *v *= inverse);
+        for r in 0..a.cols {
+            x.row_mut(r).iter_mut().zip(&*row).for_each(|(x, &y)| *x += q[(i, r)] * y);
+        }
     }
-    q.transposed().times(&y)
+    x
 }
 
 /// Factors of the independent rows of a matrix.
@@ -152,34 +163,34 @@ struct Orthogonalised<T> {
 
 /// Modified Gram-Schmidt over the rows, twice for full orthogonality.
 fn orthogonalised<T: Real>(a: &Matrix<T>) -> Orthogonalised<T> {
-    let norm = |row: &[T]| row.iter().fold(T::zero_(), |sum, &v| sum + v * v);
-    let mut kept = Vec::new();
-    let mut q = Matrix::zeros(a.rows, a.cols);
+    let dot = |a: &[T], b: &[T]| a.iter().zip(b).fold(T::zero_(), |sum, (&a, &b)| sum + a * b);
+    let mut kept = Vec::with_capacity(a.rows);
+    // Independent rows move up in q as they are found.
+    let mut q = a.clone();
     let mut l = Matrix::zeros(a.rows, a.rows);
     for i in 0..a.rows {
         let k = kept.len();
-        let mut row = a.row(i).to_vec();
+        q.row_mut(k).copy_from_slice(a.row(i));
+        let (before, rest) = q.data.split_at_mut(k * a.cols);
+        let row = &mut rest[..a.cols];
         for _ in 0..2 {
-            for j in 0..k {
-                let basis = q.row(j);
-                let part = row.iter().zip(basis).fold(T::zero_(), |sum, (&r, &b)| sum + r * b);
+            for (j, basis) in before.chunks_exact(a.cols.max(1)).enumerate() {
+                let part = dot(row, basis);
                 row.iter_mut().zip(basis).for_each(|(r, &b)| *r -= part * b);
                 l[(k, j)] += part;
             }
         }
-        let (left, length) = (norm(&row), norm(a.row(i)).re());
+        let (left, length) = (dot(row, row), dot(a.row(i), a.row(i)).re());
         if left.re() > 1e-18 * length {
             let left = left.sqrt();
             l[(k, k)] = left;
             row.iter_mut().for_each(|r| *r /= left);
-            q.row_mut(k).copy_from_slice(&row);
             kept.push(i);
         } else {
-            l.row_mut(k).iter_mut().for_each(|v| *v = T::zero_());
+            l.row_mut(k).fill(T::zero_());
         }
     }
-    let index: Vec<usize> = (0..kept.len()).collect();
-    Orthogonalised { q: q.select_rows(&index), l: l.select_rows(&index), kept }
+    Orthogonalised { kept, q, l }
 }
 
 fn largest_in_column<T: Real>(a: &Matrix<T>, c: usize, from: usize) -> usize {
@@ -189,8 +200,8 @@ fn largest_in_column<T: Real>(a: &Matrix<T>, c: usize, from: usize) -> usize {
 }
 
 fn subtract_row<T: Real>(a: &mut Matrix<T>, target: usize, source: usize, factor: T) {
-    for j in 0..a.cols {
-        let s = a[(source, j)];
-        a[(target, j)] -= s * factor;
-    }
+    let (low, high) = a.data.split_at_mut(target.max(source) * a.cols);
+    let (first, second) = (&mut low[target.min(source) * a.cols..][..a.cols], &mut high[..a.cols]);
+    let (target, source) = if target < source { (first, second) } else { (second, first) };
+    target.iter_mut().zip(&*source).for_each(|(t, &s)| *t -= s * factor);
 }

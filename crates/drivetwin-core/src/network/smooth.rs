@@ -130,28 +130,55 @@ impl<L: Lane> Law<L> {
         self.excess * (-(self.rate * m)).exponential::<F>()
     }
 
-    /// The same where `m` is larger by a small `dm`, and the smallness `rate · dm`.
+    /// μ and its derivatives at argument `m`.
     #[inline(always)]
-    pub fn moved_stiction<const F: bool>(&self, stiction: L, dm: L) -> (L, L) {
-        let q = -(self.rate * dm);
-        let (one, half) = (L::all(1.0), L::all(0.5));
-        let series = q.fma::<F>(q.fma::<F>(q.fma::<F>(L::all(1.0 / 6.0), half), one), one);
-        (stiction * series, q)
-    }
-
-    /// Value and partial derivatives at argument `m` and normal load `normal`.
-    #[inline(always)]
-    pub fn at<const F: bool>(&self, m: L, stiction: L, normal: L) -> Value<L> {
+    pub fn about<const F: bool>(&self, m: L, stiction: L) -> Friction<L> {
         let [c0, c1, c2] = self.polynomial;
         let faded = self.rate * stiction;
-        let mu = c2.fma::<F>(m, c1).fma::<F>(m, c0) + stiction;
-        let slope = (c2 + c2).fma::<F>(m, c1) - faded;
+        let fading = self.rate * faded;
+        Friction {
+            mu: c2.fma::<F>(m, c1).fma::<F>(m, c0) + stiction,
+            slope: (c2 + c2).fma::<F>(m, c1) - faded,
+            bend: c2 + c2 + fading,
+            third: -(self.rate * fading),
+        }
+    }
+}
+
+/// μ and its derivatives at one argument.
+#[derive(Clone, Copy, Debug)]
+pub struct Friction<L> {
+    mu: L,
+    slope: L,
+    bend: L,
+    third: L,
+}
+
+impl<L: Lane> Friction<L> {
+    /// The torque where the argument is larger by a small `dm`, at normal load `normal`.
+    #[inline(always)]
+    pub fn at<const F: bool>(&self, dm: L, normal: L) -> Value<L> {
+        let (half, sixth) = (self.bend.times(0.5), self.third.times(1.0 / 6.0));
+        let mu = sixth.fma::<F>(dm, half).fma::<F>(dm, self.slope).fma::<F>(dm, self.mu);
+        let slope = self.third.times(0.5).fma::<F>(dm, self.bend).fma::<F>(dm, self.slope);
         Value {
             value: normal * mu,
             by_argument: normal * slope,
-            bend: normal * self.rate.fma::<F>(faded, c2 + c2),
+            bend: normal * self.third.fma::<F>(dm, self.bend),
             by_normal: mu,
             mixed: slope,
+        }
+    }
+
+    /// The torque at the argument itself.
+    #[inline(always)]
+    pub fn here(&self, normal: L) -> Value<L> {
+        Value {
+            value: normal * self.mu,
+            by_argument: normal * self.slope,
+            bend: normal * self.bend,
+            by_normal: self.mu,
+            mixed: self.slope,
         }
     }
 }

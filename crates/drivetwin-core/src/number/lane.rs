@@ -34,22 +34,22 @@ pub trait Lane:
     fn values(self) -> Self::Values;
 }
 
-/// Values of one or several runs, as guards compare them.
+/// Values of one or several runs, as guards look at them: a guard falls where its sign bit is set.
 pub trait Values: Lane<Values = Self> {
     /// Magnitude.
     fn magnitude(self) -> Self;
 
-    /// The smaller of two, run by run; NaN where either is.
-    fn lower(self, other: Self) -> Self;
+    /// The larger of two numbers, run by run.
+    fn larger(self, other: Self) -> Self;
 
-    /// The larger of two, run by run.
-    fn upper(self, other: Self) -> Self;
+    /// Something that is negative where either is; its magnitude means nothing.
+    fn negative_with(self, other: Self) -> Self;
 
-    /// The smaller of two; 1 where both are zero.
-    fn lower_unless_idle(self, other: Self) -> Self;
+    /// Runs whose value is negative, as bits.
+    fn negative(self) -> u32;
 
-    /// Runs whose value is not above zero, as bits; NaN counts.
-    fn fallen(self) -> u32;
+    /// Runs whose value is infinite or no number, as bits.
+    fn unbounded(self) -> u32;
 }
 
 /// `a · b + c`, fused or not.
@@ -131,21 +131,20 @@ impl Values for f64 {
         self.abs()
     }
     #[inline(always)]
-    fn lower(self, other: Self) -> Self {
-        // A comparison with NaN is false: NaN in either is kept.
-        if self > other || other.is_nan() { other } else { self }
+    fn larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
     }
     #[inline(always)]
-    fn upper(self, other: Self) -> Self {
-        if self < other || other.is_nan() { other } else { self }
+    fn negative_with(self, other: Self) -> Self {
+        f64::from_bits(self.to_bits() | other.to_bits())
     }
     #[inline(always)]
-    fn lower_unless_idle(self, other: Self) -> Self {
-        if self == 0.0 && other == 0.0 { 1.0 } else { self.lower(other) }
+    fn negative(self) -> u32 {
+        (self.to_bits() >> 63) as u32
     }
     #[inline(always)]
-    fn fallen(self) -> u32 {
-        u32::from(self <= 0.0 || self.is_nan())
+    fn unbounded(self) -> u32 {
+        u32::from(!self.is_finite())
     }
 }
 

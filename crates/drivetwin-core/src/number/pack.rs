@@ -20,6 +20,15 @@ impl<const K: usize> Pack<K> {
     }
 
     #[inline(always)]
+    fn bits(self, f: impl Fn(f64) -> u32) -> u32 {
+        let mut bits = 0;
+        for i in 0..K {
+            bits |= f(self.0[i]) << i;
+        }
+        bits
+    }
+
+    #[inline(always)]
     fn each(self, f: impl Fn(f64) -> f64) -> Self {
         let mut out = self.0;
         for value in &mut out {
@@ -98,24 +107,20 @@ impl<const K: usize> Values for Pack<K> {
         self.each(f64::abs)
     }
     #[inline(always)]
-    fn lower(self, other: Self) -> Self {
-        self.zip(other, |a, b| a.lower(b))
+    fn larger(self, other: Self) -> Self {
+        self.zip(other, |a, b| a.larger(b))
     }
     #[inline(always)]
-    fn upper(self, other: Self) -> Self {
-        self.zip(other, |a, b| a.upper(b))
+    fn negative_with(self, other: Self) -> Self {
+        self.zip(other, |a, b| a.negative_with(b))
     }
     #[inline(always)]
-    fn lower_unless_idle(self, other: Self) -> Self {
-        self.zip(other, |a, b| a.lower_unless_idle(b))
+    fn negative(self) -> u32 {
+        self.bits(|a| a.negative())
     }
     #[inline(always)]
-    fn fallen(self) -> u32 {
-        let mut bits = 0;
-        for i in 0..K {
-            bits |= self.0[i].fallen() << i;
-        }
-        bits
+    fn unbounded(self) -> u32 {
+        self.bits(|a| a.unbounded())
     }
 }
 
@@ -124,10 +129,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_that_is_no_number_counts_as_fallen() {
-        let guard = Pack::<4>([1.0, 0.0, f64::NAN, -1.0]);
-        assert_eq!(guard.fallen(), 0b1110);
-        assert_eq!(guard.lower(Pack::all(2.0)).fallen(), 0b1110);
-        assert_eq!(1.0_f64.lower(f64::NAN).fallen(), 1);
+    fn a_guard_has_fallen_where_either_sign_is_negative() {
+        let (one, other) = (Pack::<4>([1.0, -1.0, 0.0, -2.0]), Pack([0.0, 3.0, -4.0, -5.0]));
+        assert_eq!(one.negative_with(other).negative(), 0b1110);
+    }
+
+    #[test]
+    fn infinities_and_what_is_no_number_are_unbounded() {
+        let values = Pack::<4>([1.0, f64::NAN, f64::NEG_INFINITY, f64::INFINITY]);
+        assert_eq!(values.unbounded(), 0b1110);
     }
 }

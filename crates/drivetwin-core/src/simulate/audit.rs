@@ -52,8 +52,9 @@ impl Auditor {
 
     /// Add the work of one step.
     pub fn add<T: Real>(&mut self, run: &Integrator<'_, T>, step: &Step<T>) {
+        let mut basis = Vec::new();
         for (node, weight) in GAUSS {
-            let basis = run.expansion.basis_at(run.network, step.length * node);
+            run.expansion.basis_at(run.network, step.length * node, &mut basis);
             self.add_powers(run, &basis, weight * step.length.re());
         }
     }

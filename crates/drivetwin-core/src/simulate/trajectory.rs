@@ -118,6 +118,8 @@ pub(super) struct Recorder<'g, T> {
     grid: &'g [f64],
     next: usize,
     columns: Vec<(Column<T>, Vec<T>)>,
+    /// Working space.
+    basis: Vec<T>,
 }
 
 impl<'g, T: Real> Recorder<'g, T> {
@@ -125,7 +127,7 @@ impl<'g, T: Real> Recorder<'g, T> {
     pub fn new(network: &Network<T>, targets: &[Target], grid: &'g [f64]) -> Self {
         let column =
             |&target: &Target| (Column::of(network, target), Vec::with_capacity(grid.len()));
-        Self { grid, next: 0, columns: targets.iter().map(column).collect() }
+        Self { grid, next: 0, columns: targets.iter().map(column).collect(), basis: Vec::new() }
     }
 
     /// Record the grid points before the end of the step; `last` includes the end.
@@ -136,11 +138,11 @@ impl<'g, T: Real> Recorder<'g, T> {
                 break;
             }
             let h = if t >= start { -step.start + t } else { T::zero_() };
-            let basis = run.expansion.basis_at(run.network, h);
+            run.expansion.basis_at(run.network, h, &mut self.basis);
             for (column, values) in &mut self.columns {
                 values.push(match column {
                     Column::Angle(row, angle) => *angle + integral(run, row, h),
-                    other => value(other, run, &basis),
+                    other => value(other, run, &self.basis),
                 });
             }
             self.next += 1;
@@ -189,35 +191,67 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
         samples: &impl Samples<T>,
         (first, count): (usize, usize),
     ) {
-        let mut picked = [0; BLOCK];
-        let mut length = 0;
-        for k in 0..count {
-            if self.grid.get(self.next + length) == Some(&run.knot(first + k)) {
-                picked[length] = k;
-                length += 1;
-            }
-        }
-        self.next += length;
+        let picked = Picked::of(&self.grid[self.next..], &run.knots()[first..first + count]);
+        self.next += picked.count();
         let (states, inputs) = (run.x.len(), run.network.first_input());
         for (column, values) in &mut self.columns {
-            let terms = passing_terms(column, run);
             let from = values.len();
-            values.resize(from + length, T::zero_());
-            for &(position, c) in &*terms {
-                let out = values[from..].iter_mut().zip(&picked[..length]);
+            values.resize(from + picked.count(), T::zero_());
+            let out = &mut values[from..];
+            for &(position, c) in &*passing_terms(column, run) {
                 if position < states {
-                    out.for_each(|(v, &k)| *v += c * samples.state(k, position));
+                    picked.add(out, |k| c * samples.state(k, position));
                 } else if position < run.network.one() {
-                    let input = position - inputs;
-                    out.for_each(|(v, &k)| *v += c * run.input_at(first + k, input));
+                    picked.add(out, |k| c * run.input_at(first + k, position - inputs));
                 } else if position == run.network.one() {
-                    out.for_each(|(v, _)| *v += c);
+                    picked.add(out, |_| c);
                 } else {
                     let channel = position - run.network.first_channel();
                     if let Some(slot) = active.iter().position(|&j| j == channel) {
-                        out.for_each(|(v, &k)| *v += c * samples.torque(k, slot));
+                        picked.add(out, |k| c * samples.torque(k, slot));
                     }
                 }
+            }
+        }
+    }
+}
+
+/// The samples of a block that stand on the grid.
+enum Picked {
+    /// All: their number.
+    All(usize),
+    /// Some: their places, and how many.
+    Some([u8; BLOCK], usize),
+}
+
+impl Picked {
+    /// Of at most [`BLOCK`] samples at `knots`, those that the rest of the grid begins with.
+    fn of(grid: &[f64], knots: &[f64]) -> Self {
+        if grid.get(..knots.len()) == Some(knots) {
+            return Self::All(knots.len());
+        }
+        let (mut places, mut count) = ([0; BLOCK], 0);
+        for (k, knot) in knots.iter().enumerate() {
+            if grid.get(count) == Some(knot) {
+                places[count] = k as u8;
+                count += 1;
+            }
+        }
+        Self::Some(places, count)
+    }
+
+    fn count(&self) -> usize {
+        let (Self::All(count) | Self::Some(_, count)) = *self;
+        count
+    }
+
+    /// Add the values at the picked samples.
+    #[inline(always)]
+    fn add<T: Real>(&self, out: &mut [T], value: impl Fn(usize) -> T) {
+        match self {
+            Self::All(_) => out.iter_mut().enumerate().for_each(|(k, v)| *v += value(k)),
+            Self::Some(places, _) => {
+                out.iter_mut().zip(places).for_each(|(v, &k)| *v += value(usize::from(k)));
             }
         }
     }

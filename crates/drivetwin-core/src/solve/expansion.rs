@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Taylor expansion in time of the whole state in one mode.
 
-use crate::network::channel::ChannelSeries;
+use crate::network::channel::{ChannelSeries, form};
 use crate::network::{Cell, Channel, Mode, Network};
 use crate::number::{Real, Series, TERMS, evaluate, slope};
 
@@ -16,6 +16,8 @@ pub struct Expansion<T> {
     pub inputs: Vec<Series<T>>,
     /// Highest coefficient that is filled in.
     pub order: usize,
+    /// One coefficient of the whole basis.
+    basis: Vec<T>,
 }
 
 /// What the step control needs.
@@ -35,19 +37,20 @@ impl<T: Real> Expansion<T> {
             channels: vec![ChannelSeries::default(); network.channels.len()],
             inputs: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             order: 0,
+            basis: Vec::with_capacity(network.basis()),
         }
     }
 
     /// The basis (x, u, prescribed accelerations, 1, φ) at `h` [s] after the start.
-    pub fn basis_at(&self, network: &Network<T>, h: T) -> Vec<T> {
+    pub fn basis_at(&self, network: &Network<T>, h: T, basis: &mut Vec<T>) {
         let value = |series: &Series<T>| evaluate(series, self.order, h);
-        let mut basis: Vec<T> = self.states.iter().map(value).collect();
+        basis.clear();
+        basis.extend(self.states.iter().map(value));
         basis.extend(self.inputs.iter().map(|input| evaluate(input, TERMS - 1, h)));
         let rate = |&(_, input): &(Vec<T>, usize)| slope(&self.inputs[input], TERMS - 1, h);
         basis.extend(network.prescribed.iter().map(rate));
         basis.push(T::of(1.0));
         basis.extend(self.channels.iter().map(|channel| value(&channel.torque)));
-        basis
     }
 
     /// Expand from state `x`; returns the step `<= h` [s] over which the truncation error stays within
@@ -98,10 +101,21 @@ impl<T: Real> Expansion<T> {
 
     /// Coefficients of a linear form over the basis (x, u, 1, φ).
     pub fn form(&self, network: &Network<T>, row: &[T]) -> Series<T> {
-        let mut out = [T::zero_(); TERMS];
-        for (k, value) in out.iter_mut().enumerate().take(self.order + 1) {
-            *value = self.form_term(network, row, k);
+        let mut out = self.speed_form(&row[..self.states.len()]);
+        let mut add = |c: T, series: &Series<T>| {
+            if c.re() != 0.0 || T::DERIVATIVES {
+                out[..=self.order].iter_mut().zip(series).for_each(|(sum, &v)| *sum += c * v);
+            }
+        };
+        row[network.first_input()..].iter().zip(&self.inputs).for_each(|(&c, u)| add(c, u));
+        let channels = row[network.first_channel()..].iter().zip(&self.channels);
+        channels.for_each(|(&c, channel)| add(c, &channel.torque));
+        for (&c, (_, input)) in row[network.first_rate()..].iter().zip(&network.prescribed) {
+            for k in 0..=self.order.min(TERMS - 2) {
+                out[k] += c * self.inputs[*input][k + 1] * (k + 1) as f64;
+            }
         }
+        out[0] += row[network.one()];
         out
     }
 
@@ -121,47 +135,30 @@ impl<T: Real> Expansion<T> {
         self.order = order;
     }
 
+    /// Coefficient `k` of the channels from that of the states.
     fn channel_terms(&mut self, network: &Network<T>, cells: &[Cell], k: usize) {
+        self.basis.clear();
+        self.basis.extend(self.states.iter().map(|state| state[k]));
         for ((channel, &cell), series) in network.channels.iter().zip(cells).zip(&mut self.channels)
         {
             for (row, argument) in channel.arguments.iter().zip(&mut series.arguments) {
-                let mut value = T::zero_();
-                for (&c, state) in row.iter().zip(&self.states) {
-                    value += c * state[k];
-                }
-                argument[k] = value;
+                argument[k] = form(row, &self.basis);
             }
             channel.term(cell, &self.inputs, series, k);
         }
     }
 
+    /// Coefficient `k + 1` of the states; the basis holds coefficient `k` of them.
     fn next_term(&mut self, network: &Network<T>, mode: &Mode<T>, k: usize) {
-        for i in 0..self.states.len() {
-            let rate = self.form_term(network, mode.derivative.row(i), k);
-            self.states[i][k + 1] = rate / (k + 1) as f64;
+        let basis = &mut self.basis;
+        basis.extend(self.inputs.iter().map(|input| input[k]));
+        let rate = |&(_, input): &(Vec<T>, usize)| self.inputs[input][k + 1] * (k + 1) as f64;
+        basis.extend(network.prescribed.iter().map(rate));
+        basis.push(T::of(if k == 0 { 1.0 } else { 0.0 }));
+        basis.extend(self.channels.iter().map(|channel| channel.torque[k]));
+        for (i, state) in self.states.iter_mut().enumerate() {
+            state[k + 1] = form(mode.derivative.row(i), basis) / (k + 1) as f64;
         }
-    }
-
-    fn form_term(&self, network: &Network<T>, row: &[T], k: usize) -> T {
-        let mut sum = T::zero_();
-        for (&c, state) in row.iter().zip(&self.states) {
-            sum += c * state[k];
-        }
-        for (&c, input) in row[network.first_input()..].iter().zip(&self.inputs) {
-            sum += c * input[k];
-        }
-        if k + 1 < TERMS {
-            for (&c, (_, input)) in row[network.first_rate()..].iter().zip(&network.prescribed) {
-                sum += c * self.inputs[*input][k + 1] * (k + 1) as f64;
-            }
-        }
-        if k == 0 {
-            sum += row[network.one()];
-        }
-        for (&c, channel) in row[network.first_channel()..].iter().zip(&self.channels) {
-            sum += c * channel.torque[k];
-        }
-        sum
     }
 
     /// Largest coefficient `k` of an input that is not linear, relative to its size now: guards depend

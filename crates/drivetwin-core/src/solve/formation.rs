@@ -9,8 +9,8 @@
 use super::inputs::Inputs;
 use super::integrator::{Integrator, Step};
 use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Guards, Source, Trail, march};
-use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
+use super::march::{BLOCK, Carry, Guards, Source, Trail, idle_guards, march};
+use super::operators::{MAX_ACTIVE, Operators};
 use super::sprint::{Ready, Samples, Sink};
 use super::status::Status;
 use crate::network::smooth::Sample;
@@ -114,7 +114,7 @@ impl<const N: usize> Formation<N> {
             watched: Vec::new(),
             x: [zero; N],
             carry: Carry::zero(),
-            guards: [[Lanes::all(1.0); 2]; MAX_WATCHED],
+            guards: idle_guards(),
             trail: Box::default(),
         }
     }
@@ -198,12 +198,14 @@ impl<const N: usize> Formation<N> {
     fn rearrange(&mut self, slots: &[usize], watched: &[usize]) {
         let (carry, guards) = (self.carry, self.guards);
         self.carry = Carry::zero();
-        self.guards = [[Lanes::all(1.0); 2]; MAX_WATCHED];
+        self.guards = idle_guards();
         for (to, id) in self.slots.iter().enumerate() {
             if let Some(from) = slots.iter().position(|old| old == id) {
                 self.carry.argument[to] = carry.argument[from];
                 self.carry.rate[to] = carry.rate[from];
                 self.carry.value[to] = carry.value[from];
+                self.carry.near[to] = carry.near[from];
+                self.carry.stiction[to] = carry.stiction[from];
             }
         }
         for (to, id) in self.watched.iter().enumerate() {
@@ -294,7 +296,7 @@ impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
         let mut carry = kept.first::<A>();
         if joining != 0 {
             let sample = source.sample(samples.0);
-            let fresh = Carry::<Lanes, A>::start::<F, N>(operators, &sample, x);
+            let fresh = Carry::<Lanes, A>::start::<F, N>(operators, (&sample, h), x);
             let first = operators.guards::<F, A>(&sample, (x, &fresh));
             for lane in (0..WIDTH).filter(|lane| joining >> lane & 1 == 1) {
                 carry.take_lane(lane, &fresh);
@@ -332,6 +334,12 @@ impl Source<Lanes> for Together<'_> {
                 (to[0].0[lane], to[1].0[lane]) = (start, rate);
             }
         }
+    }
+
+    #[inline(always)]
+    fn bounds(&self, input: usize, samples: (usize, usize)) -> [Lanes; 2] {
+        let of = self.inputs.map(|inputs| inputs.bounds(input, samples));
+        [Pack(of.map(|[low, _]| low)), Pack(of.map(|[_, high]| high))]
     }
 }
 

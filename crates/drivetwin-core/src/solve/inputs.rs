@@ -48,7 +48,12 @@ pub struct Inputs<T> {
     sines: Vec<Option<Sine<T>>>,
     /// For every segment the number of segments of its length from it on.
     equal: Vec<u32>,
+    /// Least and largest value within every [`STRETCH`] segments, stretches × inputs.
+    extremes: Vec<[f64; 2]>,
 }
+
+/// Segments of which the extremes are known together.
+const STRETCH: usize = 64;
 
 /// Offset, amplitude, angular frequency [rad/s], phase [rad].
 type Sine<T> = (T, T, f64, f64);
@@ -153,17 +158,13 @@ impl<T: Real> Inputs<T> {
             }
         }
         let equal = equal_lengths(&knots);
-        Ok(Self { knots, lines, shifts, sines, equal })
+        let extremes = extremes(&knots, &lines, signals.len());
+        Ok(Self { knots, lines, shifts, sines, equal, extremes })
     }
 
     /// Number of segments from `i` on, itself included, that are as long as it.
     pub fn equal_from(&self, i: usize) -> usize {
         self.equal[i] as usize
-    }
-
-    /// Number of inputs.
-    pub fn count(&self) -> usize {
-        self.sines.len()
     }
 
     /// Number of segments between knots.
@@ -202,14 +203,28 @@ impl<T: Real> Inputs<T> {
         &self.lines[i * self.sines.len()..(i + 1) * self.sines.len()]
     }
 
-    /// Value of an input at the start of segment `i` and its rate: with a later signal it falls by its
-    /// rate.
-    #[inline(always)]
+    /// Bounds of an input over `count` segments from `first` on, without derivatives; zero where there
+    /// are no inputs.
+    pub fn bounds(&self, input: usize, (first, count): (usize, usize)) -> [f64; 2] {
+        if self.sines.is_empty() {
+            return [0.0; 2];
+        }
+        let stretches = first / STRETCH..=(first + count.max(1) - 1) / STRETCH;
+        stretches.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], stretch| {
+            let [least, largest] = self.extremes[stretch * self.sines.len() + input];
+            [low.min(least), high.max(largest)]
+        })
+    }
+
+    /// Value of an input at the start of segment `i` and its rate.
     pub fn line(&self, i: usize, input: usize) -> [T; 2] {
-        let [start, rate] = self.lines[i * self.sines.len() + input];
-        let shift = self.shifts[input];
-        let start = if T::DERIVATIVES { T::of(start) - shift * rate } else { T::of(start) };
-        [start, T::of(rate)]
+        shifted(&self.lines(i)[input], self.shifts[input])
+    }
+
+    /// The same of every input.
+    #[inline(always)]
+    pub fn lines_at(&self, i: usize) -> impl Iterator<Item = [T; 2]> {
+        self.lines(i).iter().zip(&self.shifts).map(|(line, &shift)| shifted(line, shift))
     }
 
     /// Taylor coefficients of every input at `t` within segment `i`.
@@ -226,6 +241,29 @@ impl<T: Real> Inputs<T> {
             }
         }
     }
+}
+
+fn extremes(knots: &[f64], lines: &[[f64; 2]], inputs: usize) -> Vec<[f64; 2]> {
+    let mut all = Vec::with_capacity(knots.len().div_ceil(STRETCH) * inputs);
+    let mut knots = knots.windows(2);
+    for stretch in lines.chunks(STRETCH * inputs.max(1)) {
+        let from = all.len();
+        all.resize(from + inputs, [f64::INFINITY, f64::NEG_INFINITY]);
+        for (segment, span) in stretch.chunks_exact(inputs).zip(&mut knots) {
+            for ([low, high], &[start, rate]) in all[from..].iter_mut().zip(segment) {
+                let end = start + rate * (span[1] - span[0]);
+                (*low, *high) = (low.min(start.min(end)), high.max(start.max(end)));
+            }
+        }
+    }
+    all
+}
+
+/// With a later signal the value falls by its rate.
+#[inline(always)]
+fn shifted<T: Real>(&[start, rate]: &[f64; 2], shift: T) -> [T; 2] {
+    let start = if T::DERIVATIVES { T::of(start) - shift * rate } else { T::of(start) };
+    [start, T::of(rate)]
 }
 
 /// For every segment the number of segments from it on that are as long as it to 1e-9.

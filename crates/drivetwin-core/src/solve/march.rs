@@ -5,11 +5,11 @@
 //! ends. Its argument at the end is predicted with the second derivative of φ at the start, which
 //! leaves an error of fourth order; the cubic through the predicted end corrects it, and the law is
 //! moved to the corrected argument by its own derivatives. One exponential a sample and channel, taken
-//! before its argument is known exactly.
+//! a sample ahead at about the argument that it is needed at, so that nothing waits for it.
 
 use super::operators::{Carried, MAX_ACTIVE, MAX_WATCHED, Operators, Watched};
 use super::step::{over_channels, step};
-use crate::network::smooth::{MAX_INPUTS, Sample, Value, input_of};
+use crate::network::smooth::{Line, MAX_INPUTS, Sample, Value, input_of};
 use crate::number::{Lane, Pack, Values};
 
 /// Samples that are passed before they are handed on.
@@ -19,6 +19,12 @@ pub const BLOCK: usize = 64;
 pub trait Source<L> {
     /// Fill in the inputs of a segment.
     fn read(&self, segment: usize, sample: &mut Sample<L>);
+
+    /// The least and the largest value of an input over `count` segments from `first` on, or bounds of
+    /// these.
+    fn bounds(&self, input: usize, samples: (usize, usize)) -> [L::Values; 2]
+    where
+        L: Lane;
 
     /// The inputs of a segment.
     #[inline(always)]
@@ -41,10 +47,19 @@ pub struct Carry<L, const A: usize> {
     pub rate: [L; A],
     /// Torques with their slopes.
     pub value: [Value<L>; A],
+    /// Arguments expected at the end of the sample.
+    pub near: [L; A],
+    /// Stiction there.
+    pub stiction: [L; A],
 }
 
-/// Values of the watched guards at the start of a sample, and the sizes of their forms.
+/// Limits and values of the watched forms at the start of a sample.
 pub type Guards<V> = [[V; 2]; MAX_WATCHED];
+
+/// Of what is not watched.
+pub fn idle_guards<V: Values>() -> Guards<V> {
+    [[V::all(1.0), V::all(0.0)]; MAX_WATCHED]
+}
 
 /// Passed samples: states and carried torques at the start of each.
 pub struct Trail<L, const N: usize> {
@@ -73,32 +88,39 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
     trail: &mut Trail<L, N>,
 ) -> (usize, u32) {
     let mut u = [[L::all(0.0); 2]; MAX_INPUTS];
+    let loaded = op.loads.iter().all(|load| {
+        let bounds = source.bounds(load.input, (first, count));
+        op.stays_loaded::<F>(load, bounds)
+    });
     for k in 0..count {
         source.read(first + k, &mut u);
         if L::DERIVATIVES {
-            *carry = Carry::start::<F, N>(op, &u, x);
+            *carry = Carry::start::<F, N>(op, (&u, h), x);
         }
         trail.states[k] = *x;
         carry.torques(op, &mut trail.torques[k]);
-        let mut least = step::<L, F, N, A>(op, (&u, h), (x, carry));
-        for (place, guard) in guards.iter_mut().enumerate().take(op.watched.len()) {
+        let mut guard = step::<L, F, N, A>(op, (&u, h), (x, carry));
+        for (place, before) in guards.iter_mut().enumerate().take(op.watched.len()) {
             let after = op.guard::<F, A>(place, (&u, h), (x, carry));
-            let rise = (guard[0] - after[0]).magnitude();
-            let bow = op.bow[0].values() * rise + op.bow[1].values() * guard[1].upper(after[1]);
-            least = least.lower(guard[0].lower(after[0]) - bow);
-            *guard = after;
+            guard = guard.negative_with(op.falls(place, (*before, after)));
+            *before = after;
         }
-        for load in &op.loads {
-            let [before, rate] = load.line::<F>(&u);
-            let (before, rate) = (before.values(), rate.values());
-            least = least.lower(before.lower_unless_idle(rate.times(h) + before));
+        if !loaded {
+            for load in &op.loads {
+                guard = guard.negative_with(op.unloads::<F>(load, (&u, h)));
+            }
         }
-        let fallen = least.fallen();
+        let fallen = guard.negative();
         if fallen != 0 {
             return (k, fallen);
         }
     }
-    (count, 0)
+    // What has grown beyond all bounds is left to the expansion, which says so.
+    let sum = x.iter().fold(L::Values::all(0.0), |sum, x| x.values().magnitude() + sum);
+    match sum.unbounded() {
+        0 => (count, 0),
+        unbounded => (count.saturating_sub(1), unbounded),
+    }
 }
 
 impl<L: Lane, const N: usize> Operators<L, N> {
@@ -109,14 +131,32 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         sample: &Sample<L>,
         at: (&[L; N], &Carry<L, A>),
     ) -> Guards<L::Values> {
-        let mut guards = [[L::Values::all(1.0); 2]; MAX_WATCHED];
+        let mut guards = idle_guards();
         for (place, guard) in guards.iter_mut().enumerate().take(self.watched.len()) {
             *guard = self.guard::<F, A>(place, (sample, 0.0), at);
         }
         guards
     }
 
-    /// A watched guard `elapsed` seconds into a segment, and the size of its form.
+    /// Whether a load stays above zero in all runs while its input stays within bounds.
+    #[inline(always)]
+    fn stays_loaded<const F: bool>(&self, load: &Line<L>, bounds: [L::Values; 2]) -> bool {
+        let (gain, offset) = (load.gain.values(), load.offset.values());
+        let [low, high] = bounds.map(|u| -gain.fma::<F>(u, offset));
+        // Above zero where its negative is below.
+        low.negative() & high.negative() == L::Values::all(-1.0).negative()
+    }
+
+    /// Something negative where a load falls below zero within a sample.
+    #[inline(always)]
+    fn unloads<const F: bool>(&self, load: &Line<L>, (sample, h): (&Sample<L>, f64)) -> L::Values {
+        let [before, rate] = load.line::<F>(sample).map(Lane::values);
+        // A load of -0 is none that has fallen.
+        let none = L::Values::all(0.0);
+        (before + none).negative_with(rate.times(h) + before + none)
+    }
+
+    /// Limit and value of a watched form `elapsed` seconds into a segment.
     #[inline(always)]
     fn guard<const F: bool, const A: usize>(
         &self,
@@ -124,7 +164,7 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         (sample, elapsed): (&Sample<L>, f64),
         (x, carry): (&[L; N], &Carry<L, A>),
     ) -> [L::Values; 2] {
-        let Watched { form, limit, side, .. } = &self.watched[place];
+        let Watched { form, limit, .. } = &self.watched[place];
         let mut torque = form.constant.values();
         for drive in &self.drives {
             let [start, rate] = input_of(sample, drive.input);
@@ -138,9 +178,22 @@ impl<L: Lane, const N: usize> Operators<L, N> {
             torque = form.channels[a].values().fma::<F>(carry.value[a].value.values(), torque);
         }
         let [start, rate] = limit.line::<F>(sample);
-        let limit = rate.values().times(elapsed) + start.values();
-        let towards = (side.values() * torque).upper(-torque);
-        [limit - towards, torque.magnitude()]
+        [rate.values().times(elapsed) + start.values(), torque]
+    }
+
+    /// Something negative where a watched form may leave its limits within a sample, by these at both
+    /// ends.
+    #[inline(always)]
+    fn falls(&self, place: usize, (before, after): ([L::Values; 2], [L::Values; 2])) -> L::Values {
+        let side = self.watched[place].side.values();
+        let rise = (after[1] - before[1]).magnitude();
+        let size = before[1].magnitude().larger(after[1].magnitude());
+        let bow = self.bow[0].values() * rise + self.bow[1].values() * size;
+        let falls = |[limit, value]: [L::Values; 2]| {
+            let left = limit - bow;
+            (left - side * value).negative_with(left + value)
+        };
+        falls(before).negative_with(falls(after))
     }
 }
 
@@ -148,7 +201,13 @@ impl<L: Lane, const A: usize> Carry<L, A> {
     /// Nothing carried.
     pub fn zero() -> Self {
         let none = L::all(0.0);
-        Self { argument: [none; A], rate: [none; A], value: [Value::zero(); A] }
+        Self {
+            argument: [none; A],
+            rate: [none; A],
+            value: [Value::zero(); A],
+            near: [none; A],
+            stiction: [none; A],
+        }
     }
 
     /// The torques.
@@ -159,16 +218,15 @@ impl<L: Lane, const A: usize> Carry<L, A> {
         }
     }
 
-    /// Everything at the start of a segment.
+    /// Everything at the start of a segment of length `h`.
     #[inline(always)]
     pub fn start<const F: bool, const N: usize>(
         op: &Operators<L, N>,
-        sample: &Sample<L>,
+        (sample, h): (&Sample<L>, f64),
         x: &[L; N],
     ) -> Self {
         let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
-        let none = L::all(0.0);
-        let mut out = Self { argument: [none; A], rate: [none; A], value: [Value::zero(); A] };
+        let mut out = Self::zero();
         for a in 0..A {
             let Carried { argument, law, .. } = &channels[a];
             for i in 0..op.columns() {
@@ -176,7 +234,7 @@ impl<L: Lane, const A: usize> Carry<L, A> {
             }
             let m = out.argument[a];
             let normal = law.normal.line::<F>(sample)[0];
-            out.value[a] = law.at::<F>(m, law.stiction::<F>(m), normal);
+            out.value[a] = law.about::<F>(m, law.stiction::<F>(m)).here(normal);
         }
         for a in 0..A {
             let form = &channels[a].rate;
@@ -188,6 +246,8 @@ impl<L: Lane, const A: usize> Carry<L, A> {
                 rate = drive.now[a].fma::<F>(input_of(sample, drive.input)[0], rate);
             }
             out.rate[a] = rate;
+            out.near[a] = rate.times(h) + out.argument[a];
+            out.stiction[a] = channels[a].law.stiction::<F>(out.near[a]);
         }
         out
     }
@@ -202,6 +262,8 @@ impl<const K: usize> Carry<Pack<K>, MAX_ACTIVE> {
             first.argument[a] = self.argument[a];
             first.rate[a] = self.rate[a];
             first.value[a] = self.value[a];
+            first.near[a] = self.near[a];
+            first.stiction[a] = self.stiction[a];
         }
         first
     }
@@ -212,6 +274,8 @@ impl<const K: usize> Carry<Pack<K>, MAX_ACTIVE> {
         self.argument[..A].copy_from_slice(&first.argument);
         self.rate[..A].copy_from_slice(&first.rate);
         self.value[..A].copy_from_slice(&first.value);
+        self.near[..A].copy_from_slice(&first.near);
+        self.stiction[..A].copy_from_slice(&first.stiction);
     }
 }
 
@@ -222,6 +286,8 @@ impl<const K: usize, const A: usize> Carry<Pack<K>, A> {
         for a in 0..A {
             self.argument[a].0[lane] = from.argument[a].0[lane];
             self.rate[a].0[lane] = from.rate[a].0[lane];
+            self.near[a].0[lane] = from.near[a].0[lane];
+            self.stiction[a].0[lane] = from.stiction[a].0[lane];
             let (to, from) = (&mut self.value[a], &from.value[a]);
             to.value.0[lane] = from.value.0[lane];
             to.by_argument.0[lane] = from.by_argument.0[lane];

@@ -293,7 +293,7 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
         let n = run.x.len();
         let mut x = [T::zero_(); N];
         x[..n].copy_from_slice(&run.x);
-        let mut carry = Carry::<T, A>::start::<F, N>(operators, &first, &x);
+        let mut carry = Carry::<T, A>::start::<F, N>(operators, (&first, h), &x);
         let mut guards = operators.guards::<F, A>(&first, (&x, &carry));
         let mut trail = Trail::default();
         while count > 0 {
@@ -326,8 +326,13 @@ struct Lines<'a, T>(&'a Inputs<T>);
 impl<T: Real> Source<T> for Lines<'_, T> {
     #[inline(always)]
     fn read(&self, segment: usize, sample: &mut Sample<T>) {
-        for input in 0..self.0.count().min(MAX_INPUTS) {
-            sample[input] = self.0.line(segment, input);
+        for (to, line) in sample.iter_mut().zip(self.0.lines_at(segment)) {
+            *to = line;
         }
+    }
+
+    #[inline(always)]
+    fn bounds(&self, input: usize, samples: (usize, usize)) -> [f64; 2] {
+        self.0.bounds(input, samples)
     }
 }

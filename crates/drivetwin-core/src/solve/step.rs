@@ -30,11 +30,11 @@ struct Sampling<L: Lane, const N: usize, const A: usize> {
     cubics: [[L; CUBIC]; A],
     /// Torques at the end.
     value: [Value<L>; A],
-    /// Least guard so far.
-    least: L::Values,
+    /// Negative where a guard has fallen.
+    guard: L::Values,
 }
 
-/// Pass one sample; returns the least guard of the carried channels.
+/// Pass one sample; returns something negative where a guard of the carried channels has fallen.
 #[inline(always)]
 pub fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
     op: &Operators<L, N>,
@@ -42,17 +42,11 @@ pub fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
     (x, carry): (&mut [L; N], &mut Carry<L, A>),
 ) -> L::Values {
     let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
-    // Stiction at about the end, early: nothing waits for the exponential then.
-    let mut near = [(L::all(0.0), L::all(0.0)); A];
-    for a in 0..A {
-        let about = carry.rate[a].times(h) + carry.argument[a];
-        near[a] = (about, channels[a].law.stiction::<F>(about));
-    }
     let mut sampling = Sampling::known::<F>(op, channels, (sample, h), x);
-    sampling.predict::<F>(op, channels, (carry, &near), h);
+    sampling.predict::<F>(op, channels, carry, h);
     sampling.correct::<F>(op, channels, carry, h);
     *x = sampling.end;
-    sampling.least
+    sampling.guard
 }
 
 impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
@@ -74,7 +68,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             normal: [[none; 2]; A],
             cubics: [[none; CUBIC]; A],
             value: [Value::zero(); A],
-            least: L::Values::all(1.0),
+            guard: L::Values::all(0.0),
         };
         for a in 0..A {
             let c = &channels[a];
@@ -111,32 +105,43 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         s
     }
 
-    /// The cubics by value, rate and second derivative at the start, and the end they lead to; `near`
-    /// holds stiction at arguments close to those at the end.
+    /// The cubics by value, rate and second derivative at the start, and the end they lead to.
     #[inline(always)]
     fn predict<const F: bool>(
         &mut self,
         op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
-        (carry, near): (&Carry<L, A>, &[(L, L); A]),
+        carry: &mut Carry<L, A>,
         h: f64,
     ) {
         for a in 0..A {
             let v = &carry.value[a];
-            let slope = v.by_argument.fma::<F>(carry.rate[a], v.by_normal * self.normal[a][1]);
-            (self.cubics[a][0], self.cubics[a][1]) = (v.value, slope.times(h));
+            let drift = (v.by_normal * self.normal[a][1]).times(h);
+            self.cubics[a][0] = v.value;
+            self.cubics[a][1] = v.by_argument.times(h).fma::<F>(carry.rate[a], drift);
         }
+        let (near, stiction) = (carry.near, carry.stiction);
         for a in 0..A {
             let mut second = self.second[a];
             for b in 0..A {
-                let cubic = &self.cubics[b];
-                second = channels[a].second.channels[b].fma::<F>(cubic[0], second);
-                second = channels[a].rate.channels[b].times(1.0 / h).fma::<F>(cubic[1], second);
+                second = channels[a].second.channels[b].fma::<F>(self.cubics[b][0], second);
+            }
+            for b in 0..A {
+                let rate = channels[a].rate.channels[b].times(1.0 / h);
+                second = rate.fma::<F>(self.cubics[b][1], second);
             }
             let (v, ds) = (&carry.value[a], carry.rate[a]);
             let mixed = v.mixed * self.normal[a][1];
             let turn = v.bend.fma::<F>(ds, mixed + mixed);
-            self.cubics[a][2] = v.by_argument.fma::<F>(second, turn * ds).times(0.5 * h * h);
+            let half = 0.5 * h * h;
+            let turned = (turn * ds).times(half);
+            self.cubics[a][2] = v.by_argument.times(half).fma::<F>(second, turned);
+            // With derivatives every sample starts anew.
+            if !L::DERIVATIVES {
+                let ahead = second.times(h) + ds;
+                carry.near[a] = ahead.times(2.0 * h) + carry.argument[a];
+                carry.stiction[a] = channels[a].law.stiction::<F>(carry.near[a]);
+            }
         }
         add_moments::<L, F, N, A, 0, 3>(op, &self.cubics, &mut self.end);
         for a in 0..A {
@@ -146,11 +151,12 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                 over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, self.argument[a]);
             self.rate[a] = over_cubics::<L, F, N, A, 0, 3>(rate_end, cubics, self.rate[a]);
             let normal = self.normal[a][1].times(h) + self.normal[a][0];
-            let distance = self.argument[a] - near[a].0;
-            let (stiction, moved) = law.moved_stiction::<F>(near[a].1, distance);
-            self.value[a] = law.at::<F>(self.argument[a], stiction, normal);
+            let friction = law.about::<F>(near[a], stiction[a]);
+            let distance = self.argument[a] - near[a];
+            self.value[a] = friction.at::<F>(distance, normal);
+            let moved = law.rate * distance;
             let guard = L::Values::all(MAX_MOVE) - moved.values().magnitude();
-            self.least = self.least.lower(guard);
+            self.guard = self.guard.negative_with(guard);
         }
     }
 
@@ -166,13 +172,13 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         let mut change = [[L::all(0.0); CUBIC]; A];
         for a in 0..A {
             let (v, cubic) = (&self.value[a], &self.cubics[a]);
-            let form = &channels[a].rate;
-            let ds = self.rate[a] + over_channels::<L, F, N, A>(form, &self.value, self.direct[a]);
-            let slope = v.by_argument.fma::<F>(ds, v.by_normal * self.normal[a][1]).times(h);
+            let known = self.rate[a] + self.direct[a];
+            let ds = over_channels::<L, F, N, A>(&channels[a].rate, &self.value, known);
+            let drift = (v.by_normal * self.normal[a][1]).times(h);
+            let slope = v.by_argument.times(h).fma::<F>(ds, drift);
             let rise = v.value - cubic[0];
-            let bent = rise.times(3.0) - cubic[1].times(2.0) - slope;
-            change[a][2] = bent - cubic[2];
-            change[a][3] = cubic[1] + slope - rise.times(2.0);
+            change[a][2] = rise.times(3.0) - cubic[1].times(2.0) - cubic[2] - slope;
+            change[a][3] = cubic[1] - rise.times(2.0) + slope;
         }
         add_moments::<L, F, N, A, 2, 4>(op, &change, &mut self.end);
         let before = (carry.argument, carry.rate);
@@ -184,22 +190,24 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let size = carry.value[a].value.values().magnitude() + L::Values::all(1.0);
             let correction = (corrected.value - self.value[a].value).values().magnitude();
             let guard = size.times(MAX_CUBIC) - change[a][3].values().magnitude();
-            self.least = self.least.lower(guard).lower(size.times(MAX_CORRECTION) - correction);
+            let close = size.times(MAX_CORRECTION) - correction;
+            self.guard = self.guard.negative_with(guard).negative_with(close);
             self.value[a] = corrected;
             carry.argument[a] = self.argument[a] + ds;
         }
         carry.value = self.value;
         for a in 0..A {
             let Carried { rate, law, .. } = &channels[a];
-            carry.rate[a] =
-                self.rate[a] + over_channels::<L, F, N, A>(rate, &carry.value, self.direct[a]);
+            let known = self.rate[a] + self.direct[a];
+            carry.rate[a] = over_channels::<L, F, N, A>(rate, &carry.value, known);
             // Between its ends the argument stays within these (Bernstein's form of the cubic).
-            let (m0, m3) = (before.0[a].values(), carry.argument[a].values());
-            let m1 = before.1[a].values().times(h / 3.0) + m0;
-            let m2 = m3 - carry.rate[a].values().times(h / 3.0);
-            let (low, high) = (m0.lower(m1).lower(m2.lower(m3)), m0.upper(m1).upper(m2.upper(m3)));
-            let guard = (low - law.from.values()).lower(law.to.values() - high);
-            self.least = self.least.lower(guard);
+            let end = carry.argument[a].values();
+            let early = before.1[a].values().times(h / 3.0) + before.0[a].values();
+            let late = end - carry.rate[a].values().times(h / 3.0);
+            for m in [early, late, end] {
+                let (above, below) = (m - law.from.values(), law.to.values() - m);
+                self.guard = self.guard.negative_with(above).negative_with(below);
+            }
         }
     }
 }

@@ -172,7 +172,8 @@ impl<T: Real> Integrator<'_, T> {
     /// State and inputs of the basis for a decision, without the channels.
     pub(super) fn basis_without_channels(&self) -> Vec<T> {
         let inputs = &self.ahead;
-        let mut basis = self.x_ahead.clone();
+        let mut basis = Vec::with_capacity(self.network.basis());
+        basis.extend_from_slice(&self.x_ahead);
         basis.extend(inputs.iter().map(|input| input[0]));
         basis.extend(self.network.prescribed.iter().map(|&(_, input)| inputs[input][1]));
         basis.push(T::of(1.0));
