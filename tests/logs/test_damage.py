@@ -166,16 +166,26 @@ def test_runs_cover_exactly_what_is_true(flags: list[bool]) -> None:
     assert np.array_equal(rebuilt, mask)
 
 
-def test_a_coarse_torque_that_rests_too_long_is_noticed() -> None:
+@pytest.mark.parametrize("noise", [0.5, 0.8, 2.0])
+def test_a_coarse_torque_that_rests_too_long_is_noticed(noise: float) -> None:
     rng = np.random.default_rng(5)
-    time = np.linspace(0.0, 4.99, 500)
-    values = 11.0 * np.round((800.0 + 5.0 * rng.normal(size=500)) / 11.0)
+    time = np.linspace(0.0, 7.99, 800)
+    values = 11.0 * np.round(72.2 + noise * rng.normal(size=800))
     assert longest_rest(time, values) is None
-    values[200:260] = values[200]
+    values[200:320] = values[200]
     span = longest_rest(time, values)
     assert span is not None
     assert abs(span[0] - 2.0) < 0.06
-    assert abs(span[1] - 2.6) < 0.06
+    assert abs(span[1] - 3.2) < 0.06
+
+
+@given(noise=st.floats(0.05, 3.0), seed=st.integers(0, 1000), levels=st.integers(1, 5))
+def test_rounding_alone_makes_no_stuck_torque(noise: float, seed: int, levels: int) -> None:
+    """Steps between levels anywhere between two codes: where noise is small, some rest for long."""
+    rng = np.random.default_rng(seed)
+    level = np.repeat(rng.uniform(50.0, 150.0, levels), 1000 // levels)
+    values = np.asarray(12.5 * np.round(level + noise * rng.normal(size=level.size)), np.float64)
+    assert longest_rest(np.linspace(0.0, 9.99, level.size), values) is None
 
 
 def test_a_calculated_torque_without_jitter_may_rest() -> None:

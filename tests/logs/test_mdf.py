@@ -179,7 +179,5 @@ def test_a_recorded_log_with_german_names_and_three_time_bases() -> None:
     assert log["input_speed"].values[0] == pytest.approx(
         log["output_speed"].values[0] * 1.91, rel=5e-3
     )
-    # Its torque is coarse and rests for half a second: told, as nothing else is.
-    (told,) = log.warnings
-    assert "MMot_Ist_c" in told
-    assert "one number" in told
+    # Its torque is rounded to 12.5 N·m and rests for half a second, as its noise lets it.
+    assert log.warnings == ()

@@ -11,15 +11,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from drivetwin.logs.shiftlog import Channel, FloatArray
 from drivetwin.vehicle.spec import VehicleCard
 
-_GRID = 0.01
+GRID = 0.01
 """Raster [s] on which the speeds are compared."""
 
-_SMOOTH = 0.1
+SMOOTH = 0.1
 """Averaging [s] before comparison; noise would otherwise hide in the acceleration and bias it."""
 
 _IN_GEAR = 0.01
@@ -28,7 +29,7 @@ _IN_GEAR = 0.01
 _LEAST_TIME = 1.0
 """So much time in gear [s] is needed for a statement."""
 
-_LONGEST = 100.0
+LONGEST = 100.0
 """Points of the raster for each sample at most: beyond that the log is nearly all gap."""
 
 _SIGNIFICANT = 5.0
@@ -42,15 +43,23 @@ _LEAST_DELAY = 5e-3
 class Delay:
     """How much later [s] one channel's stamps are than another's, in the middle of the log.
 
-    `drift` [s/s] is how the delay grows; the `sigma`s are one standard deviation; `span` [s] of the
-    data in gear.
+    `drift` [s/s] is how the delay grows, zero where that was not asked; the `sigma`s are one
+    standard deviation; `span` [s] of the data in gear.
     """
 
     value: float
     sigma: float
-    drift: float
-    drift_sigma: float
-    span: float
+    drift: float = 0.0
+    drift_sigma: float = 0.0
+    span: float = 0.0
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Least-squares solution (p,) and its covariance (p, p)."""
+
+    solution: FloatArray
+    covariance: FloatArray
 
 
 def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> Delay | None:
@@ -62,22 +71,42 @@ def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> De
     """
     start = max(faster.time[0], slower.time[0])
     end = min(faster.time[-1], slower.time[-1])
-    if not _LEAST_TIME <= end - start <= _LONGEST * max(faster.time.size, slower.time.size) * _GRID:
+    if not _LEAST_TIME <= end - start <= LONGEST * max(faster.time.size, slower.time.size) * GRID:
         return None
-    time = np.arange(start, end, _GRID)
-    width = round(_SMOOTH / _GRID)
-    fast, slow = (uniform_filter1d(one.at(time), width, mode="nearest") for one in (faster, slower))
-    rate = np.gradient(slow, _GRID)
+    time = np.arange(start, end, GRID)
+    width = round(SMOOTH / GRID)
+    fast, slow = (
+        uniform_filter1d(means(one, time), width, mode="nearest") for one in (faster, slower)
+    )
+    rate = np.gradient(slow, GRID)
     gear = _gears(fast, slow, ratios, width)
     known = (gear >= 0) & np.isfinite(rate) & np.isfinite(fast)
-    if np.count_nonzero(known) * _GRID < _LEAST_TIME:
+    if np.count_nonzero(known) * GRID < _LEAST_TIME:
         return None
     ratio = np.asarray(ratios)[gear[known]]
     t = time[known] - time[known].mean()
     used = np.unique(gear[known])
     columns = [np.where(gear[known] == one, slow[known], 0.0) for one in used]
     design = np.column_stack([*columns, ratio * rate[known], ratio * rate[known] * t])
-    return _fit(design, fast[known] - ratio * slow[known], t)
+    fit = least_squares(design, fast[known] - ratio * slow[known])
+    if fit is None:
+        return None
+    (value, drift), (sigma, drift_sigma) = fit.solution[-2:], np.sqrt(np.diag(fit.covariance))[-2:]
+    return Delay(float(value), float(sigma), float(drift), float(drift_sigma), float(np.ptp(t)))
+
+
+def means(channel: Channel, time: FloatArray) -> FloatArray:
+    """Means (n,) of a channel over GRID around each `time` (n,), from all samples there are.
+
+    NaN outside its span and in its gaps.
+    """
+    start, end = channel.time[0], channel.time[-1]
+    edges = np.append(time - 0.5 * GRID, time[-1] + 0.5 * GRID).clip(start, end)
+    total = cumulative_trapezoid(channel.values, channel.time, initial=0)
+    sums = np.interp(edges, channel.time, total)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.diff(sums) / np.diff(edges)
+    return np.where(np.isfinite(channel.at(time)), mean, np.nan)
 
 
 def _gears(
@@ -93,21 +122,21 @@ def _gears(
     return gear
 
 
-def _fit(design: FloatArray, error: FloatArray, time: FloatArray) -> Delay | None:
+def least_squares(design: FloatArray, target: FloatArray) -> Fit | None:
+    """Fit `design` (n, p) to `target` (n,), rows GRID apart of signals averaged over SMOOTH.
+
+    None where a column is none of its own.
+    """
     scale = np.linalg.norm(design, axis=0)
     if not np.all(scale > 0.0):
         return None
-    solution, _, rank, _ = np.linalg.lstsq(design / scale, error, rcond=1e-8)
+    solution, _, rank, _ = np.linalg.lstsq(design / scale, target, rcond=1e-8)
     if rank < design.shape[1]:
         return None
-    residual = error - design / scale @ solution
-    independent = max(1.0, time.size * _GRID / _SMOOTH - design.shape[1])
-    variance = float(residual @ residual) / time.size * (time.size / independent)
-    covariance = variance * np.linalg.inv((design / scale).T @ (design / scale))
-    value, sigma = solution / scale, np.sqrt(np.diag(covariance)) / scale
-    return Delay(
-        float(value[-2]), float(sigma[-2]), float(value[-1]), float(sigma[-1]), float(np.ptp(time))
-    )
+    residual = target - design / scale @ solution
+    independent = max(1.0, target.size * GRID / SMOOTH - design.shape[1])
+    covariance = np.linalg.inv((design / scale).T @ (design / scale)) / np.outer(scale, scale)
+    return Fit(solution / scale, float(residual @ residual) / independent * covariance)
 
 
 def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
@@ -128,13 +157,22 @@ def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[s
     return texts
 
 
+def beyond_doubt(delay: Delay, one: Channel, other: Channel) -> bool:
+    """Whether a delay is significant and more than the sampling of both channels explains."""
+    return abs(delay.value) > max(_least(one, other), _SIGNIFICANT * delay.sigma)
+
+
+def _least(one: Channel, other: Channel) -> float:
+    return max(_LEAST_DELAY, 0.5 * one.step, 0.5 * other.step)
+
+
 def _told(delay: Delay | None, other: Channel, reference: Channel) -> list[str]:
     """Words for the delay of `other` against `reference`, if it is large and certain enough."""
     if delay is None:
         return []
-    least = max(_LEAST_DELAY, 0.5 * other.step, 0.5 * reference.step)
+    least = _least(other, reference)
     texts = []
-    if abs(delay.value) > max(least, _SIGNIFICANT * delay.sigma):
+    if beyond_doubt(delay, other, reference):
         side = "late" if delay.value > 0.0 else "early"
         texts.append(
             f"channel {other.source_name!r} is {1e3 * abs(delay.value):.1f} ms {side} against "

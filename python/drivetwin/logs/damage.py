@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
+from scipy.special import erf
 
 from drivetwin.logs.shiftlog import FloatArray, Quantity
 
@@ -49,6 +50,12 @@ this share of the usual size.
 
 _JITTER = 0.3
 """Least share of steps that move for a coarse signal to jitter."""
+
+_TWO_NEIGHBOURS = 2.0
+_WIDE_TURNS = (0.0, 0.03, 0.075, 0.12, 0.22, 0.3, 0.5, 0.6)
+_NOISES = (0.0, 0.4, 0.5, 0.6, 0.8, 1.0, 2.0, 5.0)
+"""Share of steps that turn over more than two neighbouring codes, by the deviation of normal noise
+in codes: simulated, and within a tenth the same wherever the true value lies."""
 
 _UNLIKELY = float(np.log(1e-9))
 """Logarithm of the chance below which a rest is none of the jitter's own."""
@@ -164,22 +171,36 @@ def _restless(steps: FloatArray, usual: float) -> bool:
 
 
 def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | None:
-    """Longest span [s] of one number, if a coarse signal that jitters would not rest so by chance.
+    """Longest span [s] of one number, if a signal that jitters would not rest so by itself.
 
-    The share of steps that move, besides long rests, tells how likely a rest of that length is.
+    Noise below the resolution rests where the true value lies in the middle between two changes of
+    the rounded one, so that is what the chance of so long a rest is reckoned for.
     """
     still = np.diff(values) == 0.0
     found = runs(still)
-    if not found:
+    if not found or still.all():
         return None
     start, end = max(found, key=lambda run: run[1] - run[0])
-    long = sum(b - a for a, b in found if b - a >= _STUCK_SAMPLES)
-    others = still.size - long
-    moving = np.count_nonzero(~still)
-    if others < _ENOUGH or values[start] == 0.0 or moving < _JITTER * others:
+    elsewhere = np.concatenate([values[: start + 1], values[end:]])
+    moving = np.abs(np.diff(elsewhere))
+    if values[start] == 0.0 or moving.size < _ENOUGH or np.mean(moving > 0.0) < _JITTER:
         return None
-    unlikely = (end - start) * np.log1p(-moving / others) if moving < others else -np.inf
+    resolution = float(moving[moving > 0.0].min())
+    noise = _noise(elsewhere / resolution)
+    unlikely = (end - start) * np.log(erf(0.5 / (np.sqrt(2.0) * noise))) if noise > 0.0 else 0.0
     return (float(time[start]), float(time[end])) if unlikely < _UNLIKELY else None
+
+
+def _noise(codes: FloatArray) -> float:
+    """Standard deviation of the noise before rounding to whole `codes` (n,), in their unit.
+
+    To and fro between two neighbours tells nothing, since the true value may lie between them; to
+    and fro over three codes or more does, wherever it lies.
+    """
+    steps = np.round(np.diff(codes))
+    turns = steps[1:] * steps[:-1] < 0.0
+    wide = np.abs(steps[1:]) + np.abs(steps[:-1]) > _TWO_NEIGHBOURS
+    return float(np.interp(np.mean(turns & wide), _WIDE_TURNS, _NOISES))
 
 
 def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:

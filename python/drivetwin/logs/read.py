@@ -23,6 +23,7 @@ from drivetwin.logs.profile import read_mapping
 from drivetwin.logs.raw import RawChannel, RawLog, ReadOptions, Recording, Window
 from drivetwin.logs.roles import FOR_SHIFTS, quantity_of
 from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.logs.torque_delay import torque_warnings
 from drivetwin.logs.units import channel_unit, lookup
 from drivetwin.logs.validate import check_channel
 from drivetwin.progress import tell
@@ -66,7 +67,8 @@ def read_log(
     check_common_span(channels, str(path))
     check_gearing(channels, card, str(path))
     check_torque_signs(channels, str(path))
-    warnings += [*torque_balance(channels, card), *clock_warnings(channels, card)]
+    warnings += torque_balance(channels, card)
+    warnings += [*clock_warnings(channels, card), *torque_warnings(channels)]
     return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
 
 
