@@ -39,3 +39,20 @@ def test_damage_ends_as_a_result_or_a_typed_error(kind: str, sound: Base, tmp_pa
     except DrivetwinError:
         return
     assert kind not in TELLING or told(found, sound.found)
+
+
+def test_a_gap_shortly_before_the_end_costs_nothing_else(sound: Base, tmp_path: Path) -> None:
+    speed = sound.table.columns["SpdOut"].copy()
+    speed[-29:-16] = np.nan
+    log = written(sound.table.with_column("SpdOut", speed), tmp_path)
+    assert moved(identified(log, sound.card, Method.INTEGRAL), sound.found) == []
+
+
+@pytest.mark.parametrize("others", [(), ("SpdWhl",), ("PrsBrk3",)])
+def test_a_late_output_torque_is_told(others: tuple[str, ...], sound: Base, tmp_path: Path) -> None:
+    table = sound.table
+    for name in ("TrqOut", *others):
+        values = table.columns[name]
+        table = table.with_column(name, np.concatenate([np.full(4, values[0]), values[:-4]]))
+    found = identified(written(table, tmp_path), sound.card, Method.INTEGRAL)
+    assert any("TrqOut" in text and "time_shift_s" in text for text in found.warnings)

@@ -39,7 +39,7 @@ from drivetwin.identify.signals import (
     ShiftSignals,
     Span,
 )
-from drivetwin.shifts.recorded import parts_between
+from drivetwin.shifts.recorded import LEAST, parts_between
 from drivetwin.shifts.shift import Shift
 
 
@@ -197,6 +197,8 @@ def stretches(
     for name, span, tied in spans:
         ratio = driveline.i_before if name == "before" else driveline.i_after
         for part in parts_between(span, signals.output_gaps):
+            if tied and part != span and part[1] - part[0] < LEAST:
+                continue
             windows = _windows(part, settings)
             if driveline.loss_law == "dissipative":
                 windows = _driving(signals.output_torque, windows)
