@@ -121,15 +121,18 @@ def _noisy(record: Record, measured: FloatArray, rng: np.random.Generator) -> Re
     )
     torque = record.engine_torque
     jitter = record.input_sigma["engine torque"] * rng.standard_normal(torque.values.size)
-    pressures = {}
+    pressures, held_back = {}, {}
     for name, signal in record.pressures.items():
         noise = record.input_sigma[name] * rng.standard_normal(signal.values.size)
-        pressures[name] = Signal(signal.time, signal.values + local_cubic(signal.time, noise))
+        left = local_cubic(signal.time, noise)
+        pressures[name] = Signal(signal.time, signal.values + left)
+        held_back[name] = noise - left
     return replace(
         record,
         outputs=outputs,
         engine_torque=Signal(torque.time, torque.values + jitter),
         pressures=pressures,
+        held_back=held_back,
     )
 
 

@@ -3,10 +3,15 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from drivetwin.driveline import Signal
 from drivetwin.identify.likelihood.covariance import sensor_noise, with_input_noise
 from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.likelihood.record import TORQUE
 from drivetwin.identify.likelihood.response import observed, response_of
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import FloatArray
@@ -68,3 +73,36 @@ def test_expected_inputs_move_back_towards_the_truth() -> None:
         for one in (record, part.record)
     ]
     assert np.std(errors[1]) < 0.8 * np.std(errors[0])
+
+
+def test_what_is_held_back_acts_on_the_residual_as_on_a_run() -> None:
+    posed, truth = problem(bench())
+    part = posed.until([bench().signals.shift.lockup_time - 0.02]).parts[0]
+    small = {name: 0.05 * values for name, values in part.record.held_back.items()}
+    whole = {
+        name: Signal(p.time, p.values + small[name]) for name, p in part.record.pressures.items()
+    }
+    smooth = replace(part, record=replace(part.record, held_back=small))
+    read = replace(part, record=replace(part.record, pressures=whole, held_back={}))
+    runs = smooth.run(truth), read.run(truth)
+    assert runs[0] is not None
+    assert runs[1] is not None
+    before = smooth.residual(runs[0])
+    expected = (read.residual(runs[1]) - before) / part.record.sigma
+    found = (smooth.weighted_by(truth).residual(runs[0]) - before) / part.record.sigma
+    assert np.linalg.norm(found - expected) < 0.1 * np.linalg.norm(expected)
+
+
+def test_expected_noise_of_samples_is_the_transpose_of_interpolation() -> None:
+    rng = np.random.default_rng(1)
+    record = problem(bench())[0].parts[0].record
+    steps = {
+        name: rng.standard_normal(record.time.size - 1) for name in (TORQUE, *record.pressures)
+    }
+    held = record.less(steps, 0.007).held_back[TORQUE] - record.held_back.get(TORQUE, 0.0)
+    stamps = record.engine_torque.time - 0.007
+    values = rng.standard_normal(stamps.size)
+    middle = 0.5 * (record.time[1:] + record.time[:-1])
+    through = np.interp(middle, stamps, values) * np.diff(record.time) @ steps[TORQUE]
+    period = float(np.median(np.diff(stamps)))
+    assert held @ values * period == pytest.approx(through, rel=1e-9)

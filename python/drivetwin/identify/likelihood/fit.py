@@ -124,8 +124,7 @@ def nearest(problem: Problem, start: Point) -> LikelihoodFit | None:
     if found is None:
         return None
     iterations = found.iterations
-    expected = found.problem.with_expected_inputs(found.point, problem)
-    found = minimise(expected.weighted_by(found.point), found.point)
+    found = minimise(found.problem.with_expected_inputs(found.point), found.point)
     if found is None or not found.converged:
         return None
     chi2 = (found.normal.cost - problem.prior.cost(found.point.values)) / problem.size

@@ -37,8 +37,8 @@ LARGEST = 1e9
 class Part:
     """One shift: its structure, what was recorded, and the weighting of its residuals.
 
-    `record` has the inputs that drive the run; `returned` (n,) is G·(u - û), 0 while the inputs
-    are those measured.
+    `record` has the inputs that drive the run; `returned` (n,) is G·(u - û), what those held back
+    would do, 0 before the part is weighted by input noise.
     """
 
     structure: Structure
@@ -100,7 +100,7 @@ class Part:
         slopes = columns @ matrix
         response = self.response(point, found.run)
         for name, disturbance in self._torque_changes(point).items():
-            answer = self._seen(point, response.to({"engine torque": disturbance}))
+            answer = self.seen(point, response.to({"engine torque": disturbance}))
             slopes[:, point.names.index(name)] = answer
         if not np.all(np.isfinite(slopes)):
             return None
@@ -127,13 +127,13 @@ class Part:
         self, point: Point, run: Trajectory, disturbance: dict[str, FloatArray]
     ) -> FloatArray:
         """Change (n,) of the simulated samples by disturbances (N-1,) of inputs, by name."""
-        return self._seen(point, self.response(point, run).to(disturbance))
+        return self.seen(point, self.response(point, run).to(disturbance))
 
     def answer_to_force(self, point: Point, run: Trajectory, force: FloatArray) -> FloatArray:
         """The same (n,) by torques (N-1, 4) on the speeds of engine, output and wheel."""
-        return self._seen(point, self.response(point, run).forced(force))
+        return self.seen(point, self.response(point, run).forced(force))
 
-    def _seen(self, point: Point, z: FloatArray) -> FloatArray:
+    def seen(self, point: Point, z: FloatArray) -> FloatArray:
         """What the sensors see (n,) of disturbances z (N, 4) of the state."""
         model = self.structure.model(point)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -146,38 +146,36 @@ class Part:
 
         The part as it is where the simulation fails there, or has no finite response.
         """
-        run = self.run(point)
-        if run is None:
-            return self
-        model = self.structure.model(point)
-        response = response_of(model, run, self.record)
-        if not response.finite:
-            return self
-        try:
-            return replace(self, weighting=with_input_noise(model, self.record, response))
-        except np.linalg.LinAlgError:
-            return self
+        return self._weighted(point) or self
 
-    def with_expected_inputs(self, point: Point, measured: Record) -> Part:
-        """The part driven by the `measured` inputs less their expected noise at `point`."""
+    def with_expected_inputs(self, point: Point) -> Part:
+        """The part driven by its inputs less their expected noise at `point`, weighted there.
+
+        The part as it is where the simulation fails with them.
+        """
         run = self.run(point)
-        if run is None:
-            return self
-        noise = self.weighting.input_noise(self.residual(run))
+        noise = {} if run is None else self.weighting.input_noise(self.residual(run))
         if not noise:
             return self
         age = self.structure.value(point, "te_delay")
-        record = measured.less(noise, age)
-        part = replace(self, record=record)
-        middle = 0.5 * (run.time[1:] + run.time[:-1])
-        taken = {
-            name: np.interp(middle, signal.time, signal.values)
-            for name, signal in measured.difference(record, age).items()
-        }
-        run = part.run(point)
+        return replace(self, record=self.record.less(noise, age))._weighted(point) or self
+
+    def _weighted(self, point: Point) -> Part | None:
+        """The part with weighting and held-back inputs as they act at `point`; None: no run."""
+        run = self.run(point)
         if run is None:
-            return self
-        return replace(part, returned=part.answer_to(point, run, taken))
+            return None
+        model = self.structure.model(point)
+        response = response_of(model, run, self.record)
+        if not response.finite:
+            return None
+        try:
+            weighting = with_input_noise(model, self.record, response)
+        except np.linalg.LinAlgError:
+            return None
+        held_back = self.record.held_back_over(self.structure.value(point, "te_delay"))
+        returned = self.seen(point, response.to(held_back))
+        return replace(self, weighting=weighting, returned=returned)
 
     def _pressures(self) -> dict[str, Signal]:
         """Pressures of all elements of the model: none of those that stay open."""
@@ -248,10 +246,9 @@ class Problem:
         """The problem with input noise in the covariance, at `point`."""
         return replace(self, parts=tuple(part.weighted_by(point) for part in self.parts))
 
-    def with_expected_inputs(self, point: Point, measured: Problem) -> Problem:
-        """The problem driven by the expected inputs at `point`."""
-        pairs = zip(self.parts, measured.parts, strict=True)
-        return replace(self, parts=tuple(p.with_expected_inputs(point, m.record) for p, m in pairs))
+    def with_expected_inputs(self, point: Point) -> Problem:
+        """The problem driven by the expected inputs at `point`, weighted there."""
+        return replace(self, parts=tuple(part.with_expected_inputs(point) for part in self.parts))
 
     def cost(self, point: Point) -> float:
         """Q; infinite where a simulation fails."""

@@ -16,6 +16,8 @@ from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
 
 IndexArray = NDArray[np.intp]
 
+TORQUE = "engine torque"
+"""Name of the engine torque among the inputs; the others are pressures by element."""
 OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
 """Compared signals, in the order in which residuals are stacked."""
 LATEST = 0.06
@@ -78,6 +80,7 @@ class Record:
 
     `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
     `engine_torque` are fresh values at their stamps, held at both ends; `pressures` by element.
+    Both are what drives a run, which is what was read less what is `held_back`.
     """
 
     time: FloatArray
@@ -88,6 +91,9 @@ class Record:
     """Engine torque without its noise: what its rate of change is taken from."""
     input_sigma: Mapping[str, float]
     """White noise of an input sample by name; the engine torque is `engine torque`."""
+    held_back: Mapping[str, FloatArray] = field(default_factory=dict)
+    """What was taken off the samples of an input before it drives a run, by name: read less
+    driving. An input without an entry drives as it was read."""
 
     @property
     def size(self) -> int:
@@ -128,27 +134,26 @@ class Record:
         return bool(np.median(np.diff(self.time[out.place])) > SLOW)
 
     def less(self, noise: Mapping[str, FloatArray], age: float) -> Record:
-        """The record with expected `noise` (N-1,) per step of the grid taken off its inputs.
+        """The record with expected `noise` (N-1,) per step of the grid held back from its inputs.
 
-        Of a pressure's noise only the part that passes the local cubic is still there.
+        Of a pressure's noise only the part that passes the local cubic still drives the run.
         """
         torque = self.engine_torque
-        shown = _at_samples(self.time, noise["engine torque"], torque.time - age)
+        held = {TORQUE: _at_samples(self.time, noise[TORQUE], torque.time - age)}
         pressures = {}
         for name, p in self.pressures.items():
-            left = local_cubic(p.time, _at_samples(self.time, noise[name], p.time))
-            pressures[name] = Signal(p.time, p.values - left)
-        torque = Signal(torque.time, torque.values - shown)
-        return replace(self, engine_torque=torque, pressures=pressures)
+            held[name] = local_cubic(p.time, _at_samples(self.time, noise[name], p.time))
+            pressures[name] = Signal(p.time, p.values - held[name])
+        torque = Signal(torque.time, torque.values - held[TORQUE])
+        held = {name: self.held_back.get(name, 0.0) + values for name, values in held.items()}
+        return replace(self, engine_torque=torque, pressures=pressures, held_back=held)
 
-    def difference(self, other: Record, age: float) -> dict[str, Signal]:
-        """Inputs of this record minus those of `other`, over the time at which they act."""
-        torque = self.engine_torque
-        apart = torque.values - other.engine_torque.values
-        found = {"engine torque": Signal(torque.time - age, apart)}
-        for name, p in self.pressures.items():
-            found[name] = Signal(p.time, p.values - other.pressures[name].values)
-        return found
+    def held_back_over(self, age: float) -> dict[str, FloatArray]:
+        """What is held back of each input (N-1,) in the middle of each step of the grid."""
+        middle = 0.5 * (self.time[1:] + self.time[:-1])
+        stamps = {name: p.time for name, p in self.pressures.items()}
+        stamps[TORQUE] = self.engine_torque.time - age
+        return {name: np.interp(middle, stamps[name], v) for name, v in self.held_back.items()}
 
     def torque_rate(self, age: float) -> FloatArray:
         """Rate of the engine torque [N m/s] as it acts over each step of the grid (N-1,)."""
@@ -160,14 +165,7 @@ class Record:
         """The record cut at `end` [s]."""
         count = int(np.searchsorted(self.time, end, side="right"))
         outputs = tuple(out.cut(count) for out in self.outputs)
-        return Record(
-            self.time[:count],
-            self.engine_torque,
-            self.pressures,
-            outputs,
-            self.steady_torque,
-            self.input_sigma,
-        )
+        return replace(self, time=self.time[:count], outputs=outputs)
 
 
 def record_of(signals: ShiftSignals, span: Span) -> Record:
@@ -202,13 +200,15 @@ def record_of(signals: ShiftSignals, span: Span) -> Record:
         for name, part in parts.items()
     )
     torque = signals.engine_torque
+    smooth = {name: smooth_pressure(p) for name, p in signals.pressures.items()}
     return Record(
         time,
         _held(torque),
-        {name: Signal(p.time, smooth_pressure(p)) for name, p in signals.pressures.items()},
+        {name: Signal(p.time, smooth[name]) for name, p in signals.pressures.items()},
         outputs,
         _held(replace(torque, values=local_mean(torque))),
-        {"engine torque": torque.sigma} | {n: p.sigma for n, p in signals.pressures.items()},
+        {TORQUE: torque.sigma} | {n: p.sigma for n, p in signals.pressures.items()},
+        {name: p.values - smooth[name] for name, p in signals.pressures.items()},
     )
 
 
@@ -220,11 +220,18 @@ def _filled(time: FloatArray) -> FloatArray:
 
 
 def _at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:
-    """Mean (m,) of what is constant over each step of `grid` within half a period of `stamps`."""
-    half = 0.5 * float(np.median(np.diff(stamps)))
-    total = np.concatenate([[0.0], np.cumsum(steps * np.diff(grid))])
-    ends = np.interp(stamps + half, grid, total) - np.interp(stamps - half, grid, total)
-    return np.asarray(ends / (2.0 * half))
+    """Noise of samples at `stamps` (m,) from that over each step of `grid` (N-1,).
+
+    A sample acts on the steps about it as interpolation has it; its expected noise is their mean
+    with the same weights, the transpose of interpolation.
+    """
+    middle, width = 0.5 * (grid[1:] + grid[:-1]), np.diff(grid)
+    after = np.clip(np.searchsorted(stamps, middle), 1, stamps.size - 1)
+    share = (middle - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
+    share = np.clip(share, 0.0, 1.0)
+    total = np.bincount(after - 1, (1.0 - share) * width * steps, stamps.size)
+    total += np.bincount(after, share * width * steps, stamps.size)
+    return np.asarray(total / float(np.median(np.diff(stamps))))
 
 
 def _held(signal: Sampled) -> Signal:
