@@ -12,6 +12,10 @@ mod plain;
 
 use pyo3::prelude::*;
 
+/// Compiling a network and passing an event take some hundred small blocks, in several threads.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// The compiled core.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {

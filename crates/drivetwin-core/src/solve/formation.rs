@@ -135,7 +135,9 @@ impl<const N: usize> Formation<N> {
             });
             let source =
                 Together { inputs, shared: inputs.iter().all(|i| std::ptr::eq(*i, inputs[0])) };
-            let (passed, fallen) = self.pass((&source, h), samples, joining);
+            let live = members.iter().enumerate().filter(|(_, m)| m.joined);
+            let live = live.fold(0, |bits, (lane, _)| bits | 1 << lane);
+            let (passed, fallen) = self.pass((&source, h), samples, (joining, live));
             for (lane, member) in members.iter_mut().enumerate().filter(|(_, m)| m.joined) {
                 let fell = fallen >> lane & 1 == 1;
                 // Those that did not fall have passed the sample in which others did.
@@ -220,13 +222,13 @@ impl<const N: usize> Formation<N> {
         &mut self,
         source: (&Together<'_>, f64),
         samples: (usize, usize),
-        joining: u32,
+        lanes: (u32, u32),
     ) -> (usize, u32) {
         match self.slots.len() {
-            0 => dispatch(Pass::<N, 0> { formation: self, source, samples, joining }),
-            1 => dispatch(Pass::<N, 1> { formation: self, source, samples, joining }),
-            2 => dispatch(Pass::<N, 2> { formation: self, source, samples, joining }),
-            _ => dispatch(Pass::<N, MAX_ACTIVE> { formation: self, source, samples, joining }),
+            0 => dispatch(Pass::<N, 0> { formation: self, source, samples, lanes }),
+            1 => dispatch(Pass::<N, 1> { formation: self, source, samples, lanes }),
+            2 => dispatch(Pass::<N, 2> { formation: self, source, samples, lanes }),
+            _ => dispatch(Pass::<N, MAX_ACTIVE> { formation: self, source, samples, lanes }),
         }
     }
 
@@ -269,8 +271,6 @@ impl<const N: usize> Formation<N> {
             member.run.resume();
             member.go_on(true);
         }
-        self.operators.clear_lane(lane);
-        self.x.iter_mut().for_each(|x| x.0[lane] = 0.0);
     }
 }
 
@@ -283,7 +283,8 @@ struct Pass<'f, 's, const N: usize, const A: usize> {
     formation: &'f mut Formation<N>,
     source: (&'s Together<'s>, f64),
     samples: (usize, usize),
-    joining: u32,
+    /// Those that join and all that march, as bits.
+    lanes: (u32, u32),
 }
 
 impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
@@ -291,7 +292,7 @@ impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
 
     #[inline(always)]
     fn run<const F: bool>(self) -> (usize, u32) {
-        let Self { formation, source: (source, h), samples, joining } = self;
+        let Self { formation, source: (source, h), samples, lanes: (joining, live) } = self;
         let Formation { operators, x, carry: kept, guards, trail, .. } = formation;
         let mut carry = kept.first::<A>();
         if joining != 0 {
@@ -307,7 +308,7 @@ impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
             }
         }
         let at = (&mut *x, &mut carry, &mut *guards);
-        let outcome = march::<Lanes, F, N, A>(operators, (source, h), samples, at, trail);
+        let outcome = march::<Lanes, F, N, A>(operators, (source, h), samples, at, (trail, live));
         kept.set_first(&carry);
         outcome
     }

@@ -78,14 +78,15 @@ impl<L: Lane, const N: usize> Default for Trail<L, N> {
 
 /// Pass up to `count` (at most [`BLOCK`]) samples from segment `first`. Returns how many were passed
 /// and, as bits, the runs of which a guard could have fallen within the next one. State and carry are
-/// those after that sample all the same; its start stands in the trail.
+/// those after that sample all the same; its start stands in the trail. Only the runs `live`, as bits,
+/// count.
 #[inline(always)]
 pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
     op: &Operators<L, N>,
     (source, h): (&impl Source<L>, f64),
     (first, count): (usize, usize),
     (x, carry, guards): (&mut [L; N], &mut Carry<L, A>, &mut Guards<L::Values>),
-    trail: &mut Trail<L, N>,
+    (trail, live): (&mut Trail<L, N>, u32),
 ) -> (usize, u32) {
     let mut u = [[L::all(0.0); 2]; MAX_INPUTS];
     let loaded = op.loads.iter().all(|load| {
@@ -110,14 +111,14 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
                 guard = guard.negative_with(op.unloads::<F>(load, (&u, h)));
             }
         }
-        let fallen = guard.negative();
+        let fallen = guard.negative() & live;
         if fallen != 0 {
             return (k, fallen);
         }
     }
     // What has grown beyond all bounds is left to the expansion, which says so.
     let sum = x.iter().fold(L::Values::all(0.0), |sum, x| x.values().magnitude() + sum);
-    match sum.unbounded() {
+    match sum.unbounded() & live {
         0 => (count, 0),
         unbounded => (count.saturating_sub(1), unbounded),
     }

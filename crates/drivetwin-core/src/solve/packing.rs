@@ -27,86 +27,37 @@ impl<const K: usize, const N: usize> Operators<Pack<K>, N> {
 
     /// Put the operators of one run into a lane.
     pub fn set_lane(&mut self, lane: usize, from: &Operators<f64, N>, places: Places<'_>) {
-        let (slots, watched, active) = places;
-        self.clear_lane(lane);
+        let (slots, watched, _) = places;
+        let own = |slot: usize| own_slot(places, slot);
         self.states = from.states;
         put(&mut self.bow, &from.bow, lane);
         put(self.transition.as_flattened_mut(), from.transition.as_flattened(), lane);
         put(&mut self.constant, &from.constant, lane);
-        for (slot, id) in slots.iter().enumerate() {
-            if let Some(own) = active.iter().position(|j| j == id) {
-                let channel = &from.channels[own];
-                self.channels[slot].set_lane(lane, channel, |other| own_slot(places, other));
+        for (slot, channel) in self.channels.iter_mut().enumerate().take(slots.len()) {
+            match own(slot) {
+                Some(own_slot) => channel.set_lane(lane, &from.channels[own_slot], own),
+                None => channel.clear_lane(lane),
             }
         }
-        self.drives.resize_with(from.drives.len(), Drive::idle);
-        for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
-            drive.input = from.input;
-            put(drive.step.as_flattened_mut(), from.step.as_flattened(), lane);
-        }
-        self.set_drives_of_channels(lane, from, places);
         self.watched.resize_with(watched.len(), Watched::idle);
-        for (place, id) in watched.iter().enumerate() {
-            let Some(own) = from.watched.iter().position(|w| w.id == *id) else { continue };
-            let source = &from.watched[own];
-            let watch = &mut self.watched[place];
+        self.drives.resize_with(from.drives.len(), Drive::idle);
+        for (place, (watch, id)) in self.watched.iter_mut().zip(watched).enumerate() {
             watch.id = *id;
-            watch.form.set_lane(lane, &source.form, |other| own_slot(places, other));
-            watch.limit.set_lane(lane, &source.limit);
-            watch.side.0[lane] = source.side;
-            for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
-                drive.watched[place].0[lane] = from.watched[own];
+            let found = from.watched.iter().position(|w| w.id == *id);
+            match found {
+                Some(found) => watch.set_lane(lane, &from.watched[found], own),
+                None => watch.clear_lane(lane),
             }
+            for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
+                drive.watched[place].0[lane] = found.map_or(0.0, |found| from.watched[found]);
+            }
+        }
+        for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
+            drive.set_lane(lane, from, own, slots.len());
         }
         self.loads.resize_with(from.loads.len(), Line::idle);
         for (load, from) in self.loads.iter_mut().zip(&from.loads) {
             load.set_lane(lane, from);
-        }
-    }
-
-    fn set_drives_of_channels(
-        &mut self,
-        lane: usize,
-        from: &Operators<f64, N>,
-        places: Places<'_>,
-    ) {
-        for slot in 0..places.0.len() {
-            let Some(own) = own_slot(places, slot) else { continue };
-            for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
-                put(&mut drive.argument[slot], &from.argument[own], lane);
-                put(&mut drive.rate[slot], &from.rate[own], lane);
-                drive.now[slot].0[lane] = from.now[own];
-                drive.second[slot].0[lane] = from.second[own];
-            }
-        }
-    }
-
-    /// Empty a lane.
-    pub fn clear_lane(&mut self, lane: usize) {
-        let clear = |lanes: &mut [Pack<K>]| lanes.iter_mut().for_each(|pack| pack.0[lane] = 0.0);
-        clear(&mut self.bow);
-        clear(self.transition.as_flattened_mut());
-        clear(&mut self.constant);
-        for drive in &mut self.drives {
-            clear(drive.step.as_flattened_mut());
-            clear(drive.argument.as_flattened_mut());
-            clear(drive.rate.as_flattened_mut());
-            clear(&mut drive.now);
-            clear(&mut drive.second);
-            clear(&mut drive.watched);
-        }
-        for channel in &mut self.channels {
-            channel.clear_lane(lane);
-        }
-        for watch in &mut self.watched {
-            clear(&mut watch.form.state);
-            clear(&mut watch.form.channels);
-            watch.form.constant.0[lane] = 0.0;
-            watch.side.0[lane] = 1.0;
-            (watch.limit.gain.0[lane], watch.limit.offset.0[lane]) = (0.0, 1.0);
-        }
-        for load in &mut self.loads {
-            (load.gain.0[lane], load.offset.0[lane]) = (0.0, 1.0);
         }
     }
 }
@@ -120,6 +71,47 @@ fn own_slot((slots, _, active): Places<'_>, slot: usize) -> Option<usize> {
 fn put<const K: usize>(to: &mut [Pack<K>], from: &[f64], lane: usize) {
     for (pack, &value) in to.iter_mut().zip(from) {
         pack.0[lane] = value;
+    }
+}
+
+impl<const K: usize, const N: usize> Drive<Pack<K>, N> {
+    /// All but the watched forms.
+    fn set_lane(
+        &mut self,
+        lane: usize,
+        from: &Drive<f64, N>,
+        own: impl Fn(usize) -> Option<usize>,
+        slots: usize,
+    ) {
+        self.input = from.input;
+        put(self.step.as_flattened_mut(), from.step.as_flattened(), lane);
+        for slot in 0..slots {
+            let own = own(slot);
+            let value = |of: &[f64]| own.map_or(0.0, |own| of[own]);
+            put(&mut self.argument[slot], &own.map_or([0.0; 2], |own| from.argument[own]), lane);
+            put(&mut self.rate[slot], &own.map_or([0.0; 2], |own| from.rate[own]), lane);
+            self.now[slot].0[lane] = value(&from.now);
+            self.second[slot].0[lane] = value(&from.second);
+        }
+    }
+}
+
+impl<const K: usize, const N: usize> Watched<Pack<K>, N> {
+    fn set_lane(
+        &mut self,
+        lane: usize,
+        from: &Watched<f64, N>,
+        own: impl Fn(usize) -> Option<usize>,
+    ) {
+        self.form.set_lane(lane, &from.form, own);
+        self.limit.set_lane(lane, &from.limit);
+        self.side.0[lane] = from.side;
+    }
+
+    fn clear_lane(&mut self, lane: usize) {
+        let input = self.limit.input;
+        self.set_lane(lane, &Watched::idle(), |_| None);
+        self.limit.input = input;
     }
 }
 

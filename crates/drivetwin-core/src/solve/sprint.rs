@@ -300,7 +300,7 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
             let samples = (run.segment, count.min(BLOCK));
             let at = (&mut x, &mut carry, &mut guards);
             let (passed, fallen) =
-                march::<T, F, N, A>(operators, (&source, h), samples, at, &mut trail);
+                march::<T, F, N, A>(operators, (&source, h), samples, at, (&mut trail, 1));
             sink.passed(run, active, &trail, (run.segment, passed));
             run.segment += passed;
             count -= passed;
