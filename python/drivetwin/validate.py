@@ -154,9 +154,10 @@ def _runs(twin: Twin, log: ShiftLog, shifts: Sequence[Shift]) -> Iterator[Valida
         yield validate(twin, log, shift)
 
 
-def fit_of(measured: FloatArray, simulated: FloatArray, mean: float) -> SignalFit:
+def fit_of(measured: FloatArray, simulated: FloatArray, mean: FloatArray | float) -> SignalFit:
     """Rmse and fit % = 100·(1 - ‖y - ŷ‖/‖y - mean‖) (THEORY section 4); arrays (n,), SI.
 
+    `mean` is that of the log, or of each sample's log (n,) where samples of several are pooled.
     NaN where there are no samples; a constant measurement has no fit %.
     """
     if measured.size == 0:
@@ -239,7 +240,11 @@ def _pooled_fit(validations: Sequence[Validation]) -> dict[str, dict[str, Signal
         for phase in ("all", *validations[0].phases):
             parts = [_part(trace, phases.get(phase)) for trace, phases in traces]
             measured, simulated = (np.concatenate(side) for side in zip(*parts, strict=True))
-            pooled[name][phase] = fit_of(measured, simulated, traces[0][0].log_mean)
+            means = [
+                np.full(seen.size, trace.log_mean)
+                for (trace, _), (seen, _) in zip(traces, parts, strict=True)
+            ]
+            pooled[name][phase] = fit_of(measured, simulated, np.concatenate(means))
     return pooled
 
 

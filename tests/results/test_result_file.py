@@ -30,7 +30,7 @@ def _saved(folder: Path) -> dict[str, object]:
 
 def test_keys_are_those_of_the_design(tmp_path: Path) -> None:
     tree = _saved(tmp_path)
-    assert tree["schema"] == "drivetwin/result-2"
+    assert tree["schema"] == "drivetwin/result-3"
     parameters = tree["parameters"]
     assert isinstance(parameters, dict)
     assert set(parameters["eta"]) == {
@@ -96,8 +96,8 @@ def test_round_trip(tmp_path: Path) -> None:
         ("", "cannot be read"),
         ("[1, 2]", "cannot be read"),
         ("{}", "schema is None"),
-        ('{"schema": "drivetwin/result-3"}', "newer"),
-        ('{"schema": "drivetwin/twin-1"}', "expected 'drivetwin/result-2'"),
+        ('{"schema": "drivetwin/result-4"}', "newer"),
+        ('{"schema": "drivetwin/twin-1"}', "expected 'drivetwin/result-3'"),
         ('{"schema": "drivetwin/result-1"}', "cannot be read"),
     ],
 )

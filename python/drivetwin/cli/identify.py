@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,11 +11,12 @@ import typer
 
 from drivetwin.cli.arguments import ChannelsFile, VehicleFile
 from drivetwin.cli.output import JsonFlag, note, print_json, say, show
-from drivetwin.errors import InputError, Where
+from drivetwin.cli.staging import refuse_alike
 from drivetwin.identify.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
-    from drivetwin.cli.pipeline import Outcome
+    from drivetwin.identify.result import Identification
+    from drivetwin.shifts.shift import Shift
 
 
 def identify(
@@ -29,13 +30,30 @@ def identify(
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Where result, twin and report go."),
     ] = None,
+    together: Annotated[
+        bool, typer.Option("--together", help="All logs are of one vehicle: fit them as one.")
+    ] = False,
+    hold_out: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SHIFT",
+            help="Predict instead of fit: number of a shift, a LOG, or LOG:NUMBER; repeatable.",
+        ),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Identify the driveline behind a shift log.
 
     With -o, DIR/result.json, DIR/twin.toml and DIR/report.html are written;
     several logs are identified one by one, each into DIR/NAME-OF-LOG.
+
+    With --together they are fitted as one: the driveline is common to all, the load and the age
+    of the engine torque are each log's own. What --hold-out names takes no part in the fit; it is
+    simulated with what the others tell, and compared. It implies --together.
     """
+    if together or hold_out:
+        _together(logs, (vehicle, channels, method), hold_out or [], output, as_json)
+        return
     from drivetwin.cli.pipeline import run, write
 
     folders = _folders(logs, output)
@@ -44,13 +62,34 @@ def identify(
         log: write(outcome, folders[log]) if folders else () for log, outcome in outcomes.items()
     }
     if as_json:
-        results = [_document(outcomes[log], files[log]) for log in logs]
+        results = [_document(outcomes[log].found, files[log]) for log in logs]
         print_json(results[0] if len(results) == 1 else {"results": results})
         return
     for log in logs:
-        _print(outcomes[log], log.name)
+        _print(outcomes[log].found, {log.name: outcomes[log].found.shifts})
         for file in files[log]:
             say(f"wrote {file}")
+
+
+def _together(
+    logs: list[Path],
+    how: tuple[Path, Path | None, Method],
+    hold_out: list[str],
+    output: Path | None,
+    as_json: bool,
+) -> None:
+    """Fit all logs as one and predict what is held out; `how` are card, mapping and method."""
+    from drivetwin.cli.together import print_together, run, write
+
+    outcome = run(logs, *how, hold_out)
+    files = write(outcome, output) if output is not None else ()
+    if as_json:
+        print_json(_document(outcome.found, files))
+        return
+    _print(outcome.found, outcome.shifts)
+    print_together(outcome.found)
+    for file in files:
+        say(f"wrote {file}")
 
 
 def _folders(logs: list[Path], output: Path | None) -> dict[Path, Path]:
@@ -59,27 +98,21 @@ def _folders(logs: list[Path], output: Path | None) -> dict[Path, Path]:
         return {}
     if len(logs) == 1:
         return {logs[0]: output}
-    twice = [stem for stem, count in Counter(log.stem for log in logs).items() if count > 1]
-    if twice:
-        raise InputError(
-            f"several logs are called {', '.join(twice)}: their results would share one folder",
-            "identify them in separate runs with different -o",
-            Where(file=str(output)),
-        )
+    refuse_alike(logs, "identify them in separate runs with different -o")
     return {log: output / log.stem for log in logs}
 
 
-def _document(outcome: Outcome, files: tuple[Path, ...]) -> dict[str, Any]:
+def _document(found: Identification, files: tuple[Path, ...]) -> dict[str, Any]:
     """The content of result.json, with the files that were written."""
     import json
 
     from drivetwin.results.result_file import ResultFile
 
-    document: dict[str, Any] = json.loads(ResultFile.of(outcome.found).to_json())
+    document: dict[str, Any] = json.loads(ResultFile.of(found).to_json())
     return {**document, "files": [str(file) for file in files]}
 
 
-def _print(outcome: Outcome, source: str) -> None:
+def _print(found: Identification, shifts: Mapping[str, Sequence[Shift]]) -> None:
     from drivetwin.cli.tables import (
         fit_table,
         friction_table,
@@ -88,8 +121,8 @@ def _print(outcome: Outcome, source: str) -> None:
         shift_table,
     )
 
-    found = outcome.found
-    show(shift_table(found.shifts, source))
+    for source, own in shifts.items():
+        show(shift_table(own, source))
     show(parameter_table(found.estimates, f"Parameters ({found.method} method)"))
     for line in remarks(found.estimates):
         note(line)

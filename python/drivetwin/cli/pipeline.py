@@ -46,14 +46,14 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
         shifts = usable_shifts(recording, card)
     with step(f"identifying by the {method} method"):
         found = identify(recording, card, shifts, method)
-        found = replace(found, inputs={**found.inputs, **_digests(vehicle, channels)})
+        found = replace(found, inputs={**found.inputs, **digests(vehicle, channels)})
         twin = Twin.from_identification(found, card)
     with step("simulating the shifts"):
         found = validated(found, twin, recording)
     return Outcome(recording, card, found, twin)
 
 
-def _digests(*files: Path | None) -> dict[str, str]:
+def digests(*files: Path | None) -> dict[str, str]:
     """File name -> SHA-256 of card and mapping."""
     import hashlib
 
@@ -70,7 +70,7 @@ def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
     from drivetwin.results.result_file import save_result
 
     with step("comparing experiments"):
-        found = _examined(outcome.found)
+        found = examined(outcome.found)
     with step("writing the report"), staged(folder) as beside:
         save_result(beside / RESULT, outcome.found)
         outcome.twin.save(beside / TWIN)
@@ -78,7 +78,7 @@ def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
     return tuple(folder / name for name in (RESULT, TWIN, REPORT))
 
 
-def _examined(found: Identification) -> Identification:
+def examined(found: Identification) -> Identification:
     """The identification with the experiments that would tell what its log leaves open.
 
     `evidence["suggestions"]` holds them; unchanged where nothing is open, or by another method.

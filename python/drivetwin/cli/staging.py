@@ -5,9 +5,22 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+
+from drivetwin.errors import InputError
+
+
+def refuse_alike(files: Sequence[Path], remedy: str) -> None:
+    """Raise InputError where two files have one stem: what is made of them would share a name."""
+    twice = [stem for stem, count in Counter(file.stem for file in files).items() if count > 1]
+    if twice:
+        raise InputError(
+            f"several logs are called {', '.join(twice)}: their results would share one name",
+            remedy,
+        )
 
 
 @contextmanager

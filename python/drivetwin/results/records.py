@@ -5,13 +5,21 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
 
 from drivetwin.errors import ResultFileError, Where
-from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, LoadLaw, Verdict
+from drivetwin.identify.result import (
+    Estimate,
+    FloatArray,
+    FrictionCurve,
+    LoadLaw,
+    SignalFit,
+    Verdict,
+)
 
 
 def finite_or_none(value: object) -> object:
@@ -166,6 +174,23 @@ class ParameterRecord(Record):
             std_systematic=systematic,
             reason=self.reason,
         )
+
+
+class FitRecord(Record):
+    """Agreement of simulation and measurement; null where the phase has no samples."""
+
+    rmse: OptionalFloat
+    fit_percent: OptionalFloat
+
+
+def fit_records(
+    fit: Mapping[str, Mapping[str, SignalFit]],
+) -> dict[str, dict[str, FitRecord]]:
+    """Records of fits by signal and phase."""
+    return {
+        signal: {phase: FitRecord(**vars(one)) for phase, one in phases.items()}
+        for signal, phases in fit.items()
+    }
 
 
 def _finite_interval(interval: tuple[float, float] | None) -> tuple[float, float] | None:

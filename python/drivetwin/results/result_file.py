@@ -15,6 +15,7 @@ from drivetwin.errors import ResultFileError, Where
 from drivetwin.identify.result import Identification, Method
 from drivetwin.results.atomic import write_text
 from drivetwin.results.records import (
+    FitRecord,
     FrictionRecord,
     Interval,
     LoadRecord,
@@ -24,11 +25,13 @@ from drivetwin.results.records import (
     SchemaName,
     check_schema,
     finite_or_none,
+    fit_records,
 )
+from drivetwin.results.together_records import HeldOutRecord, SeveralRecord
 from drivetwin.results.version import program_version
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
 
-RESULT_SCHEMA = "drivetwin/result-2"
+RESULT_SCHEMA = "drivetwin/result-3"
 
 
 class ShiftRecord(Record):
@@ -66,13 +69,6 @@ class RejectedRecord(Record):
         return cls(time=rejected.time, reason=rejected.reason)
 
 
-class FitRecord(Record):
-    """Agreement of simulation and measurement; null where the phase has no samples."""
-
-    rmse: OptionalFloat
-    fit_percent: OptionalFloat
-
-
 class ResultFile(Record):
     """The whole of `result.json`; all values SI."""
 
@@ -90,6 +86,8 @@ class ResultFile(Record):
     inputs: dict[str, str]
     settings: dict[str, Any]
     correlation: dict[str, dict[str, OptionalFloat]]
+    several: SeveralRecord | None = None
+    held_out: list[HeldOutRecord] = Field(default_factory=list)
     warnings: list[str]
     assumptions: list[str]
 
@@ -107,14 +105,13 @@ class ResultFile(Record):
                 "load": LoadRecord.of(found.load),
                 "shifts": [ShiftRecord.of(shift) for shift in found.shifts],
                 "rejected": [RejectedRecord.of(one) for one in found.rejected],
-                "fit": {
-                    signal: {phase: vars(fit) for phase, fit in phases.items()}
-                    for signal, phases in found.fit.items()
-                },
+                "fit": fit_records(found.fit),
                 "validity": found.validity,
                 "inputs": found.inputs,
                 "settings": plain(found.settings),
                 "correlation": _correlation(found),
+                "several": SeveralRecord.of(found.evidence.get("several")),
+                "held_out": [HeldOutRecord.of(one) for one in found.evidence.get("held_out", ())],
                 "warnings": list(found.warnings),
                 "assumptions": list(found.assumptions),
             }

@@ -161,6 +161,7 @@ def _warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str,
     texts = []
     for s, tests in zip(signals, residual_tests(fit).values(), strict=True):
         label = f"shift {s.shift.start_gear}-{s.shift.end_gear}"
+        label = f"log {s.log}, {label}" if s.log else label
         texts += list(s.shift.warnings)
         texts += [f"{label}: {text}" for test in tests for text in test.warnings]
     return (*texts, *null_directions(fit))

@@ -12,7 +12,7 @@ wrong with one of them, and the common fit starts from the mean of all weighted 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from drivetwin.identify.likelihood.unknowns import AERO, OWN, START, own_of
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import Shifts, identify
-from drivetwin.identify.result import Estimate, Identification
+from drivetwin.identify.result import Estimate, Identification, SignalFit
 from drivetwin.identify.several.consistency import Consistency, consistency
 from drivetwin.identify.several.judge import judged, pooled_curves
 from drivetwin.identify.signals import FloatArray
@@ -55,6 +55,8 @@ class LogShare:
     shifts: tuple[Shift, ...]
     alone: Mapping[str, Estimate]
     mean_speed: float
+    fit: Mapping[str, Mapping[str, SignalFit]] = field(default_factory=dict)
+    """Agreement of the common model with this log, by signal and phase; empty until simulated."""
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def _parameter_table(candidates: Sequence[Candidate], found: Sequence[Agreement]
         rows.append(
             (
                 Cell(parameter_label(one.id), note=one.id),
-                *(_value_cell(each, display) for each in one.estimates),
+                *(value_cell(each, display) for each in one.estimates),
                 Cell(display.label),
                 Cell("–" if one.apart is None else significant(one.apart, 2), number=True),
                 _verdict(one),
@@ -108,7 +108,8 @@ def _parameter_table(candidates: Sequence[Candidate], found: Sequence[Agreement]
     return TableBlock("Parameters side by side.", head, rows)
 
 
-def _value_cell(one: Estimate | None, display: Display) -> Cell:
+def value_cell(one: Estimate | None, display: Display) -> Cell:
+    """A value with its total 95 % half width below; a dash where there is none."""
     if one is None or one.value is None:
         return Cell("–", number=True, note="" if one is None else one.verdict.value)
     half = None if one.std_total is None else 1.96 * one.std_total * display.factor

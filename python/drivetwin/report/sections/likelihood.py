@@ -16,6 +16,7 @@ from drivetwin.identify.likelihood.residuals import (
 )
 from drivetwin.identify.likelihood.sensitivity import sensitivity
 from drivetwin.identify.result import Identification
+from drivetwin.identify.signals import ShiftSignals
 from drivetwin.report.figures.residuals import residual_figure, residual_panels
 from drivetwin.report.figures.sensitivity import sensitivity_figure
 from drivetwin.report.figures.shift_phases import shift_spans
@@ -41,13 +42,15 @@ def likelihood_sections(found: Identification) -> list[Section]:
 
 
 def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
-    labels = [f"{shift.start_gear}→{shift.end_gear}" for shift in found.shifts]
+    labels = [_label(s) for s in found.evidence["signals"]]
     tests = residual_tests(fit).values()
     blocks: list[Block] = [_test_table(list(zip(labels, tests, strict=True)))]
-    for shift, residuals in zip(found.shifts, white_residuals(fit).values(), strict=True):
+    for label, shift, residuals in zip(
+        labels, found.shifts, white_residuals(fit).values(), strict=True
+    ):
         phases = shift_spans(shift)
         text = (
-            f"Shift {shift.start_gear}→{shift.end_gear}: residual of each output, averaged over "
+            f"Shift {label}: residual of each output, averaged over "
             f"{1e3 * BLOCK:.0f} ms and divided by what noise alone would leave. A stretch outside "
             "the dashed lines is where the vehicle does something that the model does not know."
         )
@@ -64,6 +67,12 @@ def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
         "intervals are widened). Noise of the inputs is part of the model.",
         blocks,
     )
+
+
+def _label(signals: ShiftSignals) -> str:
+    """The shift, and its log where there are several."""
+    shift = f"{signals.shift.start_gear}→{signals.shift.end_gear}"
+    return f"{shift} of log {signals.log}" if signals.log else shift
 
 
 def _test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> TableBlock:

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: MIT
+"""A shift held out of the fit: predicted, compared, and judged against what its noise allows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from pathlib import Path
+
+from drivetwin.errors import DrivetwinError, IdentificationError, Where
+from drivetwin.identify.inputs import signals_of
+from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.priors import divided
+from drivetwin.identify.result import Estimate, Identification, Verdict
+from drivetwin.identify.several.fit import of_one_log
+from drivetwin.identify.several.predict import Bound, Expected, expected
+from drivetwin.identify.uncertainty import judge
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.parameters import OVER_ETA
+from drivetwin.shifts.converter import require_closed
+from drivetwin.shifts.recorded import recorded
+from drivetwin.shifts.shift import Shift
+from drivetwin.twin import Twin
+from drivetwin.validate import Validation, validate
+from drivetwin.vehicle.spec import VehicleCard
+
+ALLOWED = 1.1
+"""Error over the bound of the draws from which a prediction is worse than its noise allows: the
+noise levels are estimates themselves, and an effect of a tenth of the noise is none."""
+BEFORE = "likelihood, from the gear held before the shift"
+"""Method of what is told of a log that was not fitted."""
+
+
+class Outcome(StrEnum):
+    """What may be said of a prediction."""
+
+    ALLOWED = "as noise allows"
+    WORSE = "worse than noise"
+    NOT_JUDGED = "not judged"
+    NOT_PREDICTED = "not predicted"
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """One shift that was predicted.
+
+    `own` are the estimates of what its log has of its own, where the fit has not seen the log;
+    `bounds` go by compared signal, empty where no likelihood gave them. `validation` is None where
+    the shift could not be predicted; `notes` say why, and what stood in for what the fit lacks.
+    """
+
+    source: str
+    shift: Shift
+    validation: Validation | None
+    own: Mapping[str, Estimate] = field(default_factory=dict)
+    bounds: Mapping[str, Bound] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def outcome_of(self, signal: str) -> Outcome:
+        """Verdict on one compared signal."""
+        if self.validation is None or self.validation.status != "completed":
+            return Outcome.NOT_PREDICTED
+        if signal not in self.bounds:
+            return Outcome.NOT_JUDGED
+        rmse = self.validation.fit[signal]["all"].rmse
+        return Outcome.ALLOWED if rmse <= ALLOWED * self.bounds[signal].largest else Outcome.WORSE
+
+    @property
+    def outcome(self) -> Outcome:
+        """The worst verdict on any signal."""
+        if self.validation is None:
+            return Outcome.NOT_PREDICTED
+        found = {self.outcome_of(signal) for signal in self.validation.fit}
+        order = (Outcome.NOT_PREDICTED, Outcome.WORSE, Outcome.NOT_JUDGED, Outcome.ALLOWED)
+        return next(one for one in order if one in found)
+
+    @property
+    def name(self) -> str:
+        """The shift and its log in words."""
+        return f"{Path(self.source).name}, shift {self.shift.start_gear}→{self.shift.end_gear}"
+
+
+def apart(shifts: Sequence[Shift]) -> tuple[Shift, ...]:
+    """The shifts of one log with the gears between them divided, so that they share no sample."""
+    spans = divided(shifts)
+    return tuple(
+        replace(one, before=(start, one.before[1]), after=(one.after[0], end))
+        for one, (start, end) in zip(shifts, spans, strict=True)
+    )
+
+
+def hold_out(
+    found: Identification,
+    card: VehicleCard,
+    log: ShiftLog,
+    shifts: Sequence[Shift],
+    number: int,
+) -> tuple[HeldOut, ...]:
+    """Predict `shifts` of a log that `found` was not fitted to.
+
+    `number` is that of the log in a fit of several, 0 where `found` is of other shifts of this log
+    alone, and the next free one (from 1) for a log that the fit has not seen.
+    """
+    return tuple(_one(found, card, log, shift, number) for shift in shifts)
+
+
+def _one(
+    found: Identification, card: VehicleCard, log: ShiftLog, shift: Shift, number: int
+) -> HeldOut:
+    fit = found.evidence.get("likelihood")
+    try:
+        require_closed(log, card, shift)
+        fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
+        shift = recorded(log, shift, fills)
+        told = _expected(fit, card, log, shift, number)
+        mine, notes = _with_law(_of_log(found, log, number, told), shift)
+        twin = Twin.from_identification(mine, card)
+        run = validate(twin, log, shift)
+    except DrivetwinError as fault:
+        return HeldOut(log.source, shift, None, notes=(fault.what,))
+    own = {k: v for k, v in mine.estimates.items() if v.method == BEFORE}
+    bounds = {} if told is None else _of_signals(told.bounds, run, log, card)
+    return HeldOut(log.source, shift, run, own, bounds, (*notes, *run.warnings))
+
+
+def _expected(
+    fit: LikelihoodFit | None, card: VehicleCard, log: ShiftLog, shift: Shift, number: int
+) -> Expected | None:
+    """What the likelihood leads one to expect; None for another method."""
+    if fit is None:
+        return None
+    signals = replace(signals_of(log, card, shift), log=number)
+    return expected(fit, [signals], card)[0]
+
+
+def _of_log(
+    found: Identification, log: ShiftLog, number: int, told: Expected | None
+) -> Identification:
+    """The identification with what the log has of its own: from the fit, else as `told`.
+
+    Raises IdentificationError for a log that the fit has not seen, by another method.
+    """
+    several = found.evidence.get("several")
+    if number == 0:
+        return found
+    if several is not None and number <= len(several.logs):
+        return of_one_log(found, number)
+    if told is None:
+        raise IdentificationError(
+            "load and age of the engine torque of a log that was not fitted are told by the "
+            "likelihood method alone",
+            "use --method likelihood, or hold out a shift of a log whose other shifts are fitted",
+            Where(file=log.source),
+        )
+    base = found if several is None else of_one_log(found, 1)
+    load = None if base.load is None else replace(base.load, mean_speed=told.mean_speed)
+    return replace(base, estimates={**base.estimates, **_own(base, told)}, load=load)
+
+
+def _own(base: Identification, told: Expected) -> dict[str, Estimate]:
+    """Estimates of what the log has of its own; where η is from design also times η."""
+    made: dict[str, Estimate] = {}
+    for name, (value, std) in told.own.items():
+        ratio = name + OVER_ETA
+        if ratio in base.estimates:
+            made[ratio] = _estimate(ratio, value, std)
+            eta = base.estimates["eta"].value
+            if eta is not None:
+                made[name] = _estimate(name, eta * value, eta * std)
+        elif name in base.estimates:
+            made[name] = _estimate(name, value, std)
+    return made
+
+
+def _estimate(name: str, value: float, std: float) -> Estimate:
+    """The best value that there is before the shift, be it as weak as it may."""
+    wide = judge(name, value, std, BEFORE).verdict is not Verdict.IDENTIFIED
+    return Estimate(name, value, std, Verdict.WEAK if wide else Verdict.IDENTIFIED, BEFORE)
+
+
+def _of_signals(
+    bounds: Mapping[str, Bound], run: Validation, log: ShiftLog, card: VehicleCard
+) -> dict[str, Bound]:
+    """Bounds by compared signal; the fit sees the engine's speed where it has the input's."""
+    found = dict(bounds)
+    if "engine_speed" in found and "engine_speed" not in log:
+        one = found.pop("engine_speed")
+        found["input_speed"] = Bound(one.usual / card.i_in, one.largest / card.i_in)
+    return {name: one for name, one in found.items() if name in run.fit}
+
+
+def _with_law(found: Identification, shift: Shift) -> tuple[Identification, tuple[str, ...]]:
+    """The identification with a law for the on-coming element, and whose it is if another's.
+
+    That of the off-going element if it has one, else that of any other: facings are alike.
+    """
+    if shift.oncoming in found.friction or not found.friction:
+        return found, ()
+    other = shift.offgoing if shift.offgoing in found.friction else next(iter(found.friction))
+    friction = {**found.friction, shift.oncoming: found.friction[other]}
+    note = (
+        f"{shift.oncoming} comes on in no shift that was fitted: the friction law of {other} "
+        "stands in for it, which may be off by more than the prediction shows"
+    )
+    return replace(found, friction=friction), (note,)

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: MIT
+"""What a fit may be expected to leave of a shift that it has not seen.
+
+What the shift's log has of its own (load, age of the torque, state at the start) is unknown to
+the fit. It is estimated from the gear held before the shift, the shared parameters θ staying as
+they are; so their errors move it along, dξ = -H_ξξ⁻¹ H_ξθ dθ with H the information of that
+stretch. Simulated from the measured inputs, the shift is then missed by
+
+    e = (J_θ - J_ξ H_ξξ⁻¹ H_ξθ) dθ + J_ξ dξ + G u + v
+
+J the core's derivatives, G the linear response to the inputs' noise u, v the sensors' noise. Draws
+of all of these, with the covariances of the fit, give the size that e may have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.inputs import driveline_of
+from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
+from drivetwin.identify.likelihood.guess import TYPICAL_LAW
+from drivetwin.identify.likelihood.newton import minimise
+from drivetwin.identify.likelihood.output_error import CLEAR
+from drivetwin.identify.likelihood.priors import problem_of
+from drivetwin.identify.likelihood.problem import Part, Problem
+from drivetwin.identify.likelihood.unknowns import AERO, LAW, OWN, START, Point, own_of
+from drivetwin.identify.regression import Prior
+from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
+from drivetwin.vehicle.spec import VehicleCard
+
+DRAWS = 120
+"""Draws of noise and parameters: the bound is the third largest."""
+LARGEST = 0.975
+"""Share of the draws below the bound."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Root mean square error of one compared signal that a right model has, SI.
+
+    `usual` in the median, `largest` in 97.5 % of all cases.
+    """
+
+    usual: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What is expected of one shift held out.
+
+    `own` are values and standard deviations of what its log has of its own, by plain name, where
+    the fit has not seen the log; T_v/i_f holds at `mean_speed` of the wheel [rad/s]. `bounds` go
+    by compared signal; empty where the law of the on-coming element is another's, whose spread
+    nobody knows.
+    """
+
+    own: Mapping[str, tuple[float, float]]
+    mean_speed: float
+    bounds: Mapping[str, Bound]
+
+
+def expected(
+    fit: LikelihoodFit, held: Sequence[ShiftSignals], card: VehicleCard, seed: int = 0
+) -> tuple[Expected, ...]:
+    """What `fit` leads one to expect of each shift `held` out of one log.
+
+    The signals' `log` is their number in the fit, or one that it does not have. Raises
+    IdentificationError where the stretch before the shift cannot be simulated.
+    """
+    drivelines = [driveline_of(card, s.shift) for s in held]
+    problem, point = problem_of(held, drivelines, card.loss_law, _known(fit, drivelines))
+    if any(out.window > 0.0 for part in fit.problem.parts for out in part.record.outputs):
+        problem = problem.averaged()
+    unseen = _unseen(fit, problem, point)
+    before = _before(problem, point, unseen, [s.shift.before[1] - CLEAR for s in held])
+    point, own = before.point, own_of(held[0].log)
+    std = np.sqrt(np.diag(before.own))
+    told = {
+        name: (point[own[name]], float(std[unseen.index(k)]))
+        for name in OWN
+        if name in own and own[name] in point.names
+        for k in (point.names.index(own[name]),)
+        if k in unseen
+    }
+    moved = _moved(fit, problem, before, unseen)
+    rng = np.random.default_rng(seed)
+    return tuple(
+        Expected(
+            told,
+            part.structure.mean_speed,
+            _bounds(part, point, moved, rng) if _has_law(fit, part) else {},
+        )
+        for part in problem.parts
+    )
+
+
+def _has_law(fit: LikelihoodFit, part: Part) -> bool:
+    """Whether the fit shows the friction of the element that comes on."""
+    return f"{part.structure.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
+
+
+def _known(fit: LikelihoodFit, drivelines: Sequence[Driveline]) -> dict[str, float]:
+    """A value for every unknown, from the fit; an element it has not seen takes its partner's law.
+
+    Where neither has one, that of a usual facing.
+    """
+    known: dict[str, float] = {}
+    for part in fit.problem.parts:
+        known |= part.structure.fixed
+    known |= dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
+    if AERO not in fit.point.names:
+        known.pop(AERO, None)
+    for d in drivelines:
+        for one, partner in ((d.oncoming, d.offgoing), (d.offgoing, d.oncoming)):
+            for key in LAW:
+                stand_in = known.get(f"{partner.name}.{key}", TYPICAL_LAW[key])
+                known.setdefault(f"{one.name}.{key}", stand_in)
+            known.setdefault(f"{one.name}.P0", one.P0.value)
+        for one in d.couplings.values():
+            known.setdefault(f"{one.name}.drum", one.drum.value)
+    return known
+
+
+def _unseen(fit: LikelihoodFit, problem: Problem, point: Point) -> list[int]:
+    """Places of what belongs to the log or the run and is not known from the fit."""
+    structures = [part.structure for part in problem.parts]
+    starts = {f"{one.label}.{key}" for one in structures for key in START}
+    own = {name for one in structures for name in own_of(one.log).values()}
+    mine = starts | (own - set(fit.point.names))
+    return [k for k, name in enumerate(point.names) if name in mine]
+
+
+@dataclass(frozen=True)
+class _Before:
+    """What the gear held before the shifts tells: `point`, covariance `own` (u, u) of what is
+    unseen, and its answer `along` (u, k) to a change of what is known."""
+
+    point: Point
+    own: FloatArray
+    along: FloatArray
+
+
+def _before(problem: Problem, point: Point, unseen: list[int], ends: Sequence[float]) -> _Before:
+    """Fit what is unseen to the stretches before the shifts, all else held."""
+    known = [k for k in range(len(point.names)) if k not in unseen]
+    prior = problem.prior
+    precision = np.zeros_like(prior.precision)
+    precision[np.ix_(unseen, unseen)] = prior.precision[np.ix_(unseen, unseen)]
+    free = Prior(prior.mean, precision)
+    held = free
+    for k in known:
+        held = held.held(k, float(point.values[k]))
+    cut = replace(problem.until(ends), prior=held)
+    found = minimise(cut, point, lambda _, at: cut.weighted_by(at))
+    if found is None:
+        raise IdentificationError(
+            "the gear held before the shift cannot be simulated with the parameters of the fit",
+            "hold out a shift of the same vehicle, with a second of gear before it",
+        )
+    information = found.normal.data + precision
+    inner = covariance_of(information[np.ix_(unseen, unseen)])
+    return _Before(found.point, inner, -inner @ information[np.ix_(unseen, known)])
+
+
+def _moved(fit: LikelihoodFit, problem: Problem, before: _Before, unseen: list[int]) -> FloatArray:
+    """Root (p, d) of the covariance of all unknowns of the shifts held out."""
+    names = before.point.names
+    known = [k for k in range(len(names)) if k not in unseen]
+    spread = np.zeros((len(known), len(known)))
+    both = [i for i, k in enumerate(known) if names[k] in fit.point.names]
+    place = [fit.point.names.index(names[known[i]]) for i in both]
+    spread[np.ix_(both, both)] = fit.covariance[np.ix_(place, place)]
+    for i, k in enumerate(known):
+        if i not in both:
+            spread[i, i] = _inverse(float(problem.prior.precision[k, k]))
+    root = _root(spread)
+    whole = np.zeros((len(names), len(known) + len(unseen)))
+    whole[known, : len(known)] = root
+    whole[unseen, : len(known)] = before.along @ root
+    whole[unseen, len(known) :] = _root(before.own)
+    return whole
+
+
+def _inverse(precision: float) -> float:
+    """Variance of what a prior alone tells; 0 where it tells nothing, which then stays."""
+    return 1.0 / precision if precision > 0.0 else 0.0
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """A root (p, p) of a covariance, formed on its correlation; unknowns without spread stay."""
+    scale = np.sqrt(np.diag(covariance))
+    divisor = np.where(scale > 0.0, scale, 1.0)
+    power, directions = np.linalg.eigh(covariance / np.outer(divisor, divisor))
+    return np.asarray(scale[:, None] * directions * np.sqrt(np.maximum(power, 0.0)))
+
+
+def _bounds(
+    part: Part, point: Point, moved: FloatArray, rng: np.random.Generator
+) -> dict[str, Bound]:
+    """Size of the error of each output over draws; empty where the shift cannot be simulated."""
+    part = part.weighted_by(point)
+    linear, run, path = part.linearised(point), part.run(point), part.weighting.path
+    if linear is None or run is None or path is None:
+        return {}
+    columns, response = linear[1] @ moved, part.response(point, run)
+    rms: dict[str, list[float]] = {out.name: [] for out in part.record.outputs}
+    for _ in range(DRAWS):
+        noise = {name: np.sqrt(p) * rng.standard_normal(p.size) for name, p in path.power.items()}
+        error = part.seen(point, response.to(noise)) + columns @ rng.standard_normal(
+            columns.shape[1]
+        )
+        error = error + part.record.sigma * rng.standard_normal(error.size)
+        first = 0
+        for out in part.record.outputs:
+            piece = error[first : first + out.values.size]
+            first += out.values.size
+            rms[out.name].append(float(np.sqrt(np.mean(piece**2))))
+    return {
+        name: Bound(float(np.median(one)), float(np.quantile(one, LARGEST)))
+        for name, one in rms.items()
+    }

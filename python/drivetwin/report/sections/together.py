@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: MIT
+"""Several logs in one fit, and shifts that were predicted instead of fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from drivetwin.held_out import HeldOut, Outcome
+from drivetwin.identify.result import Estimate, Identification
+from drivetwin.identify.several.consistency import FAR, Consistency
+from drivetwin.identify.several.fit import LogShare, Several
+from drivetwin.parameters import log_of
+from drivetwin.report.candidates import Candidate, agreements
+from drivetwin.report.figures.comparison import agreement_figure
+from drivetwin.report.figures.validation import validation_figure, validation_panels
+from drivetwin.report.labels import parameter_label
+from drivetwin.report.sections.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    NotesBlock,
+    Section,
+    TableBlock,
+    Tile,
+    TilesBlock,
+    Tone,
+    cells,
+    link_of,
+)
+from drivetwin.report.sections.comparison import value_cell
+from drivetwin.report.sections.trust import PHASES, SIGNALS, fit_cell
+from drivetwin.report.units import display_of, significant
+from drivetwin.validate import Validation
+
+_TONES = {
+    Outcome.ALLOWED: Tone.GOOD,
+    Outcome.WORSE: Tone.DOUBTFUL,
+    Outcome.NOT_JUDGED: Tone.UNKNOWN,
+    Outcome.NOT_PREDICTED: Tone.DOUBTFUL,
+}
+_TOGETHER = "together"
+
+
+def several_section(found: Identification, several: Several) -> Section:
+    """What each log tells alone beside what they tell together, and whether they agree."""
+    tested = several.consistency
+    tone = Tone.GOOD if tested.agree else Tone.DOUBTFUL
+    word = "agree" if tested.agree else "disagree"
+    tiles = [
+        Tile("logs fitted as one", str(len(several.logs))),
+        Tile("the logs", word, tone, f"χ² {tested.chi2:.1f} on {tested.freedom}, p {tested.p:.2g}"),
+    ]
+    shared = {k: one for k, one in found.estimates.items() if not log_of(k)[1]}
+    names = [f"log {one.number}" for one in several.logs]
+    told = [(name, one.alone) for name, one in zip(names, several.logs, strict=True)]
+    candidates = [
+        Candidate(name, "", {k: v for k, v in alone.items() if k in shared}, {}, {}, {}, "")
+        for name, alone in (*told, (_TOGETHER, shared))
+    ]
+    compared = [one for one in agreements(candidates) if one.apart is not None]
+    blocks: list[Block] = [
+        TilesBlock(tiles),
+        _log_table(found, several),
+        _shared_table(shared, several.logs, tested),
+        FigureBlock(
+            agreement_figure([*names, _TOGETHER], compared),
+            "What each log tells alone and what all tell together, against their common mean, "
+            "with total 95 % intervals in standard deviations of the parameter. Of logs alike in "
+            "what they excite the common interval is narrower by the root of their number; the "
+            "part that the sensors' tolerances make stays, for it is the same in all logs.",
+        ),
+    ]
+    return Section(
+        "logs",
+        "The logs together",
+        f"In words: {tested.text}. The driveline is one for all logs; load and age of the engine "
+        "torque are each log's own. A design value counts once.",
+        blocks,
+    )
+
+
+def _log_table(found: Identification, several: Several) -> TableBlock:
+    """File, shifts, own parameters and fit of each log."""
+    own = {name: log_of(name) for name in found.estimates}
+    plain = list(dict.fromkeys(name for name, number in own.values() if number))
+    units = {name: display_of(found.estimates[f"{_numbered(name, own)}"].unit) for name in plain}
+    head = (
+        *cells("log", "file", "shifts"),
+        *(Cell(parameter_label(n), number=True, note=units[n].label) for n in plain),
+        *(Cell(f"fit of {label}", number=True) for label, _ in SIGNALS.values()),
+    )
+    rows = []
+    for one in several.logs:
+        mine = {name: key for key, (name, number) in own.items() if number == one.number}
+        shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in one.shifts)
+        rows.append(
+            (
+                *cells(str(one.number), Path(one.source).name, shifts),
+                *(value_cell(found.estimates.get(mine.get(n, "")), units[n]) for n in plain),
+                *(
+                    fit_cell(one.fit.get(signal, {}).get("all"), display)
+                    for signal, (_, display) in SIGNALS.items()
+                ),
+            )
+        )
+    return TableBlock("The logs, what each has of its own, and the fit of the model.", head, rows)
+
+
+def _numbered(plain: str, own: dict[str, tuple[str, int]]) -> str:
+    """The first id that stands for `plain` in one of the logs."""
+    return next(key for key, (name, number) in own.items() if name == plain and number)
+
+
+def _shared_table(
+    shared: dict[str, Estimate], logs: Sequence[LogShare], tested: Consistency
+) -> TableBlock:
+    """Every parameter that the logs share: alone, together, and the log farthest off."""
+    moves = {one.parameter: one for one in tested.moves}
+    rows = []
+    for name, estimate in shared.items():
+        display, move = display_of(estimate.unit), moves.get(name)
+        far = move is not None and abs(move.z) > FAR
+        rows.append(
+            (
+                Cell(parameter_label(name), note=name),
+                *(value_cell(one.alone.get(name), display) for one in logs),
+                value_cell(estimate, display),
+                Cell(display.label),
+                Cell("–")
+                if move is None or move.z == 0.0
+                else Cell(
+                    f"{move.z:+.1f} σ".replace("-", "−"),
+                    number=True,
+                    badge=True,
+                    tone=Tone.DOUBTFUL if far else Tone.GOOD,
+                    note=f"log {move.log}",
+                ),
+            )
+        )
+    head = (
+        Cell("parameter"),
+        *(Cell(f"log {one.number} alone", number=True, note="± 95 % total") for one in logs),
+        Cell(_TOGETHER, number=True, note="± 95 % total"),
+        Cell("unit"),
+        Cell("farthest off", number=True, note="a log against the others"),
+    )
+    return TableBlock(
+        "What the logs share. Farthest off: by how much one log moves the value from what the "
+        f"others say, in standard deviations of that, noise alone; doubtful beyond {FAR:g}.",
+        head,
+        rows,
+    )
+
+
+def held_out_section(found: Identification, held: Sequence[HeldOut]) -> Section:
+    """Every shift that was predicted: its fit beside the fitted ones, and what noise allows."""
+    tiles = [
+        Tile(one.name, _torque_fit(one), _TONES[one.outcome], one.outcome.value) for one in held
+    ]
+    blocks: list[Block] = [TilesBlock(tiles), _judgement_table(found, held)]
+    own = list(_own_rows(held))
+    if own:
+        head = (Cell("log"), Cell("parameter"), Cell("value", number=True), *cells("unit", "from"))
+        text = "What these logs have of their own, told by the gear held before the shift alone."
+        blocks.append(TableBlock(text, head, own))
+    notes = [f"{one.name}: {text}" for one in held for text in one.notes]
+    if notes:
+        blocks.append(NotesBlock("About the predictions", notes, Tone.DOUBTFUL))
+    for one in held:
+        if one.validation is not None:
+            blocks += [*_shown(one, one.validation)]
+    return Section(
+        "held-out",
+        "Predicted, not fitted",
+        "These shifts took no part in the fit. The identified model is driven by their measured "
+        "engine torque and pressures; only the state at the start, and for a log that was not "
+        "fitted its load and the age of its engine torque, come from the gear held before the "
+        "shift. Allowed is the error that a right model would leave in 97.5 % of all cases, with "
+        "the noise of inputs and sensors and the uncertainty of the parameters.",
+        blocks,
+    )
+
+
+def _torque_fit(one: HeldOut) -> str:
+    """Fit % of the output torque, else of the input speed."""
+    if one.validation is None:
+        return "–"
+    fits = one.validation.fit
+    return f"{next(iter(fits.values()))['all'].fit_percent:.1f} %"
+
+
+def _judgement_table(found: Identification, held: Sequence[HeldOut]) -> TableBlock:
+    head = (
+        *cells("shift", "signal"),
+        Cell("predicted", number=True, note="fit %, rmse"),
+        Cell("fitted", number=True, note="fit %, rmse"),
+        Cell("usual", number=True, note="rmse"),
+        Cell("allowed", number=True, note="rmse"),
+        *cells("unit", "verdict"),
+    )
+    rows = []
+    for one in held:
+        fits = {} if one.validation is None else one.validation.fit
+        for signal, phases in fits.items():
+            label, display = SIGNALS[signal]
+            bound, outcome = one.bounds.get(signal), one.outcome_of(signal)
+            sizes = (None, None) if bound is None else (bound.usual, bound.largest)
+            rows.append(
+                (
+                    *cells(one.name, label),
+                    fit_cell(phases["all"], display),
+                    fit_cell(found.fit.get(signal, {}).get("all"), display),
+                    *(
+                        Cell(
+                            "–" if size is None else significant(size * display.factor, 3),
+                            number=True,
+                        )
+                        for size in sizes
+                    ),
+                    Cell(display.label),
+                    Cell(outcome.value, badge=True, tone=_TONES[outcome]),
+                )
+            )
+        if not fits:
+            dashes = [Cell("–", number=True)] * 4
+            verdict = Cell(one.outcome.value, badge=True, tone=_TONES[one.outcome])
+            rows.append((*cells(one.name, ""), *dashes, Cell(""), verdict))
+    return TableBlock(
+        "Predictions beside what was fitted (of all fitted shifts), and what noise allows.",
+        head,
+        rows,
+    )
+
+
+def _own_rows(held: Sequence[HeldOut]) -> Iterator[tuple[Cell, ...]]:
+    for one in held:
+        for name, estimate in one.own.items():
+            display = display_of(estimate.unit)
+            yield (
+                Cell(Path(one.source).name),
+                Cell(parameter_label(name), note=name),
+                value_cell(estimate, display),
+                Cell(display.label),
+                Cell(estimate.method),
+            )
+
+
+def _shown(one: HeldOut, run: Validation) -> Iterator[Block]:
+    """Simulation over measurement of one prediction, and its fit by phase."""
+    yield FigureBlock(
+        validation_figure(run),
+        f"{one.name}, predicted: measured inputs, each output as measured and as predicted, and "
+        "below it what is left.",
+        validation_panels(run),
+        link_of(one.shift),
+    )
+    rows = [
+        (Cell(label), *(fit_cell(run.fit[signal].get(phase), display) for phase in PHASES))
+        for signal, (label, display) in SIGNALS.items()
+        if signal in run.fit
+    ]
+    head = (Cell("signal"), *(Cell(label, number=True) for label in PHASES.values()))
+    yield TableBlock(f"Fit % and rmse of the prediction by phase, {one.name}.", head, rows)
+
+
+def of_log(section: Section, share: LogShare) -> Section:
+    """A section of a one-log report under the number of its log."""
+    return replace(
+        section,
+        anchor=f"{section.anchor}-{share.number}",
+        title=f"{section.title}: log {share.number}, {Path(share.source).name}",
+    )

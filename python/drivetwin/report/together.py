@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""The report of an identification from several logs, or with shifts held out of the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from drivetwin.identify.result import Identification
+from drivetwin.identify.several.fit import Several, of_one_log
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.progress import part
+from drivetwin.report.html import render_page, report_sections
+from drivetwin.report.sections.blocks import Section
+from drivetwin.report.sections.likelihood import likelihood_sections
+from drivetwin.report.sections.limits import limits_section
+from drivetwin.report.sections.provenance import provenance_section
+from drivetwin.report.sections.story import friction_section, shift_section, validation_section
+from drivetwin.report.sections.together import held_out_section, of_log, several_section
+from drivetwin.report.sections.trust import trust_section
+from drivetwin.results.atomic import write_text
+
+
+def save_together(path: Path, found: Identification, logs: Sequence[ShiftLog]) -> None:
+    """Write the report; the file appears whole or not at all. `logs` are those fitted, in order."""
+    write_text(path, render_together(found, logs))
+
+
+def render_together(found: Identification, logs: Sequence[ShiftLog]) -> str:
+    """HTML text of the report; equal inputs give equal text."""
+    several: Several | None = found.evidence.get("several")
+    held = found.evidence.get("held_out", ())
+    with part(0.0, 0.5):
+        if several is None:
+            sections = report_sections(found, logs[0])
+        else:
+            sections = list(_of_several(found, several, logs))
+    if held:
+        sections.insert(1 if several is None else 2, held_out_section(found, held))
+    names = " and ".join(Path(log.source).name for log in logs)
+    predicted = f" · {len(held)} shifts predicted" if held else ""
+    return render_page(
+        title=f"Driveline model from {names}",
+        subtitle=f"{len(found.shifts)} shifts fitted{predicted} · method {found.method.value} · "
+        f"loss law {found.loss_law}",
+        sections=[section for section in sections if section.blocks],
+    )
+
+
+def _of_several(
+    found: Identification, several: Several, logs: Sequence[ShiftLog]
+) -> Iterator[Section]:
+    """The sections of all logs in reading order; stages of single shifts are in their reports."""
+    yield trust_section(found)
+    yield several_section(found, several)
+    runs = iter(found.evidence.get("validation", ()))
+    for share, log in zip(several.logs, logs, strict=True):
+        yield of_log(shift_section(of_one_log(found, share.number), log), share)
+        mine = tuple(run for _, run in zip(share.shifts, runs, strict=False))
+        yield of_log(validation_section(mine), share)
+    yield friction_section(found)
+    yield from likelihood_sections(found)
+    yield limits_section(found)
+    yield provenance_section(found)
