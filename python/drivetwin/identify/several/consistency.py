@@ -85,7 +85,7 @@ class Consistency:
 
 
 @dataclass(frozen=True)
-class _Pull:
+class Pull:
     """One log in the coordinates of the joint covariance: information (s, s) and pull (s,)."""
 
     log: int
@@ -101,7 +101,7 @@ def consistency(
     shared = shared_of(fit)
     root = _root(fit.covariance[np.ix_(shared, shared)] / max(fit.chi2, 1.0))
     pulls = [_pull(fit, log, shared, root) for log in logs]
-    square, freedom = _homogeneity(pulls)
+    square, freedom = homogeneity(pulls)
     square /= max(fit.chi2, 1.0)
     rows = _rows(fit, signals, friction)
     told = {name: row[shared] @ root for name, row in rows.items()}
@@ -124,7 +124,7 @@ def _root(covariance: FloatArray) -> FloatArray:
     return np.asarray(scale[:, None] * directions * np.sqrt(np.maximum(power, 0.0)))
 
 
-def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray) -> _Pull:
+def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray) -> Pull:
     """What one log alone says of the shared unknowns at the minimum of all.
 
     Raises IdentificationError where a simulation that the fit had made does not run again.
@@ -143,10 +143,10 @@ def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray)
         )
     rest = [k for k in range(size) if k not in shared and normal.information[k, k] > 0.0]
     told = root.T @ reduced(normal.information, list(shared), rest) @ root
-    return _Pull(log, 0.5 * (told + told.T), root.T @ normal.gradient[list(shared)])
+    return Pull(log, 0.5 * (told + told.T), root.T @ normal.gradient[list(shared)])
 
 
-def _homogeneity(pulls: Sequence[_Pull]) -> tuple[float, int]:
+def homogeneity(pulls: Sequence[Pull]) -> tuple[float, int]:
     """χ² and its degrees of freedom over the directions that each log tells."""
     rows, targets = [], []
     for one in pulls:
@@ -162,7 +162,7 @@ def _homogeneity(pulls: Sequence[_Pull]) -> tuple[float, int]:
 
 
 def _moves(
-    pulls: Sequence[_Pull], told: Mapping[str, FloatArray], widened: float
+    pulls: Sequence[Pull], told: Mapping[str, FloatArray], widened: float
 ) -> tuple[Move, ...]:
     """The largest move of every parameter by one log: minus what leaving it out would do."""
     largest: dict[str, Move] = {}

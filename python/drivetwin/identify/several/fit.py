@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +23,13 @@ from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.identify.conclude import Conclusions
 from drivetwin.identify.inputs import driveline_of
 from drivetwin.identify.likelihood.conclude import conclude
-from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
+from drivetwin.identify.likelihood.fit import PLAUSIBLE, LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.unknowns import AERO, OWN, START, own_of
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import Shifts, identify
 from drivetwin.identify.result import Estimate, Identification, SignalFit
-from drivetwin.identify.several.consistency import Consistency, consistency
+from drivetwin.identify.several.consistency import FAR, Consistency, consistency
 from drivetwin.identify.several.judge import judged, pooled_curves
 from drivetwin.identify.signals import FloatArray
 from drivetwin.logs.shiftlog import ShiftLog
@@ -39,6 +40,8 @@ from drivetwin.vehicle.spec import VehicleCard
 
 ALONE = 0.6
 """Share of the time that the fits of single logs take."""
+NAMED = 3
+"""How many differences an error names at most."""
 
 
 @dataclass(frozen=True)
@@ -86,13 +89,13 @@ def identify_several(
     drivelines = [driveline_of(card, s.shift) for s in signals]
     with part(ALONE, 0.95, "all logs together"):
         try:
+            _refuse_apart(alone)
             fit, notes = choose(signals, drivelines, card.loss_law, start_of(alone))
         except IdentificationError as fault:
             raise IdentificationError(
-                f"{len(logs)} logs can each be explained, but not by one set of parameters: "
-                f"{fault.what}",
-                "compare what each tells alone with `drivetwin report`, and leave out the one of "
-                "another vehicle, load or temperature",
+                f"each of {len(logs)} logs can be explained, but not all by one set of parameters: "
+                f"alone they tell {'; '.join(farthest(alone)) or fault.what}",
+                "leave out the log of another vehicle, payload or temperature",
             ) from fault
     told = conclude(fit, signals, drivelines, pooled_curves(alone), card.sensors)
     tested = consistency(fit, signals, told.friction)
@@ -170,6 +173,21 @@ def start_of(alone: Sequence[Identification]) -> dict[str, float]:
     return {name: value for name, value in values.items() if name not in starts | {AERO}}
 
 
+def _refuse_apart(alone: Sequence[Identification]) -> None:
+    """Raise IdentificationError where no common minimum can be plausible.
+
+    To first order the common Q exceeds that of the logs alone by Σ (θ_k - θ)ᵀ F_k (θ_k - θ).
+    """
+    fits: list[LikelihoodFit] = [one.evidence["likelihood"] for one in alone]
+    told = [_shared(fit) for fit in fits]
+    mean, excess = _mean(told), 0.0
+    for names, values, information in told:
+        away = values - np.array([mean[name] for name in names])
+        excess += float(away @ information @ away)
+    if excess > (PLAUSIBLE - 1.0) * sum(fit.problem.size for fit in fits):
+        raise IdentificationError(f"they disagree by χ² {excess:.3g}", "")
+
+
 _Told = tuple[list[str], FloatArray, FloatArray]
 
 
@@ -191,6 +209,21 @@ def _mean(told: Sequence[_Told]) -> dict[str, float]:
         pull[place] += weight @ values
     mean = covariance_of(information) @ pull
     return dict(zip(names, mean.tolist(), strict=True))
+
+
+def farthest(alone: Sequence[Identification]) -> list[str]:
+    """The shared parameters on which logs taken alone differ most, in words; at most `NAMED`."""
+    found: list[tuple[float, str]] = []
+    for one, other in combinations(alone, 2):
+        for name, a in one.estimates.items():
+            b = other.estimates.get(name)
+            if b is None or a.value is None or b.value is None or name in OWN:
+                continue
+            spread = float(np.hypot(a.std_noise or 0.0, b.std_noise or 0.0))
+            if spread > 0.0 and abs(a.value - b.value) > FAR * spread:
+                text = f"{name} {a.value:.4g} and {b.value:.4g} {a.unit}"
+                found.append((abs(a.value - b.value) / spread, text))
+    return [text for _, text in sorted(found, reverse=True)[:NAMED]]
 
 
 def _share(number: int, log: ShiftLog, alone: Identification, fit: LikelihoodFit) -> LogShare:

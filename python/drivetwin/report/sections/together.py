@@ -75,8 +75,8 @@ def several_section(found: Identification, several: Several) -> Section:
     return Section(
         "logs",
         "The logs together",
-        f"In words: {tested.text}. The driveline is one for all logs; load and age of the engine "
-        "torque are each log's own. A design value counts once.",
+        f"{tested.text[:1].upper()}{tested.text[1:]}. The driveline is one for all logs; load and "
+        "age of the engine torque are each log's own. A design value counts once.",
         blocks,
     )
 
@@ -128,7 +128,7 @@ def _shared_table(
                 *(value_cell(one.alone.get(name), display) for one in logs),
                 value_cell(estimate, display),
                 Cell(display.label),
-                Cell("–")
+                Cell("–", number=True)
                 if move is None or move.z == 0.0
                 else Cell(
                     f"{move.z:+.1f} σ".replace("-", "−"),
