@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
+from drivetwin.batch import Batch, Keep, Scenario, batch_sensitivities, simulate_batch
 from drivetwin.driveline import (
     Accuracy,
     DualClutch,
@@ -21,6 +21,7 @@ from drivetwin.driveline import (
     Signal,
     State,
     Stribeck,
+    sensitivities,
     simulate,
 )
 from drivetwin.errors import InputError
@@ -162,3 +163,64 @@ def test_lengths_and_names_must_fit() -> None:
         simulate_batch(MODEL, [scenario()], TIME, sets(2), keep=[TIME[1:]])
     with pytest.raises(InputError, match="shaft_torque"):
         simulate_batch(MODEL, [scenario()], TIME, sets(2), outputs=["angle"])
+
+
+BY = ("eta", "B3.mu_c", "start.twist", "delay.engine torque")
+
+
+def test_derivatives_are_those_of_each_run_alone() -> None:
+    given, values = scenario(), sets(3)
+    found = batch_sensitivities(MODEL, [given], TIME, values, by=BY, outputs=["shaft_torque"])
+    assert found.derivatives.shape == (3, len(BY), 1, TIME.size)
+    for run in range(3):
+        off, on = MODEL.elements
+        friction = dataclasses.replace(FRICTION, mu_c=values["B3.mu_c"][run])
+        on = dataclasses.replace(on, gain=values["B3.gain"][run], friction=friction)
+        changed = {name: values[name][run] for name in ("eta", "J1", "k_o")}
+        model = dataclasses.replace(MODEL, elements=(off, on), **changed)
+        alone = sensitivities(model, given.engine_torque, given.pressures, given.start, TIME, BY)
+        for place, name in enumerate(BY):
+            np.testing.assert_array_equal(
+                found.derivatives[run, place, 0], alone.derivatives[name].shaft_torque
+            )
+            locks = [i for i, event in enumerate(alone.run.events) if event.kind == "lock"]
+            assert found.last_lock[run, place] == alone.event_times[name][locks[-1]]
+
+
+def test_gradients_of_misfits_are_their_slopes() -> None:
+    measured = simulate_batch(MODEL, [scenario()], TIME, outputs=["shaft_torque"]).values[0]
+    at = {"eta": np.array([0.85 * 1.01]), "k_o": np.array([1.8e5])}
+    found = batch_sensitivities(
+        MODEL, [scenario()], TIME, at, by=["eta", "k_o"], keep=[measured[0]], threads=1
+    )
+    for place, name in enumerate(("eta", "k_o")):
+        step = 1e-5 * at[name][0]
+        near = {**{other: np.repeat(v, 2) for other, v in at.items()}}
+        near[name] = at[name][0] + np.array([-step, step])
+        low, high = simulate_batch(MODEL, [scenario()], TIME, near, keep=[measured[0]]).values[:, 0]
+        gradient = found.derivatives[0, place, 0]
+        assert gradient == pytest.approx((high - low) / (2 * step), rel=1e-4)
+
+
+def test_derivatives_by_more_parameters_than_one_pass_takes() -> None:
+    names = [*BY, "J1", "k_o", "c_o", "J_v", "J_out", "load.constant", "start.engine_speed"]
+    names += [f"{element}.{field}" for element in ("B2", "B3") for field in ("P0", "gain", "v_s")]
+    assert len(names) > 16
+    together = batch_sensitivities(MODEL, [scenario()], TIME, by=names, keep=Keep.LAST)
+    for place in (0, 16):
+        one = batch_sensitivities(MODEL, [scenario()], TIME, by=[names[place]], keep=Keep.LAST)
+        np.testing.assert_array_equal(together.derivatives[:, place], one.derivatives[:, 0])
+
+
+def test_a_run_that_fails_has_no_derivatives() -> None:
+    values = {"J1": np.array([20.6, -1.0])}
+    found = batch_sensitivities(MODEL, [scenario()], TIME, values, by=["eta"], keep=Keep.LAST)
+    assert list(found.batch.failed) == [1]
+    assert np.isfinite(found.derivatives[0]).all()
+    assert np.isnan(found.derivatives[1]).all()
+
+
+@pytest.mark.parametrize("by", [[], ["nothing"]])
+def test_derivatives_by_nothing_known_are_refused(by: list[str]) -> None:
+    with pytest.raises(InputError):
+        batch_sensitivities(MODEL, [scenario()], TIME, by=by)

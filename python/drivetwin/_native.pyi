@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "batch_sensitivities",
     "gear_statics",
     "linearise",
     "reduce_shift",
@@ -26,6 +27,11 @@ _Run = tuple[
 ]
 
 _Ratios = tuple[str, float, float, float]
+_Scenario = tuple[
+    Sequence[tuple[str, _Array, _Array, float]],
+    tuple[float, float, float, float, Sequence[str]],
+]
+_Kept = tuple[_Array, NDArray[np.uint32], _Array, list[tuple[int, str]]]
 
 def simulate(
     model: str,
@@ -49,16 +55,20 @@ def linearise(
 ) -> tuple[list[_Array], list[str], list[str]]: ...
 def simulate_batch(
     model: str,
-    scenarios: Sequence[
-        tuple[
-            Sequence[tuple[str, _Array, _Array]], tuple[float, float, float, float, Sequence[str]]
-        ]
-    ],
+    scenarios: Sequence[_Scenario],
     sets: tuple[Sequence[str], _Array],
     grid: _Array,
-    measured: _Array,
-    options: tuple[str, str, int],
-) -> tuple[_Array, NDArray[np.uint32], _Array, list[tuple[int, str]]]: ...
+    wanted: tuple[_Array, str],
+    options: tuple[str, int],
+) -> _Kept: ...
+def batch_sensitivities(
+    model: str,
+    scenarios: Sequence[_Scenario],
+    sets: tuple[Sequence[str], _Array],
+    grid: tuple[_Array, Sequence[str]],
+    wanted: tuple[_Array, str],
+    options: tuple[str, int],
+) -> tuple[_Kept, _Array, _Array, list[tuple[int, str]]]: ...
 def simulate_network(
     driveline: str,
     outputs: str,

@@ -51,6 +51,22 @@ class Batch:
     failed: Mapping[int, str]
 
 
+@dataclass(frozen=True)
+class BatchSensitivities:
+    """A batch with exact derivatives by `parameters` (p,), through all events.
+
+    `derivatives` are those of `batch.values`, with an axis of p after the runs; `last_lock`
+    (runs, p) those of `batch.last_lock` [s]. NaN for runs that failed. In the runs of `grazing` an
+    event only touches its guard, for the reason given: they have no derivatives after it.
+    """
+
+    batch: Batch
+    parameters: tuple[str, ...]
+    derivatives: FloatArray
+    last_lock: FloatArray
+    grazing: Mapping[int, str]
+
+
 OUTPUTS: Mapping[str, Mapping[str, str]] = {
     "engine_speed": {"speed": "engine"},
     "output_speed": {"speed": "output"},
@@ -79,7 +95,114 @@ def simulate_batch(
     its samples that are not NaN. `threads` 0 takes all cores.
     Raises InputError for unknown names, differing lengths or an inconsistent description.
     """
-    sets = {name: np.asarray(v, dtype=np.float64) for name, v in (parameters or {}).items()}
+    asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
+    try:
+        kept = _native.simulate_batch(
+            as_json(asdict(model)),
+            asked.scenarios,
+            asked.sets,
+            asked.time,
+            asked.wanted,
+            (asked.outputs, threads),
+        )
+    except ValueError as error:
+        raise InputError(str(error), "correct the model, its inputs or the names") from error
+    return asked.batch(kept)
+
+
+def batch_sensitivities(
+    model: DualClutch,
+    scenarios: Sequence[Scenario],
+    time: FloatArray,
+    parameters: Mapping[str, FloatArray] | None = None,
+    *,
+    by: Sequence[str],
+    outputs: Sequence[str] = ("shaft_torque",),
+    keep: Keep | Sequence[FloatArray] = Keep.COLUMNS,
+    threads: int = 0,
+) -> BatchSensitivities:
+    """The runs of `simulate_batch` with exact derivatives of what is kept.
+
+    `by` names what to differentiate by, at least one, as in `driveline.sensitivities` (delays
+    included); with measured columns to keep these are the gradients of the misfits.
+    Raises InputError as `simulate_batch`.
+    """
+    if not by:
+        raise InputError("nothing to differentiate by", "name a parameter, or use simulate_batch")
+    asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
+    try:
+        kept, derivatives, last_lock, grazing = _native.batch_sensitivities(
+            as_json(asdict(model)),
+            asked.scenarios,
+            asked.sets,
+            (asked.time, list(by)),
+            asked.wanted,
+            (asked.outputs, threads),
+        )
+    except ValueError as error:
+        raise InputError(str(error), "correct the model, its inputs or the names") from error
+    shape = (asked.shape[0], len(by), *asked.shape[1:])
+    return BatchSensitivities(
+        asked.batch(kept),
+        tuple(by),
+        derivatives.reshape(shape),
+        last_lock.reshape(shape[:2]),
+        dict(grazing),
+    )
+
+
+_Start = tuple[float, float, float, float, list[str]]
+_Plain = tuple[list[tuple[str, FloatArray, FloatArray, float]], _Start]
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What the core is asked for, as it takes it; `shape` is that of the values kept."""
+
+    scenarios: Sequence[_Plain]
+    sets: tuple[list[str], FloatArray]
+    time: FloatArray
+    wanted: tuple[FloatArray, str]
+    outputs: str
+    shape: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls,
+        scenarios: Sequence[Scenario],
+        time: FloatArray,
+        parameters: Mapping[str, FloatArray],
+        outputs: Sequence[str],
+        keep: Keep | Sequence[FloatArray],
+    ) -> _Asked:
+        sets = {name: np.asarray(v, dtype=np.float64) for name, v in parameters.items()}
+        table = np.stack(list(sets.values()), axis=1) if sets else np.empty((0, 0))
+        shape = (_runs(sets, scenarios), len(outputs), len(time))
+        wanted = np.empty((0, 0)) if isinstance(keep, Keep) else np.asarray(keep, dtype=np.float64)
+        if not isinstance(keep, Keep) and wanted.shape != shape[1:]:
+            raise InputError(
+                f"measured columns {wanted.shape} do not fit {len(outputs)} outputs on {len(time)}"
+                " points of time",
+                "give one column per output, sampled on the time",
+            )
+        return cls(
+            [_plain(scenario) for scenario in scenarios],
+            (list(sets), np.ascontiguousarray(table)),
+            np.ascontiguousarray(time, dtype=np.float64),
+            (np.ascontiguousarray(wanted), keep.value if isinstance(keep, Keep) else "misfit"),
+            json.dumps([_output(name) for name in outputs]),
+            shape if keep is Keep.COLUMNS else shape[:2],
+        )
+
+    def batch(
+        self, kept: tuple[FloatArray, NDArray[np.uint32], FloatArray, list[tuple[int, str]]]
+    ) -> Batch:
+        values, events, last_lock, failed = kept
+        return Batch(values.reshape(self.shape), events, last_lock, dict(failed))
+
+
+def _runs(sets: Mapping[str, FloatArray], scenarios: Sequence[Scenario]) -> int:
+    """Number of runs that sets and scenarios agree on."""
     counts = {len(values) for values in sets.values()}
     runs = counts.pop() if sets else len(scenarios)
     if counts or (len(scenarios) != 1 and len(scenarios) != runs) or not runs:
@@ -88,29 +211,7 @@ def simulate_batch(
             f"{len(scenarios)} scenarios and parameters of {lengths} values make no batch",
             "give every parameter as many values, and one scenario or as many",
         )
-    table = np.stack(list(sets.values()), axis=1) if sets else np.empty((0, 0))
-    wanted = [_output(name) for name in outputs]
-    kept = keep.value if isinstance(keep, Keep) else "misfit"
-    measured = np.empty((0, 0)) if isinstance(keep, Keep) else np.asarray(keep, dtype=np.float64)
-    if kept == "misfit" and measured.shape != (len(outputs), len(time)):
-        raise InputError(
-            f"measured columns {measured.shape} do not fit {len(outputs)} outputs on {len(time)}"
-            " points of time",
-            "give one column per output, sampled on the time",
-        )
-    try:
-        values, events, last_lock, failed = _native.simulate_batch(
-            as_json(asdict(model)),
-            [_plain(scenario) for scenario in scenarios],
-            (list(sets), np.ascontiguousarray(table)),
-            np.ascontiguousarray(time, dtype=np.float64),
-            np.ascontiguousarray(measured),
-            (kept, json.dumps(wanted), threads),
-        )
-    except ValueError as error:
-        raise InputError(str(error), "correct the model, its inputs or the names") from error
-    shape = (runs, len(outputs), len(time))[: 3 if keep is Keep.COLUMNS else 2]
-    return Batch(values.reshape(shape), events, last_lock, dict(failed))
+    return runs
 
 
 def _output(name: str) -> Mapping[str, str]:
@@ -123,12 +224,15 @@ def _output(name: str) -> Mapping[str, str]:
     return OUTPUTS[name]
 
 
-def _plain(
-    scenario: Scenario,
-) -> tuple[list[tuple[str, FloatArray, FloatArray]], tuple[float, float, float, float, list[str]]]:
+def _plain(scenario: Scenario) -> _Plain:
     signals = {"engine torque": scenario.engine_torque, **scenario.pressures}
     columns = [
-        (name, np.ascontiguousarray(s.time + s.delay), np.ascontiguousarray(s.values, np.float64))
+        (
+            name,
+            np.ascontiguousarray(s.time, np.float64),
+            np.ascontiguousarray(s.values, np.float64),
+            s.delay,
+        )
         for name, s in signals.items()
     ]
     s = scenario.start

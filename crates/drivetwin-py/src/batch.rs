@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: MIT
 //! Many runs of the dual-clutch driveline; see `drivetwin.batch.simulate_batch`.
 
-use crate::dual_clutch::{Start, model_of, start_of};
+use crate::dual_clutch::{Delayed, Start, model_of, start_of};
 use drivetwin_core::network::Network;
-use drivetwin_core::simulate::{Batch, Keep, Outcome, Output, Plan, dual_clutch_batch};
+use drivetwin_core::simulate::{
+    Batch, Keep, Outcome, Output, Plan, Sampled, dual_clutch_batch, dual_clutch_batch_sensitivities,
+};
 use drivetwin_core::solve::{Settings, Signal, Status};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Name, times [s] and values of every input, and the start, of one scenario.
-type Scenario<'py> = (Vec<(String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>)>, Start);
-/// What to keep (`columns`, `last` or `misfit`), outputs as a JSON list, threads (0: all).
-type Options = (String, String, usize);
+/// Inputs and start of one scenario.
+type Scenario<'py> = (Vec<Delayed<'py>>, Start);
+/// Measured columns (outputs, time) for a misfit, what to keep (`columns`, `last` or `misfit`).
+type Wanted<'py> = (PyReadonlyArray2<'py, f64>, String);
+/// Outputs as a JSON list, threads (0: all).
+type Options = (String, usize);
 /// Flat values, numbers of events, times of the last lock [s], failed runs and why.
 type Kept<'py> = (
     Bound<'py, PyArray1<f64>>,
@@ -21,50 +25,112 @@ type Kept<'py> = (
     Vec<(usize, String)>,
 );
 
+/// Kept, flat derivatives, derivatives of the last locks, runs with a grazing event and why.
+type Derived<'py> =
+    (Kept<'py>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Vec<(usize, String)>);
+
 /// Simulate a driveline given as JSON under many parameter sets or in many scenarios.
 #[pyfunction]
-#[pyo3(signature = (model, scenarios, sets, grid, measured, options))]
 pub fn simulate_batch<'py>(
     py: Python<'py>,
     model: &str,
     scenarios: Vec<Scenario<'py>>,
     sets: (Vec<String>, PyReadonlyArray2<'py, f64>),
     grid: PyReadonlyArray1<'py, f64>,
-    measured: PyReadonlyArray2<'py, f64>,
+    wanted: Wanted<'py>,
     options: Options,
 ) -> PyResult<Kept<'py>> {
-    let refuse = |e: &dyn std::fmt::Display| PyValueError::new_err(e.to_string());
     let model = model_of(model)?;
-    let (keep, outputs, threads) = options;
-    let outputs: Vec<Output> = serde_json::from_str(&outputs).map_err(|e| refuse(&e))?;
-    let network = Network::compile(&model.driveline()).map_err(|e| refuse(&e))?;
+    let (outputs, threads) = (outputs_of(&options.0)?, options.1);
+    let network = Network::compile(&model.driveline()).map_err(|e| refused(&e))?;
     let grid = grid.as_slice()?;
     let mut plans = Vec::with_capacity(scenarios.len());
     for (signals, start) in &scenarios {
-        let signals = signals
-            .iter()
-            .map(|(name, times, values)| {
-                Ok((name.as_str(), Signal::samples(times.as_slice()?, values.as_slice()?)))
-            })
-            .collect::<PyResult<Vec<_>>>()?;
+        let signals: Vec<_> = sampled(signals)?
+            .into_iter()
+            .map(|(name, times, values, delay)| (name, Signal::Samples { times, values, delay }))
+            .collect();
         let plan = Plan::new(&network, &signals, grid, &outputs, (Settings::default(), false));
-        plans.push((plan.map_err(|e| refuse(&e))?, start_of(start.clone())));
+        plans.push((plan.map_err(|e| refused(&e))?, start_of(start.clone())));
     }
-    let (names, sets) = sets;
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let sets = sets.as_slice()?;
-    let measured: Vec<Vec<f64>> =
-        measured.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
-    let keep = match keep.as_str() {
-        "columns" => Keep::Columns,
-        "last" => Keep::Last,
-        "misfit" => Keep::Misfit(&measured),
-        other => return Err(refuse(&format!("{other:?} cannot be kept"))),
-    };
+    let (names, sets) = (names_of(&sets.0), sets.1.as_slice()?);
+    let measured = rows_of(&wanted.0);
+    let keep = keep_of(&wanted.1, &measured)?;
     let batch = py
         .detach(|| dual_clutch_batch(&model, &plans, (&names, sets), (keep, threads)))
-        .map_err(|e| refuse(&e))?;
+        .map_err(|e| refused(&e))?;
     Ok(kept(py, batch))
+}
+
+/// The same with derivatives by the named parameters, at least one.
+#[pyfunction]
+pub fn batch_sensitivities<'py>(
+    py: Python<'py>,
+    model: &str,
+    scenarios: Vec<Scenario<'py>>,
+    sets: (Vec<String>, PyReadonlyArray2<'py, f64>),
+    grid: (PyReadonlyArray1<'py, f64>, Vec<String>),
+    wanted: Wanted<'py>,
+    options: Options,
+) -> PyResult<Derived<'py>> {
+    let model = model_of(model)?;
+    let (outputs, threads) = (outputs_of(&options.0)?, options.1);
+    let (grid, by) = (grid.0.as_slice()?, names_of(&grid.1));
+    let scenarios = scenarios
+        .iter()
+        .map(|(signals, start)| Ok((sampled(signals)?, start_of(start.clone()))))
+        .collect::<PyResult<Vec<_>>>()?;
+    let (names, sets) = (names_of(&sets.0), sets.1.as_slice()?);
+    let measured = rows_of(&wanted.0);
+    let keep = keep_of(&wanted.1, &measured)?;
+    let (sets, grid, how) = ((&names[..], sets), (grid, &outputs[..]), (keep, threads));
+    let (batch, derivatives) = py
+        .detach(|| dual_clutch_batch_sensitivities(&model, &scenarios, sets, grid, &by, how))
+        .map_err(|e| refused(&e))?;
+    let grazing = derivatives.grazing.iter();
+    let grazing = grazing
+        .map(|(i, time, element)| (*i, format!("{element} grazes its event at {time:.9} s")));
+    let grazing = grazing.collect();
+    Ok((
+        kept(py, batch),
+        PyArray1::from_vec(py, derivatives.kept),
+        PyArray1::from_vec(py, derivatives.last_lock),
+        grazing,
+    ))
+}
+
+fn refused(error: &dyn std::fmt::Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+fn outputs_of(json: &str) -> PyResult<Vec<Output>> {
+    serde_json::from_str(json).map_err(|e| refused(&e))
+}
+
+fn names_of(names: &[String]) -> Vec<&str> {
+    names.iter().map(String::as_str).collect()
+}
+
+fn rows_of(array: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
+    array.as_array().rows().into_iter().map(|row| row.to_vec()).collect()
+}
+
+fn sampled<'a>(signals: &'a [Delayed<'_>]) -> PyResult<Vec<Sampled<'a>>> {
+    signals
+        .iter()
+        .map(|(name, times, values, delay)| {
+            Ok((name.as_str(), times.as_slice()?, values.as_slice()?, *delay))
+        })
+        .collect()
+}
+
+fn keep_of<'m>(name: &str, measured: &'m [Vec<f64>]) -> PyResult<Keep<'m>> {
+    match name {
+        "columns" => Ok(Keep::Columns),
+        "last" => Ok(Keep::Last),
+        "misfit" => Ok(Keep::Misfit(measured)),
+        other => Err(refused(&format!("{other:?} cannot be kept"))),
+    }
 }
 
 fn kept(py: Python<'_>, batch: Batch) -> Kept<'_> {

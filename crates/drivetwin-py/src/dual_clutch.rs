@@ -7,7 +7,7 @@ use drivetwin_core::simulate::{
     DualClutchStart, Trajectory, dual_clutch_sensitivities, simulate_dual_clutch,
 };
 use drivetwin_core::solve::{Settings, Signal};
-use numpy::{PyArray2, PyArray3, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -60,7 +60,7 @@ type Sensitive<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 /// Name, times [s], values and delay [s] of an input.
-type Delayed<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, f64);
+pub type Delayed<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, f64);
 
 /// Simulate and differentiate by the named parameters.
 #[pyfunction]
@@ -87,11 +87,13 @@ pub fn sensitivities<'py>(
     let found = py
         .detach(|| dual_clutch_sensitivities(&model, &signals, &start, grid, (settings, &names)))
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let derivatives = found.columns;
+    let shape = [names.len(), found.run.columns.len(), grid.len()];
     Ok((
         PyArray2::from_vec2(py, &found.run.columns)?,
         events_of(&found.run),
         status_of(&found.run),
-        PyArray3::from_vec3(py, &found.columns)?,
+        derivatives.into_pyarray(py).reshape(shape)?,
         PyArray2::from_vec2(py, &found.events)?,
     ))
 }

@@ -22,6 +22,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(dual_clutch::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(dual_clutch::sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(batch::simulate_batch, module)?)?;
+    module.add_function(wrap_pyfunction!(batch::batch_sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(linear::linearise, module)?)?;
     module.add_function(wrap_pyfunction!(network::simulate_network, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;

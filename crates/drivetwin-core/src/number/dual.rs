@@ -171,6 +171,9 @@ impl<const P: usize> Real for Dual<P> {
     fn re(&self) -> f64 {
         self.re
     }
+    fn is_constant(&self) -> bool {
+        self.eps == [0.0; P]
+    }
     fn recip(self) -> Self {
         let inverse = self.re.recip();
         self.chain(inverse, -inverse * inverse)

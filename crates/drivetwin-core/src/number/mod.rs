@@ -48,6 +48,9 @@ pub trait Real:
     /// The value.
     fn re(&self) -> f64;
 
+    /// Whether it has no derivatives other than zero.
+    fn is_constant(&self) -> bool;
+
     /// 1 / x.
     fn recip(self) -> Self;
 
@@ -72,6 +75,10 @@ impl Real for f64 {
     #[inline(always)]
     fn re(&self) -> f64 {
         *self
+    }
+    #[inline(always)]
+    fn is_constant(&self) -> bool {
+        true
     }
     fn recip(self) -> Self {
         self.recip()

@@ -8,6 +8,7 @@ use super::start::State;
 use super::trajectory::Recorder;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
+use crate::number::Real;
 use crate::solve::{Event, EventKind, Integrator, Status, WIDTH, run_together};
 use rayon::prelude::*;
 
@@ -92,29 +93,56 @@ pub fn dual_clutch_batch(
 ) -> Result<Batch, SensitivityError> {
     let width = parameters.len();
     let count = sets.len().checked_div(width).unwrap_or(scenarios.len());
-    let place = |model: &mut DualClutch<f64>, start: &mut DualClutchStart<f64>, i: usize| {
-        for (k, &name) in parameters.iter().enumerate() {
-            let place = match name.split_once('.') {
-                Some(("start", field)) => start.field_mut(field),
-                _ => model.parameter_mut(name),
-            };
-            *place.ok_or(name)? = sets[i * width + k];
-        }
-        Ok::<(), &str>(())
-    };
-    if count > 0 {
-        place(&mut model.clone(), &mut scenarios[0].1.clone(), 0)
-            .map_err(|name| SensitivityError::Unknown { name: name.to_owned() })?;
+    if let Some((_, start)) = scenarios.first() {
+        check_names(model, start, (parameters, sets))?;
     }
     let scenario = |i: usize| &scenarios[i % scenarios.len()];
     let make = |i: usize| {
-        let (mut model, mut start) = (model.clone(), scenario(i).1.clone());
-        place(&mut model, &mut start, i).expect("names that the first run has");
+        let (model, start) = placed(model, &scenario(i).1, (parameters, sets), i);
         let network = Network::compile(&model.driveline())?;
         let state = start.named().state(&network)?;
         Ok((network, state))
     };
     Ok(batch(count, |i| &scenario(i).0, make, options))
+}
+
+/// Model and start of run `i` of a batch, whose names have been checked.
+pub(super) fn placed(
+    model: &DualClutch<f64>,
+    start: &DualClutchStart<f64>,
+    (parameters, sets): (&[&str], &[f64]),
+    i: usize,
+) -> (DualClutch<f64>, DualClutchStart<f64>) {
+    let (mut model, mut start) = (model.clone(), start.clone());
+    for (&name, &value) in parameters.iter().zip(&sets[i * parameters.len()..]) {
+        *place(&mut model, &mut start, name).expect("names that were checked") = value;
+    }
+    (model, start)
+}
+
+/// Refuse names that are no parameters.
+pub(super) fn check_names(
+    model: &DualClutch<f64>,
+    start: &DualClutchStart<f64>,
+    (parameters, sets): (&[&str], &[f64]),
+) -> Result<(), SensitivityError> {
+    let (mut model, mut start) = (model.clone(), start.clone());
+    let unknown = |name: &&&str| place(&mut model, &mut start, name).is_none();
+    match parameters.iter().find(unknown) {
+        Some(&name) if !sets.is_empty() => Err(SensitivityError::Unknown { name: name.to_owned() }),
+        _ => Ok(()),
+    }
+}
+
+fn place<'m>(
+    model: &'m mut DualClutch<f64>,
+    start: &'m mut DualClutchStart<f64>,
+    name: &str,
+) -> Option<&'m mut f64> {
+    match name.split_once('.') {
+        Some(("start", field)) => start.field_mut(field),
+        _ => model.parameter_mut(name),
+    }
 }
 
 /// How one run ended.
@@ -127,13 +155,17 @@ struct End {
 
 impl End {
     fn of(status: Status, events: &[Event<f64>]) -> Self {
-        let lock = events.iter().rfind(|event| event.kind == EventKind::Lock);
         Self {
             outcome: Outcome::Ran(status),
             events: events.len() as u32,
-            last_lock: lock.map_or(f64::NAN, |event| event.time),
+            last_lock: last_lock(events).unwrap_or(f64::NAN),
         }
     }
+}
+
+/// Time of the last lock [s].
+pub(super) fn last_lock<T: Real>(events: &[Event<T>]) -> Option<T> {
+    events.iter().rfind(|event| event.kind == EventKind::Lock).map(|event| event.time)
 }
 
 /// Run up to [`WIDTH`] scenarios, those over the same knots together.
@@ -204,7 +236,7 @@ impl Keep<'_> {
         }
     }
 
-    fn reduce(self, columns: &[Vec<f64>], out: &mut [f64]) {
+    pub(super) fn reduce<T: Real>(self, columns: &[Vec<T>], out: &mut [T]) {
         match self {
             Self::Columns => {
                 for (column, out) in columns.iter().zip(out.chunks_exact_mut(columns[0].len())) {
@@ -219,7 +251,7 @@ impl Keep<'_> {
             Self::Misfit(measured) => {
                 for ((column, measured), out) in columns.iter().zip(measured).zip(out) {
                     let known = column.iter().zip(measured).filter(|(_, m)| !m.is_nan());
-                    *out = known.map(|(c, m)| (c - m) * (c - m)).sum();
+                    *out = known.fold(T::zero_(), |sum, (&c, &m)| sum + (c + -m) * (c + -m));
                 }
             }
         }

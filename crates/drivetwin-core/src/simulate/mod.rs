@@ -3,6 +3,7 @@
 
 mod audit;
 mod batch;
+mod batch_sensitivity;
 mod dual_clutch;
 mod linear;
 mod run;
@@ -12,6 +13,7 @@ mod trajectory;
 
 pub use audit::EnergyAudit;
 pub use batch::{Batch, Keep, Outcome, batch, dual_clutch_batch};
+pub use batch_sensitivity::{BatchDerivatives, Stated, dual_clutch_batch_sensitivities};
 pub use dual_clutch::{DualClutchRun, DualClutchStart, dual_clutch_outputs, simulate_dual_clutch};
 pub use linear::{Linear, Slipping, linearise};
 pub use run::{Plan, SimulateError, run};

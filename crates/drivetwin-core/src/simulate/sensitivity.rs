@@ -10,9 +10,10 @@ use crate::solve::{Event, Settings, Signal};
 use thiserror::Error;
 
 /// Parameters that one pass differentiates for.
-const LANES: usize = 16;
+pub(super) const LANES: usize = 16;
 
-type Derived = Dual<LANES>;
+/// A number with its derivatives by the parameters of one pass.
+pub(super) type Derived = Dual<LANES>;
 
 /// Why sensitivities cannot be computed.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -40,8 +41,9 @@ pub type Sampled<'a> = (&'a str, &'a [f64], &'a [f64], f64);
 pub struct Sensitivities {
     /// Values.
     pub run: DualClutchRun<f64>,
-    /// Derivative of every column by every parameter: parameters × columns × time.
-    pub columns: Vec<Vec<Vec<f64>>>,
+    /// Derivative of every column by every parameter: parameters × columns × time, the last the
+    /// fastest.
+    pub columns: Vec<f64>,
     /// Derivative of every event time by every parameter: parameters × events.
     pub events: Vec<Vec<f64>>,
 }
@@ -62,15 +64,34 @@ pub fn dual_clutch_sensitivities(
         let group = &parameters[k * LANES..parameters.len().min((k + 1) * LANES)];
         let dual = differentiated(model, signals, start, grid, (settings, group))?;
         run.get_or_insert_with(|| values_of(&dual));
+        append_derivatives(&dual.columns, group.len(), &mut columns);
         for lane in 0..group.len() {
-            let column = |c: &Vec<Derived>| c.iter().map(|value| value.eps[lane]).collect();
-            columns.push(dual.columns.iter().map(column).collect());
             events.push(dual.events.iter().map(|e| e.time.eps[lane]).collect());
         }
     }
     let run = run.expect("at least one pass");
     Ok(Sensitivities { run, columns, events })
 }
+
+/// The first derivatives of all columns, lane by lane.
+fn append_derivatives(columns: &[Vec<Derived>], lanes: usize, to: &mut Vec<f64>) {
+    let length = columns.first().map_or(0, Vec::len);
+    let from = to.len();
+    to.resize(from + lanes * columns.len() * length, 0.0);
+    for (place, column) in columns.iter().enumerate() {
+        // Few at a time, so that whole cache lines are written.
+        for (block, values) in column.chunks(STRETCH).enumerate() {
+            for lane in 0..lanes {
+                let at = from + (lane * columns.len() + place) * length + block * STRETCH;
+                let out = to[at..].iter_mut().zip(values);
+                out.for_each(|(out, value)| *out = value.eps[lane]);
+            }
+        }
+    }
+}
+
+/// Samples of which the derivatives are sorted together.
+const STRETCH: usize = 16;
 
 /// The run without its derivatives.
 fn values_of(run: &DualClutchRun<Derived>) -> DualClutchRun<f64> {
@@ -94,6 +115,18 @@ fn differentiated(
     grid: &[f64],
     (settings, parameters): (Settings, &[&str]),
 ) -> Result<DualClutchRun<Derived>, SensitivityError> {
+    let (model, start, delays) = variables(model, signals, start, parameters)?;
+    let inputs = delayed(signals, &delays);
+    Ok(simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?)
+}
+
+/// Model, start and delays with the named parameters as variables, at most [`LANES`].
+pub(super) fn variables(
+    model: &DualClutch<f64>,
+    signals: &[Sampled<'_>],
+    start: &DualClutchStart<f64>,
+    parameters: &[&str],
+) -> Result<(DualClutch<Derived>, DualClutchStart<Derived>, Vec<Derived>), SensitivityError> {
     let mut model = model.lifted::<Derived>();
     let mut start = start.lifted::<Derived>();
     let mut delays: Vec<Derived> = signals.iter().map(|s| Derived::of(s.3)).collect();
@@ -108,10 +141,16 @@ fn differentiated(
         let place = place.ok_or_else(|| SensitivityError::Unknown { name: name.to_owned() })?;
         place.eps[lane] = 1.0;
     }
-    let inputs: Vec<_> = signals
-        .iter()
-        .zip(&delays)
-        .map(|(s, &delay)| (s.0, Signal::Samples { times: s.1, values: s.2, delay }))
-        .collect();
-    Ok(simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?)
+    Ok((model, start, delays))
+}
+
+/// The inputs with delays as variables.
+pub(super) fn delayed<'a>(
+    signals: &[Sampled<'a>],
+    delays: &[Derived],
+) -> Vec<(&'a str, Signal<'a, Derived>)> {
+    let signal = |(&(name, times, values, _), &delay): (&Sampled<'a>, &Derived)| {
+        (name, Signal::Samples { times, values, delay })
+    };
+    signals.iter().zip(delays).map(signal).collect()
 }

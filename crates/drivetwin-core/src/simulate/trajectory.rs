@@ -199,16 +199,19 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
             values.resize(from + picked.count(), T::zero_());
             let out = &mut values[from..];
             for &(position, c) in &*passing_terms(column, run) {
+                // Most coefficients have no derivatives.
+                let constant = c.is_constant();
+                let scaled = |value: T| if constant { value * c.re() } else { c * value };
                 if position < states {
-                    picked.add(out, |k| c * samples.state(k, position));
+                    picked.add(out, |k| scaled(samples.state(k, position)));
                 } else if position < run.network.one() {
-                    picked.add(out, |k| c * run.input_at(first + k, position - inputs));
+                    picked.add(out, |k| scaled(run.input_at(first + k, position - inputs)));
                 } else if position == run.network.one() {
                     picked.add(out, |_| c);
                 } else {
                     let channel = position - run.network.first_channel();
                     if let Some(slot) = active.iter().position(|&j| j == channel) {
-                        picked.add(out, |k| c * samples.torque(k, slot));
+                        picked.add(out, |k| scaled(samples.torque(k, slot)));
                     }
                 }
             }

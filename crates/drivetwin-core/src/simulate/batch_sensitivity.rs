@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+//! Exact derivatives of what a batch keeps, run by run over all cores.
+
+use super::batch::{Batch, Keep, Outcome, check_names, last_lock, placed};
+use super::dual_clutch::DualClutchStart;
+use super::run::{Plan, SimulateError};
+use super::sensitivity::{Derived, LANES, Sampled, SensitivityError, delayed, variables};
+use super::trajectory::{Output, Trajectory};
+use crate::model::dual_clutch::DualClutch;
+use crate::network::Network;
+use crate::number::Real;
+use crate::solve::{Settings, Status};
+use rayon::prelude::*;
+
+/// Inputs and start of a run.
+pub type Stated<'a> = (Vec<Sampled<'a>>, DualClutchStart<f64>);
+
+/// Derivatives of a batch, NaN for runs that failed.
+#[derive(Clone, Debug)]
+pub struct BatchDerivatives {
+    /// Of what was kept: runs × parameters × kept.
+    pub kept: Vec<f64>,
+    /// Of the time of the last lock: runs × parameters.
+    pub last_lock: Vec<f64>,
+    /// Runs of which an event only grazed its guard, its time [s] and element: no derivatives there.
+    pub grazing: Vec<(usize, f64, String)>,
+}
+
+/// As [`super::dual_clutch_batch`], with the derivatives `by` the named parameters, which may also be
+/// delays; see [`super::dual_clutch_sensitivities`].
+pub fn dual_clutch_batch_sensitivities(
+    model: &DualClutch<f64>,
+    scenarios: &[Stated<'_>],
+    (parameters, sets): (&[&str], &[f64]),
+    (grid, outputs): (&[f64], &[Output]),
+    by: &[&str],
+    (keep, threads): (Keep<'_>, usize),
+) -> Result<(Batch, BatchDerivatives), SensitivityError> {
+    let count = sets.len().checked_div(parameters.len()).unwrap_or(scenarios.len());
+    if let Some((_, start)) = scenarios.first() {
+        check_names(model, start, (parameters, sets))?;
+    }
+    let groups: Vec<&[&str]> = by.chunks(LANES).collect();
+    let mut plans = Vec::with_capacity(scenarios.len());
+    for (signals, start) in scenarios {
+        let plan = |names: &&[&str]| plan(model, (signals, start), (grid, outputs), names);
+        plans.push(groups.iter().map(plan).collect::<Result<Vec<_>, _>>()?);
+    }
+    let run = |i: usize| -> Result<Vec<Kept>, SimulateError> {
+        let (signals, start) = &scenarios[i % scenarios.len()];
+        let (model, start) = placed(model, start, (parameters, sets), i);
+        let passes = groups.iter().zip(&plans[i % plans.len()]).map(|(names, plan)| {
+            let (model, start, _) =
+                variables(&model, signals, &start, names).expect("names that were checked");
+            let network = Network::compile(&model.driveline())?;
+            let state = start.named().state(&network)?;
+            Ok(Kept::of(plan.run(&network, &state), keep))
+        });
+        passes.collect()
+    };
+    let all = || (0..count).into_par_iter().map(run).collect();
+    let passes: Vec<Result<Vec<Kept>, SimulateError>> =
+        match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+            Ok(pool) => pool.install(all),
+            Err(_) => all(),
+        };
+    Ok(gathered(passes, keep.size(outputs.len(), grid.len()), by.len()))
+}
+
+/// The scenario made ready for one group of variables.
+fn plan(
+    model: &DualClutch<f64>,
+    (signals, start): (&[Sampled<'_>], &DualClutchStart<f64>),
+    (grid, outputs): (&[f64], &[Output]),
+    names: &[&str],
+) -> Result<Plan<Derived>, SensitivityError> {
+    let (model, _, delays) = variables(model, signals, start, names)?;
+    let network = Network::compile(&model.driveline()).map_err(SimulateError::from)?;
+    let inputs = delayed(signals, &delays);
+    Ok(Plan::new(&network, &inputs, grid, outputs, (Settings::default(), false))?)
+}
+
+/// What is left of one pass of a run.
+struct Kept {
+    values: Vec<Derived>,
+    last_lock: Derived,
+    events: u32,
+    status: Status,
+    grazing: Option<(f64, String)>,
+}
+
+impl Kept {
+    fn of(run: Trajectory<Derived>, keep: Keep<'_>) -> Self {
+        let failed = run.status != Status::Completed;
+        let nothing = Derived::new(f64::NAN, [f64::NAN; LANES]);
+        let mut values = vec![nothing; keep.size(run.columns.len(), run.time.len())];
+        if !failed {
+            keep.reduce(&run.columns, &mut values);
+        }
+        Self {
+            values,
+            last_lock: last_lock(&run.events).unwrap_or(nothing),
+            events: run.events.len() as u32,
+            status: run.status,
+            grazing: run.grazing,
+        }
+    }
+}
+
+/// All runs in their order; `size` numbers are kept of each, derived by so many parameters.
+fn gathered(
+    runs: Vec<Result<Vec<Kept>, SimulateError>>,
+    size: usize,
+    parameters: usize,
+) -> (Batch, BatchDerivatives) {
+    let mut batch = Batch { values: vec![], outcomes: vec![], events: vec![], last_lock: vec![] };
+    let mut derivatives = BatchDerivatives {
+        kept: vec![f64::NAN; runs.len() * parameters * size],
+        last_lock: vec![f64::NAN; runs.len() * parameters],
+        grazing: vec![],
+    };
+    for (i, passes) in runs.into_iter().enumerate() {
+        let passes = match passes {
+            Ok(passes) => passes,
+            Err(error) => {
+                batch.values.resize((i + 1) * size, f64::NAN);
+                batch.outcomes.push(Outcome::Refused(error));
+                batch.events.push(0);
+                batch.last_lock.push(f64::NAN);
+                continue;
+            }
+        };
+        for k in 0..parameters {
+            let (pass, lane) = (&passes[k / LANES], k % LANES);
+            let row = i * parameters + k;
+            let out = derivatives.kept[row * size..].iter_mut().zip(&pass.values);
+            out.for_each(|(out, value)| *out = value.eps[lane]);
+            derivatives.last_lock[row] = pass.last_lock.eps[lane];
+        }
+        let Some(first) = passes.into_iter().next() else { continue };
+        batch.values.extend(first.values.iter().map(Real::re));
+        batch.outcomes.push(Outcome::Ran(first.status));
+        batch.events.push(first.events);
+        batch.last_lock.push(first.last_lock.re());
+        derivatives.grazing.extend(first.grazing.map(|(time, element)| (i, time, element)));
+    }
+    (batch, derivatives)
+}
