@@ -55,6 +55,13 @@ def test_without_a_flag_the_speeds_tell() -> None:
     assert found.end > 5.9
 
 
+def test_a_late_engine_speed_is_no_opening() -> None:
+    made = PLAN.log()
+    inlet = made["input_speed"]
+    late = replace(inlet, role="engine_speed", time=inlet.time + 0.03)
+    assert lock_ups(replace(made, channels={**made.channels, "engine_speed": late}), CARD) == ()
+
+
 def test_closed_throughout_is_no_event() -> None:
     assert lock_ups(log(INLET), CARD) == ()
     assert lock_ups(log(INLET, np.ones(TIME.size)), CARD) == ()

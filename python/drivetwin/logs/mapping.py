@@ -93,8 +93,9 @@ def plain(name: str) -> str:
 def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, list[Column]]:
     """Return the candidate columns of each role; `elements` gives the kind of each by name.
 
-    A column without any number is a candidate only where no other is.
+    A column without any number is a candidate only where no other is, a silent one never.
     """
+    columns = [column for column in columns if not column.silent]
     found = {
         role: [column for column in columns if re.fullmatch(pattern, plain(column.name))]
         for role, pattern in _NAMES.items()
@@ -151,9 +152,7 @@ def resolve(
             continue
         what = f"{role!r} may be any of the columns {', '.join(map(str, candidates))}"
         if role in needed or role in MEASURED or role.startswith(PRESSURE):
-            repeated = len(set(candidates)) < len(candidates)
-            remedy = "rename the repeated column in the file" if repeated else _remedy(role)
-            raise MappingError(what, remedy, Where(file=file))
+            raise MappingError(what, _choice(role, candidates), Where(file=file))
         warnings.append(f"{what}; none is used, name one in a channel mapping")
     _refuse_shared(channels, stated, file)
     _refuse_absent(needed, channels, columns, file)
@@ -163,6 +162,19 @@ def resolve(
         warnings.append(f"no pressure of {', '.join(without)}: nothing that needs it can be told")
     return Mapped(
         {role: channels[role] for role in order if role in channels}, warnings=tuple(warnings)
+    )
+
+
+def _choice(role: str, candidates: Sequence[Column]) -> str:
+    """How to choose among the candidates of a role: by name, or by group where that is one."""
+    if len(set(candidates)) < len(candidates):
+        return "rename the repeated column in the file"
+    if len({one.name for one in candidates}) > 1:
+        return _remedy(role)
+    first = candidates[0]
+    return (
+        f"choose one in a channel mapping (--channels): channels.{role} = "
+        f'{{ source = "{first.name}", group = "{first.group}" }}'
     )
 
 
@@ -185,9 +197,11 @@ def _refuse_absent(
         if role in needed and role not in channels and STAND_INS.get(role) not in channels
     ]
     if absent:
+        silent = ", ".join(dict.fromkeys(column.name for column in columns if column.silent))
         raise MissingChannelError(
             f"no column for {' nor '.join(map(repr, absent))} among "
-            f"{', '.join(dict.fromkeys(column.name for column in columns))}",
+            f"{', '.join(dict.fromkeys(one.name for one in columns if not one.silent))}"
+            + (f"; without a value throughout: {silent}" if silent else ""),
             _remedy(absent[0]),
             Where(file=file),
         )

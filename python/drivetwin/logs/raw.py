@@ -26,14 +26,15 @@ class Column:
     """A column of a file by name, unit as written (None: none) and group.
 
     The group is what tells equal names apart: raster of a measurement file, message and sender on a
-    bus; blank where the format has none. `empty`: it holds too few numbers
-    for any role.
+    bus; blank where the format has none. `empty`: it holds too few numbers for any role. `silent`:
+    its sender says throughout that there is no value; it is no candidate for any role.
     """
 
     name: str
     unit: str | None = None
     group: str = ""
     empty: bool = False
+    silent: bool = False
 
     def __str__(self) -> str:
         return f"{self.name} ({self.group})" if self.group else self.name

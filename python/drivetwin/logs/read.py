@@ -8,7 +8,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin.errors import DamagedChannelError, Where
+from drivetwin.errors import (
+    DamagedChannelError,
+    PlausibilityError,
+    TimeError,
+    UnitError,
+    Where,
+)
 from drivetwin.logs.agreement import (
     check_common_span,
     check_gearing,
@@ -21,11 +27,11 @@ from drivetwin.logs.held import find_raster
 from drivetwin.logs.mapping import ChannelSpec, Mapped, resolve
 from drivetwin.logs.profile import read_mapping
 from drivetwin.logs.raw import RawChannel, RawLog, ReadOptions, Recording, Window
-from drivetwin.logs.roles import FOR_SHIFTS, quantity_of
+from drivetwin.logs.roles import AUXILIARY, FOR_SHIFTS, quantity_of
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.logs.torque_delay import torque_warnings
 from drivetwin.logs.units import channel_unit, lookup
-from drivetwin.logs.validate import check_channel
+from drivetwin.logs.validate import Checked, check_channel
 from drivetwin.progress import tell
 from drivetwin.vehicle.card import VehicleCard
 
@@ -44,7 +50,8 @@ def read_log(
     speed); what else there is comes along. Only mapped columns are read, in a `window` (first and
     last time of the file [s], before any time_shift) only the samples inside.
 
-    What is damaged is left out and listed in `warnings`; nothing is replaced. Raises
+    What is damaged is left out and listed in `warnings`, also a pedal, gear or flag as a whole that
+    nobody asked for; nothing is replaced. Raises
     FileFormatError, MissingExtraError, MissingChannelError, MappingError, UnitError, TimeError,
     DamagedChannelError, PlausibilityError; each says what to do.
     """
@@ -57,12 +64,14 @@ def read_log(
         warnings = [*recording.warnings, *mapped.warnings]
         for count, (role, spec) in enumerate(mapped.channels.items()):
             tell(count / len(mapped.channels))
-            raw = _load(recording, spec, window)
-            warnings += [f"channel {raw.name!r}: {note}" for note in raw.notes]
-            warnings += _asserted(spec, raw)
-            checked = check_channel(_channel(role, spec, raw, str(path)), str(path))
-            held = find_raster(checked.channel) is not None
-            channels[role] = replace(checked.channel, held=held)
+            try:
+                checked = _checked(role, spec, _load(recording, spec, window), str(path))
+            except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
+                if role in specs or quantity_of(role) not in AUXILIARY:
+                    raise
+                warnings.append(f"channel {spec.source!r}: {fault.what}; left out")
+                continue
+            channels[role] = checked.channel
             warnings += checked.warnings
     check_common_span(channels, str(path))
     check_gearing(channels, card, str(path))
@@ -109,6 +118,15 @@ def _channel(role: str, spec: ChannelSpec, source: RawChannel, file: str) -> Cha
         source_name=source.name,
         source_unit=unit_text or "",
     )
+
+
+def _checked(role: str, spec: ChannelSpec, raw: RawChannel, file: str) -> Checked:
+    """The channel of a role, fit for use, and what is to be said of it."""
+    notes = [f"channel {raw.name!r}: {note}" for note in raw.notes]
+    found = check_channel(_channel(role, spec, raw, file), file)
+    held = find_raster(found.channel) is not None
+    warnings = (*notes, *_asserted(spec, raw), *found.warnings)
+    return Checked(replace(found.channel, held=held), warnings)
 
 
 def _asserted(spec: ChannelSpec, raw: RawChannel) -> list[str]:

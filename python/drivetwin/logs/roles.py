@@ -31,6 +31,9 @@ FOR_SHIFTS = ("input_speed", "output_speed")
 STAND_INS = {"input_speed": "engine_speed", "output_speed": "wheel_speed"}
 """Roles that another may replace, for finding shifts."""
 
+AUXILIARY = frozenset((Quantity.FRACTION, Quantity.STATE))
+"""Quantities that help where they are there: pedal, gear, flags. No result needs them."""
+
 MEASURED = frozenset(role for role in ROLES if ROLES[role] in (Quantity.TORQUE, Quantity.SPEED))
 """Roles for which two candidate columns are an error even where the role is not needed."""
 

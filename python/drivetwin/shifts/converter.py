@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.errors import IdentificationError, Where
+from drivetwin.logs.damage import runs
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.flags import set_spans
 from drivetwin.shifts.shift import Shift
@@ -94,7 +95,10 @@ def _flagged(log: ShiftLog, card: VehicleCard, flag: Channel, span: Span) -> Loc
 
 
 def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
-    """Closings that the speeds show: the slip, averaged over _HOLD/3, comes to rest for _HOLD."""
+    """Closings that the speeds show: the slip, averaged over _HOLD/3, comes to rest for _HOLD.
+
+    It has to be there for as long before.
+    """
     start, end = max(engine.time[0], inlet.time[0]), min(engine.time[-1], inlet.time[-1])
     time = np.arange(start, end, _STEP)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -103,10 +107,13 @@ def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
     if time.size < 4 * width:
         return ()
     mean = np.convolve(np.where(np.isfinite(slip), slip, 1.0), np.ones(width) / width, "same")
-    closed = np.concatenate([[False], np.abs(mean) < CLOSED, [False]]).astype(np.int8)
-    edges = np.flatnonzero(np.diff(closed))
+    closed = np.abs(mean) < CLOSED
+    for first, stop in runs(~closed):
+        # A late engine speed looks like slip while a shift changes the speeds.
+        if first > 0 and (stop - first) * _STEP < _HOLD:
+            closed[first:stop] = True
     return tuple(
         LockUp(float(time[first]), _HOLD / 6.0, float(time[stop - 1]))
-        for first, stop in zip(edges[::2], edges[1::2], strict=True)
+        for first, stop in runs(closed)
         if (stop - first) * _STEP >= _HOLD and first > width
     )

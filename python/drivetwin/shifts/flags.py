@@ -43,12 +43,22 @@ def checked(
     if "shift_in_process" not in log:
         return told, tuple(rejected)
     seen = [(s.torque_phase[0], s.lockup_time) for s in shifts] + [r.time for r in rejected]
+    flag = log["shift_in_process"]
     empty = [
-        RejectedShift(span, "the shift flag is set, but the speeds show no change of gear")
-        for span in set_spans(log["shift_in_process"])
+        RejectedShift(span, _unseen(flag, span))
+        for span in set_spans(flag)
         if not any(low <= span[1] and high >= span[0] for low, high in seen)
     ]
     return told, (*rejected, *empty)
+
+
+def _unseen(flag: Channel, span: Span) -> str:
+    """Why a flag that is set over `span` [s] has no shift."""
+    if span[0] <= flag.time[0]:
+        return "the shift flag is set where the recording begins: the shift is not all in it"
+    if span[1] >= flag.time[-1]:
+        return "the shift flag is set where the recording ends: the shift is not all in it"
+    return "the shift flag is set, but the speeds show no change of gear"
 
 
 def _contradictions(log: ShiftLog, shift: Shift) -> list[str]:

@@ -17,7 +17,7 @@ from drivetwin.logs.can.frames import Frames
 from drivetwin.logs.j1939 import torque
 from drivetwin.logs.j1939.codes import check_codes
 from drivetwin.logs.j1939.identifier import group_of, sender_of
-from drivetwin.logs.j1939.transport import Assembled, reassemble
+from drivetwin.logs.j1939.transport import REPEATED, Assembled, reassemble
 from drivetwin.logs.raw import BusOptions, Column, RawChannel, Window
 from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.validate import MIN_SAMPLES
@@ -89,9 +89,9 @@ class BusRecording:
             if check.note:
                 notes.append(check.note)
             there[there] = check.valid
-        again = np.concatenate(([False], np.diff(track.time) <= 0.0)) & there
+        again = _again(track) & there
         if again.any():
-            notes.append(f"{int(again.sum())} frames with a repeated or earlier stamp left out")
+            notes.append(f"{int(again.sum())} repeated frames, or with an earlier stamp, left out")
             there &= ~again
         if not there.any():
             raise DamagedChannelError(
@@ -173,10 +173,18 @@ class BusRecording:
 def _marked(entry: _Entry) -> Column:
     """The column, marked where a sender never fills the signal, or hardly ever speaks."""
     try:
-        few = entry.decode().time.size < MIN_SAMPLES
+        return replace(entry.column, empty=entry.decode().time.size < MIN_SAMPLES)
     except DamagedChannelError:
-        few = True
-    return replace(entry.column, empty=few)
+        return replace(entry.column, empty=True, silent=True)
+
+
+def _again(track: Track) -> NDArray[np.bool_]:
+    """Frames (n,) that do not come after the one before, or of J1939 repeat it at once."""
+    later = np.diff(track.time)
+    again = later <= 0.0
+    if track.message.j1939:
+        again |= (later < REPEATED) & np.all(track.data[1:] == track.data[:-1], axis=1)
+    return np.concatenate(([False], again))
 
 
 def _sender(track: Track) -> str:

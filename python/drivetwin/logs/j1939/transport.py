@@ -21,6 +21,9 @@ _RTS, _BAM, _ABORT = 16, 32, 255
 _TIMEOUT = 1.25
 """Longest pause [s] between packets (T2 of J1939-21); a transfer that pauses longer has ended."""
 
+REPEATED = 1e-3
+"""An equal frame of one sender within this time [s] is the same frame recorded twice."""
+
 _BYTES, _LONGEST = 7, 1785
 
 
@@ -50,6 +53,11 @@ class _Transfer:
     packets: int
     time: float
     parts: list[bytes] = field(default_factory=list)
+
+    def announced_again(self, group: int, length: int, time: float) -> bool:
+        """Whether this is the same announcement, told twice by a gateway or a logger."""
+        same = (self.group, self.length) == (group, length)
+        return same and not self.parts and time - self.time < REPEATED
 
 
 def reassemble(frames: Frames) -> Transport:
@@ -87,9 +95,12 @@ class _Assembly:
             return
         if payload[0] not in (_RTS, _BAM):
             return  # clear to send, end of message: the receiver's part
-        self._drop(key, "replaced by the next before its end")
         length = int.from_bytes(payload[1:3], "little")
         group = int.from_bytes(payload[5:8], "little")
+        begun = self._open.get(key)
+        if begun is not None and begun.announced_again(group, length, time):
+            return
+        self._drop(key, "replaced by the next before its end")
         if not 8 < length <= _LONGEST or payload[3] != -(-length // _BYTES):
             self._faults["announced with an impossible length"] += 1
             return
