@@ -191,7 +191,7 @@ def test_gradients_of_misfits_are_their_slopes() -> None:
     measured = simulate_batch(MODEL, [scenario()], TIME, outputs=["shaft_torque"]).values[0]
     at = {"eta": np.array([0.85 * 1.01]), "k_o": np.array([1.8e5])}
     found = batch_sensitivities(
-        MODEL, [scenario()], TIME, at, by=["eta", "k_o"], keep=[measured[0]], threads=1
+        MODEL, [scenario()], TIME, at, by=["eta", "k_o"], keep=[measured[0]]
     )
     for place, name in enumerate(("eta", "k_o")):
         step = 1e-5 * at[name][0]

@@ -119,12 +119,12 @@ def batch_sensitivities(
     by: Sequence[str],
     outputs: Sequence[str] = ("shaft_torque",),
     keep: Keep | Sequence[FloatArray] = Keep.COLUMNS,
-    threads: int = 0,
 ) -> BatchSensitivities:
     """The runs of `simulate_batch` with exact derivatives of what is kept.
 
     `by` names what to differentiate by, at least one, as in `driveline.sensitivities` (delays
-    included); with measured columns to keep these are the gradients of the misfits.
+    included); with measured columns to keep these are the gradients of the misfits. Takes all
+    cores.
     Raises InputError as `simulate_batch`.
     """
     if not by:
@@ -137,7 +137,7 @@ def batch_sensitivities(
             asked.sets,
             (asked.time, list(by)),
             asked.wanted,
-            (asked.outputs, threads),
+            (asked.outputs, 0),
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error

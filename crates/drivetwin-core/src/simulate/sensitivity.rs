@@ -120,13 +120,16 @@ fn differentiated(
     Ok(simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?)
 }
 
+/// Model, start and delays [s].
+pub(super) type Variables = (DualClutch<Derived>, DualClutchStart<Derived>, Vec<Derived>);
+
 /// Model, start and delays with the named parameters as variables, at most [`LANES`].
 pub(super) fn variables(
     model: &DualClutch<f64>,
     signals: &[Sampled<'_>],
     start: &DualClutchStart<f64>,
     parameters: &[&str],
-) -> Result<(DualClutch<Derived>, DualClutchStart<Derived>, Vec<Derived>), SensitivityError> {
+) -> Result<Variables, SensitivityError> {
     let mut model = model.lifted::<Derived>();
     let mut start = start.lifted::<Derived>();
     let mut delays: Vec<Derived> = signals.iter().map(|s| Derived::of(s.3)).collect();
