@@ -7,11 +7,12 @@ import shutil
 import sqlite3
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 
 from drivetwin.errors import StoreError
 from drivetwin.fleet import parts
-from drivetwin.fleet.rows import Row, RowKind
+from drivetwin.fleet.rows import Row, RowKind, schema
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import Outcome, ShiftRow, State
 from tests.fleet.toys import contents, make_logs, run_toys
@@ -72,6 +73,12 @@ def test_a_part_that_is_none_is_not_taken_for_one(tmp_path: Path, content: bytes
     (tmp_path / "x.parquet").write_bytes(content)
     assert parts.read_outcome(tmp_path / "x.parquet") is None
     with pytest.raises(StoreError, match="a part cannot be read"):
+        parts.read_rows(tmp_path / "x.parquet")
+
+
+def test_a_table_of_other_columns_is_no_part(tmp_path: Path) -> None:
+    pq.write_table(schema().empty_table().drop(["free_std"]), tmp_path / "x.parquet")
+    with pytest.raises(StoreError, match="columns"):
         parts.read_rows(tmp_path / "x.parquet")
 
 

@@ -57,18 +57,24 @@ def read_outcome(path: Path) -> Outcome | None:
 def read_rows(path: Path, kinds: Sequence[RowKind] = ()) -> Any:
     """Arrow table of a part's rows of these kinds, or all. Raises StoreError where damaged."""
     import pyarrow as pa
+    import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
     try:
-        wanted = [("kind", "in", [kind.value for kind in kinds])] if kinds else None
-        rows = pq.read_table(path, schema=schema(), partitioning=None, filters=wanted)
-        return rows.replace_schema_metadata()
+        # Not read_table, which brings the whole of Arrow's data sets along for one small file.
+        with pq.ParquetFile(path) as file:
+            rows = file.read(use_threads=False).replace_schema_metadata()
+        if rows.schema != schema():
+            raise pa.ArrowInvalid("its columns are not those of a part")
     except (OSError, pa.ArrowException) as fault:
         raise StoreError(
             f"a part cannot be read: {str(fault).splitlines()[0]}",
             "remove the file and run `drivetwin fleet` again: its logs are then done anew",
             Where(file=str(path)),
         ) from None
+    if not kinds:
+        return rows
+    return rows.filter(pc.is_in(rows.column("kind"), pa.array([kind.value for kind in kinds])))
 
 
 def prefixes(count: int) -> list[str]:
@@ -93,21 +99,23 @@ def merge(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path
     digest = hashlib.sha256("\n".join(logs).encode()).hexdigest()[:16]
     name = f"{ROWS}/{prefix or 'all'}-{digest}.parquet"
     if not (folder / name).is_file():
-        wanted = pa.array(logs, pa.string())
-        whole = pa.concat_tables(list(_picked(sources, wanted)))
-        order = pa.compute.sort_indices(whole.column("log"))
-        write_bytes(folder / name, _bytes(whole.take(order)))
+        found = {log: rows for source in sources for log, rows in _by_log(read_rows(source))}
+        ordered = [found[log] for log in logs if log in found]
+        whole = pa.concat_tables([schema().empty_table(), *ordered])
+        write_bytes(folder / name, _bytes(whole.combine_chunks()))
         sync_folder(folder / ROWS)
     return name
 
 
-def _picked(sources: Sequence[Path], wanted: Any) -> Iterator[Any]:
+def _by_log(rows: Any) -> Iterator[tuple[str, Any]]:
+    """The rows of each log of a part, where they stand together, without a copy."""
     import pyarrow.compute as pc
 
-    yield schema().empty_table()
-    for source in sources:
-        rows = read_rows(source)
-        yield rows.filter(pc.is_in(rows.column("log"), wanted))
+    runs = pc.run_end_encode(rows.column("log").combine_chunks())
+    start = 0
+    for log, end in zip(runs.values.to_pylist(), runs.run_ends.to_pylist(), strict=True):
+        yield log, rows.slice(start, end - start)
+        start = end
 
 
 def _bytes(whole: Any) -> bytes:

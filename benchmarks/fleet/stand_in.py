@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""Functions that take the place of identification where the fleet itself is measured."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from time import process_time
+
+from benchmarks.fleet.made import make_fleet
+from drivetwin.fleet.identify import identify_log
+from drivetwin.fleet.rows import Found, Row, RowKind
+from drivetwin.fleet.task import Recipe, Task
+
+CLOCK = "processor_time"
+"""Name of the row with the processor time [s] that identifying a log took."""
+_MODEL = ".model.csv"
+"""The one real log; a file whose name begins with a dot is no log of the fleet."""
+
+
+def timed(task: Task) -> Found:
+    """Identify a log, and say how much processor time that took."""
+    start = process_time()
+    found = identify_log(task)
+    row = Row(RowKind.QUALITY, CLOCK, process_time() - start, shift=0)
+    return Found([*found.rows, row], found.shifts)
+
+
+def real_rows(task: Task) -> Found:
+    """What a real log leaves, identified once in each worker; the numbers differ by file."""
+    number = int(Path(task.path).read_text())
+    model = _model(task.recipe)
+    rows = [
+        row if row.value is None else replace(row, value=row.value * (1.0 + 1e-6 * number))
+        for row in model.rows
+    ]
+    return Found(rows, model.shifts)
+
+
+@cache
+def _model(recipe: Recipe) -> Found:
+    path = Path(recipe.vehicle).with_name(_MODEL)
+    content = hashlib.sha256(path.read_bytes()).hexdigest()
+    return identify_log(Task("", str(path), content, recipe, ""))
+
+
+def make_healthy_logs(folder: Path, count: int) -> None:
+    """`count` made logs without those that are damaged on purpose, with rules and card."""
+    for made in make_fleet(folder, count):
+        if made.damage:
+            (folder / made.path).unlink()
+
+
+def make_small_files(folder: Path, count: int) -> None:
+    """`count` files that are all different, in folders of 500, with the model's rules and card."""
+    make_fleet(folder, 1)
+    shutil.move(next(folder.glob("unit_*/*.csv")), folder / _MODEL)
+    for number in range(count):
+        place = folder / f"unit_{number // 500:03d}"
+        place.mkdir(exist_ok=True)
+        (place / f"log_{number:06d}_at_{number % 200}_Mm.csv").write_text(f"{number}\n")
