@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: MIT
+"""The report of several logs with a prediction."""
+
+from __future__ import annotations
+
+import re
+
+from drivetwin.report.together import render_together
+from tests.identify.several.made import loaded, together
+
+
+def test_the_page_shows_logs_predictions_and_every_shift_once() -> None:
+    made = together()
+    page = render_together(made.found, made.fitted)
+    anchors = re.findall(r'<section id="([^"]+)"', page)
+    assert len(anchors) == len(set(anchors))
+    assert anchors[:3] == ["trust", "logs", "held-out"]
+    assert {"shift-1", "shift-2", "validation-1", "validation-2"} <= set(anchors)
+    assert "as noise allows" in page
+    assert "log 1 alone" in page
+    assert page == render_together(made.found, made.fitted)
+
+
+def test_a_disagreement_stands_on_the_first_page() -> None:
+    made = loaded()
+    page = render_together(made.found, made.fitted)
+    first = page.partition('<section id="logs"')[0]
+    assert "the logs do not agree on what they share" in first
+    assert "standard deviations off the others" in first

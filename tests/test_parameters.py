@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+"""Ids of parameters: what is declared, and the number of a log in one."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivetwin.errors import InputError
+from drivetwin.parameters import log_of, spec_of
+
+
+@pytest.mark.parametrize(
+    ("name", "plain", "number"),
+    [
+        ("te_delay", "te_delay", 0),
+        ("te_delay.2", "te_delay", 2),
+        ("Tv_over_if.12", "Tv_over_if", 12),
+        ("Tv_over_if.1_over_eta", "Tv_over_if_over_eta", 1),
+        ("P0.2", "P0.2", 0),
+        ("J_prime_2", "J_prime_2", 0),
+    ],
+)
+def test_the_number_of_a_log_is_taken_off(name: str, plain: str, number: int) -> None:
+    assert log_of(name) == (plain, number)
+    assert spec_of(name).stem == spec_of(plain).stem
+
+
+@pytest.mark.parametrize("name", ["eta.1", "k_o.2", "nonsense"])
+def test_what_logs_share_takes_no_number(name: str) -> None:
+    with pytest.raises(InputError):
+        spec_of(name)
