@@ -47,12 +47,20 @@ _ENGINE = "mot|motor|eng|engine|verbrennungsmotor|vm"
 _TORQUE = "m|md|mom|moment|t|tq|trq|torque|drehmoment"
 _SPEED = "n|w|om|omega|spd|speed|drehzahl|drz|rpm"
 _INPUT = (
-    "inputshaft|in|inp|input|ein|eing|eingang|eingangs|getrein|gearboxin|turb|turbine|trnsinp|"
-    "transinput"
+    "inputshaft|inshaft|in|inp|input|ein|eing|eingang|eingangs|getrein|gearboxin|trb|turb|turbine|"
+    "turbinen|trnsinp|transinput"
 )
-_OUTPUT = "out|outp|output|ab|abtr|abtrieb|abtriebs|aus|ausgang|ausgangs|outshaft|outputshaft"
+_OUTPUT = (
+    "out|outp|output|ab|abtr|abtrieb|abtriebs|aus|ausgang|ausgangs|outshaft|outputshaft|"
+    "abtriebswelle|kard|kardan|cardan|prop|propshaft|gelenkwelle|gelenkwellen|tailshaft"
+)
 _GEARBOX = "(getr|getriebe|gbx|gearbox|trans|transmission|at)?"
-_WHEEL = "whl|wheel|wheels|rad|raeder|rd"
+_WHEEL = (
+    "whl|wheel|wheels|rad|raeder|rd|hinterrad|antriebsrad|drivenwheel|drivenwheels|rearwheel|"
+    "rearwheels|rearaxle"
+)
+_BESIDE = "(can|bus|xcp|ecu|tcu|mess|meas)*"
+_AFTER = "(ist|act|actual|can|bus|xcp|mess|meas|value|val|mean|avg|mittel|ha|rear|nm|rpm|bar)*"
 _STATE = "(ist|act|actual|mess|meas|val|c|avg|mw)*"
 
 
@@ -64,21 +72,22 @@ _NAMES: dict[str, str] = {
     "engine_torque": f"{_either_order(_ENGINE, _TORQUE)}|te|me|engnettorque",
     "output_torque": f"{_either_order(_OUTPUT, _TORQUE)}|to",
     "input_speed": _either_order(_INPUT, _SPEED),
-    "engine_speed": f"{_either_order(_ENGINE, _SPEED)}|we|ne",
+    "engine_speed": f"{_either_order(_ENGINE, _SPEED)}|we|ne|omegae",
     "output_speed": _either_order(_OUTPUT, _SPEED),
     "wheel_speed": f"{_either_order(_WHEEL, _SPEED)}|ww",
-    "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|pwg)((pos1?)|stellung)?" + _STATE,
-    "gear": "(trans)?(current|act|ist)?(gear|gang)" + _STATE,
+    "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|pwg)((pos1?)|stellung|wert)?" + _STATE,
+    "gear": "(trans)?(current|act|actual|ist|n)?(gear|gang)(engaged)?" + _STATE,
     "shift_in_process": "(trans|getr)?(shift|schaltung)(inprocess|active|flag|aktiv)" + _STATE,
     "lockup_engaged": "(trans)?(torqueconverter|tc|wandler)?(lockup|luc|wk)(engaged|closed|zu)?"
     + _STATE,
 }
-"""Names of each role, in the form of `plain`: without case, separators, umlauts."""
+"""Names of each role, in the form of `plain`: without case, separators, umlauts. Where no column
+has one, names with a source before them or more words after them count."""
 
 _PRESSURE_WORD = "p|prs|pres|press|pressure|druck"
 _KIND_WORD = {
-    "brake": "b|br|brk|brake|bremse",
-    "clutch": "c|k|cl|clu|clutch|kup|kuppl|kupplung",
+    "brake": "b|br|brk|brake|bremse|brems",
+    "clutch": "c|k|cl|clu|clt|clutch|kup|kuppl|kupplung|kupplungs",
 }
 
 
@@ -97,7 +106,7 @@ def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, l
     """
     columns = [column for column in columns if not column.silent]
     found = {
-        role: [column for column in columns if re.fullmatch(pattern, plain(column.name))]
+        role: _first(columns, (pattern, f"{_BESIDE}({pattern}){_AFTER}"))
         for role, pattern in _NAMES.items()
     }
     for element, kind in elements.items():
@@ -105,8 +114,21 @@ def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, l
     return {role: _with_numbers(candidates) for role, candidates in found.items() if candidates}
 
 
+def _first(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
+    """Columns whose name has the first of the `forms` that any has."""
+    for form in forms:
+        if found := [column for column in columns if re.fullmatch(form, plain(column.name))]:
+            return found
+    return []
+
+
 def _with_numbers(candidates: list[Column]) -> list[Column]:
     return [column for column in candidates if not column.empty] or candidates
+
+
+def _whole(words: str) -> str:
+    """Those of the alternatives that are more than an abbreviation."""
+    return "|".join(word for word in words.split("|") if len(word) > 2)
 
 
 def _pressure_candidates(columns: Sequence[Column], element: str, kind: str) -> list[Column]:
@@ -119,11 +141,12 @@ def _pressure_candidates(columns: Sequence[Column], element: str, kind: str) -> 
         forms.append(
             f"({_PRESSURE_WORD})({numbered}){_STATE}|({numbered})({_PRESSURE_WORD}){_STATE}"
         )
+        # Compounds name kind and pressure before number or label, in whole words: no `Kp2`.
+        compound = f"({_whole(_KIND_WORD[kind])})({_whole(_PRESSURE_WORD)})"
+        forms.append(f"{compound}({label}|0*{digits}){_STATE}")
+        forms.append(f"({_PRESSURE_WORD})({_KIND_WORD[kind]})({label}){_STATE}")
         forms.append(f"({_PRESSURE_WORD})0*{digits}{_STATE}")
-    for form in forms:
-        if found := [column for column in columns if re.fullmatch(form, plain(column.name))]:
-            return found
-    return []
+    return _first(columns, forms)
 
 
 def resolve(
