@@ -100,22 +100,22 @@ def merge(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path
     name = f"{ROWS}/{prefix or 'all'}-{digest}.parquet"
     if not (folder / name).is_file():
         found = {log: rows for source in sources for log, rows in _by_log(read_rows(source))}
-        ordered = [found[log] for log in logs if log in found]
-        whole = pa.concat_tables([schema().empty_table(), *ordered])
-        write_bytes(folder / name, _bytes(whole.combine_chunks()))
+        whole = pa.Table.from_batches([found[log] for log in logs if log in found], schema())
+        write_bytes(folder / name, _bytes(whole))
         sync_folder(folder / ROWS)
     return name
 
 
 def _by_log(rows: Any) -> Iterator[tuple[str, Any]]:
-    """The rows of each log of a part, where they stand together, without a copy."""
+    """The rows of each log of a part, as a record batch without a copy; they stand together."""
     import pyarrow.compute as pc
 
-    runs = pc.run_end_encode(rows.column("log").combine_chunks())
-    start = 0
-    for log, end in zip(runs.values.to_pylist(), runs.run_ends.to_pylist(), strict=True):
-        yield log, rows.slice(start, end - start)
-        start = end
+    for batch in rows.combine_chunks().to_batches():
+        runs = pc.run_end_encode(batch.column("log"))
+        start = 0
+        for log, end in zip(runs.values.to_pylist(), runs.run_ends.to_pylist(), strict=True):
+            yield log, batch.slice(start, end - start)
+            start = end
 
 
 def _bytes(whole: Any) -> bytes:
