@@ -1,22 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""`python -m benchmarks.estimation [COUNT]`: run the studies and write docs/accuracy.md."""
+"""`python -m benchmarks.estimation`: run the studies and write docs/accuracy.md after each."""
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
 from benchmarks.estimation.bench import Knowledge
 from benchmarks.estimation.mismatch import FAULTS, shift_of
-from benchmarks.estimation.report import page
+from benchmarks.estimation.report import Page, text_of
+from benchmarks.estimation.starts import count_outcomes
 from benchmarks.estimation.study import run_study
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
-COUNT = 200
-SHARE = 10
-"""One realisation of each fault for so many of a study: a shift of the mean needs few."""
+COUNT, TRIES, FAULTY = 200, 200, 20
+"""Realisations of a case, tries of bad starts, realisations of a fault: a shift of the mean needs
+few."""
 ROUGH = Knowledge(J_out=0.1, P0=5e3)
 CASES = (
     (ScenarioName.THROTTLE_STEPS, Knowledge(), "Jo′ and P0 known"),
@@ -33,19 +35,28 @@ CASES = (
 
 def main() -> int:
     """Run all cases with as many realisations as asked for."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT
-    few = max(2, count // SHARE)
-    studies = []
-    for name, know, text in CASES:
-        studies.append((run_study(SCENARIOS[name](), know, count), text))
-        print(f"{name}, {text}: done", flush=True)
-    shifts = []
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", type=int, nargs="?", default=COUNT, help="realisations of a case")
+    parser.add_argument("--tries", type=int, default=TRIES, help="fits from bad start values")
+    parser.add_argument("--faulty", type=int, default=FAULTY, help="realisations of a fault")
+    asked = parser.parse_args()
+    made = Page()
+    for place, (name, know, text) in enumerate(CASES):
+        seeds = range(place * asked.count, (place + 1) * asked.count)
+        made = made.with_study(run_study(SCENARIOS[name](), know, seeds), text)
+        _write(made, f"{name}, {text}")
+    made = made.with_outcomes(count_outcomes(asked.tries))
+    _write(made, f"{asked.tries} bad starts")
     for fault in FAULTS:
-        shifts.append(shift_of(fault, few))
-        print(f"{fault.text}: done", flush=True)
-    PAGE.write_text(page(studies, shifts, (count, few)), encoding="utf-8")
-    print(f"wrote {PAGE.name}")
+        made = made.with_shift(shift_of(fault, asked.faulty), asked.faulty)
+        _write(made, fault.text)
     return 0
+
+
+def _write(made: Page, done: str) -> None:
+    """Bring the page up to what is done."""
+    PAGE.write_text(text_of(made), encoding="utf-8")
+    print(f"{done}: done", flush=True)
 
 
 if __name__ == "__main__":

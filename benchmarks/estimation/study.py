@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -41,28 +41,30 @@ class Sample:
 
 @dataclass(frozen=True)
 class Study:
-    """`samples[method][parameter]`, the truth and the bound by parameter, failures by method."""
+    """`samples[method][parameter]` of `count` realisations, the truth and the bound by parameter,
+    failures by method."""
 
     name: str
+    count: int
     truth: Mapping[str, float]
     bounds: Mapping[str, float]
     samples: Mapping[str, Mapping[str, list[Sample]]]
     failures: Mapping[str, int]
 
 
-def run_study(scenario: Scenario, know: Knowledge, count: int) -> Study:
-    """Fit `count` noise realisations by the linear and the likelihood method."""
+def run_study(scenario: Scenario, know: Knowledge, seeds: Sequence[int]) -> Study:
+    """Fit the noise realisations of `seeds` by the linear and the likelihood method."""
     truth = truth_of(realise(scenario, 0, know, noise=0.0))
     samples: dict[str, dict[str, list[Sample]]] = {"integral": {}, "likelihood": {}}
     failures = dict.fromkeys(samples, 0)
     with ProcessPoolExecutor() as pool:
-        for linear, best in pool.map(partial(_fits, scenario, know), range(count)):
+        for linear, best in pool.map(partial(_fits, scenario, know), seeds):
             _collect(samples["integral"], truth, linear)
             if best is None:
                 failures["likelihood"] += 1
             else:
                 _collect(samples["likelihood"], truth, best)
-    return Study(scenario.name, truth, bounds_of(scenario, know), samples, failures)
+    return Study(scenario.name, len(seeds), truth, bounds_of(scenario, know), samples, failures)
 
 
 _Told = dict[str, tuple[float, float]]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.newton import minimise
+from drivetwin.identify.likelihood.newton import Found, minimise
 from drivetwin.identify.likelihood.output_error import staged
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
@@ -33,6 +33,9 @@ RESTARTS: tuple[tuple[float, float], ...] = (
 """Factors on shaft stiffness and friction level: what a wrong minimum hangs on."""
 HOPELESS = 100.0
 """Q per sample after the stages above which the full fit is not tried."""
+DOUBTFUL = 3.0
+"""Q per sample after the stages above which every other start comes first: where the stages end
+well, input noise that they leave out makes it a little more than one."""
 PLAUSIBLE = 2.0
 """Q per sample above which a minimum is taken for a wrong one."""
 
@@ -102,6 +105,7 @@ def _attempts(
         direct = nearest(problem, start)
         yield direct
         restarts = RESTARTS if direct is None else RESTARTS[:1]
+    doubtful: list[Found] = []
     for shaft, friction in restarts:
         factor = [
             shaft if name == "k_o" else friction if name.endswith(".mu_c") else 1.0
@@ -110,8 +114,12 @@ def _attempts(
         near = staged(problem, start.moved(start.values * np.array(factor)), shifts)
         if near is None or near.normal.cost > HOPELESS * problem.size:
             yield None
+        elif near.normal.cost > DOUBTFUL * problem.size:
+            doubtful.append(near)
         else:
             yield nearest(problem, near.point)
+    for near in sorted(doubtful, key=lambda one: one.normal.cost):
+        yield nearest(problem, near.point)
 
 
 def nearest(problem: Problem, start: Point) -> LikelihoodFit | None:

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""From bad start values, without the linear method: where does the likelihood method end?"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from enum import StrEnum
+
+import numpy as np
+
+from benchmarks.estimation.bench import Bench, Knowledge, realise
+from benchmarks.estimation.study import guess_from_truth, told
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenarios import SCENARIOS
+from drivetwin.errors import IdentificationError
+from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.variants import choose
+
+OFF = 0.4
+"""Start values lie so far beside the truth, at most, drawn evenly."""
+SAME = 1.96
+"""Difference of two minima in standard deviations of a parameter below which they are one: locks
+make kinks in Q, and many small minima about P0 of the element that lets go."""
+KNOW = Knowledge(J_out=0.1, P0=5e3)
+TRIED = (ScenarioName.THROTTLE_STEPS, ScenarioName.PAPER_STEPS)
+"""Scenarios of the tries, in turn."""
+DESIGN = ("P0", "drum")
+"""Unknowns that start from the card's value, which is drawn about the truth already."""
+
+
+class Outcome(StrEnum):
+    """Where a try ended: at the minimum that is found from the truth, refused, or elsewhere."""
+
+    RIGHT = "right"
+    REFUSED = "refused"
+    WRONG = "wrong"
+
+
+def count_outcomes(count: int) -> Counter[Outcome]:
+    """Outcomes of `count` tries, each with a noise realisation and start values of its own."""
+    with ProcessPoolExecutor() as pool:
+        return Counter(pool.map(outcome_of, range(count)))
+
+
+def outcome_of(seed: int, off: float = OFF) -> Outcome:
+    """Where the fit of the realisation `seed` ends from start values up to `off` beside it."""
+    bench = realise(SCENARIOS[TRIED[seed % len(TRIED)]](), seed, KNOW)
+    truth = guess_from_truth(bench)
+    try:
+        found = _fit(bench, beside(truth, bench, seed, off))
+    except IdentificationError:
+        return Outcome.REFUSED
+    return Outcome.RIGHT if _same(found, _fit(bench, truth), bench) else Outcome.WRONG
+
+
+def beside(truth: Mapping[str, float], bench: Bench, seed: int, off: float) -> dict[str, float]:
+    """Values up to `off` (relative) beside `truth`; v_s itself is moved, not its logarithm."""
+    rng = np.random.default_rng([seed, 2])
+    card = {
+        f"{name}.{key}": getattr(coupling, key).value
+        for name, coupling in bench.driveline.couplings.items()
+        for key in DESIGN
+    }
+    moved = {}
+    for name, value in truth.items():
+        factor = 1.0 + off * float(rng.uniform(-1.0, 1.0))
+        moved[name] = value + np.log(factor) if name.endswith(".ln_v_s") else factor * value
+    return {**moved, **card}
+
+
+def _fit(bench: Bench, guess: Mapping[str, float]) -> LikelihoodFit:
+    law = bench.run.scenario.model.loss_law
+    return choose([bench.signals], [bench.driveline], law, guess)[0]
+
+
+def _same(one: LikelihoodFit, other: LikelihoodFit, bench: Bench) -> bool:
+    """Whether two fits agree in every parameter."""
+    reference = told(other, bench)
+    return all(
+        abs(value - reference[name][0]) <= SAME * reference[name][1]
+        for name, (value, _) in told(one, bench).items()
+        if reference[name][1] > 0.0
+    )
