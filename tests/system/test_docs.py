@@ -14,7 +14,7 @@ from drivetwin.vehicle.card import load_card
 
 ROOT = Path(__file__).resolve().parents[2]
 REFERENCE = ROOT / "docs" / "reference"
-PLACEHOLDER = {"gear": "_<gear>", "element": ".<element>", "": ""}
+PLACEHOLDER = {"gear": "_<gear>", "element": ".<element>", "": "", "log": ".<log>"}
 
 
 def blocks(document: Path, language: str) -> list[str]:
@@ -44,6 +44,8 @@ def test_the_documented_channel_mapping_loads(tmp_path: Path) -> None:
 
 def row(spec: ParameterSpec) -> str:
     name = f"{spec.stem}{PLACEHOLDER[spec.suffix]}"
+    if spec.suffix == "log":
+        name = f"{spec.stem}` or `{name}"
     return f"| `{name}` | {spec.symbol} | {spec.unit} | {spec.meaning} |"
 
 

@@ -90,11 +90,15 @@ def conclude(
 
 
 def low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
-    """By parameter id what a still engine torque in the lower gear costs it."""
+    """By parameter id what a still engine torque in the lower gear costs it.
+
+    A gear in which the torque moves before any of the shifts is told by that one.
+    """
     notes: dict[str, str] = {}
-    for s in signals:
-        note = _low_gear_note(s, s.shift.start_gear)
-        if note:
+    found = [(s, _low_gear_note(s, s.shift.start_gear)) for s in signals]
+    moved = {s.shift.start_gear for s, note in found if not note}
+    for s, note in found:
+        if note and s.shift.start_gear not in moved:
             notes |= {"eta": note}
             notes |= {f"J_prime_{g}": note for g in (s.shift.start_gear, s.shift.end_gear)}
     return notes
