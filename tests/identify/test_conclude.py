@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from drivetwin.identify.conclude import low_gear_notes
-from tests.identify.asked import still, stepped
+from tests.identify.asked import stepped, still
 
 
 def test_a_gear_with_still_torque_is_named() -> None:
