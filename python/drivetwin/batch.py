@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -98,7 +98,7 @@ def simulate_batch(
     asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
     try:
         kept = _native.simulate_batch(
-            as_json(asdict(model)),
+            as_json(model),
             asked.scenarios,
             asked.sets,
             asked.time,
@@ -132,7 +132,7 @@ def batch_sensitivities(
     asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
     try:
         kept, derivatives, last_lock, grazing = _native.batch_sensitivities(
-            as_json(asdict(model)),
+            as_json(model),
             asked.scenarios,
             asked.sets,
             (asked.time, list(by)),

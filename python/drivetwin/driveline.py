@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -235,7 +235,7 @@ def simulate(
     options = (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit)
     try:
         columns, events, status, energy = _native.simulate(
-            as_json(asdict(model)),
+            as_json(model),
             [(name, _array(s.time + s.delay), _array(s.values)) for name, s in signals.items()],
             _start(start),
             _array(time),
@@ -268,7 +268,7 @@ def sensitivities(
     options = (Accuracy().tolerance, list(parameters))
     try:
         columns, events, status, derivatives, event_derivatives = _native.sensitivities(
-            as_json(asdict(model)), delayed, _start(start), _array(time), options
+            as_json(model), delayed, _start(start), _array(time), options
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
@@ -313,13 +313,18 @@ def _trajectory(
 
 
 def as_json(description: object) -> str:
-    """A description as the core reads it; JSON has no NaN, so these are refused by name here."""
-    bad = [key for key, value in _leaves("", description) if not np.isfinite(value)]
-    if bad:
-        raise InputError(
-            f"not a finite number: {', '.join(bad)}", "give every parameter of the model a value"
-        )
-    return json.dumps(description)
+    """A description, of dataclasses too, as the core reads it.
+
+    JSON has no NaN, so numbers that are not finite are refused by name here: raises InputError.
+    """
+    try:
+        return json.dumps(description, default=vars, allow_nan=False)
+    except ValueError:
+        plain = json.loads(json.dumps(description, default=vars))
+    bad = [key for key, value in _leaves("", plain) if not np.isfinite(value)]
+    raise InputError(
+        f"not a finite number: {', '.join(bad)}", "give every parameter of the model a value"
+    )
 
 
 def _leaves(path: str, value: object) -> Iterator[tuple[str, float]]:

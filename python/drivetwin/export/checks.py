@@ -12,9 +12,8 @@ MAX_POINTS = 64
 
 def check_exportable(model: DualClutch, start: State) -> None:
     """Raises InputError for a model that is not two shift elements with laws that C can hold."""
-    from dataclasses import asdict
 
-    as_json(asdict(model))  # names every number that is not finite
+    as_json(model)  # names every number that is not finite
     if len(model.elements) != 2:
         raise InputError(
             f"the model has {len(model.elements)} shift elements",

@@ -88,6 +88,37 @@ impl<T: Real> Matrix<T> {
     }
 }
 
+/// The entries of a matrix that are not zero, row by row.
+#[derive(Clone, Debug)]
+pub struct SparseRows<T> {
+    /// Column and value.
+    terms: Vec<(usize, T)>,
+    /// End of each row among them.
+    ends: Vec<usize>,
+}
+
+impl<T: Real> SparseRows<T> {
+    /// Of a dense matrix.
+    pub fn of(dense: &Matrix<T>) -> Self {
+        let (mut terms, mut ends) = (Vec::with_capacity(4 * dense.rows), Vec::new());
+        for i in 0..dense.rows {
+            let row = dense.row(i).iter().copied().enumerate();
+            terms.extend(row.filter(|(_, v)| v.re() != 0.0 || !v.is_constant()));
+            ends.push(terms.len());
+        }
+        Self { terms, ends }
+    }
+
+    /// The products of all rows with a vector.
+    pub fn times<'s>(&'s self, vector: &'s [T]) -> impl Iterator<Item = T> + 's {
+        let mut start = 0;
+        self.ends.iter().map(move |&end| {
+            let row = &self.terms[std::mem::replace(&mut start, end)..end];
+            row.iter().fold(T::zero_(), |sum, &(j, value)| sum + value * vector[j])
+        })
+    }
+}
+
 impl<T> std::ops::Index<(usize, usize)> for Matrix<T> {
     type Output = T;
     fn index(&self, (i, j): (usize, usize)) -> &T {

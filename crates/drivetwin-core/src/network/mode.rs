@@ -4,7 +4,7 @@
 
 use super::compile::Network;
 use super::constraints::force_map;
-use super::linalg::{Matrix, independent_rows, least_norm, solve};
+use super::linalg::{Matrix, SparseRows, independent_rows, least_norm, solve};
 use crate::model::mechanism::{Loss, LossLaw};
 use crate::number::Real;
 use std::borrow::Cow;
@@ -73,6 +73,8 @@ pub struct Mode<T> {
     pub key: ModeKey,
     /// State derivatives, states × basis.
     pub derivative: Matrix<T>,
+    /// The same.
+    pub rates: SparseRows<T>,
     /// Rows at rest.
     pub stuck: Vec<Row>,
     /// Their torques in that order (a held gear's is its loss torque), then the torques of
@@ -168,9 +170,11 @@ impl<T: Real> Network<T> {
         let motion = self.motion_of(key)?;
         let stuck = key.rows();
         if stuck.is_empty() && self.prescribed.is_empty() {
+            let derivative = self.with_other_states(&motion.free);
             return Some(Mode {
                 key,
-                derivative: self.with_other_states(&motion.free),
+                rates: SparseRows::of(&derivative),
+                derivative,
                 stuck,
                 stuck_torque: Matrix::zeros(0, self.basis()),
                 gear_torque: OnceLock::new(),
@@ -190,9 +194,11 @@ impl<T: Real> Network<T> {
             stuck.len(),
         );
         let acceleration = difference(&motion.free, &response.times(&stuck_torque));
+        let derivative = self.with_other_states(&acceleration);
         Some(Mode {
             key,
-            derivative: self.with_other_states(&acceleration),
+            rates: SparseRows::of(&derivative),
+            derivative,
             gear_torque: OnceLock::new(),
             stuck_torque,
             stuck,

@@ -156,8 +156,8 @@ impl<T: Real> Expansion<T> {
         basis.extend(network.prescribed.iter().map(rate));
         basis.push(T::of(if k == 0 { 1.0 } else { 0.0 }));
         basis.extend(self.channels.iter().map(|channel| channel.torque[k]));
-        for (i, state) in self.states.iter_mut().enumerate() {
-            state[k + 1] = form(mode.derivative.row(i), basis) / (k + 1) as f64;
+        for (state, rate) in self.states.iter_mut().zip(mode.rates.times(basis)) {
+            state[k + 1] = rate / (k + 1) as f64;
         }
     }
 

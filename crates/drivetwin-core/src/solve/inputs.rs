@@ -127,15 +127,21 @@ impl<T: Real> Inputs<T> {
         (start, end): (f64, f64),
     ) -> Result<Self, InputError> {
         let (mut jumps, mut sines, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut checked: Option<(&[f64], f64)> = None;
         for &(name, signal) in signals {
             match signal {
                 Signal::Samples { times, values, delay } => {
                     shifts.push(delay - delay.re());
-                    let delay = delay.re();
-                    check(name, times, values, (start - delay, end - delay))?;
-                    let twice = times.windows(2).filter(|w| w[0] == w[1]);
-                    jumps.extend(twice.map(|w| w[0] + delay));
                     sines.push(None);
+                    let raster = (times, delay.re());
+                    check_values(name, times, values)?;
+                    // Most signals stand on one raster.
+                    if !is_raster(checked, raster) {
+                        check_times(name, times, (start - raster.1, end - raster.1))?;
+                        let twice = times.windows(2).filter(|w| w[0] == w[1]);
+                        jumps.extend(twice.map(|w| w[0] + raster.1));
+                        checked = Some(raster);
+                    }
                 }
                 Signal::Sine { offset, amplitude, frequency, phase } => {
                     let omega = 2.0 * std::f64::consts::PI * frequency;
@@ -145,17 +151,11 @@ impl<T: Real> Inputs<T> {
             }
         }
         let knots = merge_knots(&inner_times(signals, (start, end)), &jumps, (start, end));
-        let mut lines = Vec::with_capacity((knots.len() - 1) * signals.len());
-        let mut cursors = vec![0; signals.len()];
-        for span in knots.windows(2) {
-            for ((_, signal), cursor) in signals.iter().zip(&mut cursors) {
-                lines.push(match signal {
-                    Signal::Samples { times, values, delay } => {
-                        line(times, values, delay.re(), (span[0], span[1]), cursor)
-                    }
-                    Signal::Sine { .. } => [0.0; 2],
-                });
-            }
+        let mut lines = vec![[0.0; 2]; (knots.len() - 1) * signals.len()];
+        for (input, (_, signal)) in signals.iter().enumerate() {
+            let Signal::Samples { times, values, delay } = *signal else { continue };
+            let to = lines[input..].iter_mut().step_by(signals.len());
+            fill(to, (&knots, jumps.is_empty()), (times, values, delay.re()));
         }
         let equal = equal_lengths(&knots);
         let extremes = extremes(&knots, &lines, signals.len());
@@ -252,7 +252,9 @@ fn extremes(knots: &[f64], lines: &[[f64; 2]], inputs: usize) -> Vec<[f64; 2]> {
         for (segment, span) in stretch.chunks_exact(inputs).zip(&mut knots) {
             for ([low, high], &[start, rate]) in all[from..].iter_mut().zip(segment) {
                 let end = start + rate * (span[1] - span[0]);
-                (*low, *high) = (low.min(start.min(end)), high.max(start.max(end)));
+                let (less, more) = if start < end { (start, end) } else { (end, start) };
+                *low = if less < *low { less } else { *low };
+                *high = if more > *high { more } else { *high };
             }
         }
     }
@@ -297,26 +299,31 @@ fn sine_series<T: Real>(&(offset, amplitude, omega, phase): &Sine<T>, t: T) -> S
     })
 }
 
-fn check(
-    name: &str,
-    times: &[f64],
-    values: &[f64],
-    (start, end): (f64, f64),
-) -> Result<(), InputError> {
-    let name = name.to_owned();
+/// Whether a raster, times [s] and delay [s], is the known one.
+fn is_raster(known: Option<(&[f64], f64)>, (times, delay): (&[f64], f64)) -> bool {
+    known.is_some_and(|(others, d)| d == delay && (std::ptr::eq(others, times) || others == times))
+}
+
+fn check_values(name: &str, times: &[f64], values: &[f64]) -> Result<(), InputError> {
     if times.len() != values.len() || times.len() < 2 {
-        return Err(InputError::Length { name, times: times.len(), values: values.len() });
+        let (name, times, values) = (name.to_owned(), times.len(), values.len());
+        return Err(InputError::Length { name, times, values });
     }
+    match values.iter().position(|v| !v.is_finite()) {
+        Some(index) => Err(InputError::Value { name: name.to_owned(), index }),
+        None => Ok(()),
+    }
+}
+
+fn check_times(name: &str, times: &[f64], (start, end): (f64, f64)) -> Result<(), InputError> {
     let ordered = |i: usize| {
         times[i].is_finite()
             && (i == 0 || times[i] >= times[i - 1])
             && (i < 2 || times[i] > times[i - 2])
     };
+    let name = name.to_owned();
     if let Some(index) = (0..times.len()).find(|&i| !ordered(i)) {
         return Err(InputError::Time { name, index });
-    }
-    if let Some(index) = values.iter().position(|v| !v.is_finite()) {
-        return Err(InputError::Value { name, index });
     }
     let (from, to) = (times[0], times[times.len() - 1]);
     let slack = 1e-9 * (1.0 + to.abs());
@@ -332,8 +339,7 @@ fn inner_times<T: Real>(signals: &[(&str, Signal<'_, T>)], (start, end): (f64, f
     let mut last: Option<(&[f64], f64)> = None;
     for (_, signal) in signals {
         let Signal::Samples { times, delay, .. } = *signal else { continue };
-        // Signals on one raster, as most are, have nothing to add to the first.
-        if last == Some((times, delay.re())) {
+        if is_raster(last, (times, delay.re())) {
             continue;
         }
         last = Some((times, delay.re()));
@@ -363,6 +369,27 @@ fn merge_knots(sorted: &[f64], jumps: &[f64], (start, end): (f64, f64)) -> Vec<f
     }
     knots.push(end);
     knots
+}
+
+/// Lines of one signal over all segments; `smooth` where no knot stands twice.
+fn fill<'l>(
+    lines: impl Iterator<Item = &'l mut [f64; 2]>,
+    (knots, smooth): (&[f64], bool),
+    (times, values, delay): (&[f64], &[f64], f64),
+) {
+    let first = times.partition_point(|&t| t < knots[0]);
+    // Where the knots are samples there is nothing to search.
+    if smooth && delay == 0.0 && times.get(first..first + knots.len()) == Some(knots) {
+        let values = values[first..first + knots.len()].windows(2);
+        for (line, (span, values)) in lines.zip(knots.windows(2).zip(values)) {
+            *line = [values[0], (values[1] - values[0]) / (span[1] - span[0])];
+        }
+        return;
+    }
+    let mut cursor = 0;
+    for (to, span) in lines.zip(knots.windows(2)) {
+        *to = line(times, values, delay, (span[0], span[1]), &mut cursor);
+    }
 }
 
 /// Value at the start of a segment and rate within it. The samples' interval is found by the

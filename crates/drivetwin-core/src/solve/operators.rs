@@ -6,6 +6,7 @@
 //! channel there and its rate are linear in x, u, u', a. Channels count in their direction of motion:
 //! `τ = sign · φ` over `m = sign · s`.
 
+use super::lanes::{Task, dispatch};
 use crate::network::smooth::{Law, Line};
 use crate::network::{Mode, Network};
 use crate::number::{Lane, Real};
@@ -136,58 +137,7 @@ impl<T: Real, const N: usize> Operators<T, N> {
         (active, laws): (&[usize], &[Law<T>]),
         h: f64,
     ) -> Option<Self> {
-        let n = network.states();
-        let derivative = |i: usize, column: usize| {
-            if i < n { mode.derivative[(i, column)] } else { T::zero_() }
-        };
-        let forcing = |column: usize| -> [T; N] { std::array::from_fn(|i| derivative(i, column)) };
-        let a: Square<T, N> = std::array::from_fn(|i| {
-            std::array::from_fn(|j| if j < n { derivative(i, j) } else { T::zero_() })
-        });
-        let reach = radius(&a) * h;
-        if reach > if active.is_empty() { MAX_LINEAR } else { MAX_SLIPPING } {
-            return None;
-        }
-        let s = integrals(&a, h, terms(reach));
-        let transition = std::array::from_fn(|j| std::array::from_fn(|i| s[0][i][j]));
-        let constant = apply(&s[1], &forcing(network.one()));
-        let drive = |input: usize| {
-            let force = forcing(network.first_input() + input);
-            Drive::new(input, [apply(&s[1], &force), apply(&s[2], &force)])
-        };
-        let inputs = 0..network.mechanism.inputs.len();
-        let drives = inputs.filter(|&input| network.is_driven_by(input)).map(drive).collect();
-        let mut signs = [T::zero_(); MAX_ACTIVE];
-        signs.iter_mut().zip(laws).for_each(|(sign, law)| *sign = law.sign);
-        let forces = active
-            .iter()
-            .zip(signs)
-            .map(|(&j, sign)| forcing(network.first_channel() + j).map(|f| f * sign));
-        let moments: Vec<[[T; N]; CUBIC]> = forces.map(|force| moments(&s, &force, h)).collect();
-        // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
-        let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
-        let mut operators = Self {
-            states: n,
-            bow,
-            signs,
-            transition,
-            constant,
-            drives,
-            channels: vec![],
-            watched: vec![],
-            loads: vec![],
-        };
-        for (slot, &j) in active.iter().enumerate() {
-            let argument: [T; N] = std::array::from_fn(|i| {
-                network.channels[j].arguments[0].get(i).map_or(T::zero_(), |&c| c * signs[slot])
-            });
-            operators.carry(slot, (network, mode), (active, &moments), (argument, laws[slot]));
-        }
-        // Inner loops exist for 0, 1, 2 and 4 channels.
-        if operators.channels.len() == 3 {
-            operators.channels.push(Carried::idle());
-        }
-        Some(operators)
+        dispatch(Build { network, mode, active, laws, h })
     }
 
     /// Add a channel; `argument` is its argument over the states.
@@ -245,6 +195,76 @@ impl<T: Real, const N: usize> Operators<T, N> {
         let form = Form::over(network, (active, &self.signs), row);
         let side = T::of(if both { 1.0 } else { -1.0 });
         self.watched.push(Watched { form, limit, side, id });
+    }
+}
+
+/// [`Operators::build`], to be dispatched.
+struct Build<'b, T, const N: usize> {
+    network: &'b Network<T>,
+    mode: &'b Mode<T>,
+    active: &'b [usize],
+    laws: &'b [Law<T>],
+    h: f64,
+}
+
+impl<T: Real, const N: usize> Task for Build<'_, T, N> {
+    type Output = Option<Operators<T, N>>;
+
+    #[inline(always)]
+    fn run<const F: bool>(self) -> Option<Operators<T, N>> {
+        let Self { network, mode, active, laws, h } = self;
+        let n = network.states();
+        let derivative = |i: usize, column: usize| {
+            if i < n { mode.derivative[(i, column)] } else { T::zero_() }
+        };
+        let forcing = |column: usize| -> [T; N] { std::array::from_fn(|i| derivative(i, column)) };
+        let a: Square<T, N> = std::array::from_fn(|i| {
+            std::array::from_fn(|j| if j < n { derivative(i, j) } else { T::zero_() })
+        });
+        let reach = radius::<T, F, N>(&a) * h;
+        if reach > if active.is_empty() { MAX_LINEAR } else { MAX_SLIPPING } {
+            return None;
+        }
+        let s = integrals::<T, F, N>(&a, h, terms(reach));
+        let transition = std::array::from_fn(|j| std::array::from_fn(|i| s[0][i][j]));
+        let constant = apply(&s[1], &forcing(network.one()));
+        let drive = |input: usize| {
+            let force = forcing(network.first_input() + input);
+            Drive::new(input, [apply(&s[1], &force), apply(&s[2], &force)])
+        };
+        let inputs = 0..network.mechanism.inputs.len();
+        let drives = inputs.filter(|&input| network.is_driven_by(input)).map(drive).collect();
+        let mut signs = [T::zero_(); MAX_ACTIVE];
+        signs.iter_mut().zip(laws).for_each(|(sign, law)| *sign = law.sign);
+        let forces = active
+            .iter()
+            .zip(signs)
+            .map(|(&j, sign)| forcing(network.first_channel() + j).map(|f| f * sign));
+        let moments: Vec<[[T; N]; CUBIC]> = forces.map(|force| moments(&s, &force, h)).collect();
+        // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
+        let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
+        let mut operators = Operators {
+            states: n,
+            bow,
+            signs,
+            transition,
+            constant,
+            drives,
+            channels: vec![],
+            watched: vec![],
+            loads: vec![],
+        };
+        for (slot, &j) in active.iter().enumerate() {
+            let argument: [T; N] = std::array::from_fn(|i| {
+                network.channels[j].arguments[0].get(i).map_or(T::zero_(), |&c| c * signs[slot])
+            });
+            operators.carry(slot, (network, mode), (active, &moments), (argument, laws[slot]));
+        }
+        // Inner loops exist for 0, 1, 2 and 4 channels.
+        if operators.channels.len() == 3 {
+            operators.channels.push(Carried::idle());
+        }
+        Some(operators)
     }
 }
 
@@ -367,7 +387,8 @@ fn terms(reach: f64) -> usize {
 
 /// Estimate of the spectral radius [1/s] from `A^16`, of which a bad scaling of the states counts only
 /// by its sixteenth root.
-fn radius<T: Real, const N: usize>(a: &Square<T, N>) -> f64 {
+#[inline(always)]
+fn radius<T: Real, const F: bool, const N: usize>(a: &Square<T, N>) -> f64 {
     let mut power: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| a[i][j].re()));
     let mut scale = 0.0;
     for _ in 0..4 {
@@ -377,7 +398,7 @@ fn radius<T: Real, const N: usize>(a: &Square<T, N>) -> f64 {
         }
         scale = 2.0 * (scale + size.ln());
         let unit = power.map(|row| row.map(|v| v / size));
-        power = multiply(&unit, &unit);
+        power = multiply::<f64, F, N>(&unit, &unit);
     }
     let size = power.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
     ((scale + size.max(f64::MIN_POSITIVE).ln()) / 16.0).exp()
@@ -386,7 +407,8 @@ fn radius<T: Real, const N: usize>(a: &Square<T, N>) -> f64 {
 /// `S_k = Σ_i A^i h^(i+k) / (i+k)!` for k = 0 .. CUBIC: S_0 is the transition matrix, and
 /// `k! S_(k+1) e` the response to a force `e t^k`. The highest by its series, the lower ones by
 /// `S_(k-1) = I h^(k-1)/(k-1)! + A S_k`.
-fn integrals<T: Real, const N: usize>(
+#[inline(always)]
+fn integrals<T: Real, const F: bool, const N: usize>(
     a: &Square<T, N>,
     h: f64,
     terms: usize,
@@ -398,7 +420,7 @@ fn integrals<T: Real, const N: usize>(
     let mut sum = identity(1.0);
     for i in (1..terms).rev() {
         let weight = 1.0 / (i + CUBIC) as f64;
-        sum = multiply(&ah, &sum).map(|row| row.map(|v| v * weight));
+        sum = multiply::<T, F, N>(&ah, &sum).map(|row| row.map(|v| v * weight));
         (0..N).for_each(|d| sum[d][d] += 1.0);
     }
     let mut weights = [1.0; CUBIC + 1];
@@ -408,19 +430,22 @@ fn integrals<T: Real, const N: usize>(
     let mut all = [identity(0.0); CUBIC + 1];
     all[CUBIC] = sum.map(|row| row.map(|v| v * weights[CUBIC]));
     for k in (0..CUBIC).rev() {
-        all[k] = multiply(a, &all[k + 1]);
+        all[k] = multiply::<T, F, N>(a, &all[k + 1]);
         (0..N).for_each(|d| all[k][d][d] += weights[k]);
     }
     all
 }
 
 #[inline(always)]
-fn multiply<T: Real, const N: usize>(a: &Square<T, N>, b: &Square<T, N>) -> Square<T, N> {
+fn multiply<T: Real, const F: bool, const N: usize>(
+    a: &Square<T, N>,
+    b: &Square<T, N>,
+) -> Square<T, N> {
     let mut out = [[T::zero_(); N]; N];
     for i in 0..N {
         for k in 0..N {
             for j in 0..N {
-                out[i][j] += a[i][k] * b[k][j];
+                out[i][j] = a[i][k].fma::<F>(b[k][j], out[i][j]);
             }
         }
     }
