@@ -32,7 +32,7 @@ from drivetwin.identify.several.fit import Several
 from drivetwin.parameters import log_of
 from drivetwin.shifts.usable import usable_shifts
 from drivetwin.together import Source, Together, identify_together
-from drivetwin.vehicle.spec import Prior, VehicleCard
+from drivetwin.vehicle.spec import PriorValue, VehicleCard
 
 COUNT = 40
 LEVEL, LOAD = 0.85, 2000.0
@@ -79,7 +79,7 @@ def _known(card: VehicleCard, made: Scenario, seed: int) -> VehicleCard:
     """The card with a design value of Jo′ that errs as its standard deviation says."""
     std = J_OUT_SPREAD * made.model.J_out
     value = made.model.J_out + std * float(np.random.default_rng(seed).standard_normal())
-    return replace(card, J_out=Prior(value, std))
+    return replace(card, J_out=PriorValue(value, std))
 
 
 def _truth(made: Scenario) -> dict[str, float]:

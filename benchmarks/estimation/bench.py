@@ -11,8 +11,9 @@ from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.identify.inputs import sampled
 from drivetwin.identify.noise import resolution
-from drivetwin.identify.signals import Coupling, Driveline, PriorValue, ShiftSignals
+from drivetwin.identify.signals import Coupling, Driveline, ShiftSignals
 from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.vehicle.spec import PriorValue
 
 SHIFT_SIGMA = {"torque_start": 0.01, "inertia_start": 0.001, "lockup": 0.0005}
 """What shift detection states of its instants on such logs [s]."""

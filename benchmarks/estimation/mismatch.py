@@ -18,7 +18,7 @@ from drivetwin.dyno.scenarios import gearbox, throttle_steps
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.integral import identify_shift
-from drivetwin.identify.signals import PriorValue
+from drivetwin.vehicle.spec import PriorValue
 
 SHOWN = ("eta", "J_prime_2", "J_out", "Tv_over_if", "J_vehicle", "k_o", "c_o", "mu at 30 rad/s")
 KNOW = Knowledge(J_out=0.1)

@@ -24,7 +24,8 @@ from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import LAW, Point
 from drivetwin.identify.likelihood.variants import choose
-from drivetwin.identify.signals import FloatArray, PriorValue
+from drivetwin.identify.signals import FloatArray
+from drivetwin.vehicle.spec import PriorValue
 
 SLIPS = (10.0, 30.0, 50.0)
 """Slips [rad/s] at which the friction coefficient is compared."""

@@ -31,7 +31,7 @@ from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.shift import Shift
 from drivetwin.shown import Shown
-from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, Prior, VehicleCard
+from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue, VehicleCard
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class TwinElement:
 
     def spec(self, name: str) -> ElementSpec:
         """The same as on a vehicle card, all of it taken as known."""
-        P0, drum = Prior(self.P0), Prior(self.drum_inertia)
+        P0, drum = PriorValue(self.P0), PriorValue(self.drum_inertia)
         return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
 
 

@@ -20,7 +20,7 @@ from drivetwin.shifts.shift import Shift
 from drivetwin.shown import Shown
 from drivetwin.start_state import calm_moment, start_state
 from drivetwin.twin import Twin
-from drivetwin.vehicle.spec import Prior
+from drivetwin.vehicle.spec import PriorValue
 
 SIGNALS = ("output_torque", "input_speed", "output_speed")
 _GRID = 1e-3
@@ -69,7 +69,7 @@ def validate(
     in the shift; a run that fails returns its status.
     """
     model = model or twin.dual_clutch(shift)
-    shift = recorded(log, shift, {one.name: Prior(one.P0) for one in model.elements})
+    shift = recorded(log, shift, {one.name: PriorValue(one.P0) for one in model.elements})
     return _simulated(twin, log, shift, model, _window(log, shift))
 
 

@@ -8,7 +8,7 @@ import pytest
 from drivetwin.app.locks import Lock, LockKind, card_lock, checked, lockable, locked
 from drivetwin.app.session import Session
 from drivetwin.errors import InputError
-from drivetwin.vehicle.spec import Prior
+from drivetwin.vehicle.spec import PriorValue
 
 FIXED = LockKind.FIXED
 
@@ -16,9 +16,9 @@ FIXED = LockKind.FIXED
 @pytest.mark.parametrize("name", ["eta", "k_o", "c_o", "J_vehicle", "J_prime_2", "te_delay"])
 def test_fixed_and_prior_are_known_beforehand(identified: Session, name: str) -> None:
     card = identified.work.require_card()
-    assert locked(card, {name: Lock(FIXED, 0.9)}).known == {name: Prior(0.9)}
+    assert locked(card, {name: Lock(FIXED, 0.9)}).known == {name: PriorValue(0.9)}
     prior = Lock(LockKind.PRIOR, 0.9, 0.1)
-    assert locked(card, {name: prior}).known == {name: Prior(0.9, 0.1)}
+    assert locked(card, {name: prior}).known == {name: PriorValue(0.9, 0.1)}
     assert locked(locked(card, {name: prior}), {name: Lock(LockKind.FREE)}).known == {}
 
 
@@ -27,7 +27,7 @@ def test_what_the_card_states_itself_is_replaced_there(identified: Session) -> N
     element = next(iter(card.elements))
     locks = {"J_out": Lock(FIXED, 1.1), f"P0.{element}": Lock(LockKind.PRIOR, 7e4, 1e3)}
     fresh = locked(card, locks)
-    assert fresh.J_out == Prior(1.1)
+    assert fresh.J_out == PriorValue(1.1)
     P0 = fresh.elements[element].P0
     assert (P0.value, P0.std) == (7e4, 1e3)
     free = locked(card, {"J_out": Lock(LockKind.FREE), f"P0.{element}": Lock(LockKind.FREE)})

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.fleet.free import without_prior
-from drivetwin.vehicle.spec import Prior
+from drivetwin.vehicle.spec import PriorValue
 
 
 @given(
@@ -22,7 +22,7 @@ def test_it_gives_back_what_the_log_alone_says(
     own = np.array([mu, P0])
     stds = np.array([1e-3, std])
     covariance = np.outer(stds, stds) * np.array([[1.0, correlation], [correlation, 1.0]])
-    prior = Prior(8e4, prior_std)
+    prior = PriorValue(8e4, prior_std)
     information = np.linalg.inv(covariance)
     pull = information @ own
     information[1, 1] += prior.std**-2
@@ -43,4 +43,4 @@ def test_it_gives_back_what_the_log_alone_says(
 )
 def test_where_the_log_says_nothing_nothing_is_given_back(std: float, variance: float) -> None:
     covariance = np.array([[1e-6, 0.0], [0.0, variance]])
-    assert without_prior(np.array([0.1, 8e4]), covariance, Prior(8e4, std)) is None
+    assert without_prior(np.array([0.1, 8e4]), covariance, PriorValue(8e4, std)) is None

@@ -13,15 +13,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivetwin.identify.noise import resolution, white_noise
-from drivetwin.identify.signals import (
-    Coupling,
-    Driveline,
-    FloatArray,
-    PriorValue,
-    Sampled,
-    ShiftSignals,
-)
+from drivetwin.identify.signals import Coupling, Driveline, FloatArray, Sampled, ShiftSignals
 from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.vehicle.spec import PriorValue
 
 Input = Callable[[float], float]
 

@@ -10,7 +10,8 @@ import pytest
 
 from drivetwin.identify.combine import combine
 from drivetwin.identify.integral import IntegralShift
-from drivetwin.identify.signals import FloatArray, PriorValue
+from drivetwin.identify.signals import FloatArray
+from drivetwin.vehicle.spec import PriorValue
 
 
 def _shift(ids: tuple[str, ...], values: list[float], covariance: FloatArray) -> IntegralShift:

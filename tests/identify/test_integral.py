@@ -13,8 +13,9 @@ import pytest
 from drivetwin.identify.friction import stribeck_at
 from drivetwin.identify.integral import IntegralShift, identify_shift
 from drivetwin.identify.noise import white_noise
-from drivetwin.identify.signals import PriorValue, Sampled, ShiftSignals
+from drivetwin.identify.signals import Sampled, ShiftSignals
 from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.vehicle.spec import PriorValue
 from tests.identify.synthetic import Run, Truth, run, smooth_steps, upshift
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference"

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.identify.known import with_known
-from drivetwin.identify.signals import PriorValue
+from drivetwin.vehicle.spec import PriorValue
 
 IDS = ("eta", "k_o", "c_o")
 VALUES = np.array([0.9, 1.5e5, 300.0])

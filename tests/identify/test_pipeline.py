@@ -22,7 +22,7 @@ from drivetwin.logs.read import read_log
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.shifts.find import FoundShifts, find_shifts
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.spec import Prior, SensorTolerance, VehicleCard
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance, VehicleCard
 
 ROOT = Path(__file__).parents[2]
 LOGS = ROOT.parent / "shared" / "logs"
@@ -192,7 +192,7 @@ def test_without_an_output_torque_ratios_are_told_and_absolute_values_refused() 
 
 def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> None:
     """With η on the card the absolute values are told, and η's spread is their systematic part."""
-    known = replace(card, known={"eta": Prior(0.9, 0.02)})
+    known = replace(card, known={"eta": PriorValue(0.9, 0.02)})
     driveline = driveline_of(known, found.shifts[0])
     fit, signals = found.evidence["likelihood"], found.evidence["signals"]
     told = conclude(fit, signals, [driveline], {}, {}).estimates

@@ -18,7 +18,7 @@ from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
 from drivetwin.twin import Twin
 from drivetwin.validate import SignalTrace, Validation, fit_of, phases_of
-from drivetwin.vehicle.card import ElementSpec, Gear, Prior, VehicleCard
+from drivetwin.vehicle.card import ElementSpec, Gear, PriorValue, VehicleCard
 
 TIME = np.arange(0.0, 3.0, 1e-3)
 STRIBECK = {"mu_c": 0.11, "mu_s": 0.135, "v_s": 15.0, "mu_v": 1e-4}
@@ -48,12 +48,14 @@ def card() -> VehicleCard:
         final_drive=5.38,
         gears=(Gear("2", 1.91, ("B2",)), Gear("3", 1.43, ("B3",))),
         elements={
-            "B2": ElementSpec("B2", "brake", 3.78e-2, Prior(8e4)),
-            "B3": ElementSpec("B3", "brake", 2.7e-2, Prior(8e4), drum_inertia=Prior(0.05)),
+            "B2": ElementSpec("B2", "brake", 3.78e-2, PriorValue(8e4)),
+            "B3": ElementSpec(
+                "B3", "brake", 2.7e-2, PriorValue(8e4), drum_inertia=PriorValue(0.05)
+            ),
         },
         J_prime_range=(5.0, 40.0),
         J_vehicle_range=(5000.0, 9000.0),
-        J_out=Prior(0.9, 0.09),
+        J_out=PriorValue(0.9, 0.09),
     )
 
 

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from drivetwin.logs.read import read_log
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.spec import ElementSpec, Gear, Prior, VehicleCard
+from drivetwin.vehicle.spec import ElementSpec, Gear, PriorValue, VehicleCard
 
 FloatArray = NDArray[np.float64]
 
 ROOT = Path(__file__).parents[2]
 SHARED = ROOT.parent / "shared"
 P0_MADE = 0.8e5
-_P0 = Prior(P0_MADE)
+_P0 = PriorValue(P0_MADE)
 
 
 def shared(name: str) -> Path:
@@ -33,7 +33,7 @@ def shared(name: str) -> Path:
     return path
 
 
-def make_card(ratios: Mapping[str, float], P0: Prior = _P0) -> VehicleCard:
+def make_card(ratios: Mapping[str, float], P0: PriorValue = _P0) -> VehicleCard:
     """Card whose gears are each made by a brake B<gear>, except direct drive by a clutch."""
     elements = {}
     for name, ratio in ratios.items():

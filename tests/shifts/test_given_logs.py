@@ -8,20 +8,20 @@ import pytest
 
 from drivetwin.shifts.find import find_shifts
 from drivetwin.shifts.shift import ShiftKind
-from drivetwin.vehicle.spec import Prior, VehicleCard
+from drivetwin.vehicle.spec import PriorValue, VehicleCard
 from tests.shifts.made import load_measured, load_reference, make_card
 
 _CASES = ("upshift", "drum_inertia", "weak_then_catch")
 
 
-def _card(second: float, third: float, P0: Prior) -> VehicleCard:
+def _card(second: float, third: float, P0: PriorValue) -> VehicleCard:
     return make_card({"2": second, "3": third}, P0)
 
 
 @pytest.mark.parametrize("name", _CASES)
 def test_noise_free_events(name: str) -> None:
     truth = load_reference(name)
-    (shift,), rejected = find_shifts(truth.log, _card(1.91, 1.43, Prior(0.8e5)))
+    (shift,), rejected = find_shifts(truth.log, _card(1.91, 1.43, PriorValue(0.8e5)))
     assert rejected == ()
     assert shift.lockup_time == pytest.approx(truth.lock_up, abs=5e-4)
     assert shift.inertia_phase[0] == pytest.approx(truth.break_away, abs=2e-3)
@@ -35,7 +35,7 @@ def test_lock_up_with_noise(name: str) -> None:
     errors, scores = [], []
     for seed in range(8):
         truth = load_reference(name, noise=(0.3, 0.05), seed=seed)
-        (shift,), _ = find_shifts(truth.log, _card(1.91, 1.43, Prior(0.8e5)))
+        (shift,), _ = find_shifts(truth.log, _card(1.91, 1.43, PriorValue(0.8e5)))
         errors.append(shift.lockup_time - truth.lock_up)
         scores.append(errors[-1] / shift.sigma["lockup"])
     assert np.median(np.abs(errors)) < 2e-3

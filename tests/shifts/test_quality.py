@@ -13,7 +13,7 @@ from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.shifts.find import find_shifts
 from drivetwin.shifts.quality import QUALITY_UNITS, shift_quality
 from drivetwin.shifts.shift import Shift, ShiftKind
-from drivetwin.vehicle.spec import Prior
+from drivetwin.vehicle.spec import PriorValue
 from tests.shifts.made import load_reference, make_card, make_log
 
 _CARD = make_card({"2": 2.0, "3": 1.5})
@@ -115,7 +115,7 @@ def test_friction_work_in_closed_form() -> None:
 def test_friction_work_of_the_reference(name: str) -> None:
     """Eq. 16 leaves out Jo'·ω_out': small on the work of cases without drum inertia."""
     truth = load_reference(name)
-    (shift,), _ = find_shifts(truth.log, make_card({"2": 1.91, "3": 1.43}, Prior(0.8e5)))
+    (shift,), _ = find_shifts(truth.log, make_card({"2": 1.91, "3": 1.43}, PriorValue(0.8e5)))
     time = truth.columns["time_s"]
     inside = (time >= truth.break_away) & (time <= truth.lock_up)
     power = (truth.columns["T_c3_Nm"] * truth.columns["slip_3_rad_s"])[inside]
@@ -125,7 +125,7 @@ def test_friction_work_of_the_reference(name: str) -> None:
 
 def test_every_figure_has_a_unit_and_is_reached() -> None:
     truth = load_reference("upshift")
-    (shift,), _ = find_shifts(truth.log, make_card({"2": 1.91, "3": 1.43}, Prior(0.8e5)))
+    (shift,), _ = find_shifts(truth.log, make_card({"2": 1.91, "3": 1.43}, PriorValue(0.8e5)))
     assert set(shift.quality) == set(QUALITY_UNITS)
     assert all(np.isfinite(value) for value in shift.quality.values())
 

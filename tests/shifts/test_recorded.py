@@ -14,9 +14,9 @@ from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.recorded import LEAST, OLDEST, YOUNGEST, parts_between, recorded
 from drivetwin.shifts.shift import Shift, ShiftKind
-from drivetwin.vehicle.spec import Prior
+from drivetwin.vehicle.spec import PriorValue
 
-FILLS = {"B2": Prior(8e4, 5e3), "B3": Prior(8e4, 5e3)}
+FILLS = {"B2": PriorValue(8e4, 5e3), "B3": PriorValue(8e4, 5e3)}
 SHIFT = Shift(
     start_gear="2",
     end_gear="3",

@@ -9,7 +9,7 @@ import pytest
 
 from drivetwin.errors import CardError
 from drivetwin.logs.mapping import ChannelSpec
-from drivetwin.vehicle.card import Prior, SensorTolerance, VehicleCard, card_schema, load_card
+from drivetwin.vehicle.card import PriorValue, SensorTolerance, VehicleCard, card_schema, load_card
 from tests.logs.made import CARD
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "vehicles"
@@ -42,7 +42,7 @@ def test_values_are_si_and_defaults_stand(tmp_path: Path) -> None:
     assert card.J_out is None
     element = card.elements["B2"]
     assert (element.P0.value, element.P0.std) == (0.8e5, 0.0)
-    assert (element.gain, element.peak, element.drum_inertia) == (0.03, 1.0, Prior(0.0))
+    assert (element.gain, element.peak, element.drum_inertia) == (0.03, 1.0, PriorValue(0.0))
     assert card.sensors == {}
     assert card.channels == {}
 

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 from drivetwin.errors import InputError, Where
 from drivetwin.parameters import spec_of
-from drivetwin.vehicle.spec import Prior, VehicleCard
+from drivetwin.vehicle.spec import PriorValue, VehicleCard
 
 
 class LockKind(StrEnum):
@@ -36,9 +36,9 @@ class Lock:
     value: float = 0.0
     std: float = 0.0
 
-    def prior(self) -> Prior:
+    def prior(self) -> PriorValue:
         """As a design value."""
-        return Prior(self.value, self.std if self.kind is LockKind.PRIOR else 0.0)
+        return PriorValue(self.value, self.std if self.kind is LockKind.PRIOR else 0.0)
 
 
 def lockable(parameter_id: str) -> bool:
@@ -85,7 +85,7 @@ def locked(card: VehicleCard, locks: Mapping[str, Lock]) -> VehicleCard:
             card = replace(card, J_out=None if lock.kind is LockKind.FREE else lock.prior())
         elif name.startswith("P0.") and element in card.elements:
             spec = card.elements[element]
-            free = Prior(spec.P0.value, WIDE * spec.P0.value)
+            free = PriorValue(spec.P0.value, WIDE * spec.P0.value)
             P0 = free if lock.kind is LockKind.FREE else lock.prior()
             card = replace(card, elements={**card.elements, element: replace(spec, P0=P0)})
         elif lock.kind is LockKind.FREE:
@@ -96,7 +96,7 @@ def locked(card: VehicleCard, locks: Mapping[str, Lock]) -> VehicleCard:
     return card
 
 
-def _on_card(card: VehicleCard, parameter_id: str) -> Prior | None:
+def _on_card(card: VehicleCard, parameter_id: str) -> PriorValue | None:
     if parameter_id == "J_out":
         return card.J_out
     if parameter_id.startswith("P0."):

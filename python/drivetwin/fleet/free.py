@@ -14,7 +14,7 @@ import numpy as np
 from drivetwin.identify.friction import P0, stribeck
 from drivetwin.identify.likelihood.unknowns import LAW
 from drivetwin.identify.result import FloatArray, Identification
-from drivetwin.vehicle.spec import Prior, VehicleCard
+from drivetwin.vehicle.spec import PriorValue, VehicleCard
 
 _LAW_SIZE = P0
 _LEAST = 0.02
@@ -56,7 +56,7 @@ def free_friction(
 
 
 def without_prior(
-    values: FloatArray, covariance: FloatArray, prior: Prior
+    values: FloatArray, covariance: FloatArray, prior: PriorValue
 ) -> tuple[FloatArray, FloatArray] | None:
     """Values (p,) and covariance (p, p) with the Gaussian `prior` of the last one taken out.
 

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivetwin.identify.integral import IntegralShift
-from drivetwin.identify.signals import FloatArray, PriorValue
+from drivetwin.identify.signals import FloatArray
+from drivetwin.vehicle.spec import PriorValue
 
 NUGGET = 1e-7
 """Variance, as a share of a parameter's own, by which derived parameters may leave the equation

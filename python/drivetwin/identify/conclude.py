@@ -12,8 +12,9 @@ from drivetwin.identify.combine import combine
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.known import with_known
 from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw
-from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
+from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import correlation, designed, judge, refused
+from drivetwin.vehicle.spec import PriorValue
 
 METHOD = "integral"
 PRIOR_SHARE = 0.8

@@ -8,16 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.identify.noise import resolution, white_noise
-from drivetwin.identify.signals import Coupling, Driveline, PriorValue, Sampled, ShiftSignals
+from drivetwin.identify.signals import Coupling, Driveline, Sampled, ShiftSignals
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.spec import Prior, VehicleCard
-
-
-def _prior(prior: Prior) -> PriorValue:
-    return PriorValue(prior.value, prior.std)
+from drivetwin.vehicle.spec import VehicleCard
 
 
 def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
@@ -30,17 +26,17 @@ def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
             1.0 / (card.i_in * i_c),
             i_out,
             spec.gain,
-            _prior(spec.P0),
-            _prior(spec.drum_inertia),
+            spec.P0,
+            spec.drum_inertia,
         )
     return Driveline(
         i_f=card.final_drive,
         offgoing=couplings[shift.offgoing],
         oncoming=couplings[shift.oncoming],
         couplings=couplings,
-        J_out=None if card.J_out is None else _prior(card.J_out),
+        J_out=card.J_out,
         loss_law=card.loss_law,
-        known={name: _prior(prior) for name, prior in card.known.items()},
+        known=card.known,
     )
 
 

@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from drivetwin.identify.signals import FloatArray, PriorValue
+from drivetwin.identify.signals import FloatArray
+from drivetwin.vehicle.spec import PriorValue
 
 CONTRADICTS = 4.0
 """Difference of log and known value in its standard deviations from which a warning is due."""

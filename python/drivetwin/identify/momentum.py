@@ -31,16 +31,10 @@ from drivetwin.identify.modulating import (
     windows_in,
 )
 from drivetwin.identify.regression import Fit, Prior, Term, regressors, solve, whitening
-from drivetwin.identify.signals import (
-    Driveline,
-    FloatArray,
-    PriorValue,
-    Sampled,
-    ShiftSignals,
-    Span,
-)
+from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
 from drivetwin.shifts.recorded import LEAST, parts_between
 from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import PriorValue
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 
 from drivetwin.logs.shiftlog import pauses
 from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import PriorValue
 
 FloatArray = NDArray[np.float64]
 Span = tuple[float, float]
+NO_DRUM = PriorValue(0.0)
+"""Inertia of the drum of an element that has none."""
 
 
 @dataclass(frozen=True)
@@ -44,14 +47,6 @@ class Sampled:
 
 
 @dataclass(frozen=True)
-class PriorValue:
-    """A design value and its standard deviation; `std` 0 means known."""
-
-    value: float
-    std: float = 0.0
-
-
-@dataclass(frozen=True)
 class Coupling:
     """A shift element in the dual-clutch form: slip = a·ω_e - b·ω_out (eq. 15).
 
@@ -64,7 +59,7 @@ class Coupling:
     b: float
     gain: float
     P0: PriorValue
-    drum: PriorValue = PriorValue(0.0)
+    drum: PriorValue = NO_DRUM
 
     @property
     def ratio(self) -> float:

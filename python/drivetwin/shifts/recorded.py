@@ -19,7 +19,7 @@ from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.roles import PRESSURE
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.spec import Prior
+from drivetwin.vehicle.spec import PriorValue
 
 Span = tuple[float, float]
 
@@ -57,7 +57,7 @@ class _Gap:
         return f"{self.channel.source_name!r} has no samples from {low:.3f} s to {high:.3f} s"
 
 
-def recorded(log: ShiftLog, shift: Shift, fills: Mapping[str, Prior]) -> Shift:
+def recorded(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> Shift:
     """Return `shift` with `before` and `after` cut to what its inputs were recorded for.
 
     `fills` is P0 [Pa] of both elements by name. A cut is told in the warnings of the shift. Raises
@@ -87,7 +87,7 @@ def recorded(log: ShiftLog, shift: Shift, fills: Mapping[str, Prior]) -> Shift:
     return shift
 
 
-def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, Prior]) -> list[_Gap]:
+def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[_Gap]:
     """Gaps of the inputs that matter to the shift."""
     found = []
     if "engine_torque" in log:
@@ -101,7 +101,7 @@ def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, Prior]) -> list[_Gap]
     return found
 
 
-def _decides(pressure: Channel, gap: Span, shift: Shift, fill: Prior) -> bool:
+def _decides(pressure: Channel, gap: Span, shift: Shift, fill: PriorValue) -> bool:
     """Whether an element might have begun to carry torque, or to slip, within a gap."""
     if gap[1] > shift.before[1] and gap[0] < shift.lockup_time:
         return True

@@ -13,7 +13,7 @@ from drivetwin.vehicle.schema import CardFile, SensorsTable, card_schema
 from drivetwin.vehicle.spec import (
     ElementSpec,
     Gear,
-    Prior,
+    PriorValue,
     SensorTolerance,
     VehicleCard,
     brake_ratios,
@@ -22,7 +22,7 @@ from drivetwin.vehicle.spec import (
 __all__ = [
     "ElementSpec",
     "Gear",
-    "Prior",
+    "PriorValue",
     "SensorTolerance",
     "VehicleCard",
     "brake_ratios",

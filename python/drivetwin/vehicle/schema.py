@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from drivetwin.driveline import LossLaw
 from drivetwin.logs.profile import ByRole, ChannelTable
 from drivetwin.tomlfile import StrictModel
-from drivetwin.vehicle.spec import ElementSpec, Prior, SensorTolerance
+from drivetwin.vehicle.spec import ElementSpec, PriorValue, SensorTolerance
 
 BAR = 1e5  # Pa
 RPM = math.pi / 30.0  # rad/s
@@ -23,9 +23,9 @@ class PriorTable(StrictModel):
     value: float = Field(ge=0)
     std: float = Field(default=0.0, ge=0)
 
-    def prior(self, factor: float = 1.0) -> Prior:
+    def prior(self, factor: float = 1.0) -> PriorValue:
         """Return the value in SI, `factor` being the size of the file's unit."""
-        return Prior(factor * self.value, factor * self.std)
+        return PriorValue(factor * self.value, factor * self.std)
 
 
 def _known(value: object) -> object:

@@ -15,7 +15,7 @@ ElementKind = Literal["brake", "clutch"]
 
 
 @dataclass(frozen=True)
-class Prior:
+class PriorValue:
     """A design value and its standard deviation, same unit; `std` 0: taken as known."""
 
     value: float
@@ -52,9 +52,9 @@ class ElementSpec:
     name: str
     kind: ElementKind
     gain: float
-    P0: Prior
+    P0: PriorValue
     peak: float = 1.0
-    drum_inertia: Prior = Prior(0.0)
+    drum_inertia: PriorValue = PriorValue(0.0)
     i_c: float | None = None
     i_out: float | None = None
 
@@ -86,11 +86,11 @@ class VehicleCard:
     elements: Mapping[str, ElementSpec]
     J_prime_range: tuple[float, float]
     J_vehicle_range: tuple[float, float]
-    J_out: Prior | None = None
+    J_out: PriorValue | None = None
     sensors: Mapping[str, SensorTolerance] = field(default_factory=dict)
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
     source: str = ""
-    known: Mapping[str, Prior] = field(default_factory=dict)
+    known: Mapping[str, PriorValue] = field(default_factory=dict)
 
     def gear(self, name: str) -> Gear:
         """Return the gear of this name; raises CardError if the card has none."""

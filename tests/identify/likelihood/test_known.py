@@ -14,7 +14,7 @@ from drivetwin.identify.likelihood.fit import fit
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import Point
-from drivetwin.identify.signals import PriorValue
+from drivetwin.vehicle.spec import PriorValue
 from tests.identify.likelihood.made import bench, fitted, truth_of
 
 STEP = 1e-6

@@ -10,7 +10,8 @@ import pytest
 
 from drivetwin.identify.likelihood.derived import oscillation, parameters
 from drivetwin.identify.likelihood.priors import problem_of
-from drivetwin.identify.signals import Coupling, PriorValue
+from drivetwin.identify.signals import Coupling
+from drivetwin.vehicle.spec import PriorValue
 from tests.identify.likelihood.made import bench, truth_of
 
 IDLE = Coupling("K2", 1.4, 1.4, 4.6e-2, PriorValue(8e4), PriorValue(0.2, 0.1))

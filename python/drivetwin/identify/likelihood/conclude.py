@@ -24,10 +24,10 @@ from drivetwin.identify.likelihood.residuals import residual_tests
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
 from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw, Verdict
-from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
+from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import correlation, designed, judge, refused
 from drivetwin.parameters import OVER_ETA, spec_of
-from drivetwin.vehicle.spec import SensorTolerance
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
 NO_SCALE = (
     "without an output torque sensor all torques share one unknown scale; what is told is the "

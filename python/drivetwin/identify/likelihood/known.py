@@ -14,8 +14,9 @@ import numpy as np
 from drivetwin.errors import InputError
 from drivetwin.identify.likelihood.unknowns import COMMON, Point, Tie
 from drivetwin.identify.regression import Prior
-from drivetwin.identify.signals import Driveline, FloatArray, PriorValue, ShiftSignals
+from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.parameters import OVER_ETA
+from drivetwin.vehicle.spec import PriorValue
 
 _GEAR_INERTIA = "J_prime_"
 

@@ -36,16 +36,10 @@ from drivetwin.identify.likelihood.unknowns import (
 )
 from drivetwin.identify.momentum import DELAY_STD_MAX, MomentumSettings, rounding_error
 from drivetwin.identify.regression import Prior
-from drivetwin.identify.signals import (
-    Driveline,
-    FloatArray,
-    PriorValue,
-    Sampled,
-    ShiftSignals,
-    Span,
-)
+from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
 from drivetwin.parameters import SPECS
 from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import PriorValue
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
     "te_delay": (-0.5 * LATEST, LATEST),
