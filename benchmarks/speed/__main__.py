@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.speed import c_peer, cvode_peer, general, numba_peer, reference, scipy_peer, shift
-from benchmarks.speed.batch import batches
+from benchmarks.speed.batch import batches, threads_curve
 from benchmarks.speed.core import ROOT, Example, Scenario
 from benchmarks.speed.growth import curves
 from benchmarks.speed.instructions import instruction_table
@@ -42,11 +42,12 @@ def main() -> int:
             "Many runs": batches(of, given, folder),
             "Instructions": instruction_table(of, given, example, stated, folder),
             "Growth": "Time of one run inside Rust, network ready, over the number of samples of "
-            "inputs and outputs, of states, and of clutches that slip.\n\n"
+            "inputs and outputs, of states, and of clutches that slip; and time per run in a "
+            "batch, called from Python, over threads.\n\n"
             f"![Growth of the time of a run](img/{PICTURE.name})\n",
         }
         text = page(measured, skipped, _base(measured), extra)
-        picture = svg(curves(stated, example))
+        picture = svg([*curves(stated, example), threads_curve(of, given)])
     _tell("")
     print(text)
     if options.write:
