@@ -72,20 +72,12 @@ impl<T: Real> FrictionLaw<T> {
 
     /// μ at a slip of magnitude `s` ≥ 0 [rad/s].
     pub fn at(&self, s: T) -> T {
-        self.with_slope(s)[0]
-    }
-
-    /// μ at a slip of magnitude `s` ≥ 0 [rad/s] and its slope [s/rad].
-    pub fn with_slope(&self, s: T) -> [T; 2] {
         match self {
             Self::Stribeck(law) => {
                 let stiction = (law.mu_s - law.mu_c) * (-s / law.v_s).exp();
-                [law.mu_c + stiction + law.mu_v * s, law.mu_v - stiction / law.v_s]
+                law.mu_c + stiction + law.mu_v * s
             }
-            Self::Table(table) => {
-                let (piece, _) = table.piece(table.cell(s.re()));
-                [piece.at(s), piece.slope]
-            }
+            Self::Table(table) => table.piece(table.cell(s.re())).0.at(s),
         }
     }
 

@@ -92,16 +92,6 @@ impl<T: Real> Normal<T> {
         }
     }
 
-    /// Value and rate of the normal load from those of the inputs, not cut at zero.
-    pub fn line(&self, inputs: &[[T; 2]]) -> [T; 2] {
-        match *self {
-            Self::Pressure { input, gain, p0 } => {
-                [gain * (inputs[input][0] - p0), gain * inputs[input][1]]
-            }
-            Self::Constant(normal) => [normal, T::zero_()],
-        }
-    }
-
     /// All coefficients of the normal load.
     pub fn series(&self, inputs: &[Series<T>]) -> Series<T> {
         std::array::from_fn(|k| self.term(inputs, k))
@@ -109,22 +99,6 @@ impl<T: Real> Normal<T> {
 }
 
 impl<T: Real> Channel<T> {
-    /// For smooth laws the torque φ at argument s and normal load N, and its partial derivatives:
-    /// `φ' = φ_s s' + φ_N N'`.
-    pub fn partials(&self, cell: Cell, s: T, normal: T) -> [T; 3] {
-        match (&self.law, cell) {
-            (Law::Friction { mu, .. }, Cell::Moving { sign, .. }) => {
-                let [mu, slope] = mu.with_slope(s * sign);
-                [mu * normal * sign, slope * normal, mu * sign]
-            }
-            (Law::Quadratic(coefficient), Cell::Moving { sign, .. }) => {
-                let slope = *coefficient * s * sign;
-                [slope * s, slope * 2.0, T::zero_()]
-            }
-            (law, cell) => unreachable!("cell {cell:?} of {law:?} is not smooth"),
-        }
-    }
-
     /// Whether the torque is a product of arguments: it may then start with a power of time twice as
     /// high as theirs, after terms that are all zero.
     pub fn is_product(&self) -> bool {

@@ -6,6 +6,7 @@ use super::start::{StartError, find};
 use super::trajectory::Output;
 use crate::model::mechanism::Normal;
 use crate::network::linalg::Matrix;
+use crate::network::smooth::Law;
 use crate::network::{Cell, ModeKey, Network, Row};
 
 /// An element that slips at the operating point.
@@ -112,12 +113,14 @@ fn channel_slopes(
             Normal::Constant(normal) => (normal, None),
         };
         let cell = Cell::Moving { sign, piece: piece_of(network, j, point.slip.abs()) };
-        let partials = network.channels[j].partials(cell, point.slip, normal);
+        let law = Law::of(&network.channels[j], cell).expect("friction is smooth in a cell");
+        let m = point.slip.abs();
+        let torque = law.about::<false>(m, law.stiction::<false>(m)).here(normal);
         for (entry, &c) in channels.row_mut(j).iter_mut().zip(&row.slip) {
-            *entry += partials[1] * c;
+            *entry += torque.by_argument * c;
         }
         if let Some((input, gain)) = input.filter(|_| normal > 0.0) {
-            channels[(j, network.first_input() + input)] += partials[2] * gain;
+            channels[(j, network.first_input() + input)] += sign * torque.by_normal * gain;
         }
     }
     Ok(channels)
