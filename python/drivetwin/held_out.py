@@ -18,7 +18,7 @@ from drivetwin.identify.several.predict import Bound, Expected, expected
 from drivetwin.identify.uncertainty import judge
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.parameters import OVER_ETA
-from drivetwin.shifts.converter import require_closed
+from drivetwin.shifts.converter import behind_converter, require_closed
 from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin import Twin
@@ -111,6 +111,7 @@ def _one(
     fit = found.evidence.get("likelihood")
     try:
         require_closed(log, card, shift)
+        log = behind_converter(log, card, shift)
         fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
         shift = recorded(log, shift, fills)
         told = _expected(fit, card, log, shift, number)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from drivetwin.converter import Converter
 from drivetwin.driveline import (
     DualClutch,
     FrictionTable,
@@ -68,7 +69,8 @@ class Twin(Shown):
     element; `covariance` (n, n) over `covariance_ids`, total; `validity` the ranges of slip,
     pressure, torque and speed that the log covered; `inputs` file name -> SHA-256. The design
     ranges [kg m^2] and `channels` by role are those of the vehicle card. `load_law` says how the
-    load torque grows with speed; None where it is constant.
+    load torque grows with speed; None where it is constant. `converter` is the card's map of the
+    torque converter, None where it has none.
     """
 
     name: str
@@ -91,6 +93,7 @@ class Twin(Shown):
     covariance: FloatArray | None = None
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
     load_law: LoadLaw | None = None
+    converter: Converter | None = None
 
     @classmethod
     def from_identification(cls, found: Identification, card: VehicleCard) -> Twin:
@@ -173,6 +176,7 @@ class Twin(Shown):
             J_prime_range=self.J_prime_range,
             J_vehicle_range=self.J_vehicle_range,
             channels=self.channels,
+            converter=self.converter,
         )
 
     def _load(self, Tv_over_if: float, scale: float) -> RoadLoad:

@@ -14,6 +14,7 @@ from drivetwin.identify.result import FloatArray, Identification, SignalFit
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.progress import tell
+from drivetwin.shifts.converter import behind_converter
 from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import Shift
@@ -86,6 +87,7 @@ def _simulated(
     twin: Twin, log: ShiftLog, shift: Shift, model: DualClutch, window: tuple[float, float]
 ) -> Validation:
     """Run and comparison over `window` [s]."""
+    log = behind_converter(log, twin.card(), shift)
     engine_torque = _moved(log["engine_torque"], -twin.value("te_delay", 0.0))
     pressures = {name: _signal(each) for name, each in shift_pressures(log, shift).items()}
     count = int((window[1] - window[0]) / _GRID + 1e-6)

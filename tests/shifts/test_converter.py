@@ -8,9 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.converter import Converter
 from drivetwin.errors import IdentificationError
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity, ShiftLog
-from drivetwin.shifts.converter import converter_slip, lock_ups, require_closed
+from drivetwin.shifts.converter import (
+    behind_converter,
+    converter_slip,
+    lock_ups,
+    require_closed,
+)
 from drivetwin.shifts.find import find_shifts
 from tests.shifts.made import Plan, make_card
 
@@ -84,3 +90,24 @@ def test_a_shift_with_an_open_converter_is_refused() -> None:
                 require_closed(whole, PLAN.card(), shift)
         else:
             require_closed(whole, PLAN.card(), shift)
+
+
+def test_with_a_map_the_turbine_stands_for_the_engine() -> None:
+    converter = Converter((0.0, 1.0), (0.05, 0.0), (2.0, 1.0))
+    card = replace(PLAN.card(), converter=converter)
+    (shift,), _ = find_shifts(PLAN.log(), card)
+    made = PLAN.log()
+    inlet = made["input_speed"]
+    for factor in (1.25, 1.0):
+        engine = replace(inlet, role="engine_speed", values=factor * inlet.values)
+        whole = replace(made, channels={**made.channels, "engine_speed": engine})
+        require_closed(whole, card, shift)
+        found = behind_converter(whole, card, shift)
+        if factor == 1.0:
+            assert found is whole
+            continue
+        assert "engine_speed" not in found
+        # ν = 0.8: C = 0.01, m = 1.2.
+        expected = 1.2 * 0.01 * engine.values**2
+        assert found["engine_torque"].values == pytest.approx(expected)
+        assert behind_converter(found, card, shift) is found

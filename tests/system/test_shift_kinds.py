@@ -13,12 +13,12 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.cli.synth import write_run
 from drivetwin.driveline import FrictionTable, Stribeck
-from drivetwin.dyno.dyno import run
+from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import scenario_of
 
 RATE = 400.0
-"""Hz of the logger: less than usual, so that six identifications take less time."""
+"""Hz of the logger: less than usual, so that seven identifications take less time."""
 KINDS = {
     ScenarioName.POWER_ON_DOWN: "power-on downshift",
     ScenarioName.POWER_OFF_UP: "power-off upshift",
@@ -26,6 +26,7 @@ KINDS = {
     ScenarioName.INPUT_GEAR: "power-on upshift",
     ScenarioName.DUAL_CLUTCH: "power-on upshift",
     ScenarioName.MANUAL: "power-on upshift",
+    ScenarioName.OPEN_CONVERTER: "power-on upshift",
 }
 
 
@@ -33,9 +34,7 @@ KINDS = {
 def test_truth_lies_in_the_intervals(
     name: ScenarioName, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    scenario = scenario_of(name)
-    slower = tuple(replace(s, rate=min(s.rate, RATE)) for s in scenario.sensors)
-    made = run(replace(scenario, sensors=slower), seed=0)
+    made = _slower(name, seed=0)
     log, card, truth_file = write_run(tmp_path / "log.csv", made)
     assert main(["identify", str(log), "--vehicle", str(card), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
@@ -63,3 +62,25 @@ def _holds(curve: dict[str, list[float]], law: Stribeck | FrictionTable) -> None
     truth = law.at(slip)
     assert np.mean((truth >= low) & (truth <= high)) > 0.6
     assert slip.max() > 80.0
+
+
+def test_a_twin_of_an_open_converter_is_simulated_behind_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, card, _ = write_run(tmp_path / "log.csv", _slower(ScenarioName.OPEN_CONVERTER, seed=1))
+    folder = tmp_path / "out"
+    identify = ["identify", str(log), "--vehicle", str(card)]
+    assert main([*identify, "-o", str(folder)]) == 0
+    capsys.readouterr()
+    assert main(["simulate", str(folder / "twin.toml"), str(log), "--json"]) == 0
+    (shift,) = json.loads(capsys.readouterr().out)["shifts"]
+    assert shift["fit"]["output_torque"]["all"]["fit_percent"] > 80.0
+    card.write_text(card.read_text().partition("[converter]")[0])
+    assert main([*identify, "--json"]) != 0
+    assert "converter is open" in capsys.readouterr().out
+
+
+def _slower(name: ScenarioName, seed: int) -> DynoRun:
+    scenario = scenario_of(name)
+    sensors = tuple(replace(s, rate=min(s.rate, RATE)) for s in scenario.sensors)
+    return run(replace(scenario, sensors=sensors), seed=seed)

@@ -32,6 +32,7 @@ PYTHON_LAYERS = (
             "shown",
             "parameters",
             "driveline",
+            "converter",
             "batch",
             "linear",
             "network",

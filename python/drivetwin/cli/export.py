@@ -17,7 +17,7 @@ from drivetwin.export.platforms import Platform
 from drivetwin.export.targets import Target
 
 if TYPE_CHECKING:
-    from drivetwin.drive.powertrain import Converter
+    from drivetwin.converter import Converter
     from drivetwin.export.fmu.experiment import Experiment
     from drivetwin.export.parameters.content import ParameterSet
     from drivetwin.export.subject import Subject

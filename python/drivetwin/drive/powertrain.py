@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
+from drivetwin.converter import Converter
 from drivetwin.driveline import FloatArray, RoadLoad
 from drivetwin.gearbox.spec import Capacity
 
@@ -43,25 +44,6 @@ class Engine:
         b, a = [1.0 - mean, mean - decay], [1.0, -decay]
         torque, _ = signal.lfilter(b, a, steady[1:], zi=[(mean - decay) * steady[0]])
         return np.concatenate([[0.0], torque])
-
-
-@dataclass(frozen=True)
-class Converter:
-    """Steady-state map over ν = ω_turbine/ω_pump: `capacity` [N m s^2/rad^2] and torque ratio."""
-
-    speed_ratio: tuple[float, ...]
-    capacity: tuple[float, ...]
-    torque_ratio: tuple[float, ...]
-
-    def pump_torque(self, pump: FloatArray | float, turbine: FloatArray | float) -> FloatArray:
-        """Torque that the pump takes [N m] at speeds of pump and turbine [rad/s], pump > 0."""
-        capacity = np.interp(np.divide(turbine, pump), self.speed_ratio, self.capacity)
-        return np.asarray(capacity * np.square(pump), dtype=np.float64)
-
-    def ratio(self, pump: FloatArray | float, turbine: FloatArray | float) -> FloatArray:
-        """Turbine torque over pump torque."""
-        ratio = np.interp(np.divide(turbine, pump), self.speed_ratio, self.torque_ratio)
-        return np.asarray(ratio, dtype=np.float64)
 
 
 @dataclass(frozen=True)

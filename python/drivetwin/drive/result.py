@@ -123,7 +123,7 @@ def observe(
         brake_torque=schedule.at(BRAKE, time),
         speed_ratio=turbine / crank,
         torque_ratio=torque_ratio,
-        turbine_torque=torque_ratio * converter.pump_torque(crank, turbine),
+        turbine_torque=converter.turbine_torque(crank, turbine),
         slip=slip,
         torque=torque,
         pressure={name: schedule.at(name, time) for name in elements},

@@ -215,7 +215,7 @@ class _Driver:
         else:
             converter = self.powertrain.converter
             after = (crank, turbine + swing)
-            torque = float(converter.ratio(*after) * converter.pump_torque(*after))
+            torque = float(converter.turbine_torque(*after))
         return ShiftPlan(
             reduction=reduction,
             drive=drive,

@@ -10,18 +10,18 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from drivetwin.drive.powertrain import Control, Converter, Engine, Powertrain
+from drivetwin.drive.powertrain import Control, Engine, Powertrain
 from drivetwin.driveline import RoadLoad, Stribeck
 from drivetwin.gearbox.schema import BAR, RPM
 from drivetwin.gearbox.spec import Capacity
 from drivetwin.tomlfile import StrictModel
+from drivetwin.vehicle.converter import ConverterTable, Curve
 
 AIR_DENSITY = 1.188
 """kg/m^3, as VECTO takes it."""
 GRAVITY = 9.81
 
 Positive = Annotated[float, Field(gt=0)]
-Curve = Annotated[list[float], Field(min_length=2)]
 
 
 def _increases(values: list[float]) -> bool:
@@ -69,33 +69,6 @@ class EngineTable(StrictModel):
             full=tuple(full.tolist()),
             lag=self.lag_s,
             idle=self.idle_rpm * RPM,
-        )
-
-
-class ConverterTable(StrictModel):
-    """`[converter]`: pump torque at 1000 rpm times `scale`, and torque ratio, over speed ratio."""
-
-    speed_ratio: Curve
-    torque_ratio: Curve
-    pump_torque_at_1000rpm_Nm: Curve
-    scale: Positive = 1.0
-
-    @model_validator(mode="after")
-    def _fits(self) -> ConverterTable:
-        lengths = {len(self.torque_ratio), len(self.pump_torque_at_1000rpm_Nm)}
-        if lengths != {len(self.speed_ratio)}:
-            raise ValueError("torque_ratio and pump_torque go with the points of speed_ratio")
-        if not _increases(self.speed_ratio):
-            raise ValueError("speed_ratio must increase")
-        return self
-
-    def spec(self) -> Converter:
-        """Return the map in SI."""
-        per_square = self.scale / (1000.0 * RPM) ** 2
-        return Converter(
-            speed_ratio=tuple(self.speed_ratio),
-            capacity=tuple(torque * per_square for torque in self.pump_torque_at_1000rpm_Nm),
-            torque_ratio=tuple(self.torque_ratio),
         )
 
 

@@ -69,14 +69,20 @@ def _looks(sensor: Sensor, stamps: FloatArray) -> FloatArray:
 
 
 def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[str, Signal]]:
-    """The exact motion at `time`, and the inputs behind it by role."""
+    """The exact motion at `time`, and by role what it does not hold: inputs, engine speed."""
     grid = np.arange(int(np.ceil(scenario.duration * scenario.rate)) + 1) / scenario.rate
     pressures = {
         name: Signal(grid, actuator.pressure(grid)) for name, actuator in scenario.actuators.items()
     }
     torque = Signal(grid, scenario.torque(grid))
-    run = driveline.simulate if scenario.plant is None else scenario.plant.simulate
-    trajectory = run(scenario.model, torque, pressures, scenario.start(), time)
+    given = (scenario.model, torque, pressures, scenario.start(), time)
+    speeds = {}
+    if scenario.converter is not None:
+        trajectory, crank = scenario.converter.simulate(*given)
+        speeds["engine_speed"] = Signal(time, crank)
+    else:
+        run = driveline.simulate if scenario.plant is None else scenario.plant.simulate
+        trajectory = run(*given)
     if trajectory.status != "completed":
         raise SimulationError(
             f"scenario {scenario.name!r} ended with status {trajectory.status!r}",
@@ -87,7 +93,7 @@ def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[st
         both = Signal(grid, np.asarray(total, dtype=np.float64))
         pressures = dict.fromkeys(pressures, both)
     inputs = {f"pressure.{name}": pressure for name, pressure in pressures.items()}
-    return trajectory, {"engine_torque": torque, **inputs}
+    return trajectory, {"engine_torque": torque, **inputs, **speeds}
 
 
 def _quantity(

@@ -16,6 +16,7 @@ from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.roles import PRESSURE
 from drivetwin.logs.shiftlog import Channel, FloatArray
 from drivetwin.logs.units import UNITS, lookup
+from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.schema import BAR
 from drivetwin.vehicle.spec import brake_ratios
 
@@ -91,6 +92,9 @@ def card_text(scenario: Scenario) -> str:
     card.add("gears", gears)
     card.add("elements", tomlkit.item(elements))
     card.add("inertia", tomlkit.item(inertia))
+    if scenario.converter is not None:
+        table = ConverterTable.of(scenario.converter.converter)
+        card.add("converter", tomlkit.item(table.model_dump()))
     if scenario.one_clutch:
         (column,) = (s.column for s in scenario.sensors if s.role.startswith(PRESSURE))
         roles = {gear.element: {"source": column} for gear in scenario.gears}

@@ -20,3 +20,4 @@ class ScenarioName(StrEnum):
     INPUT_GEAR = "input_gear"
     DUAL_CLUTCH = "dual_clutch"
     MANUAL = "manual"
+    OPEN_CONVERTER = "open_converter"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from drivetwin.driveline import DualClutch, ShiftElement, State
 from drivetwin.dyno.actuators import Actuator, Program
+from drivetwin.dyno.converter import OpenConverter
 from drivetwin.dyno.plant import Plant
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.errors import InputError, Where
@@ -57,6 +58,7 @@ class Scenario:
     """Shifts through `gears`, each held by one element of the model.
 
     Where there is a `plant`, the whole gearbox is simulated, and `model` is its dual-clutch form.
+    With a `converter` the model is behind it, and `engine_speed` is that of the turbine.
     `engine_speed` [rad/s] is the speed at time 0, where the start gear is in quasi-steady
     acceleration. `engine_torque` [N m] is the driver's demand, without the TCU's `reductions`.
     `rate` [Hz] is the sampling of the inputs, linear between samples. `drive_range` are plausible
@@ -78,6 +80,7 @@ class Scenario:
     rate: float = 1000.0
     plant: Plant | None = None
     one_clutch: bool = False
+    converter: OpenConverter | None = None
 
     @property
     def start_gear(self) -> str:
@@ -127,7 +130,10 @@ class Scenario:
         turning = model.load.rolling * float(np.sign(wheel_speed))
         air = model.load.aero * wheel_speed * abs(wheel_speed)
         load = (model.load.constant + turning + air) / model.i_f
-        drive = model.eta * float(self.torque(np.zeros(1))[0]) * i_g
+        torque = float(self.torque(np.zeros(1))[0])
+        if self.converter is not None:
+            _, torque = self.converter.steady(torque, self.engine_speed)
+        drive = model.eta * torque * i_g
         J4 = (model.J1 * model.eta + model.J2e) * i_g**2 + model.J_out
         J5 = model.J_v / model.i_f**2
         shaft_torque = load + J5 * (drive - load) / (J4 + J5)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from drivetwin.dyno.car_scenarios import dual_clutch, manual
+from drivetwin.dyno.converter_scenario import open_converter
 from drivetwin.dyno.dual_scenarios import paper, paper_steps, throttle_steps
 from drivetwin.dyno.gearbox_scenarios import gearbox, gearbox_chain
 from drivetwin.dyno.kind_scenarios import (
@@ -41,6 +42,7 @@ SCENARIOS: dict[ScenarioName, Callable[[], Scenario]] = {
     ScenarioName.INPUT_GEAR: input_gear,
     ScenarioName.DUAL_CLUTCH: dual_clutch,
     ScenarioName.MANUAL: manual,
+    ScenarioName.OPEN_CONVERTER: open_converter,
 }
 
 

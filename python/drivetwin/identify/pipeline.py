@@ -31,11 +31,17 @@ from drivetwin.identify.uncertainty import systematic_std
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.parameters import spec_of
 from drivetwin.progress import part
-from drivetwin.shifts.converter import require_closed
+from drivetwin.shifts.converter import behind_converter, open_slip, require_closed
 from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import RejectedShift, Shift
-from drivetwin.vehicle.spec import VehicleCard
+from drivetwin.vehicle.spec import PriorValue, VehicleCard
 
+NO_AGE = PriorValue(0.0)
+"""Age of a torque [s] that is computed from speeds."""
+BEHIND_CONVERTER = (
+    "the converter is open in the shifts: what drives the gearbox is its turbine, by the map on "
+    "the card from the speeds of engine and input; J′ is without the engine"
+)
 LOADS = {
     False: "is constant over the log",
     True: "grows with the square of the wheel speed and else is constant over the log",
@@ -74,6 +80,10 @@ def identify(
             Where(file=log.source),
         )
     usable, refused = _recorded(log, card, shifts.shifts)
+    recorded_log, log = log, behind_converter(log, card, usable[0])
+    is_open = log is not recorded_log
+    if is_open:
+        card = replace(card, known={**card.known, "te_delay": NO_AGE})
     signals = [signals_of(log, card, shift) for shift in usable]
     drivelines = [driveline_of(card, shift) for shift in usable]
     if all(s.scale_known for s in signals):
@@ -93,7 +103,10 @@ def identify(
         settings=_settings(card, method),
         evidence={**evidence, "signals": tuple(signals)},
         warnings=(*log.warnings, *found.warnings),
-        assumptions=_assumptions(card, method, found.load is not None),
+        assumptions=(
+            *((BEHIND_CONVERTER,) if is_open else ()),
+            *_assumptions(card, method, found.load is not None),
+        ),
         correlation_ids=found.correlation_ids,
         correlation=found.correlation,
         load=found.load,
@@ -105,8 +118,9 @@ def _recorded(
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
     """The shifts that can be used, cut to where their inputs were recorded, and those refused.
 
-    Refused for a gap or an open converter; where none is left, the last refusal is raised
-    (DamagedChannelError, IdentificationError).
+    Refused for a gap, for an open converter without a map, and for one with a map where other
+    shifts of the log have it closed: the inertia on the engine's side is another. Where none is
+    left, the last refusal is raised (DamagedChannelError, IdentificationError).
     """
     usable: list[Shift] = []
     refused: list[RejectedShift] = []
@@ -120,7 +134,15 @@ def _recorded(
                 raise
             span = (shift.before[1], shift.lockup_time)
             refused.append(RejectedShift(span, refusal.what))
-    return tuple(usable), tuple(refused)
+    closed = tuple(shift for shift in usable if open_slip(log, card, shift) is None)
+    if not closed:
+        return tuple(usable), tuple(refused)
+    refused += [
+        RejectedShift((shift.before[1], shift.lockup_time), "the converter is open in this shift")
+        for shift in usable
+        if shift not in closed
+    ]
+    return closed, tuple(refused)
 
 
 _Stage = tuple[Conclusions, Method, dict[str, Any]]

@@ -237,9 +237,11 @@ def fit_ringdown(torque: Sampled, lockup: float, end: float, drive: Drive | None
 def _power_near(residual: FloatArray, omega: float, step: float, sigma: float) -> float:
     """Noise variance per sample that acts on a fit at ω: the residual's power from ω/2 to 2ω.
 
-    Never less than the power over all frequencies or the sensor's own noise.
+    Never less than the power over all frequencies or the sensor's own noise; these alone where a
+    fit has gone to an ω that the samples do not resolve.
     """
     power = np.abs(np.fft.rfft(residual)) ** 2 / residual.size
     frequency = 2.0 * np.pi * np.fft.rfftfreq(residual.size, step)
     near = (frequency > 0.5 * omega) & (frequency < 2.0 * omega)
-    return max(float(np.mean(power[near])), float(np.mean(residual**2)), sigma**2)
+    there = float(np.mean(power[near])) if near.any() else 0.0
+    return max(there, float(np.mean(residual**2)), sigma**2)

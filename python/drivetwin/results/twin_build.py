@@ -16,6 +16,7 @@ from drivetwin.results.result_file import plain
 from drivetwin.results.twin_file import (
     TWIN_SCHEMA,
     ChannelRecord,
+    ConverterRecord,
     CovarianceRecord,
     ElementRecord,
     GearRecord,
@@ -64,6 +65,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
         covariance=covariance,
         channels=card.channels,
         load_law=found.load,
+        converter=card.converter,
     )
 
 
@@ -120,6 +122,7 @@ def file_of(twin: Twin) -> TwinFile:
             J_vehicle_range_kgm2=twin.J_vehicle_range,
             elements={name: _element_record(one) for name, one in twin.elements.items()},
             channels={role: ChannelRecord(**vars(one)) for role, one in twin.channels.items()},
+            converter=ConverterRecord.of(twin.converter),
         ),
         parameters={name: ParameterRecord.of(one) for name, one in twin.parameters.items()},
         friction={name: FrictionRecord.of(curve) for name, curve in twin.friction.items()},
@@ -182,4 +185,5 @@ def twin_from_file(content: TwinFile) -> Twin:
         covariance=None if covariance is None else np.asarray(covariance.matrix),
         channels={role: ChannelSpec(**one.model_dump()) for role, one in gearbox.channels.items()},
         load_law=None if content.load is None else content.load.law(),
+        converter=None if gearbox.converter is None else gearbox.converter.converter(),
     )

@@ -10,6 +10,7 @@ from typing import Any, Literal, Self
 import tomlkit
 from pydantic import Field, FiniteFloat, ValidationError, model_validator
 
+from drivetwin.converter import Converter
 from drivetwin.errors import ResultFileError, Where
 from drivetwin.identify.result import Method
 from drivetwin.results.atomic import write_text
@@ -62,6 +63,29 @@ class ChannelRecord(Record):
     group: str | None = None
 
 
+class ConverterRecord(Record):
+    """Map of the torque converter: capacity [N m s^2/rad^2] and torque ratio over speed ratio."""
+
+    speed_ratio: list[FiniteFloat]
+    capacity: list[FiniteFloat]
+    torque_ratio: list[FiniteFloat]
+
+    @classmethod
+    def of(cls, converter: Converter | None) -> ConverterRecord | None:
+        """Record of a map; None stays None."""
+        if converter is None:
+            return None
+        return cls(
+            speed_ratio=list(converter.speed_ratio),
+            capacity=list(converter.capacity),
+            torque_ratio=list(converter.torque_ratio),
+        )
+
+    def converter(self) -> Converter:
+        """Return the map."""
+        return Converter(tuple(self.speed_ratio), tuple(self.capacity), tuple(self.torque_ratio))
+
+
 class TransmissionRecord(Record):
     """What the vehicle card knew from design."""
 
@@ -72,6 +96,7 @@ class TransmissionRecord(Record):
     gears: dict[str, GearRecord]
     elements: dict[str, ElementRecord]
     channels: dict[str, ChannelRecord] = Field(default_factory=dict)
+    converter: ConverterRecord | None = None
 
 
 class CovarianceRecord(Record):

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: MIT
 """The converter's lock-up clutch: when it closes and opens, and whether a shift has it closed.
 
+With the clutch open the gearbox is driven by the turbine; a map tells its torque from both speeds.
 Closed means ω_e = i_in·ω_in. The flag on the bus tells when; the speeds decide whether it is true.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.logs.damage import runs
-from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.flags import set_spans
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import VehicleCard
@@ -55,18 +56,49 @@ def converter_slip(log: ShiftLog, card: VehicleCard, span: Span) -> float | None
     return float(np.mean(engine.values[inside][known] / inlet[known])) - 1.0
 
 
+def open_slip(log: ShiftLog, card: VehicleCard, shift: Shift) -> float | None:
+    """Slip of the converter before `shift`; None where it is closed or no channel tells it."""
+    slip = converter_slip(log, card, (shift.before[1] - _BESIDE, shift.before[1]))
+    return slip if slip is not None and abs(slip) > CLOSED else None
+
+
+def behind_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog:
+    """The log as the gearbox sees it: where the converter is open, the turbine is its engine.
+
+    Its torque, by the card's map from the speeds of engine and input, takes the place of
+    `engine_torque`, and its speed that of the engine. The log as it is where the converter is
+    closed before `shift` or the card has no map.
+    """
+    if card.converter is None or open_slip(log, card, shift) is None:
+        return log
+    engine = log["engine_speed"]
+    turbine = card.i_in * log["input_speed"].at(engine.time)
+    known = np.isfinite(turbine) & (engine.values > 0.0)
+    torque = Channel(
+        role="engine_torque",
+        quantity=Quantity.TORQUE,
+        time=engine.time[known],
+        values=card.converter.turbine_torque(engine.values[known], turbine[known]),
+        source_name=f"turbine torque from {engine.source_name}",
+        source_unit="Nm",
+    )
+    others = {role: c for role, c in log.channels.items() if role != "engine_speed"}
+    return replace(log, channels={**others, "engine_torque": torque})
+
+
 def require_closed(log: ShiftLog, card: VehicleCard, shift: Shift) -> None:
-    """Raise IdentificationError where the converter slips before `shift`.
+    """Raise IdentificationError where the converter slips before `shift` and has no map.
 
     Its torque would have to be known then; the engine torque is not that of the gearbox.
     """
-    slip = converter_slip(log, card, (shift.before[1] - _BESIDE, shift.before[1]))
-    if slip is not None and abs(slip) > CLOSED:
+    slip = open_slip(log, card, shift)
+    if slip is not None and card.converter is None:
         raise IdentificationError(
             f"the converter is open before the shift {shift.start_gear}-{shift.end_gear}: engine "
             f"and gearbox input differ by {100.0 * slip:.1f} %",
-            "record the shift with the lock-up clutch closed; phases and speeds of this one are "
-            "told by `drivetwin shifts`",
+            "state the map of the converter as [converter] on the card, or record the shift with "
+            "the lock-up clutch closed; phases and speeds of this one are told by "
+            "`drivetwin shifts`",
             Where(file=log.source, time=shift.before[1]),
         )
 

@@ -60,6 +60,7 @@ def load_card(path: Path) -> VehicleCard:
         channels={role: table.spec() for role, table in file.channels.items()},
         source=str(path),
         known={} if file.eta is None else {"eta": file.eta.prior()},
+        converter=None if file.converter is None else file.converter.spec(),
     )
 
 

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from drivetwin.driveline import LossLaw
 from drivetwin.logs.profile import ByRole, ChannelTable
 from drivetwin.tomlfile import StrictModel
+from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.spec import ElementSpec, PriorValue, SensorTolerance
 
 BAR = 1e5  # Pa
@@ -176,6 +177,7 @@ class CardFile(StrictModel):
     gears: list[GearTable] = Field(min_length=2)
     elements: dict[str, ElementTable] = Field(min_length=1)
     inertia: InertiaTable
+    converter: ConverterTable | None = None
     sensors: SensorsTable = SensorsTable()
     channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from drivetwin.converter import Converter
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import CardError, Where
 from drivetwin.logs.mapping import ChannelSpec
@@ -76,6 +77,7 @@ class VehicleCard:
     engine, `J_vehicle_range` [kg m^2] bounds J3 at the wheel; `J_out` [kg m^2] is the inertia of
     the output side before the shaft (Jo' without drums), None if unknown. `sensors` and `channels`
     go by channel role. `known` is what else is known, by parameter id (see parameters.py).
+    `converter` is the map of the torque converter, None where the card has none.
     """
 
     name: str
@@ -91,6 +93,7 @@ class VehicleCard:
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
     source: str = ""
     known: Mapping[str, PriorValue] = field(default_factory=dict)
+    converter: Converter | None = None
 
     def gear(self, name: str) -> Gear:
         """Return the gear of this name; raises CardError if the card has none."""

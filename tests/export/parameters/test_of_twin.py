@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.drive.powertrain import Converter
+from drivetwin.converter import Converter
 from drivetwin.driveline import Stribeck
 from drivetwin.export.parameters.content import Curve, Scalar
 from drivetwin.export.parameters.of_twin import converter_curves, parameters_of

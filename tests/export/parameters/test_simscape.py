@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.drive.powertrain import Converter
+from drivetwin.converter import Converter
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.of_twin import parameters_of

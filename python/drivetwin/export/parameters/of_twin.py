@@ -15,7 +15,7 @@ from drivetwin.parameters import spec_of
 from drivetwin.twin import friction_law
 
 if TYPE_CHECKING:
-    from drivetwin.drive.powertrain import Converter
+    from drivetwin.converter import Converter
     from drivetwin.driveline import FloatArray, FrictionTable, Stribeck
     from drivetwin.identify.result import Estimate
     from drivetwin.twin import Twin, TwinElement

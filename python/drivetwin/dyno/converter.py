@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: MIT
+"""An open torque converter between the engine and the driveline of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from drivetwin.converter import Converter
+from drivetwin.driveline import DualClutch, FloatArray, ShiftElement, Signal, State, Trajectory
+from drivetwin.network import Element, Output, Start, simulate
+
+_CRANK, _TURBINE, _INPUT, _OUTPUT = "crankshaft", "turbine", "input", "output"
+_AXLE, _WHEEL, _SHAFT = "axle", "wheel", "output shaft"
+_TORQUE = "engine torque"
+_STALL = 0.05
+"""Least speed ratio looked at for the steady state."""
+
+
+@dataclass(frozen=True)
+class OpenConverter:
+    """A converter whose pump turns with an engine of `engine_inertia` [kg m^2].
+
+    The model behind it has the turbine's inertia in its J1.
+    """
+
+    converter: Converter
+    engine_inertia: float
+
+    def steady(self, torque: float, turbine: float) -> tuple[float, float]:
+        """Speed of the engine [rad/s] that gives `torque` [N m] steadily, and turbine torque."""
+
+        def surplus(ratio: float) -> float:
+            return float(self.converter.pump_torque(turbine / ratio, turbine)) - torque
+
+        speed = turbine / float(brentq(surplus, _STALL, 1.0))
+        return speed, float(self.converter.turbine_torque(speed, turbine))
+
+    def simulate(
+        self,
+        model: DualClutch,
+        engine_torque: Signal,
+        pressures: Mapping[str, Signal],
+        start: State,
+        time: FloatArray,
+    ) -> tuple[Trajectory, FloatArray]:
+        """Run `model` behind the converter: its motion, and the engine speed (n,) [rad/s].
+
+        The engine speed of the trajectory is that of the turbine; the engine starts where its
+        torque is steady. Raises InputError where the description is inconsistent.
+        """
+        torque = float(np.interp(time[0], engine_torque.time, engine_torque.values))
+        crank, _ = self.steady(torque, start.engine_speed)
+        names = [each.name for each in model.elements]
+        run = simulate(
+            self._elements(model),
+            {**pressures, _TORQUE: engine_torque},
+            _start(model, start, crank),
+            time,
+            _outputs(names),
+        )
+        motion = run.columns
+        trajectory = Trajectory(
+            time=time,
+            engine_speed=motion["speed", _TURBINE],
+            output_speed=motion["speed", _OUTPUT],
+            wheel_speed=motion["speed", _WHEEL],
+            twist=motion["twist", _SHAFT],
+            shaft_torque=motion["shaft_torque", _SHAFT],
+            clutch_torque={name: motion["friction_torque", name] for name in names},
+            slip={name: motion["slip", name] for name in names},
+            events=run.events,
+            status=run.status,
+            audit=run.audit,
+        )
+        return trajectory, motion["speed", _CRANK]
+
+    def _elements(self, model: DualClutch) -> list[Element]:
+        """The dual clutch in general elements, the converter before it."""
+        loss = {"law": model.loss_law, "eta": model.eta}
+        return [
+            _element("torque", _TORQUE, node=_CRANK, input=_TORQUE),
+            _element("inertia", "engine", node=_CRANK, inertia=self.engine_inertia),
+            _element(
+                "torque_converter",
+                "converter",
+                pump=_CRANK,
+                turbine=_TURBINE,
+                map=asdict(self.converter),
+            ),
+            _element("inertia", "J1", node=_TURBINE, inertia=model.J1),
+            _element("gear", "input gear", a=_TURBINE, b=_INPUT, ratio=model.i_in, loss=loss),
+            *(part for each in model.elements for part in _clutch(each)),
+            _element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
+            _element(
+                "spring_damper",
+                _SHAFT,
+                a=_OUTPUT,
+                b=_AXLE,
+                stiffness=model.k_o,
+                damping=model.c_o,
+            ),
+            _element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
+            _element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
+            _element("road_load", "load", node=_WHEEL, **asdict(model.load)),
+        ]
+
+
+def _element(kind: str, name: str, **fields: Any) -> Element:
+    return {"type": kind, "name": name, **fields}
+
+
+def _sides(name: str) -> tuple[str, str]:
+    """Nodes on both sides of a shift element."""
+    return f"{name} driving", f"{name} driven"
+
+
+def _clutch(one: ShiftElement) -> list[Element]:
+    """A shift element between its two ratios (eq. 15)."""
+    driving, driven = _sides(one.name)
+    return [
+        _element("gear", f"{one.name} i_c", a=_INPUT, b=driving, ratio=one.i_c),
+        _element("gear", f"{one.name} i_out", a=driven, b=_OUTPUT, ratio=one.i_out),
+        _element(
+            "clutch",
+            one.name,
+            a=driving,
+            b=driven,
+            friction=asdict(one.friction),
+            gain=one.gain,
+            p0=one.P0,
+            peak=one.peak,
+            pressure=one.name,
+            drum_inertia=one.drum_inertia,
+        ),
+    ]
+
+
+def _start(model: DualClutch, start: State, crank: float) -> Start:
+    inlet = start.engine_speed / model.i_in
+    speeds = {
+        _CRANK: crank,
+        _TURBINE: start.engine_speed,
+        _INPUT: inlet,
+        _OUTPUT: start.output_speed,
+        _AXLE: model.i_f * start.wheel_speed,
+        _WHEEL: start.wheel_speed,
+    }
+    for one in model.elements:
+        driving, driven = _sides(one.name)
+        speeds |= {driving: inlet / one.i_c, driven: one.i_out * start.output_speed}
+    return Start(speeds, {_SHAFT: start.twist}, start.locked)
+
+
+def _outputs(elements: list[str]) -> list[Output]:
+    return [
+        *(("speed", node) for node in (_CRANK, _TURBINE, _OUTPUT, _WHEEL)),
+        ("twist", _SHAFT),
+        ("shaft_torque", _SHAFT),
+        *(("slip", name) for name in elements),
+        *(("friction_torque", name) for name in elements),
+    ]

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT
+"""The table of a torque converter in a vehicle card or powertrain file."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from drivetwin.converter import Converter
+from drivetwin.tomlfile import StrictModel
+
+_PER_1000RPM = 1000.0 * math.pi / 30.0  # rad/s
+
+Curve = Annotated[list[float], Field(min_length=2)]
+
+
+class ConverterTable(StrictModel):
+    """`[converter]`: pump torque at 1000 rpm times `scale`, and torque ratio, over speed ratio."""
+
+    speed_ratio: Curve
+    torque_ratio: Curve
+    pump_torque_at_1000rpm_Nm: Curve
+    scale: Annotated[float, Field(gt=0)] = 1.0
+
+    @model_validator(mode="after")
+    def _fits(self) -> ConverterTable:
+        lengths = {len(self.torque_ratio), len(self.pump_torque_at_1000rpm_Nm)}
+        if lengths != {len(self.speed_ratio)}:
+            raise ValueError("torque_ratio and pump_torque go with the points of speed_ratio")
+        if not all(a < b for a, b in pairwise(self.speed_ratio)):
+            raise ValueError("speed_ratio must increase")
+        return self
+
+    @classmethod
+    def of(cls, converter: Converter) -> ConverterTable:
+        """The table of a map in SI."""
+        return cls(
+            speed_ratio=list(converter.speed_ratio),
+            torque_ratio=list(converter.torque_ratio),
+            pump_torque_at_1000rpm_Nm=[
+                round(each * _PER_1000RPM**2, 9) for each in converter.capacity
+            ],
+        )
+
+    def spec(self) -> Converter:
+        """Return the map in SI."""
+        per_square = self.scale / _PER_1000RPM**2
+        return Converter(
+            speed_ratio=tuple(self.speed_ratio),
+            capacity=tuple(torque * per_square for torque in self.pump_torque_at_1000rpm_Nm),
+            torque_ratio=tuple(self.torque_ratio),
+        )
