@@ -43,7 +43,18 @@ PYTHON_LAYERS = (
     frozenset({"logs", "vehicle", "held", "gearbox"}),
     frozenset({"shifts", "dyno", "drive"}),
     frozenset({"identify"}),
-    frozenset({"twin", "results", "start_state", "validate", "held_out", "together", "stepping", "stepped"}),
+    frozenset(
+        {
+            "twin",
+            "results",
+            "start_state",
+            "validate",
+            "held_out",
+            "together",
+            "stepping",
+            "stepped",
+        }
+    ),
     frozenset({"observer"}),
     frozenset({"report", "export"}),
     frozenset({"fleet", "app"}),
