@@ -43,15 +43,30 @@ def test_the_packed_form_is_relative_to_its_first_frame() -> None:
 def test_lines_that_are_no_data_frame_are_counted() -> None:
     data = SPACED + (
         b" (000.007000)  can0  123   [0]  remote request\n"
-        b"(0.008000) can0 123#R\n(0.009000) can0 123##112233\n"
+        b"(0.008000) can0 123#R\n"
         b" (000.010000)  can0  18FEDF00   [8]  8A A0\n garbage\n"
     )
     frames = read_candump(data, "log")
     assert frames.time.size == 3
     assert frames.warnings == (
-        "3 remote, error or FD frames left out",
-        "2 damaged lines left out of 8",
+        "2 remote or error frames left out",
+        "2 damaged lines left out of 7",
     )
+
+
+def test_frames_of_can_fd_are_longer() -> None:
+    long = bytes(range(24))
+    data = (
+        b"(0.001000) can0 123##1" + long.hex().encode() + b"\n"
+        b" (000.002000)  can0  124  [24]  " + long.hex(" ").encode() + b"\n"
+        b"(0.003000) can0 125#0102\n"
+    )
+    assert is_candump(data)
+    frames = read_candump(data, "log")
+    assert frames.warnings == ()
+    assert frames.length.tolist() == [24, 24, 2]
+    assert frames.data[0].tobytes() == frames.data[1].tobytes() == long
+    assert frames.data[2, :4].tolist() == [1, 2, 255, 255]
 
 
 @pytest.mark.parametrize("head", [b"", b"time,n\ns,rpm\n0,1\n", b"(hello) can0\n"])

@@ -39,7 +39,7 @@ def test_frames_without_signals_are_counted(tmp_path: Path, suffix: str) -> None
     frames = read_asc(path) if suffix == ".asc" else read_blf(path)
     assert frames.time.size == 3
     assert frames.identifier.tolist() == [0x123] * 3
-    assert frames.warnings == ("1 remote, error or FD frames left out",)
+    assert frames.warnings == ("1 remote or error frames left out",)
 
 
 @pytest.mark.parametrize("keep", [10, 144, 200])
@@ -60,3 +60,25 @@ def test_without_the_library_the_install_command_is_named(
     with pytest.raises(MissingExtraError) as caught:
         (read_asc if form == "asc" else read_blf)(path)
     assert caught.value.remedy == 'pip install "drivetwin[can]"'
+
+
+@pytest.mark.parametrize("suffix", [".asc", ".blf"])
+def test_frames_of_can_fd_are_longer(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"bus{suffix}"
+    writer = can.ASCWriter(str(path)) if suffix == ".asc" else can.BLFWriter(str(path))
+    with writer:
+        for number, data in enumerate((bytes(range(32)), b"\1\2")):
+            writer.on_message_received(
+                can.Message(
+                    timestamp=1.0 + number,
+                    arbitration_id=0x123,
+                    is_extended_id=False,
+                    is_fd=len(data) > 8,
+                    data=data,
+                    channel=0,
+                )
+            )
+    frames = read_asc(path) if suffix == ".asc" else read_blf(path)
+    assert frames.length.tolist() == [32, 2]
+    assert frames.data[0].tobytes() == bytes(range(32))
+    assert frames.warnings == ()

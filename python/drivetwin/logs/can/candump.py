@@ -6,20 +6,20 @@ from __future__ import annotations
 import re
 
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.can.frames import PAYLOAD, Frames, frame_table
+from drivetwin.logs.can.frames import LONGEST, Frames, frame_table
 
 _LINE = re.compile(
     rb"^[ \t]*\((?P<time>\d{1,12}\.\d{1,9})\)[ \t]+(?P<bus>[\w.:-]+)[ \t]+"
     rb"(?:(?:RX|TX|[-BE]{2})[ \t]+(?:[-BE]{2}[ \t]+)?)?(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})"
     rb"(?:[ \t]+\[(?P<count>\d{1,2})\](?P<spaced>(?:[ \t]+[0-9A-Fa-f]{2})*)"
-    rb"|#(?P<packed>(?:[0-9A-Fa-f]{2}\.?)*))"
+    rb"|#(?P<packed>(?:#[0-9A-Fa-f])?(?:[0-9A-Fa-f]{2}\.?)*))"
     rb"(?:[ \t]+(?:'[^\n]*|[RT]))?[ \t]*\r?$",
     re.MULTILINE,
 )
 _OTHER = re.compile(rb"^[ \t]*\(\d{1,12}\.\d{1,9}\)[ \t]+[\w.:-]+[ \t]+[0-9A-Fa-f]{3,8}"
-                    rb"(?:[ \t]+\[\d+\][ \t]+(?:remote request|ERRORFRAME)|#R\d?\b|##)",
+                    rb"(?:[ \t]+\[\d+\][ \t]+(?:remote request|ERRORFRAME)|#R\d?\b)",
                     re.MULTILINE)  # fmt: skip
-"""Remote requests, error frames and CAN FD frames: lines of a sound file that carry no signal."""
+"""Remote requests and error frames: lines of a sound file that carry no signal."""
 
 
 def is_candump(head: bytes) -> bool:
@@ -41,8 +41,9 @@ def read_candump(data: bytes, file: str) -> Frames:
     buses: list[str] = []
     for match in _LINE.finditer(data):
         stamp, bus, identifier, count, spaced, packed = match.groups()
-        payload = bytes.fromhex((packed if spaced is None else spaced).replace(b".", b"").decode())
-        if len(payload) > PAYLOAD or (count is not None and int(count) != len(payload)):
+        digits = _without_flags(packed) if spaced is None else spaced
+        payload = bytes.fromhex(digits.replace(b".", b"").decode())
+        if len(payload) > LONGEST or (count is not None and int(count) != len(payload)):
             continue
         stamps.append(float(stamp))
         identifiers.append(int(identifier, 16))
@@ -57,7 +58,12 @@ def read_candump(data: bytes, file: str) -> Frames:
     damaged = sum(1 for line in data.splitlines() if line.strip()) - len(stamps) - other
     warnings = []
     if other:
-        warnings.append(f"{other} remote, error or FD frames left out")
+        warnings.append(f"{other} remote or error frames left out")
     if damaged:
         warnings.append(f"{damaged} damaged lines left out of {len(stamps) + damaged + other}")
     return frame_table(stamps, identifiers, extended, payloads, buses, tuple(warnings))
+
+
+def _without_flags(packed: bytes) -> bytes:
+    """The data of the compact form; a CAN FD frame has a second `#` and a digit of flags first."""
+    return packed[2:] if packed.startswith(b"#") else packed

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from drivetwin.logs.shiftlog import FloatArray
 
-PAYLOAD = 8
-"""Data bytes of a classical frame; longer ones (CAN FD) are counted and left out."""
+PAYLOAD, LONGEST = 8, 64
+"""Most data bytes of a classical frame, and of one of CAN FD."""
 
 _ABSOLUTE = 1e8
 """Stamps above this [s] count from 1970 and are made relative to the first frame."""
@@ -22,8 +22,9 @@ _ABSOLUTE = 1e8
 class Frames:
     """Data frames in file order.
 
-    `time` (n,) [s]; `identifier` (n,) with 11 or 29 bits as `extended` (n,) says; `data` (n, 8)
-    padded with 0xFF; `length` (n,) of valid bytes; `bus` (n,) an index into `buses`.
+    `time` (n,) [s]; `identifier` (n,) with 11 or 29 bits as `extended` (n,) says; `data` (n, width)
+    padded with 0xFF, as wide as the longest and at least 8; `length` (n,) of valid bytes; `bus`
+    (n,) an index into `buses`.
     """
 
     time: FloatArray
@@ -36,6 +37,11 @@ class Frames:
     warnings: tuple[str, ...] = field(default=())
 
 
+def relative(time: FloatArray) -> FloatArray:
+    """Stamps (n,) [s] from the first frame on where they count from 1970, else as they are."""
+    return time - time[0] if time.size and time[0] > _ABSOLUTE else time
+
+
 def frame_table(
     stamps: Sequence[float],
     identifiers: Sequence[int],
@@ -44,18 +50,17 @@ def frame_table(
     buses: Sequence[str],
     warnings: tuple[str, ...] = (),
 ) -> Frames:
-    """Build the table from one entry for each frame; payloads have at most 8 bytes."""
-    time = np.array(stamps, np.float64)
-    if time.size and time[0] > _ABSOLUTE:
-        time = time - time[0]
+    """Build the table from one entry for each frame; payloads have at most LONGEST bytes."""
+    time = relative(np.array(stamps, np.float64))
     names = tuple(dict.fromkeys(buses))
     index = {name: place for place, name in enumerate(names)}
-    padded = b"".join(payload.ljust(PAYLOAD, b"\xff") for payload in payloads)
+    width = max(PAYLOAD, max(map(len, payloads), default=0))
+    padded = b"".join(payload.ljust(width, b"\xff") for payload in payloads)
     return Frames(
         time=time,
         identifier=np.array(identifiers, np.uint32),
         extended=np.array(extended, np.bool_),
-        data=np.frombuffer(padded, np.uint8).reshape(-1, PAYLOAD),
+        data=np.frombuffer(padded, np.uint8).reshape(-1, width),
         length=np.array([len(payload) for payload in payloads], np.uint8),
         bus=np.array([index[name] for name in buses], np.intp),
         buses=names,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.can.frames import PAYLOAD, Frames, frame_table
+from drivetwin.logs.can.frames import LONGEST, Frames, frame_table
 from drivetwin.logs.extras import foreign_parser, require
 
 _ASC = re.compile(
@@ -66,7 +66,7 @@ def _read(reader: Any, kind: str, path: Path) -> Frames:
     if not frames:
         raise FileFormatError("no frame in the file", "record it again", Where(file=str(path)))
     if left_out:
-        warnings.append(f"{left_out} remote, error or FD frames left out")
+        warnings.append(f"{left_out} remote or error frames left out")
     stamps, identifiers, extended, payloads, buses = zip(*frames, strict=True)
     return frame_table(stamps, identifiers, extended, payloads, buses, tuple(warnings))
 
@@ -76,7 +76,7 @@ def _collect(reader: Iterable[Any], frames: list[tuple[float, int, bool, bytes, 
     left_out = 0
     for message in reader:
         data = bytes(message.data)
-        if message.is_remote_frame or message.is_error_frame or len(data) > PAYLOAD:
+        if message.is_remote_frame or message.is_error_frame or len(data) > LONGEST:
             left_out += 1
             continue
         frames.append(
