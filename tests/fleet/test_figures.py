@@ -61,4 +61,4 @@ def test_units_are_sorted_and_odd_ones_stand_out(one: JointEstimate) -> None:
     assert list(usual.text) == ["a", "b"]
     assert list(odd.text) == ["b from 120"]
     assert odd.y[0] == pytest.approx(0.09)
-    assert unit_label("a", None) == "a"
+    assert unit_label(one, one.units[0]) == "a"

@@ -16,9 +16,10 @@ from drivetwin.identify.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
     from drivetwin.fleet.events import Summary
-    from drivetwin.fleet.joint.result import JointEstimate
+    from drivetwin.fleet.joint.result import Change, JointEstimate
 
 RUN = "run"
+_Z95 = 1.96
 
 
 class LogsOrCommand(TyperGroup):
@@ -203,29 +204,47 @@ def estimate(
 
 def _print_estimates(found: list[JointEstimate]) -> None:
     from drivetwin.cli.numbers import shown
+    from drivetwin.report.units import display_of, significant
 
     table = table_of(
-        "Fleet", "parameter", "value", "95 %", "unit", "spread", "drift", "per",
-        right=("value", "95 %", "spread", "drift"),
+        "Fleet", "parameter", "value", "95 %", "unit", "spread", "drift", "95 % of it", "per",
+        right=("value", "95 %", "spread", "drift", "95 % of it"),
     )  # fmt: skip
     for one in found:
         value, interval, unit = shown(one.value, one.ci95, one.si_unit)
-        drift = one.drifts[0] if one.drifts else None
-        table.add_row(
-            one.parameter, value, interval, unit,
-            "" if one.spread is None else shown(one.spread, None, one.si_unit)[0],
-            "" if drift is None else shown(drift.slope, None, one.si_unit)[0],
-            "" if drift is None else drift.field,
-        )  # fmt: skip
+        factor = display_of(one.si_unit).factor
+        spread = "" if one.spread is None else significant(one.spread * factor, 2)
+        table.add_row(one.parameter, value, interval, unit, spread, *_drift(one))
     show(table)
     for one in found:
         for change in one.changes:
-            note(
-                f"{one.parameter}: unit {change.unit} changed between {change.before:g} and "
-                f"{change.after:g} {change.field}"
-            )
+            note(_change(one, change))
         for outlier in one.outliers:
             note(f"{one.parameter}: {Path(outlier.path).name}: {outlier.reason}")
+
+
+def _change(one: JointEstimate, change: Change) -> str:
+    """What happened to a unit, in words."""
+    from drivetwin.cli.numbers import shown
+    from drivetwin.fleet.readings import span_text
+
+    ends = (change.size - _Z95 * change.std, change.size + _Z95 * change.std)
+    step = " ".join(shown(change.size, ends, one.si_unit))
+    where = span_text(change.field, change.before, change.after)
+    return f"{one.parameter}: unit {change.unit} changed by {step} between {where}"
+
+
+def _drift(one: JointEstimate) -> tuple[str, str, str]:
+    """Drift over the first field, its interval, and per what it is."""
+    from drivetwin.cli.numbers import shown
+    from drivetwin.fleet.readings import drift_unit
+
+    if not one.drifts:
+        return "", "", ""
+    drift = one.drifts[0]
+    factor, per = drift_unit(drift.field)
+    ends = (drift.ci95[0] * factor, drift.ci95[1] * factor)
+    return *shown(drift.slope * factor, ends, one.si_unit)[:2], per
 
 
 @fleet.command()
@@ -256,7 +275,19 @@ def query(
     if output is not None:
         say(f"wrote {output}")
         return
-    table = table_of("", *answer.columns)
+    numbers = {
+        name
+        for name, column in zip(answer.columns, zip(*answer.rows, strict=True), strict=False)
+        if all(isinstance(cell, int | float | None) for cell in column)
+    }
+    table = table_of("", *answer.columns, right=tuple(numbers))
     for row in answer.rows:
-        table.add_row(*("" if cell is None else str(cell) for cell in row))
+        table.add_row(*map(_cell, row))
     show(table)
+
+
+def _cell(value: object) -> str:
+    """A value of an answer as a person reads it; `-o` and `--json` give all digits."""
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -9,7 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from drivetwin.fleet.joint.mixed import FloatArray
-from drivetwin.fleet.joint.result import Drift, JointEstimate
+from drivetwin.fleet.joint.result import Drift, JointEstimate, UnitValue
+from drivetwin.fleet.readings import reading_text
 from drivetwin.fleet.rules import is_date
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, axis, layout
@@ -104,14 +105,14 @@ def units_figure(one: JointEstimate) -> go.Figure:
                 "thickness": 1,
                 "width": 0,
             },
-            text=[unit_label(unit.unit, unit.since) for _, unit in picked],
+            text=[unit_label(one, unit) for _, unit in picked],
             mode="markers",
             name=name,
             marker={"color": colour, "size": 6},
             hovertemplate="unit %{text}: %{y:.3g}<extra></extra>",
         )
     few = len(units) <= 80
-    ticks = [unit_label(unit.unit, unit.since) for unit in units] if few else None
+    ticks = [unit_label(one, unit) for unit in units] if few else None
     figure.update_layout(
         layout(
             340,
@@ -132,9 +133,11 @@ def units_figure(one: JointEstimate) -> go.Figure:
     return figure
 
 
-def unit_label(unit: str, since: float | None) -> str:
+def unit_label(one: JointEstimate, unit: UnitValue) -> str:
     """A unit, or what became of it after a change."""
-    return unit if since is None else f"{unit} from {since:g}"
+    if unit.since is None:
+        return unit.unit
+    return f"{unit.unit} from {reading_text(one.drifts[0].field, unit.since)}"
 
 
 def _shown(

@@ -15,8 +15,11 @@ from drivetwin.fleet.friction import fleet_friction
 from drivetwin.fleet.joint.estimate import joint_estimates
 from drivetwin.fleet.joint.result import Interval, JointEstimate
 from drivetwin.fleet.pages import LIBRARY
+from drivetwin.fleet.readings import drift_unit, span_text
+from drivetwin.fleet.singles import MOST_ROWS, cut, single, singles
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import State
+from drivetwin.parameters import spec_of
 from drivetwin.report.figures.friction import friction_figure
 from drivetwin.report.html import render_page
 from drivetwin.report.labels import parameter_label
@@ -36,8 +39,6 @@ from drivetwin.report.units import display_of, significant, with_uncertainty
 from drivetwin.results.atomic import write_text
 
 PAGE = "report.html"
-_MOST_ROWS = 200
-"""Rows of a table; the store holds them all."""
 
 
 def save_fleet_report(store: Store, path: Path) -> list[JointEstimate]:
@@ -47,19 +48,23 @@ def save_fleet_report(store: Store, path: Path) -> list[JointEstimate]:
     """
     found = joint_estimates(store)
     shared = store.folder / REPORTS / LIBRARY
-    inside = path.absolute().parent == store.folder and shared.is_file()
-    write_text(path, render_fleet(store, found, f"{REPORTS}/{LIBRARY}" if inside else None))
+    folder = path.absolute().parent
+    inside = folder == store.folder and shared.is_file()
+    write_text(path, render_fleet(store, found, folder, f"{REPORTS}/{LIBRARY}" if inside else None))
     return found
 
 
-def render_fleet(store: Store, found: Sequence[JointEstimate], library: str | None = None) -> str:
-    """HTML text of the page."""
+def render_fleet(
+    store: Store, found: Sequence[JointEstimate], folder: Path, library: str | None = None
+) -> str:
+    """HTML text of the page, which will stand in `folder`: links count from there."""
     sections = [
         _overview(store),
         _parameters(found),
-        _odd(store, found),
+        _odd(store, found, folder),
         _ageing(found),
         _friction(store),
+        singles(store, folder),
         _failed(store),
         _settings(store),
     ]
@@ -113,7 +118,8 @@ _SHIFTS = "SELECT count(*) FROM shifts WHERE state = 'used' AND log IN (SELECT l
 
 
 def _parameters(found: Sequence[JointEstimate]) -> Section:
-    rows = [_parameter_row(one) for one in found]
+    several = _several_rules(found)
+    rows = [_parameter_row(one, several=several) for one in found]
     head = (
         Cell("parameter"), Cell("logs", number=True), Cell("fleet's mean", number=True),
         Cell("± 95 %", number=True), Cell("unit"), Cell("spread over units (1 σ)", number=True),
@@ -129,7 +135,11 @@ def _parameters(found: Sequence[JointEstimate]) -> Section:
     )
 
 
-def _parameter_row(one: JointEstimate) -> tuple[Cell, ...]:
+def _several_rules(found: Sequence[JointEstimate]) -> bool:
+    return len({one.rule for one in found}) > 1
+
+
+def _parameter_row(one: JointEstimate, *, several: bool) -> tuple[Cell, ...]:
     display = display_of(one.si_unit)
     value, half = with_uncertainty(
         one.value * display.factor, 0.5 * (one.ci95[1] - one.ci95[0]) * display.factor
@@ -138,11 +148,16 @@ def _parameter_row(one: JointEstimate) -> tuple[Cell, ...]:
     if one.spread is not None and one.spread_ci95 is not None:
         spread = significant(one.spread * display.factor, 2)
         between = _between(one.spread_ci95, display.factor)
-    drift = one.drifts[0] if one.drifts else None
-    slope = "" if drift is None else significant(drift.slope * display.factor, 2)
-    note = "" if drift is None else _between(drift.ci95, display.factor) + f" per {drift.field}"
+    slope, note = "", ""
+    if one.drifts:
+        factor, per = drift_unit(one.drifts[0].field)
+        slope = significant(one.drifts[0].slope * factor * display.factor, 2)
+        note = _between(one.drifts[0].ci95, factor * display.factor) + f" per {per}"
+    meaning = spec_of(one.parameter).meaning
     return (
-        Cell(parameter_label(one.parameter), note=one.rule),
+        Cell(
+            parameter_label(one.parameter), note=f"{meaning} · {one.rule}" if several else meaning
+        ),
         Cell(str(one.logs), number=True),
         Cell(value, number=True),
         Cell(half, number=True),
@@ -159,12 +174,10 @@ def _between(ci95: Interval, factor: float) -> str:
 
 def _remark(one: JointEstimate) -> str:
     parts = list(one.notes)
-    own = float(np.median(one.points.std))
-    if one.drifts and math.prod(one.drifts[0].ci95) > 0.0:
-        whole = abs(one.drifts[0].slope) * float(np.ptp(one.points.reading))
-        parts.append("drifts" + _small(whole, own))
-    if one.spread is not None and one.spread_ci95 is not None and one.spread_ci95[0] > 0.0:
-        parts.append("units differ" + _small(one.spread, own))
+    if drift := _whole_drift(one):
+        parts.append(_drift_text(one, drift) + _small(drift, one))
+    if spread := _sure_spread(one):
+        parts.append("units differ" + _small(spread, one))
     if one.left_out:
         parts.append(f"{one.left_out} logs tell nothing of it")
     if one.excess > 1.5:
@@ -172,45 +185,71 @@ def _remark(one: JointEstimate) -> str:
     return "; ".join(parts)
 
 
-def _small(size: float, own: float) -> str:
-    """What to say of an effect that is real but less than one log's own error `own`."""
-    if size >= own:
+def _whole_drift(one: JointEstimate) -> float:
+    """Drift over the whole range of the first field, SI; 0 where its interval holds 0."""
+    if not one.drifts or math.prod(one.drifts[0].ci95) <= 0.0:
+        return 0.0
+    return one.drifts[0].slope * float(np.ptp(one.points.reading))
+
+
+def _sure_spread(one: JointEstimate) -> float:
+    """Spread over units, SI; 0 where its interval reaches 0."""
+    sure = one.spread is not None and one.spread_ci95 is not None and one.spread_ci95[0] > 0.0
+    return one.spread or 0.0 if sure else 0.0
+
+
+def _drift_text(one: JointEstimate, whole: float) -> str:
+    field, readings = one.drifts[0].field, one.points.reading
+    ends = span_text(field, float(np.min(readings)), float(np.max(readings)))
+    share = 100.0 * whole / one.value
+    return f"drifts by {significant(share, 2)} % between {ends}"
+
+
+def _own(one: JointEstimate) -> float:
+    """The error that a log states of its own, in the middle."""
+    return float(np.median(one.points.std))
+
+
+def _small(size: float, one: JointEstimate) -> str:
+    """What to say of an effect that is real but less than one log's own error."""
+    if abs(size) >= _own(one):
         return ""
     return ", by less than one log's own error: an error of the method may look like that"
 
 
 def _ageing(found: Sequence[JointEstimate]) -> Section:
-    """Every parameter over the first field, and by unit; those that drift or differ first."""
-    several = len({one.rule for one in found}) > 1
+    """Every parameter over the first field, and by unit where units differ."""
+    several = _several_rules(found)
     blocks: list[Block] = []
-    for one in sorted(found, key=lambda one: not _tells(one)):
+    for one in sorted(found, key=_effect, reverse=True):
         name = parameter_label(one.parameter) + (f" of {one.rule}" if several else "")
         if one.drifts:
             text = f"{name}: every log; the shared line with its 95 % band."
             if one.changes:
                 text += " Dashed: a unit changed there."
             blocks.append(FigureBlock(drift_figure(one), text))
-        if len(one.units) > 1:
+        if _sure_spread(one) or any(unit.odd for unit in one.units):
             text = f"{name}: how far each unit is from the shared value, with 95 % intervals."
             blocks.append(FigureBlock(units_figure(one), text))
-    return Section(
-        "ageing", "Ageing and units", "Parameters that drift or differ over units first.", blocks
+    intro = (
+        "What drifts or differs most, measured by one log's own error, comes first. Units are "
+        "shown where they differ beyond the errors of their logs."
     )
+    return Section("ageing", "Ageing and units", intro, blocks)
 
 
-def _tells(one: JointEstimate) -> bool:
-    """Whether a parameter drifts, or differs over units, beyond its intervals."""
-    drifts = bool(one.drifts) and math.prod(one.drifts[0].ci95) > 0.0
-    return drifts or (one.spread_ci95 is not None and one.spread_ci95[0] > 0.0)
+def _effect(one: JointEstimate) -> float:
+    """How large drift and spread are, where they are certain, against one log's own error."""
+    return max(abs(_whole_drift(one)), _sure_spread(one)) / _own(one)
 
 
-def _odd(store: Store, found: Sequence[JointEstimate]) -> Section:
+def _odd(store: Store, found: Sequence[JointEstimate], folder: Path) -> Section:
     """Changes of units, units beyond chance, logs that do not fit."""
     blocks: list[Block] = []
     changes = [
         cells(
             change.unit, parameter_label(one.parameter),
-            f"between {change.before:g} and {change.after:g} of {change.field}",
+            "between " + span_text(change.field, change.before, change.after),
             _with_error(one, change.size, change.std),
         )
         for one in found for change in one.changes
@@ -220,7 +259,7 @@ def _odd(store: Store, found: Sequence[JointEstimate]) -> Section:
         blocks.append(TableBlock("Units that changed, as after a repair.", head, changes))
     units = [
         cells(
-            unit_label(unit.unit, unit.since), parameter_label(one.parameter),
+            unit_label(one, unit), parameter_label(one.parameter),
             _with_error(one, unit.deviation, unit.std), f"{unit.score:.1f}",
         )
         for one in found for unit in one.units if unit.odd
@@ -230,15 +269,15 @@ def _odd(store: Store, found: Sequence[JointEstimate]) -> Section:
         blocks.append(TableBlock("Units beyond what chance makes.", head, units))
     logs = [
         (
-            Cell(Path(outlier.path).name, href=_single(store, outlier.log)),
+            Cell(Path(outlier.path).name, href=single(store, outlier.log, folder)),
             *cells(parameter_label(one.parameter), outlier.reason),
         )
         for one in found
         for outlier in one.outliers
     ]
     if logs:
-        caption = f"Logs that do not fit{_cut(len(logs))}."
-        blocks.append(TableBlock(caption, cells("log", "parameter", "reason"), logs[:_MOST_ROWS]))
+        caption = f"Logs that do not fit{cut(len(logs))}."
+        blocks.append(TableBlock(caption, cells("log", "parameter", "reason"), logs[:MOST_ROWS]))
     return Section("odd", "What is odd", "Left out of the shared values above.", blocks)
 
 
@@ -246,15 +285,6 @@ def _with_error(one: JointEstimate, value: float, std: float) -> str:
     display = display_of(one.si_unit)
     text, half = with_uncertainty(value * display.factor, 1.96 * std * display.factor)
     return f"{text} ± {half} {display.label}".removesuffix(" –")
-
-
-def _single(store: Store, log: str) -> str:
-    """Link to the report of a single log; empty where there is none."""
-    return f"{REPORTS}/{log}.html" if store.report(log).is_file() else ""
-
-
-def _cut(count: int) -> str:
-    return f", the first {_MOST_ROWS} of {count}" if count > _MOST_ROWS else ""
 
 
 def _friction(store: Store) -> Section:
@@ -281,11 +311,11 @@ def _failed(store: Store) -> Section:
             Cell(error),
             Cell(what, note=remedy),
         )
-        for path, unit, state, error, what, remedy in every[:_MOST_ROWS]
+        for path, unit, state, error, what, remedy in every[:MOST_ROWS]
     ]
     blocks: list[Block] = []
     if rows:
-        caption = f"Logs without a result{_cut(len(every))}."
+        caption = f"Logs without a result{cut(len(every))}."
         blocks.append(
             TableBlock(caption, cells("log", "state", "reason", "what, and what to do"), rows)
         )

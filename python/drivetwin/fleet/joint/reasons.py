@@ -27,7 +27,7 @@ def reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEstimate]
     for one in found:
         for outlier in one.outliers:
             also.setdefault(outlier.log, []).append(one.parameter)
-    fits = _fits(store)
+    fits = output_fits(store)
     warnings = _warnings(store, also)
 
     def told(one: JointEstimate, outlier: Outlier) -> Outlier:
@@ -53,8 +53,8 @@ def _side(outlier: Outlier) -> str:
     return "above" if outlier.score > 0.0 else "below"
 
 
-def _fits(store: Store) -> dict[str, float]:
-    """Fit of the output torque [%] by log."""
+def output_fits(store: Store) -> dict[str, float]:
+    """How well the simulation fits the output torque [%], by log; only those that have one."""
     import pyarrow.compute as pc
 
     rows = store.rows(RowKind.FIT)

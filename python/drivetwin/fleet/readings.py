@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+"""Readings of a field as people write them: dates as dates, drifts of dates per year."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from drivetwin.fleet.rules import is_date
+
+_YEAR = 365.25 * 86400.0
+
+
+def reading_text(field: str, reading: float) -> str:
+    """One reading: an ISO date, or the number alone."""
+    if is_date(field):
+        return datetime.fromtimestamp(reading, UTC).date().isoformat()
+    return f"{reading:g}"
+
+
+def span_text(field: str, low: float, high: float) -> str:
+    """Two readings and what they are of, e.g. `119 and 123 odometer_Mm`."""
+    ends = f"{reading_text(field, low)} and {reading_text(field, high)}"
+    return ends if is_date(field) else f"{ends} {field}"
+
+
+def drift_unit(field: str) -> tuple[float, str]:
+    """What a change with one unit of the field is multiplied by to be shown, and per what it is."""
+    return (_YEAR, "year") if is_date(field) else (1.0, field)

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin fleet --method likelihood`: a log to the end of its time, then to its rows."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.fleet.made import Truth, make_fleet, plan
+from drivetwin.cli import main
+from drivetwin.fleet.rows import RowKind
+from drivetwin.fleet.store import Store
+
+MOST = 4.0
+"""Standard errors within which a truth must lie; beyond that is no chance."""
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One made log."""
+    folder = tmp_path_factory.mktemp("likelihood") / "logs"
+    make_fleet(folder, 1)
+    return folder
+
+
+def _run(logs: Path, capsys: pytest.CaptureFixture[str], *more: str) -> dict[str, Any]:
+    """Run the fleet; its summary."""
+    command = ["fleet", str(logs), "--vehicle", str(logs / "rules.toml"), "--json", *more]
+    assert main([*command, "-o", str(logs.parent / "store"), "--method", "likelihood"]) == 0
+    return dict(json.loads(capsys.readouterr().out.splitlines()[-1]))
+
+
+def test_a_log_beyond_its_time_is_done_when_it_is_given_more(
+    logs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short = _run(logs, capsys, "--time-limit", "0.3")
+    assert (short["quarantined"], short["failures"]) == (1, {"TimeLimit": 1})
+    again = _run(logs, capsys)
+    assert (again["quarantined"], again["computed"]) == (1, 0)
+    enough = _run(logs, capsys, "--retry")
+    assert (enough["done"], enough["computed"], enough["failures"]) == (1, 1, {})
+    (made,) = plan(1, Truth())
+    with Store(logs.parent / "store") as store:
+        parameters = {row["name"]: row for row in store.rows(RowKind.PARAMETER).to_pylist()}
+        kinds = set(store.rows().column("kind").to_pylist())
+        (settings,) = store.table("settings")
+    assert kinds >= {"parameter", "friction", "fit", "quality"}
+    assert json.loads(settings["document"])["method"] == "likelihood"
+    assert parameters["eta"]["method"] == "likelihood"
+    truths = {"mu.B3": made.mu, "P0.B3": made.P0}
+    for name, true in truths.items():
+        row = parameters[name]
+        assert row["free_std"] > row["std_noise"] > 0.0
+        assert abs(row["free_value"] - true) < MOST * row["free_std"], name
+    assert abs(parameters["eta"]["value"] - 0.85) < MOST * parameters["eta"]["std_total"]
