@@ -117,6 +117,22 @@ def candump(spaced: bool) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
+def _mf4_bus(folder: Path) -> bytes:
+    """The frames in an MDF 4 file, as loggers record them raw."""
+    import asammdf
+
+    kinds = [("ID", "<u4"), ("IDE", "<u1"), ("DataLength", "<u1"), ("DataBytes", "(8,)u1")]
+    rows = [
+        (number, 1, len(data), np.frombuffer(data.ljust(8, b"\0"), np.uint8))
+        for _, number, data in frames()
+    ]
+    table = np.array(rows, [(f"CAN_DataFrame.{name}", kind) for name, kind in kinds])
+    time = np.array([time for time, _, _ in frames()])
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([asammdf.Signal(samples=table, timestamps=time, name="CAN_DataFrame")])
+        return Path(mdf.save(folder / "bus.mf4", overwrite=True)).read_bytes()
+
+
 def _vector(suffix: str) -> Callable[[Path], bytes]:
     def make(folder: Path) -> bytes:
         import can
@@ -139,6 +155,7 @@ SEEDS: dict[str, Callable[[Path], bytes]] = {
     "csv": _written(".csv"),
     "mf4": _written(".mf4"),
     "mdf3": _mdf3,
+    "mf4-bus": _mf4_bus,
     "mat": _written(".mat"),
     "mat5": _mat5_plain,
     "mat73": _mat73,

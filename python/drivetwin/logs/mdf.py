@@ -17,9 +17,12 @@ from typing import Any
 import numpy as np
 
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError, Where
+from drivetwin.logs.can.frames import Frames
+from drivetwin.logs.can.mdf_frames import bus_frames, holds_frames
+from drivetwin.logs.can.open import bus_recording
 from drivetwin.logs.extras import foreign_parser, require
 from drivetwin.logs.mdf_blocks import check_blocks
-from drivetwin.logs.raw import Column, RawChannel, ReadOptions, Recording, Window
+from drivetwin.logs.raw import Column, Joined, RawChannel, ReadOptions, Recording, Window
 from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.units import time_factor
 
@@ -56,10 +59,33 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
             mdf.configure(read_fragment_size=_FRAGMENT)
         try:
             with foreign_parser(_KIND, path):
-                recording = MdfRecording(mdf, path, options)
-            yield recording
+                signals = MdfRecording(mdf, path, options)
+                frames = bus_frames(mdf)
+            yield _with_bus(signals, frames, options, path)
         finally:
             mdf.close()
+
+
+def _with_bus(
+    signals: MdfRecording, frames: Frames | None, options: ReadOptions, path: Path
+) -> Recording:
+    """The signals of a file and those of its raw frames.
+
+    Frames are decoded where a database is stated or nothing else is in the file: else their signals
+    might stand in it twice. Raises MissingChannelError without any column.
+    """
+    if frames is not None and (options.bus.databases or not signals.columns):
+        return Joined((signals, bus_recording(frames, options, path)))
+    if frames is not None:
+        note = "raw bus frames are not decoded: name their DBC files under [bus]"
+        signals.warnings = (*signals.warnings, note)
+    if not signals.columns:
+        raise MissingChannelError(
+            "the file has no channel with a time base",
+            "record or export the log again",
+            Where(file=str(path)),
+        )
+    return signals
 
 
 class MdfRecording:
@@ -81,6 +107,8 @@ class MdfRecording:
                 timeless.append(names[number])
                 continue
             self._check_size(group, names[number])
+            if holds_frames(group):
+                continue
             for index, channel in enumerate(group.channels):
                 if index == mdf.masters_db[number]:
                     continue
@@ -91,12 +119,6 @@ class MdfRecording:
         self.columns: Sequence[Column] = tuple(columns)
         if timeless:
             self.warnings = (f"groups without a time channel left out: {', '.join(timeless)}",)
-        if not columns:
-            raise MissingChannelError(
-                "the file has no channel with a time base",
-                "record or export the log again",
-                Where(file=str(path)),
-            )
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one channel, in a window only the records inside; see `Recording`."""

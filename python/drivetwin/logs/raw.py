@@ -112,6 +112,29 @@ class Recording(Protocol):
 
 
 @dataclass(frozen=True)
+class Joined:
+    """Several recordings as one: columns of the first one first."""
+
+    parts: tuple[Recording, ...]
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        return tuple(column for part in self.parts for column in part.columns)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return tuple(text for part in self.parts for text in part.warnings)
+
+    def load(self, index: int, window: Window | None = None) -> RawChannel:
+        """Read the column at `index` from the part that has it; see `Recording`."""
+        for part in self.parts:
+            if index < len(part.columns):
+                return part.load(index, window)
+            index -= len(part.columns)
+        raise IndexError(index)
+
+
+@dataclass(frozen=True)
 class RawLog:
     """All columns of one file in memory. `unreadable` tells by name why one holds no numbers."""
 

@@ -26,16 +26,17 @@ def open_bus_text(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Open a candump or ASC log; raises FileFormatError, MissingExtraError, MissingChannelError."""
     data = path.read_bytes()
     frames = read_candump(data, str(path)) if is_candump(data[:8192]) else read_asc(path)
-    yield _recording(frames, options, path)
+    yield bus_recording(frames, options, path)
 
 
 @contextmanager
 def open_blf(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Open a BLF log; raises FileFormatError, MissingExtraError, MissingChannelError."""
-    yield _recording(read_blf(path), options, path)
+    yield bus_recording(read_blf(path), options, path)
 
 
-def _recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
+def bus_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
+    """Decode frames by the databases stated; raises MissingChannelError, MissingExtraError."""
     return BusRecording(frames, _messages(options.bus.databases), options.bus, path)
 
 
