@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The text of docs/accuracy.md."""
+"""The text of docs/accuracy.md, section by section."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -41,39 +41,20 @@ the engine torque in ms. `chi2` is Q per sample without and with the fault: it d
 """
 
 
-@dataclass(frozen=True)
-class Page:
-    """What has been computed so far: studies with a word on each, bad starts, faults."""
-
-    studies: tuple[tuple[Study, str], ...] = ()
-    outcomes: Counter[Outcome] | None = None
-    shifts: tuple[Shift, ...] = ()
-    faulty: int = 0
-
-    def with_study(self, study: Study, text: str) -> Page:
-        """The page with one more case."""
-        return replace(self, studies=(*self.studies, (study, text)))
-
-    def with_outcomes(self, outcomes: Counter[Outcome]) -> Page:
-        """The page with the tries of bad starts."""
-        return replace(self, outcomes=outcomes)
-
-    def with_shift(self, shift: Shift, count: int) -> Page:
-        """The page with one more fault, from `count` realisations."""
-        return replace(self, shifts=(*self.shifts, shift), faulty=count)
+def updated(page: str, section: str) -> str:
+    """The `page` with `section` in place of the one of the same heading, else at its end."""
+    heading = section.partition("\n")[0]
+    parts = [f"## {part}" for part in page.split("\n## ")[1:]]
+    titles = [part.partition("\n")[0] for part in parts]
+    if heading in titles:
+        parts[titles.index(heading)] = section
+    else:
+        parts.append(section)
+    return "\n".join([HEAD, *(part.rstrip("\n") + "\n" for part in parts)])
 
 
-def text_of(made: Page) -> str:
-    """The whole page."""
-    parts = [HEAD, *(_section(study, text) for study, text in made.studies)]
-    if made.outcomes is not None:
-        parts.append(_starts(made.outcomes))
-    if made.shifts:
-        parts += [MISMATCH.format(count=made.faulty), *_faults(made.shifts), ""]
-    return "\n".join(parts)
-
-
-def _starts(outcomes: Counter[Outcome]) -> str:
+def starts_section(outcomes: Counter[Outcome]) -> str:
+    """What became of bad starts."""
     return STARTS.format(
         off=100 * OFF,
         tries=outcomes.total(),
@@ -83,9 +64,10 @@ def _starts(outcomes: Counter[Outcome]) -> str:
     )
 
 
-def _faults(shifts: tuple[Shift, ...]) -> list[str]:
+def faults_section(shifts: Sequence[Shift], count: int) -> str:
+    """What faults do, from `count` realisations of each."""
     head = ("fault", *SHOWN, "te_delay", "chi2")
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    lines = [MISMATCH.format(count=count), f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for one in shifts:
         if one.percent is None:
             lines.append(
@@ -95,10 +77,11 @@ def _faults(shifts: tuple[Shift, ...]) -> list[str]:
         cells = [f"{one.percent[name]:+.2f}" for name in SHOWN]
         chi2 = f"{one.chi2[0]:.3f} → {one.chi2[1]:.3f}"
         lines.append(f"| {' | '.join([one.fault.text, *cells, f'{one.delay:+.2f}', chi2])} |")
-    return lines
+    return "\n".join([*lines, ""])
 
 
-def _section(study: Study, text: str) -> str:
+def study_section(study: Study, text: str) -> str:
+    """Every parameter of both methods; `text` says what the card knows."""
     lines = [f"## {study.name}: {text}", ""]
     head = ("parameter", "bound", "method", "bias", "std", "RMSE/bound", "coverage")
     lines += [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
