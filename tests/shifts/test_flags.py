@@ -28,6 +28,14 @@ def flag(*spans: tuple[float, float]) -> FloatArray:
     return np.array([float(any(low <= t <= high for low, high in spans)) for t in TIME])
 
 
+def test_a_single_wrong_frame_is_no_change_of_a_flag() -> None:
+    values = flag((1.0, 1.5))
+    values[[30, 120, 300]] = 1.0 - values[[30, 120, 300]]
+    (channel,) = states(shift_in_process=values).values()
+    (span,) = set_spans(channel)
+    assert span == pytest.approx((1.0, 1.5))
+
+
 def with_states(log: ShiftLog, **values: FloatArray) -> ShiftLog:
     return replace(log, channels={**log.channels, **states(**values)})
 

@@ -75,6 +75,17 @@ def lost(frames: tuple[Frame, ...]) -> list[Frame]:
     return [frame for frame, keep in zip(frames, kept, strict=True) if keep]
 
 
+def with_strangers(frames: tuple[Frame, ...]) -> list[Frame]:
+    """Engine messages of another sender, and gearbox messages of zeros under the right address."""
+    stamps = np.random.default_rng(2).uniform(*SPAN, 330).round(6)
+    engine = b"\xff\x7d\x7d\0\0\xff\xff\xff"
+    sent = [Frame(float(time), "can0", 0x0CF004F9, engine) for time in stamps[:300]]
+    sent += [
+        Frame(float(time), "can0", 0x0CF00203, b"\xc5\0\0\xff\xff\0\0\3") for time in stamps[300:]
+    ]
+    return sorted([*frames, *sent])
+
+
 VARIATIONS: dict[str, Callable[[tuple[Frame, ...]], list[Frame]]] = {
     "other addresses": lambda frames: [other_addresses(one) for one in frames],
     "no gear, road speed, reference torque": lambda frames: [
@@ -89,6 +100,7 @@ VARIATIONS: dict[str, Callable[[tuple[Frame, ...]], list[Frame]]] = {
     ],
     "engine torque not available": lambda frames: [one.blank(EEC1, 1, 3) for one in frames],
     "one frame in ten lost": lost,
+    "injected messages": with_strangers,
     "a pause of the bus between the shifts": lambda frames: [
         one for one in frames if not 7.0 < one.time < 8.5
     ],

@@ -102,7 +102,8 @@ def plain(name: str) -> str:
 def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, list[Column]]:
     """Return the candidate columns of each role; `elements` gives the kind of each by name.
 
-    A column without any number is a candidate only where no other is, a silent one never.
+    A column without any number, or from a strange sender, is a candidate only where no other is, a
+    silent one never.
     """
     columns = [column for column in columns if not column.silent]
     found = {
@@ -111,7 +112,11 @@ def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, l
     }
     for element, kind in elements.items():
         found[PRESSURE + element] = _pressure_candidates(columns, element, kind)
-    return {role: _with_numbers(candidates) for role, candidates in found.items() if candidates}
+    return {
+        role: _with_numbers(_foremost(candidates))
+        for role, candidates in found.items()
+        if candidates
+    }
 
 
 def _first(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
@@ -120,6 +125,10 @@ def _first(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
         if found := [column for column in columns if re.fullmatch(form, plain(column.name))]:
             return found
     return []
+
+
+def _foremost(candidates: list[Column]) -> list[Column]:
+    return [column for column in candidates if not column.aside] or candidates
 
 
 def _with_numbers(candidates: list[Column]) -> list[Column]:
@@ -172,6 +181,7 @@ def resolve(
             continue
         if len(candidates) == 1:
             channels[role] = spec_of(candidates[0], columns)
+            warnings += _others(candidates[0], columns)
             continue
         what = f"{role!r} may be any of the columns {', '.join(map(str, candidates))}"
         if role in needed or role in MEASURED or role.startswith(PRESSURE):
@@ -199,6 +209,14 @@ def _choice(role: str, candidates: Sequence[Column]) -> str:
         f"choose one in a channel mapping (--channels): channels.{role} = "
         f'{{ source = "{first.name}", group = "{first.group}" }}'
     )
+
+
+def _others(chosen: Column, columns: Sequence[Column]) -> list[str]:
+    """Words for the strange senders of a signal."""
+    others = [one for one in columns if one.aside and not one.silent and one.name == chosen.name]
+    if not others:
+        return []
+    return [f"{chosen} is used; left aside: {', '.join(map(str, others))}"]
 
 
 def spec_of(column: Column, columns: Sequence[Column]) -> ChannelSpec:

@@ -27,7 +27,8 @@ class Column:
 
     The group is what tells equal names apart: raster of a measurement file, message and sender on a
     bus; blank where the format has none. `empty`: it holds too few numbers for any role. `silent`:
-    its sender says throughout that there is no value; it is no candidate for any role.
+    its sender says throughout that there is no value; it is no candidate for any role. `aside`:
+    the unit that it belongs to tells it too; a candidate only where no other is.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Column:
     group: str = ""
     empty: bool = False
     silent: bool = False
+    aside: bool = False
 
     def __str__(self) -> str:
         return f"{self.name} ({self.group})" if self.group else self.name

@@ -8,23 +8,31 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.logs.damage import runs
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 Span = tuple[float, float]
+
+_GLITCH = 0.05
+"""A flag that changes for a shorter time [s] than this was sent wrongly, or by another sender."""
 
 _LATE = 0.3
 """How late [s] a gear or flag may be told on the bus."""
 
 
 def set_spans(flag: Channel) -> tuple[Span, ...]:
-    """Spans [s] in which a flag is set, from its first to its last set sample."""
-    on = np.concatenate([[False], flag.values > 0.5, [False]]).astype(np.int8)
-    edges = np.flatnonzero(np.diff(on))
-    return tuple(
-        (float(flag.time[first]), float(flag.time[stop - 1]))
-        for first, stop in zip(edges[::2], edges[1::2], strict=True)
-    )
+    """Spans [s] in which a flag is set, from its first to its last set sample.
+
+    A change for less than _GLITCH is none.
+    """
+    on, ends = flag.values > 0.5, np.append(flag.time, flag.time[-1] + flag.step)
+    for state in (False, True):
+        for first, stop in runs(on == state):
+            inside = first > 0 and stop < on.size
+            if inside and ends[stop] - ends[first] < _GLITCH:
+                on[first:stop] = not state
+    return tuple((float(flag.time[first]), float(flag.time[stop - 1])) for first, stop in runs(on))
 
 
 def flag_before(log: ShiftLog, time: float, reach: float) -> float | None:

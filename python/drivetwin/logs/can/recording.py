@@ -16,7 +16,7 @@ from drivetwin.logs.can.database import Message, Signal, admitted, codes, physic
 from drivetwin.logs.can.frames import Frames
 from drivetwin.logs.j1939 import torque
 from drivetwin.logs.j1939.codes import check_codes
-from drivetwin.logs.j1939.identifier import group_of, sender_of
+from drivetwin.logs.j1939.identifier import ENGINE, TRANSMISSION, group_of, sender_of
 from drivetwin.logs.j1939.transport import REPEATED, Assembled, reassemble
 from drivetwin.logs.raw import BusOptions, Column, RawChannel, Window
 from drivetwin.logs.shiftlog import FloatArray
@@ -25,13 +25,23 @@ from drivetwin.logs.validate import MIN_SAMPLES
 
 @dataclass(frozen=True)
 class Track:
-    """All payloads (n, bytes) of one message from one sender, at `time` (n,) [s]."""
+    """All payloads (n, bytes) of one message from one `sender`, at `time` (n,) [s].
+
+    `sender` is a J1939 address, None for other messages; `aside` as in `Column`.
+    """
 
     message: Message
+    sender: int | None
+    bus: int
     group: str
     time: FloatArray
     data: NDArray[np.uint8]
     length: NDArray[np.intp]
+    aside: bool = False
+
+    def column(self, name: str, unit: str | None) -> Column:
+        """One of its signals as a column."""
+        return Column(name, unit, self.group, aside=self.aside)
 
 
 @dataclass(frozen=True)
@@ -48,7 +58,9 @@ class BusRecording:
     ) -> None:
         self._path = path
         transport = reassemble(frames)
-        tracks = [*_single(frames, messages), *_multiple(transport.messages, messages, frames)]
+        tracks = _with_aside(
+            [*_single(frames, messages), *_multiple(transport.messages, messages, frames)]
+        )
         if not tracks:
             raise MissingChannelError(
                 f"none of the {len(np.unique(frames.identifier))} identifiers on the bus is in the "
@@ -60,9 +72,7 @@ class BusRecording:
         incomplete = (f"multi-packet messages incomplete: {faults}",) if faults else ()
         self.warnings: tuple[str, ...] = (*frames.warnings, *incomplete)
         entries = [
-            _Entry(
-                Column(signal.name, signal.unit, track.group), partial(self._decode, track, signal)
-            )
+            _Entry(track.column(signal.name, signal.unit), partial(self._decode, track, signal))
             for track in tracks
             for signal in track.message.signals
         ]
@@ -116,15 +126,15 @@ class BusRecording:
             self.warnings = (*self.warnings, note)
             return
         for track, signal in percent:
-            column = Column(torque.torque_name(signal.name), torque.UNIT, track.group)
+            column = track.column(torque.torque_name(signal.name), torque.UNIT)
             yield _Entry(column, partial(self._torque, track, signal, (reference, note)))
         for track, actual in percent:
             friction = [
                 pair for pair in percent
-                if pair[1].spn == torque.FRICTION and _sender(pair[0]) == _sender(track)
+                if pair[1].spn == torque.FRICTION and _source(pair[0]) == _source(track)
             ]  # fmt: skip
             if actual.spn == torque.ACTUAL and len(friction) == 1:
-                column = Column(torque.NET_TORQUE, torque.UNIT, track.group)
+                column = track.column(torque.NET_TORQUE, torque.UNIT)
                 pairs = ((track, actual), friction[0])
                 yield _Entry(column, partial(self._net, pairs, (reference, note)))
 
@@ -187,8 +197,18 @@ def _again(track: Track) -> NDArray[np.bool_]:
     return np.concatenate(([False], again))
 
 
-def _sender(track: Track) -> str:
-    return track.group.partition(" ")[2]
+def _source(track: Track) -> tuple[int | None, int]:
+    return track.sender, track.bus
+
+
+def _with_aside(tracks: Sequence[Track]) -> list[Track]:
+    """Mark messages of a strange sender where engine or transmission itself sends the same."""
+    own = (ENGINE, TRANSMISSION)
+    told = {(one.message.name, one.bus) for one in tracks if one.sender in own}
+    return [
+        replace(one, aside=one.sender not in own and (one.message.name, one.bus) in told)
+        for one in tracks
+    ]
 
 
 def _group(message: Message, sender: int | None, bus: str, many: bool) -> str:
@@ -214,6 +234,8 @@ def _single(frames: Frames, messages: Sequence[Message]) -> Iterator[Track]:
                 group = _group(message, tag if message.j1939 else None, name, many)
                 yield Track(
                     message,
+                    tag if message.j1939 else None,
+                    bus,
                     group,
                     frames.time[rows],
                     frames.data[rows],
@@ -237,6 +259,8 @@ def _multiple(
             padded = b"".join(one.payload.ljust(width, b"\xff") for one in own)
             yield Track(
                 message,
+                sender,
+                bus,
                 _group(message, sender, frames.buses[bus], many),
                 np.array([one.time for one in own]),
                 np.frombuffer(padded, np.uint8).reshape(-1, width),

@@ -10,6 +10,10 @@ _PDU1_BELOW = 240
 """Formats below this address one receiver: the next byte is its address, no part of the group."""
 
 
+ENGINE, TRANSMISSION = 0x00, 0x03
+"""Source addresses that SAE J1939 sets aside for the first engine and the first transmission."""
+
+
 def group_of(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
     """Return the parameter group number (n,) of each identifier."""
     page = (identifier >> 24) & 0x3
