@@ -172,3 +172,34 @@ fn an_excursion_within_one_sample_breaks_away() {
     }
     assert!((runs[0].events[0].time - runs[1].events[0].time).abs() < 1e-7);
 }
+
+/// Samples far apart beside a stiff shaft, and chains of many masses: both are passed by exact operators
+/// over parts of a sample, to the same accuracy.
+#[test]
+fn coarse_samples_and_long_chains_are_followed_as_closely() {
+    for (h, masses) in [(2e-2, 1), (1e-2, 3), (1e-3, 9)] {
+        let time = samples(h, (1.0 / h).round() as usize);
+        let mut elements = vec![
+            inertia("a", 2.0),
+            inertia("b", 1.0),
+            torque("a", "T"),
+            Element::Clutch(stribeck("C", "a", "b")),
+        ];
+        let mut speeds = vec![("a", 80.0), ("b", 50.0)];
+        let mut last = "b";
+        for name in ["m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8", "m9"].iter().take(masses) {
+            elements.push(inertia(name, 8.0));
+            elements.push(shaft(last, name, 2e4, 30.0));
+            speeds.push((name, 50.0));
+            last = name;
+        }
+        let torque: Vec<f64> = time.iter().map(|t| 60.0 + 25.0 * (9.0 * t).sin()).collect();
+        let pressure: Vec<f64> = time.iter().map(|t| 500.0 + 1500.0 * t).collect();
+        let columns = [("T", torque), ("P C", pressure)];
+        let output = Output::Slip("C".into());
+        let runs = both(&compile(elements), &time, &columns, &start(&speeds, &[]), &output);
+        assert_eq!(kinds(&runs[0]), kinds(&runs[1]));
+        assert_eq!(kinds(&runs[0]).last(), Some(&EventKind::Lock), "{masses} masses");
+        assert!(worst(&runs) < 1e-6, "{h} s, {masses} masses: {}", worst(&runs));
+    }
+}

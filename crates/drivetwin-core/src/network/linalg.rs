@@ -43,6 +43,11 @@ impl<T: Real> Matrix<T> {
         out
     }
 
+    /// Multiply all entries.
+    pub fn scale(&mut self, factor: f64) {
+        self.data.iter_mut().for_each(|v| *v *= factor);
+    }
+
     /// Transpose.
     pub fn transposed(&self) -> Self {
         let mut out = Self::zeros(self.cols, self.rows);

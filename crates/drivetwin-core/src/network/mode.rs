@@ -75,6 +75,8 @@ pub struct Mode<T> {
     pub derivative: Matrix<T>,
     /// The same.
     pub rates: SparseRows<T>,
+    /// About the spectral radius of the motion, 1/s.
+    pub radius: f64,
     /// Rows at rest.
     pub stuck: Vec<Row>,
     /// Their torques in that order (a held gear's is its loss torque), then the torques of
@@ -174,6 +176,7 @@ impl<T: Real> Network<T> {
             return Some(Mode {
                 key,
                 rates: SparseRows::of(&derivative),
+                radius: self.radius(&derivative),
                 derivative,
                 stuck,
                 stuck_torque: Matrix::zeros(0, self.basis()),
@@ -198,12 +201,35 @@ impl<T: Real> Network<T> {
         Some(Mode {
             key,
             rates: SparseRows::of(&derivative),
+            radius: self.radius(&derivative),
             derivative,
             gear_torque: OnceLock::new(),
             stuck_torque,
             stuck,
             redundant,
         })
+    }
+
+    /// Estimate of the spectral radius [1/s] of the motion from `A^16`, of which a bad scaling of the
+    /// states counts only by its sixteenth root.
+    fn radius(&self, derivative: &Matrix<T>) -> f64 {
+        let n = self.states();
+        let mut power = Matrix::<f64>::zeros(n, n);
+        for i in 0..n {
+            let row = power.row_mut(i).iter_mut().zip(derivative.row(i));
+            row.for_each(|(to, from)| *to = from.re());
+        }
+        let mut scale = 0.0;
+        for _ in 0..4 {
+            let size = power.max_abs();
+            if size == 0.0 {
+                return 0.0;
+            }
+            scale = 2.0 * (scale + size.ln());
+            power.scale(1.0 / size);
+            power = power.times(&power);
+        }
+        ((scale + power.max_abs().max(f64::MIN_POSITIVE).ln()) / 16.0).exp()
     }
 
     /// The motion that the modes of a key share; compiled with the network where it has no gear whose

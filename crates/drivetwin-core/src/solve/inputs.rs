@@ -157,9 +157,39 @@ impl<T: Real> Inputs<T> {
             let to = lines[input..].iter_mut().step_by(signals.len());
             fill(to, (&knots, jumps.is_empty()), (times, values, delay.re()));
         }
+        Ok(Self::of_lines(knots, lines, (shifts, sines)))
+    }
+
+    fn of_lines(
+        knots: Vec<f64>,
+        lines: Vec<[f64; 2]>,
+        (shifts, sines): (Vec<T>, Vec<Option<Sine<T>>>),
+    ) -> Self {
         let equal = equal_lengths(&knots);
-        let extremes = extremes(&knots, &lines, signals.len());
-        Ok(Self { knots, lines, shifts, sines, equal, extremes })
+        let extremes = extremes(&knots, &lines, shifts.len());
+        Self { knots, lines, shifts, sines, equal, extremes }
+    }
+
+    /// The same inputs over shorter segments: one of length l [s] becomes `parts(l)`.
+    pub fn divided(self, parts: impl Fn(f64) -> usize) -> Self {
+        let parts: Vec<usize> =
+            self.knots.windows(2).map(|span| parts(span[1] - span[0])).collect();
+        let count: usize = parts.iter().sum();
+        if count == parts.len() {
+            return self;
+        }
+        let mut knots = Vec::with_capacity(count + 1);
+        let mut lines = Vec::with_capacity(count * self.sines.len());
+        for (i, &parts) in parts.iter().enumerate() {
+            let (from, to) = self.span(i);
+            for part in 0..parts {
+                let elapsed = (to - from) * part as f64 / parts as f64;
+                knots.push(from + elapsed);
+                lines.extend(self.lines(i).iter().map(|[u, rate]| [u + rate * elapsed, *rate]));
+            }
+        }
+        knots.push(self.knots[self.segments()]);
+        Self::of_lines(knots, lines, (self.shifts, self.sines))
     }
 
     /// Number of segments from `i` on, itself included, that are as long as it.

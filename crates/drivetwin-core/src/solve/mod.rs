@@ -26,5 +26,6 @@ pub use formation::{Recording, WIDTH, run_together};
 pub use inputs::{InputError, Inputs, Signal};
 pub use integrator::{Event, EventKind, Integrator, RowState, Settings, Step};
 pub use march::BLOCK;
-pub use sprint::{Samples, Sink};
+pub use operators::MAX_SLIPPING;
+pub use sprint::{Samples, Sink, can_march};
 pub use status::Status;

@@ -120,7 +120,7 @@ pub struct Watched<L, const N: usize> {
 type Square<T, const N: usize> = [[T; N]; N];
 
 /// Largest `ρ(A) h` for which a cubic follows a slipping element.
-const MAX_SLIPPING: f64 = 0.7;
+pub const MAX_SLIPPING: f64 = 0.7;
 /// Largest `ρ(A) h` for which the series of the operators is summed directly.
 const MAX_LINEAR: f64 = 3.0;
 /// What may be left of the series, relative to its first term; generous, as A is badly scaled.
@@ -221,7 +221,7 @@ impl<T: Real, const N: usize> Task for Build<'_, T, N> {
         let a: Square<T, N> = std::array::from_fn(|i| {
             std::array::from_fn(|j| if j < n { derivative(i, j) } else { T::zero_() })
         });
-        let reach = radius::<T, F, N>(&a) * h;
+        let reach = mode.radius * h;
         if reach > if active.is_empty() { MAX_LINEAR } else { MAX_SLIPPING } {
             return None;
         }
@@ -383,25 +383,6 @@ fn terms(reach: f64) -> usize {
             left < REMAINDER
         })
         .unwrap_or(MAX_SERIES)
-}
-
-/// Estimate of the spectral radius [1/s] from `A^16`, of which a bad scaling of the states counts only
-/// by its sixteenth root.
-#[inline(always)]
-fn radius<T: Real, const F: bool, const N: usize>(a: &Square<T, N>) -> f64 {
-    let mut power: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| a[i][j].re()));
-    let mut scale = 0.0;
-    for _ in 0..4 {
-        let size = power.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
-        if size == 0.0 {
-            return 0.0;
-        }
-        scale = 2.0 * (scale + size.ln());
-        let unit = power.map(|row| row.map(|v| v / size));
-        power = multiply::<f64, F, N>(&unit, &unit);
-    }
-    let size = power.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
-    ((scale + size.max(f64::MIN_POSITIVE).ln()) / 16.0).exp()
 }
 
 /// `S_k = Σ_i A^i h^(i+k) / (i+k)!` for k = 0 .. CUBIC: S_0 is the transition matrix, and

@@ -8,8 +8,9 @@ use super::integrator::{Integrator, RowState};
 use super::lanes::{Task, dispatch};
 use super::march::{BLOCK, Carry, Source, Trail, march};
 use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
+use crate::network::channel::{self, Channel};
 use crate::network::smooth::{Law, Line, MAX_INPUTS, Sample, line_of};
-use crate::network::{Cell, GearState, ModeKey, Row};
+use crate::network::{Cell, GearState, ModeKey, Network, Row};
 use crate::number::Real;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -23,6 +24,24 @@ pub(super) enum AnySize<T> {
     Eight(Operators<T, 8>),
     /// Up to 12; not with derivatives, for which the gain no longer pays for the code.
     Twelve(Operators<T, 12>),
+    /// Up to [`MAX_STATES`]; likewise.
+    Many(Operators<T, MAX_STATES>),
+}
+
+/// Most states of a network that is marched.
+const MAX_STATES: usize = 24;
+/// The same with derivatives.
+const MAX_DERIVED: usize = 8;
+
+/// Whether a network is of the kind that passes samples by exact operators.
+pub fn can_march<T: Real>(network: &Network<T>) -> bool {
+    let smooth = |channel: &Channel<T>| {
+        matches!(channel.law, channel::Law::Friction { .. } | channel::Law::Quadratic(_))
+    };
+    network.states() <= if T::DERIVATIVES { MAX_DERIVED } else { MAX_STATES }
+        && network.prescribed.is_empty()
+        && network.mechanism.inputs.len() <= MAX_INPUTS
+        && network.channels.iter().all(smooth)
 }
 
 impl AnySize<f64> {
@@ -32,6 +51,7 @@ impl AnySize<f64> {
             Self::Four(operators) => operators,
             Self::Eight(operators) => operators,
             Self::Twelve(operators) => operators,
+            Self::Many(operators) => operators,
         };
         any.downcast_ref()
     }
@@ -111,6 +131,11 @@ impl<T: Real> Integrator<'_, T> {
                     self.pass(operators, active, (h, count), sink);
                 }
             }
+            AnySize::Many(operators) => {
+                if !T::DERIVATIVES {
+                    self.pass(operators, active, (h, count), sink);
+                }
+            }
         }
         self.resume();
     }
@@ -167,9 +192,12 @@ impl<T: Real> Integrator<'_, T> {
         let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| {
             let built = match self.network.states() {
                 0..=4 => self.build::<4>(active, &laws, h).map(AnySize::Four),
-                5..=8 => self.build::<8>(active, &laws, h).map(AnySize::Eight),
+                5..=MAX_DERIVED => self.build::<8>(active, &laws, h).map(AnySize::Eight),
                 9..=12 if !T::DERIVATIVES => {
                     self.build::<12>(active, &laws, h).map(AnySize::Twelve)
+                }
+                13..=MAX_STATES if !T::DERIVATIVES => {
+                    self.build::<MAX_STATES>(active, &laws, h).map(AnySize::Many)
                 }
                 _ => None,
             };
