@@ -39,7 +39,8 @@ def one() -> JointEstimate:
 def test_every_log_is_drawn_and_the_line_goes_through_the_reference(one: JointEstimate) -> None:
     figure = drift_figure(one)
     traces = {trace.name: trace for trace in figure.data}
-    assert len(traces["log"].x) == 3
+    assert list(traces["log"].x) == [0.0, 50.0]
+    assert list(traces["unit that changed, from there"].x) == [150.0]
     assert list(traces["outlier"].y) == [pytest.approx(0.99)]
     line = traces["fleet"]
     at = np.interp(75.0, line.x, line.y)

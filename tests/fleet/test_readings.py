@@ -19,5 +19,7 @@ def test_dates_are_written_as_they_were_read() -> None:
 
 
 def test_numbers_keep_the_name_of_their_field() -> None:
-    assert span_text("odometer_Mm", 119.25, 123.0) == "119.25 and 123 odometer_Mm"
+    assert span_text("odometer_Mm", 119.2543, 123.0) == "119.3 and 123 odometer_Mm"
+    assert span_text("odometer_km", 98764.0, 123456.0) == "98760 and 123500 odometer_km"
+    assert reading_text("odometer_km", 123456.0) == "123456"
     assert drift_unit("odometer_Mm") == (1.0, "odometer_Mm")

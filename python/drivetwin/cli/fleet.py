@@ -229,7 +229,7 @@ def _change(one: JointEstimate, change: Change) -> str:
     from drivetwin.fleet.readings import span_text
 
     ends = (change.size - _Z95 * change.std, change.size + _Z95 * change.std)
-    step = " ".join(shown(change.size, ends, one.si_unit))
+    step = " ".join(shown(change.size, ends, one.si_unit)).removesuffix(" –")
     where = span_text(change.field, change.before, change.after)
     return f"{one.parameter}: unit {change.unit} changed by {step} between {where}"
 

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 import plotly.graph_objects as go
+from numpy.typing import NDArray
 
 from drivetwin.fleet.joint.mixed import FloatArray
 from drivetwin.fleet.joint.result import Drift, JointEstimate, UnitValue
@@ -28,13 +29,14 @@ def drift_figure(one: JointEstimate) -> go.Figure:
     """
     display = display_of(one.si_unit)
     drift, points = one.drifts[0], one.points
-    odd = {outlier.value for outlier in one.outliers}
-    out = np.isin(points.value, list(odd))
+    out = np.isin(points.value, [outlier.value for outlier in one.outliers])
+    after = _after_change(one) & ~out
     stride = -(-points.value.size // _MOST_POINTS)
     kept = np.arange(0, points.value.size, stride)
     figure = go.Figure()
     for name, picked, colour, symbol in (
-        ("log", kept[~out[kept]], MEASURED, "circle"),
+        ("log", kept[~(out | after)[kept]], MEASURED, "circle"),
+        ("unit that changed, from there", kept[after[kept]], SECOND, "circle"),
         ("outlier", np.flatnonzero(out), ACCENT, "x"),
     ):
         if picked.size:
@@ -44,7 +46,7 @@ def drift_figure(one: JointEstimate) -> go.Figure:
                 text=[points.unit[k] for k in picked],
                 mode="markers",
                 name=name,
-                marker={"color": colour, "size": 5 if name == "log" else 9, "symbol": symbol,
+                marker={"color": colour, "size": 9 if symbol == "x" else 5, "symbol": symbol,
                         "opacity": 0.45 if name == "log" else 1.0},
                 hovertemplate="unit %{text}: %{y:.4g}<extra></extra>",
             )  # fmt: skip
@@ -61,6 +63,14 @@ def drift_figure(one: JointEstimate) -> go.Figure:
         )
     )
     return figure
+
+
+def _after_change(one: JointEstimate) -> NDArray[np.bool_]:
+    """Which of the points are of a unit that changed, from its change on."""
+    units, found = np.array(one.points.unit), np.zeros(one.points.value.size, np.bool_)
+    for change in one.changes:
+        found |= (units == change.unit) & (one.points.reading >= change.after)
+    return found
 
 
 def _add_line(figure: go.Figure, one: JointEstimate, drift: Drift) -> None:

@@ -144,7 +144,7 @@ class Index:
 
     def put_file(self, file: FileRow) -> None:
         """Remember a file; replaces what was known of its path."""
-        fields = json.dumps(dict(file.fields), sort_keys=True)
+        fields = json.dumps(dict(file.fields))
         values = (file.path, file.log, file.content, file.size, file.modified, file.rule, file.unit)
         self._write(
             "INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",

@@ -11,16 +11,18 @@ _YEAR = 365.25 * 86400.0
 
 
 def reading_text(field: str, reading: float) -> str:
-    """One reading: an ISO date, or the number alone."""
+    """One reading: an ISO date, or the number alone to six digits."""
     if is_date(field):
         return datetime.fromtimestamp(reading, UTC).date().isoformat()
     return f"{reading:g}"
 
 
 def span_text(field: str, low: float, high: float) -> str:
-    """Two readings and what they are of, e.g. `119 and 123 odometer_Mm`."""
-    ends = f"{reading_text(field, low)} and {reading_text(field, high)}"
-    return ends if is_date(field) else f"{ends} {field}"
+    """Two readings and what they are of, e.g. `119.2 and 123 odometer_Mm`; four digits do."""
+    if is_date(field):
+        return f"{reading_text(field, low)} and {reading_text(field, high)}"
+    ends = (f"{float(f'{each:.4g}'):g}" for each in (low, high))
+    return " and ".join(ends) + f" {field}"
 
 
 def drift_unit(field: str) -> tuple[float, str]:

@@ -13,7 +13,7 @@ import numpy as np
 from drivetwin.fleet.figures import drift_figure, unit_label, units_figure
 from drivetwin.fleet.friction import fleet_friction
 from drivetwin.fleet.joint.estimate import joint_estimates
-from drivetwin.fleet.joint.result import Interval, JointEstimate
+from drivetwin.fleet.joint.result import Interval, JointEstimate, Outlier
 from drivetwin.fleet.pages import LIBRARY
 from drivetwin.fleet.readings import drift_unit, span_text
 from drivetwin.fleet.singles import MOST_ROWS, cut, single, singles
@@ -119,11 +119,12 @@ _SHIFTS = "SELECT count(*) FROM shifts WHERE state = 'used' AND log IN (SELECT l
 
 def _parameters(found: Sequence[JointEstimate]) -> Section:
     several = _several_rules(found)
+    per = " or ".join({drift_unit(one.drifts[0].field)[1]: 0 for one in found if one.drifts})
     rows = [_parameter_row(one, several=several) for one in found]
     head = (
         Cell("parameter"), Cell("logs", number=True), Cell("fleet's mean", number=True),
-        Cell("± 95 %", number=True), Cell("unit"), Cell("spread over units (1 σ)", number=True),
-        Cell("drift", number=True), Cell("remark"),
+        Cell("± 95 %", number=True), Cell("unit"), Cell("spread of units, 1 σ", number=True),
+        Cell(f"drift per {per}" if per else "drift", number=True), Cell("remark"),
     )  # fmt: skip
     blocks: list[Block] = [TableBlock("Shared values, at the fields' means.", head, rows)]
     return Section(
@@ -150,9 +151,12 @@ def _parameter_row(one: JointEstimate, *, several: bool) -> tuple[Cell, ...]:
         between = _between(one.spread_ci95, display.factor)
     slope, note = "", ""
     if one.drifts:
-        factor, per = drift_unit(one.drifts[0].field)
-        slope = significant(one.drifts[0].slope * factor * display.factor, 2)
-        note = _between(one.drifts[0].ci95, factor * display.factor) + f" per {per}"
+        factor = display.factor * drift_unit(one.drifts[0].field)[0]
+        ends = one.drifts[0].ci95
+        slope, note = with_uncertainty(
+            one.drifts[0].slope * factor, 0.5 * (ends[1] - ends[0]) * factor
+        )
+        note = f"± {note}"
     meaning = spec_of(one.parameter).meaning
     return (
         Cell(
@@ -226,7 +230,8 @@ def _ageing(found: Sequence[JointEstimate]) -> Section:
         if one.drifts:
             text = f"{name}: every log; the shared line with its 95 % band."
             if one.changes:
-                text += " Dashed: a unit changed there."
+                units = ", ".join(dict.fromkeys(change.unit for change in one.changes))
+                text += f" Dashed: unit {units} changed there."
             blocks.append(FigureBlock(drift_figure(one), text))
         if _sure_spread(one) or any(unit.odd for unit in one.units):
             text = f"{name}: how far each unit is from the shared value, with 95 % intervals."
@@ -270,15 +275,27 @@ def _odd(store: Store, found: Sequence[JointEstimate], folder: Path) -> Section:
     logs = [
         (
             Cell(Path(outlier.path).name, href=single(store, outlier.log, folder)),
-            *cells(parameter_label(one.parameter), outlier.reason),
+            *cells(parameter_label(one.parameter), *_values(one, outlier), outlier.reason),
         )
         for one in found
         for outlier in one.outliers
     ]
     if logs:
         caption = f"Logs that do not fit{cut(len(logs))}."
-        blocks.append(TableBlock(caption, cells("log", "parameter", "reason"), logs[:MOST_ROWS]))
-    return Section("odd", "What is odd", "Left out of the shared values above.", blocks)
+        head = cells("log", "parameter", "value", "expected", "reason")
+        blocks.append(TableBlock(caption, head, logs[:MOST_ROWS]))
+    intro = (
+        "Logs that do not fit are left out of the shared values above; a unit that changed counts "
+        "as another one from there on."
+    )
+    return Section("odd", "What is odd", intro, blocks)
+
+
+def _values(one: JointEstimate, outlier: Outlier) -> tuple[str, str]:
+    """What a log says and what its unit and fields let expect."""
+    display = display_of(one.si_unit)
+    value = f"{significant(outlier.value * display.factor)} {display.label}".removesuffix(" –")
+    return value, significant(outlier.expected * display.factor)
 
 
 def _with_error(one: JointEstimate, value: float, std: float) -> str:
