@@ -120,3 +120,25 @@ def test_wrong_usage_is_told(
 ) -> None:
     assert main(arguments) == 2
     assert says in capsys.readouterr().err
+
+
+def test_dates_of_a_list_are_dates_everywhere(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    logs = sorted((fleet / "logs").glob("*/log*.csv"))
+    dated = [f"{path},2024-03-{day:02d}" for day, path in enumerate(logs, 1)]
+    (tmp_path / "list.csv").write_text("\n".join(["path,recorded", *dated]))
+    rules = (fleet / "logs" / "rules.toml").read_text().split("[fields")[0]
+    (fleet / "logs" / "dated.toml").write_text(f'{rules}[fields.date]\ncolumn = "recorded"\n')
+    command = ["fleet", "--list", str(tmp_path / "list.csv"), "--method", "integral", "--json"]
+    command += ["--vehicle", str(fleet / "logs" / "dated.toml"), "-o", str(fleet / "store")]
+    assert main(command) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["computed"] == 0
+    sql = (
+        "SELECT max(date) - min(date) AS span, min(date) AS first FROM files"
+    )
+    assert main(["fleet", "query", str(fleet / "store"), sql, "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert row == {"span": "7 days, 0:00:00", "first": "2024-03-01 00:00:00"}
+    assert main(["fleet", "estimate", str(fleet / "store"), "--parameter", "eta"]) == 0
+    assert "year" in capsys.readouterr().out

@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from drivetwin.fleet.joint.mixed import FloatArray
 from drivetwin.fleet.joint.result import Drift, JointEstimate, UnitValue
-from drivetwin.fleet.readings import reading_text
+from drivetwin.fleet.readings import moment, reading_text
 from drivetwin.fleet.rules import is_date
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, axis, layout
@@ -156,4 +154,4 @@ def _shown(
     """Readings as they are drawn: dates as such."""
     if not is_date(field):
         return readings
-    return np.array([datetime.fromtimestamp(each, UTC) for each in readings], dtype=object)
+    return np.array([moment(each) for each in readings], dtype=object)

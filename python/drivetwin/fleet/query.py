@@ -6,12 +6,15 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from drivetwin.errors import QueryError
 from drivetwin.fleet.index import Index
+from drivetwin.fleet.readings import moment
 from drivetwin.fleet.rows import RowKind, schema
+from drivetwin.fleet.rules import is_date
 from drivetwin.fleet.store import Store
 from drivetwin.logs.extras import require
 
@@ -83,13 +86,21 @@ def _table(index: Index, sql: str) -> Any:
 def _files(index: Index) -> list[dict[str, Any]]:
     """One row for each file, with its fields as columns; a field may be absent."""
     found = [
-        {"path": path, "log": log, "rule": rule, "unit": unit, **json.loads(fields)}
+        {"path": path, "log": log, "rule": rule, "unit": unit, **_readings(fields)}
         for path, log, rule, unit, fields in index.select(
             "SELECT path, log, rule, unit, fields FROM files ORDER BY path"
         )
     ]
     columns = dict.fromkeys(name for row in found for name in row)
     return [{name: row.get(name) for name in columns} for row in found]
+
+
+def _readings(fields: str) -> dict[str, float | datetime]:
+    """Fields by name; a date as a point in time (UTC), with which SQL can reckon."""
+    return {
+        name: moment(reading).replace(tzinfo=None) if is_date(name) else reading
+        for name, reading in json.loads(fields).items()
+    }
 
 
 def save_answer(answer: Answer, path: Path) -> None:

@@ -10,10 +10,15 @@ from drivetwin.fleet.rules import is_date
 _YEAR = 365.25 * 86400.0
 
 
+def moment(reading: float) -> datetime:
+    """The point in time of a date's reading [s since 1970]."""
+    return datetime.fromtimestamp(reading, UTC)
+
+
 def reading_text(field: str, reading: float) -> str:
     """One reading: an ISO date, or the number alone to six digits."""
     if is_date(field):
-        return datetime.fromtimestamp(reading, UTC).date().isoformat()
+        return moment(reading).date().isoformat()
     return f"{reading:g}"
 
 
