@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from drivetwin.identify.likelihood.newton import minimise
-from drivetwin.identify.likelihood.problem import Problem
+from drivetwin.identify.likelihood.newton import STALLED, minimise
+from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.regression import Prior
+from drivetwin.identify.signals import FloatArray
 
 NAMES = ("a", "b", "c")
 
@@ -35,3 +36,34 @@ def test_correlated_unknowns_at_their_bounds(
     best = lsq_linear(root, root @ np.array(mean), (-upper, upper), method="bvls").x
     least = problem.cost(Point(NAMES, best))
     assert problem.cost(found.point) == pytest.approx(least, abs=0.02 * (1.0 + least))
+
+
+class Kinked(Problem):
+    """Q = x² + y² + z² + 5·|x + 2y - 1| + 5·|y - z - 1|, with the slopes of the side it is on."""
+
+    _BENDS = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, -1.0]])
+
+    def _sides(self, point: Point) -> FloatArray:
+        return self._BENDS @ point.values - 1.0
+
+    def cost(self, point: Point) -> float:
+        """Q at a point."""
+        return float(point.values @ point.values + 5.0 * np.abs(self._sides(point)).sum())
+
+    def normal(self, point: Point) -> Normal:
+        """Half the gradient of the side that the point is on, and the smooth part's curvature."""
+        signs = np.where(self._sides(point) >= 0.0, 1.0, -1.0)
+        gradient = point.values + 2.5 * signs @ self._BENDS
+        return Normal(self.cost(point), gradient, np.eye(3), np.eye(3), (), ())
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3))
+def test_a_search_goes_along_kinks_to_their_crossing(start: list[float]) -> None:
+    free = np.full(3, np.inf)
+    problem = Kinked((), Prior(np.zeros(3), np.zeros((3, 3))), -free, free)
+    found = minimise(problem, Point(NAMES, np.array(start)))
+    assert found is not None
+    assert found.converged
+    # On both kinks: x = 1 - 2y, z = y - 1, of which x² + y² + z² is least at y = 1/2.
+    best = Point(NAMES, np.array([0.0, 0.5, -0.5]))
+    assert problem.cost(found.point) == pytest.approx(problem.cost(best), abs=STALLED)

@@ -4,15 +4,19 @@
 The unknowns differ by ten orders of magnitude in size; every matrix is scaled to a unit diagonal
 before it is solved. The search ends where a full step would lower Q by less than a small part of
 one, which is the same part of a standard deviation squared for every unknown.
+
+Q has kinks: pressure noise about P0 fills and vents an element many times, and what moves such an
+instant over a sample bends Q. A search that meets one crawls along it. There the least combination
+of the gradients on its sides is what may still fall (Lemaréchal 1975), and takes its place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import Bounds, LinearConstraint, lsq_linear, minimize
 
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.retraction import ahead
@@ -23,10 +27,14 @@ from drivetwin.progress import tell
 ENOUGH = 1e-2
 """Expected fall of Q at which the search ends: 0.1 standard deviations."""
 STALLED = 0.3
-"""Expected fall of Q below which a point that no step improves is a minimum all the same.
-
-Pressure noise about P0 fills and vents an element many times, and each such instant is a small
-kink of Q, where the expansion promises what no step keeps."""
+"""Expected fall of Q below which a point that no step improves is a minimum all the same: at a
+kink the expansion promises what no step keeps."""
+CRAWLING = 0.1
+"""Fall of Q over the expected one below which a step has met a kink."""
+SIDES = 8
+"""Most gradients about a kink that are combined."""
+HALVINGS = 6
+"""How often a step across a kink is halved before the other side counts as reached."""
 DAMPING = 1e-3
 """First damping relative to the diagonal of the information."""
 LARGEST = 1e8
@@ -102,11 +110,86 @@ def minimise(
         trial, fall, damping = _better(problem, point, normal, damping)
         if rough and trial is not None and fall < ROUGH * normal.cost:
             return Found(problem, trial, normal, True, iteration)
+        if not rough and settled and fall < CRAWLING * expected:
+            along, expected = _along_kink(problem, point, normal)
+            trial = along or trial
         if trial is None or (fall < ENOUGH and expected < STALLED and settled):
             return Found(problem, point, normal, expected < STALLED, iteration)
         point = trial
     last = problem.normal(point)
     return None if last is None else Found(problem, point, last, False, most)
+
+
+def _along_kink(problem: Problem, point: Point, normal: Normal) -> tuple[Point | None, float]:
+    """A point with less Q along the kink that `point` lies at, and the fall expected on the way.
+
+    None where there is none: the sides that the steps reach are gathered until their least
+    combination promises too little.
+    """
+    sides = [_Side(normal.gradient, 0.0)]
+    while True:
+        gradient, below = _least_of(sides, normal.information)
+        least = replace(normal, gradient=gradient)
+        expected = _expected(problem, point, least) + below
+        if expected < ENOUGH or len(sides) == SIDES:
+            return None, expected
+        step = _step(problem, point, least, 0.0)
+        for share in 0.5 ** np.arange(HALVINGS):
+            values = np.clip(point.values + share * step, problem.lower, problem.upper)
+            trial = point.moved(values)
+            if normal.cost - problem.cost(trial) > CRAWLING * share * expected:
+                return trial, expected
+        behind = problem.normal(trial)
+        if behind is None:
+            return None, expected
+        sides.append(_Side.seen(behind, normal, trial.values - point.values))
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One of the smooth pieces that meet at a kink, continued to the point of the search: its
+    gradient (p,) there, and by how much it lies `below` Q."""
+
+    gradient: FloatArray
+    below: float
+
+    @classmethod
+    def seen(cls, there: Normal, here: Normal, way: FloatArray) -> _Side:
+        """The side on which Q was expanded `way` (p,) from here."""
+        curved = here.information @ way
+        continued = there.cost - 2.0 * there.gradient @ way + way @ curved
+        return cls(there.gradient - curved, max(here.cost - float(continued), 0.0))
+
+
+def _least_of(sides: list[_Side], information: FloatArray) -> tuple[FloatArray, float]:
+    """The convex combination of sides that promises the least fall: gradient (p,), how far below.
+
+    The dual of the least of all sides' highest: min ‖Σ a·g‖² + Σ a·below over the simplex, in the
+    measure of the information's inverse.
+    """
+    scale = _scale(information)
+    gradients = np.array([side.gradient for side in sides])
+    below = np.array([side.below for side in sides])
+    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-13, hermitian=True)
+    square = (gradients / scale) @ inverse @ (gradients / scale).T
+    unit = max(float(square.max() + below.max()), 1e-300)
+
+    def fall(share: FloatArray) -> float:
+        return float(share @ square @ share + below @ share) / unit
+
+    def slope(share: FloatArray) -> FloatArray:
+        return np.asarray((2.0 * square @ share + below) / unit)
+
+    found = minimize(
+        fall,
+        np.full(len(sides), 1.0 / len(sides)),
+        jac=slope,
+        bounds=Bounds(0.0, 1.0),
+        constraints=LinearConstraint(np.ones((1, len(sides))), 1.0, 1.0),
+        method="SLSQP",
+        options={"ftol": 1e-12},
+    )
+    return np.asarray(found.x @ gradients), float(found.x @ below)
 
 
 def _done(first: float, expected: float) -> float:
