@@ -211,3 +211,16 @@ def test_a_saturated_pressure_is_told() -> None:
     checked = check_channel(channel("pressure.B2", np.minimum(true, 9.9e5)), "log.csv")
     assert any("at one number" in text for text in checked.warnings)
     assert np.count_nonzero(checked.channel.values == 9.9e5) < 3
+
+
+def test_a_channel_of_few_steps_is_told() -> None:
+    rng = np.random.default_rng(1)
+    true = (
+        800.0 + 600.0 * np.sin(np.linspace(0.0, 9.0, TIME.size)) + 5.0 * rng.normal(size=TIME.size)
+    )
+    checked = check_channel(channel("engine_torque", 100.0 * np.round(true / 100.0)), "log.csv")
+    assert any("in steps of 100 N·m, 7 % of its largest" in text for text in checked.warnings)
+    fine = check_channel(channel("engine_torque", 12.5 * np.round(true / 12.5)), "log.csv")
+    assert fine.warnings == ()
+    switched = np.where(np.arange(TIME.size) < TIME.size // 2, 0.0, 9e5)
+    assert check_channel(channel("pressure.B2", switched), "log.csv").warnings == ()

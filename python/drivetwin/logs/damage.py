@@ -182,13 +182,18 @@ def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | 
         return None
     start, end = max(found, key=lambda run: run[1] - run[0])
     elsewhere = np.concatenate([values[: start + 1], values[end:]])
-    moving = np.abs(np.diff(elsewhere))
-    if values[start] == 0.0 or moving.size < _ENOUGH or np.mean(moving > 0.0) < _JITTER:
+    moving = np.diff(elsewhere) != 0.0
+    if values[start] == 0.0 or moving.size < _ENOUGH or np.mean(moving) < _JITTER:
         return None
-    resolution = float(moving[moving > 0.0].min())
-    noise = _noise(elsewhere / resolution)
+    noise = _noise(elsewhere / resolution(elsewhere))
     unlikely = (end - start) * np.log(erf(0.5 / (np.sqrt(2.0) * noise))) if noise > 0.0 else 0.0
     return (float(time[start]), float(time[end])) if unlikely < _UNLIKELY else None
+
+
+def resolution(values: FloatArray) -> float:
+    """Smallest step between two samples in a row; 0 where there is none."""
+    steps = np.abs(np.diff(values))
+    return float(steps[steps > 0.0].min()) if steps.any() else 0.0
 
 
 def _noise(codes: FloatArray) -> float:

@@ -15,10 +15,12 @@ from drivetwin.logs.damage import (
     dropouts,
     longest_rest,
     missing,
+    resolution,
     spikes,
     stuck,
 )
 from drivetwin.logs.held import find_raster, fresh_samples
+from drivetwin.logs.roles import AUXILIARY
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.logs.units import usual_units
 
@@ -39,6 +41,10 @@ MAX_SPARSE = 100.0
 
 TYPICAL_STEP = (1e-4, 0.2)
 """Sample interval [s] that a proposed unit of time must lead to."""
+
+COARSE = 0.03
+"""Resolution as a share of the largest number from which a channel counts as coarse; engines on a
+bus have 1 % of their reference torque."""
 
 MAX_AT_LIMIT = 0.1
 """Share of samples at the largest number above which an engine torque may be saturated."""
@@ -115,6 +121,7 @@ def check_channel(channel: Channel, file: str) -> Checked:
     _check_wraps(channel, where)
     warnings += _at_limit(channel)
     warnings += _at_rest(channel)
+    warnings += _coarse(channel)
     return Checked(channel, tuple(warnings))
 
 
@@ -150,6 +157,22 @@ def _at_rest(channel: Channel) -> list[str]:
         f"channel {channel.source_name!r}: one number from {span[0]:.6g} s to {span[1]:.6g} s, "
         "though it jitters elsewhere; if it is stuck there, results that rest on it are wrong"
     ]
+
+
+def _coarse(channel: Channel) -> list[str]:
+    """Words for a measured channel that was rounded so much that nothing precise rests on it."""
+    step, largest = resolution(channel.values), float(np.abs(channel.values).max())
+    if channel.quantity in AUXILIARY or step <= COARSE * largest or _switched(channel.values):
+        return []
+    return [
+        f"channel {channel.source_name!r}: recorded in steps of {_show(step, channel.quantity)}, "
+        f"{100 * step / largest:.0f} % of its largest number; what rests on it may be as coarse"
+    ]
+
+
+def _switched(values: FloatArray) -> bool:
+    """Whether a signal knows two numbers only, as the pressure of a valve that is on or off."""
+    return bool(np.all((values == values.min()) | (values == values.max())))
 
 
 def _dropouts(channel: Channel) -> Damage | None:

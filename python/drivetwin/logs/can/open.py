@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
 
@@ -42,7 +43,10 @@ def bus_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecord
 
 def _messages(databases: tuple[Path, ...]) -> tuple[Message, ...]:
     """Messages of the stated databases, else the built-in ones of J1939."""
-    if databases:
-        return read_database(databases)
+    return read_database(databases) if databases else _j1939()
+
+
+@cache
+def _j1939() -> tuple[Message, ...]:
     with as_file(files("drivetwin.logs.j1939") / "driveline.dbc") as path:
         return read_database((path,))
