@@ -116,7 +116,7 @@ def _slip_time(maneuver: Maneuver) -> str:
 def _energy(motion: DriveRun) -> Table:
     table = table_of("Energy over the drive", "part", "kJ", right=("kJ",))
     for part, value in _balance(motion).items():
-        table.add_row(part, f"{value / 1e3:.3f}")
+        table.add_row(part, f"{value / 1e3:z.3f}")
     return table
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile
-from drivetwin.cli.numbers import shown
+from drivetwin.cli.numbers import around, shown
 from drivetwin.cli.output import JsonFlag, print_json, say, show, step, table_of
 from drivetwin.identify.shape.kind import Shape
 from drivetwin.parameters import spec_of
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from drivetwin.cli.pipeline import Outcome
     from drivetwin.identify.bootstrap import Bootstrap
-    from drivetwin.identify.experiment.suggest import Suggestion
     from drivetwin.identify.profile import Profile
     from drivetwin.identify.result import Identification
     from drivetwin.identify.shape.departures import Departure
@@ -108,6 +107,7 @@ class Answer:
 
 def _answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
     """Every answer, in the order in which they are printed."""
+    from drivetwin.cli.tables import suggestion_table
     from drivetwin.identify.bootstrap import bootstrap
     from drivetwin.identify.experiment.suggest import suggest
     from drivetwin.identify.profile import profile
@@ -116,9 +116,11 @@ def _answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
 
     found = outcome.found
     with step("comparing experiments"):
-        suggestions = suggest(found)
+        suggestions = found.evidence.get("suggestions") or suggest(found)
     yield Answer(
-        SUGGESTIONS, doubts.suggestions_text(suggestions), _suggestions(suggestions, found)
+        SUGGESTIONS,
+        doubts.suggestions_text(suggestions),
+        suggestion_table(suggestions, found.estimates),
     )
     for name in asked.profiles:
         with step(f"profile likelihood of {name}"):
@@ -167,27 +169,6 @@ def _write(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     return tuple(folder / name for name in names)
 
 
-def _around(value: float | None, half: float, unit: str) -> str:
-    """`± half width` of an interval in display units."""
-    if half == float("inf"):
-        return "open"
-    return shown(value or half, (-half, half), unit)[1]
-
-
-def _suggestions(found: tuple[Suggestion, ...], all_: Identification) -> Table:
-    table = table_of(
-        "What would tell more", "parameter", "now", "experiment", "then", "unit",
-        right=("now", "then"),
-    )  # fmt: skip
-    for one in found:
-        estimate = all_.estimates[one.parameter]
-        unit = estimate.unit
-        then = "" if one.limit else _around(estimate.value, one.prospects[0].half_width, unit)
-        now = _around(estimate.value, one.half_width, unit)
-        table.add_row(one.parameter, now, one.text, then, shown(None, None, unit)[2])
-    return table
-
-
 def _profile(one: Profile, found: Identification) -> Table:
     unit = found.estimates[one.parameter].unit
     table = table_of(
@@ -212,8 +193,8 @@ def _bootstrap(one: Bootstrap, found: Identification) -> Table:
         linear = 1.96 * (estimate.std_noise or float("inf"))
         table.add_row(
             name,
-            _around(estimate.value, linear, estimate.unit),
-            _around(estimate.value, 1.96 * float(one.std[k]), estimate.unit),
+            around(estimate.value, linear, estimate.unit),
+            around(estimate.value, 1.96 * float(one.std[k]), estimate.unit),
             f"{one.bias[k] / one.std[k]:+.2f} σ",
             shown(None, None, estimate.unit)[2],
         )

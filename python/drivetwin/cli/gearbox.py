@@ -77,9 +77,9 @@ def _ratios(box: Gearbox, gears: list[GearStatics]) -> Table:
         table.add_row(
             each.gear,
             " ".join(each.elements),
-            f"{each.ratio:.4f}",
+            f"{each.ratio:z.4f}",
             f"{published:.4g}",
-            f"{100 * (each.ratio / published - 1):+.2f}",
+            f"{100 * (each.ratio / published - 1):+z.2f}",
         )
     return table
 
@@ -87,7 +87,7 @@ def _ratios(box: Gearbox, gears: list[GearStatics]) -> Table:
 def _speeds(gear: GearStatics) -> Table:
     table = table_of("Speeds over the input speed", "member", "speed", right=("speed",))
     for member, speed in gear.speeds.items():
-        table.add_row(member, "idle" if speed is None else f"{speed:.4f}")
+        table.add_row(member, "idle" if speed is None else f"{speed:z.4f}")
     return table
 
 
@@ -97,7 +97,7 @@ def _torques(gear: GearStatics) -> Table:
     table = table_of(title, "element", "member", *numbers, right=numbers)
     for flange in gear.flanges:
         power = flange.torque * (gear.speeds[flange.member] or 0.0)
-        table.add_row(flange.element, flange.member, f"{flange.torque:.4f}", f"{power:.4f}")
+        table.add_row(flange.element, flange.member, f"{flange.torque:z.4f}", f"{power:z.4f}")
     return table
 
 

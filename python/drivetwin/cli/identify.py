@@ -119,15 +119,21 @@ def _print(found: Identification, shifts: Mapping[str, Sequence[Shift]]) -> None
         parameter_table,
         remarks,
         shift_table,
+        suggestion_table,
     )
 
     for source, own in shifts.items():
         show(shift_table(own, source))
     show(parameter_table(found.estimates, f"Parameters ({found.method} method)"))
-    for line in remarks(found.estimates):
+    for line in (lines := remarks(found.estimates)):
         note(line)
+    if lines:
+        say("")
     if found.friction:
         show(friction_table(found.friction))
+    suggestions = found.evidence.get("suggestions", ())
+    if suggestions:
+        show(suggestion_table(suggestions, found.estimates))
     if found.fit:
         show(fit_table(found.fit, "Simulation over measurement"))
     for shift in found.shifts:

@@ -33,6 +33,13 @@ def quantity(value: float | None, si_unit: str) -> str:
     return f"{significant(value * display.factor, 3)} {display.label}".rstrip()
 
 
+def around(value: float | None, half: float, si_unit: str) -> str:
+    """`± half width` of an interval about a value in display units; `open` where infinite."""
+    if half == float("inf"):
+        return "open"
+    return shown(value or half, (-half, half), si_unit)[1]
+
+
 def percent(value: float | None) -> str:
     """A share in percent with one decimal; a dash for None or NaN."""
     return "-" if value is None or not isfinite(value) else f"{value:.1f}"

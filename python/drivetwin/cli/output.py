@@ -43,8 +43,14 @@ def note(text: str) -> None:
 
 
 def show(table: Table) -> None:
-    """Print a table on stdout."""
-    console().print(table)
+    """Print a table on stdout; its title is wrapped to the terminal, not to a narrow table."""
+    from rich.text import Text
+
+    out, title = console(), table.title
+    table.title = None
+    if title:
+        out.print(Text(str(title), style="table.title"))
+    out.print(table)
 
 
 def table_of(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:

@@ -50,6 +50,8 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
         twin = Twin.from_identification(found, card)
     with step("simulating the shifts"):
         found = validated(found, twin, recording)
+    with step("comparing experiments"):
+        found = examined(found)
     return Outcome(recording, card, found, twin)
 
 
@@ -69,12 +71,10 @@ def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
     from drivetwin.report.html import save_report
     from drivetwin.results.result_file import save_result
 
-    with step("comparing experiments"):
-        found = examined(outcome.found)
     with step("writing the report"), staged(folder) as beside:
         save_result(beside / RESULT, outcome.found)
         outcome.twin.save(beside / TWIN)
-        save_report(beside / REPORT, found, outcome.log)
+        save_report(beside / REPORT, outcome.found, outcome.log)
     return tuple(folder / name for name in (RESULT, TWIN, REPORT))
 
 

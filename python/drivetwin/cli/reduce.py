@@ -87,7 +87,7 @@ def _elements(reduction: Reduction) -> Table:
 
 
 def _matrix(reduction: Reduction) -> Table:
-    title = "Mass matrix of the gearbox over (ω_in, ω_out), kg m²"
+    title = "Mass matrix of the gearbox over (ω_in, ω_out), kg·m²"
     table = table_of(title, "", "ω_in", "ω_out", right=("ω_in", "ω_out"))
     table.add_row("ω_in", f"{reduction.M11:.4g}", f"{reduction.M12:.4g}")
     table.add_row("ω_out", f"{reduction.M12:.4g}", f"{reduction.M22:.4g}")

@@ -6,12 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.numbers import percent, quantity, shown
+from drivetwin.cli.numbers import around, percent, quantity, shown
 from drivetwin.cli.output import table_of
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from drivetwin.identify.experiment.suggest import Suggestion
     from drivetwin.identify.result import Estimate, FrictionCurve, SignalFit
     from drivetwin.shifts.shift import Shift
 
@@ -65,6 +66,21 @@ def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, int]:
     """The different reasons, numbered from 1 in the order of the parameters."""
     reasons = dict.fromkeys(one.reason for one in estimates.values() if one.reason)
     return {reason: number for number, reason in enumerate(reasons, start=1)}
+
+
+def suggestion_table(suggestions: Sequence[Suggestion], estimates: Mapping[str, Estimate]) -> Table:
+    """By parameter the experiment that would narrow it most, with the interval now and then."""
+    table = table_of(
+        "What would tell more", "parameter", "now", "experiment", "then", "unit",
+        right=("now", "then"),
+    )  # fmt: skip
+    for one in suggestions:
+        estimate = estimates[one.parameter]
+        unit, best = estimate.unit, one.prospects[:1]
+        then = "" if one.limit or not best else around(estimate.value, best[0].half_width, unit)
+        now = around(estimate.value, one.half_width, unit)
+        table.add_row(one.parameter, now, one.text, then, shown(None, None, unit)[2])
+    return table
 
 
 def friction_table(friction: Mapping[str, FrictionCurve]) -> Table:

@@ -76,7 +76,9 @@ def run(
         made = identify_together(sources, card, method)
     inputs = {log.name: one.sha256 for log, one in zip(logs, read, strict=True)}
     inputs |= digests(vehicle, channels)
-    return Joined(read, replace(made, found=replace(made.found, inputs=inputs)))
+    with step("comparing experiments"):
+        found = examined(replace(made.found, inputs=inputs))
+    return Joined(read, replace(made, found=found))
 
 
 def write(outcome: Joined, folder: Path) -> tuple[Path, ...]:
@@ -91,13 +93,11 @@ def write(outcome: Joined, folder: Path) -> tuple[Path, ...]:
     named = {TWIN: twins[0][1]}
     if len(twins) > 1:
         named |= {f"{Path(source).stem}.{TWIN}": twin for source, twin in twins}
-    with step("comparing experiments"):
-        found = examined(outcome.found)
     with step("writing the report"), staged(folder) as beside:
         save_result(beside / RESULT, outcome.found)
         for name, twin in named.items():
             twin.save(beside / name)
-        save_together(beside / REPORT, found, outcome.made.fitted)
+        save_together(beside / REPORT, outcome.found, outcome.made.fitted)
     return tuple(folder / name for name in (RESULT, *named, REPORT))
 
 

@@ -73,7 +73,7 @@ def _drums(reduction: Reduction, drive: Drive) -> tuple[float, float]:
     if best == (0.0, 0.0):
         raise ReductionError(
             f"no drum inertia of {reduction.off_going.element} or {reduction.on_coming.element} "
-            f"can carry M12 = {M12:.4g} kg m² of shift {reduction.from_gear}-{reduction.to_gear}",
+            f"can carry M12 = {M12:.4g} kg·m² of shift {reduction.from_gear}-{reduction.to_gear}",
             "leave the coupling out (keep_coupling=False) and read the estimate of its error, or "
             "simulate the whole gearbox",
         )

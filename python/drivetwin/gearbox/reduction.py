@@ -106,7 +106,7 @@ class Reduction:
                 "Condition (1) holds: no member that turns with both shafts has an inertia, so the "
                 "dual-clutch form is exact."
             )
-        names = ", ".join(f"{each.member} ({each.coupling:+.4g} kg m²)" for each in self.violations)
+        names = ", ".join(f"{each.member} ({each.coupling:+.4g} kg·m²)" for each in self.violations)
         if self.exact:
             return (
                 "The dual-clutch form is exact although members turn with both shafts: their "
@@ -114,7 +114,7 @@ class Reduction:
             )
         return (
             "Condition (1) is violated: these members turn with both shafts and couple input and "
-            f"output: {names}. Together M12 = {self.M12:.4g} kg m², "
+            f"output: {names}. Together M12 = {self.M12:.4g} kg·m², "
             f"{100 * self.coupling_ratio:.3g} % of √(M11·M22)."
         )
 
