@@ -14,30 +14,13 @@ from drivetwin.identify.shape.fit import ShapedFriction
 from drivetwin.parameters import spec_of
 from drivetwin.results.records import FrictionRecord
 from drivetwin.results.result_file import plain
+from drivetwin.results.suggestions import SuggestionRecord
 
 
 def suggestions_text(found: tuple[Suggestion, ...]) -> str:
     """`suggestions.json`: by parameter the experiments in order of worth; infinite widths null."""
-    return _text({"suggestions": [_suggestion(one) for one in found]})
-
-
-def _suggestion(one: Suggestion) -> dict[str, Any]:
-    return {
-        "parameter": one.parameter,
-        "unit": spec_of(one.parameter).unit,
-        "verdict": one.verdict,
-        "half_width": one.half_width,
-        "text": one.text,
-        "experiments": [
-            {
-                "experiment": prospect.experiment,
-                "repeats": prospect.repeats,
-                "half_width": prospect.half_width,
-                "verdict": prospect.verdict,
-            }
-            for prospect in one.prospects
-        ],
-    }
+    rows = [SuggestionRecord.of(one).model_dump(mode="json") for one in found]
+    return _text({"suggestions": rows})
 
 
 def profile_text(one: Profile) -> str:

@@ -27,6 +27,7 @@ from drivetwin.results.records import (
     finite_or_none,
     fit_records,
 )
+from drivetwin.results.suggestions import SuggestionRecord
 from drivetwin.results.together_records import HeldOutRecord, SeveralRecord
 from drivetwin.results.version import program_version
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
@@ -88,6 +89,7 @@ class ResultFile(Record):
     correlation: dict[str, dict[str, OptionalFloat]]
     several: SeveralRecord | None = None
     held_out: list[HeldOutRecord] = Field(default_factory=list)
+    suggestions: list[SuggestionRecord] = Field(default_factory=list)
     warnings: list[str]
     assumptions: list[str]
 
@@ -112,6 +114,9 @@ class ResultFile(Record):
                 "correlation": _correlation(found),
                 "several": SeveralRecord.of(found.evidence.get("several")),
                 "held_out": [HeldOutRecord.of(one) for one in found.evidence.get("held_out", ())],
+                "suggestions": [
+                    SuggestionRecord.of(one) for one in found.evidence.get("suggestions", ())
+                ],
                 "warnings": list(found.warnings),
                 "assumptions": list(found.assumptions),
             }
