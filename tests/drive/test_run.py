@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,9 +23,14 @@ from drivetwin.drive import (
     suited_powertrain,
 )
 from drivetwin.drive.network import LOCK_UP
+from drivetwin.drive.result import Maneuver
 from drivetwin.drive.shift import ShiftKind
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, gear_statics, load_gearbox
+from drivetwin.logs.read import read_log
+from drivetwin.shifts.find import find_shifts
+from tests.drive.bus import REFERENCE, candump
+from tests.shifts.made import make_card
 
 
 def test_energy_of_a_launch_to_the_highest_gear_closes(gearbox: Gearbox, truck: Powertrain) -> None:
@@ -161,3 +167,30 @@ def test_a_gearbox_with_dogs_is_refused(name: str, truck: Powertrain) -> None:
     box = load_gearbox(name)
     with pytest.raises(InputError, match="shifts with dogs"):
         run(box, truck, launch(box, truck.control))
+
+
+def test_every_shift_is_found_in_what_the_bus_tells(
+    drive: DriveRun, gearbox: Gearbox, tmp_path: Path
+) -> None:
+    """Six gears up and down, with and without power, from standstill with an open converter."""
+    log, mapping = tmp_path / "bus.log", tmp_path / "bus.toml"
+    log.write_text(candump(drive))
+    mapping.write_text(f"[bus]\nreference_torque_Nm = {REFERENCE}\n")
+    card = make_card({gear: gear_statics(gearbox, gear).ratio for gear in "123456"})
+    found = find_shifts(read_log(log, card, mapping), card)
+    made = [each for each in drive.maneuvers if each.action.kind in list(ShiftKind)]
+    assert found.rejected == ()
+    assert [
+        (f"{shift.start_gear}→{shift.end_gear}", str(shift.kind)) for shift in found.shifts
+    ] == [(each.action.label, f"{each.action.kind}shift") for each in made]
+    for shift, each in zip(found.shifts, made, strict=True):
+        begun = _slip_begun(drive, each, gear_statics(gearbox, shift.start_gear).ratio)
+        assert shift.inertia_phase == pytest.approx((begun, each.lock), abs=0.05)
+
+
+def _slip_begun(drive: DriveRun, shift: Maneuver, ratio: float) -> float:
+    """When the slip of the gear left passes 5 % of that at lock-up, as slow speeds show it."""
+    assert shift.lock is not None
+    during = (drive.time >= shift.action.start) & (drive.time <= shift.lock)
+    slip = np.abs(drive.input_speed[during] - ratio * drive.output_speed[during])
+    return float(drive.time[during][np.flatnonzero(slip < 0.05 * slip[-1])[-1]])
