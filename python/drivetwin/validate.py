@@ -275,6 +275,10 @@ def _warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
     return tuple(texts)
 
 
+_RANGES = {"slip": "rad/s", "pressure": "Pa", "torque": "N·m", "speed": "rad/s"}
+"""Units of what a twin has a range of."""
+
+
 def _outside(name: str, arrays: list[FloatArray], limits: tuple[float, float]) -> list[str]:
     values = np.concatenate(arrays)
     values = values[np.isfinite(values)]
@@ -286,5 +290,5 @@ def _outside(name: str, arrays: list[FloatArray], limits: tuple[float, float]) -
         return []
     return [
         f"the simulation leaves the twin's range of {name}: {low:.4g} to {high:.4g}, "
-        f"identified for {limits[0]:.4g} to {limits[1]:.4g} (SI)"
+        f"identified for {limits[0]:.4g} to {limits[1]:.4g} {_RANGES[name]}"
     ]

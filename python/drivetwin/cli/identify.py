@@ -137,7 +137,7 @@ def _print(found: Identification, shifts: Mapping[str, Sequence[Shift]]) -> None
     if found.fit:
         show(fit_table(found.fit, "Simulation over measurement"))
     for shift in found.shifts:
-        for text in shift.warnings:
+        for text in (each for each in shift.warnings if each not in found.warnings):
             note(f"{shift.start_gear}→{shift.end_gear}: {text}")
     for warning in found.warnings:
         note(f"warning: {warning}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from drivetwin.cli.holding import held_numbers
 from drivetwin.cli.numbers import percent, quantity
-from drivetwin.cli.output import note, show, step, table_of
+from drivetwin.cli.output import note, say, show, step, table_of
 from drivetwin.cli.pipeline import REPORT, RESULT, TWIN, digests, examined
 from drivetwin.cli.staging import refuse_alike, staged
 
@@ -107,6 +107,7 @@ def print_together(found: Identification) -> None:
     if several is not None:
         show(_log_table(several))
         note(several.consistency.text)
+        say("")
     held = found.evidence.get("held_out", ())
     if held:
         show(_held_table(held, found))
