@@ -58,14 +58,17 @@ impl<T: Real> Plan<T> {
         (settings, audit): (Settings, bool),
     ) -> Result<Self, SimulateError> {
         check_grid(grid)?;
-        let inputs = join(network, signals, (grid[0], grid[grid.len() - 1]))?;
         let find = |output: &Output| output.find(network);
         let targets = outputs.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         // Between samples only the expansion knows the motion.
         let motion = |target: &Target| matches!(target, Target::Angle(_));
-        let dense = audit || targets.iter().any(motion) || !inputs.has_knots(grid);
-        let settings = Settings { sprint: settings.sprint && !dense, ..settings };
-        let inputs = if settings.sprint { fine(network, inputs) } else { inputs };
+        let sprint = settings.sprint && !audit && !targets.iter().any(motion);
+        let sampled = |(_, signal): &(_, _)| matches!(signal, Signal::Samples { .. });
+        let fine = sprint && can_march(network) && signals.iter().all(sampled);
+        let span = (grid[0], grid[grid.len() - 1]);
+        let inputs = join(network, signals, (span, if fine { grid } else { &[] }))?;
+        let inputs = if fine { divided(network, inputs) } else { inputs };
+        let settings = Settings { sprint: sprint && inputs.has_knots(grid), ..settings };
         Ok(Self { inputs, grid: grid.to_vec(), targets, settings, audit })
     }
 
@@ -139,12 +142,9 @@ const FINE: f64 = 0.4;
 /// Most parts of a segment.
 const MAX_PARTS: usize = 100;
 
-/// The inputs with segments short enough for the exact operators, where these can be used at all. With
-/// nothing at rest the motion is the fastest: every lock only lowers the highest frequency.
-fn fine<T: Real>(network: &Network<T>, inputs: Inputs<T>) -> Inputs<T> {
-    if !can_march(network) || !inputs.is_sampled() {
-        return inputs;
-    }
+/// The inputs with segments short enough for the exact operators. With nothing at rest the motion is the
+/// fastest: every lock only lowers the highest frequency.
+fn divided<T: Real>(network: &Network<T>, inputs: Inputs<T>) -> Inputs<T> {
     let capacity = vec![T::zero_(); network.frictions.len()];
     let Some(Mode { radius, .. }) = network.mode(ModeKey::default(), &capacity) else {
         return inputs;
@@ -160,7 +160,7 @@ fn fine<T: Real>(network: &Network<T>, inputs: Inputs<T>) -> Inputs<T> {
 fn join<T: Real>(
     network: &Network<T>,
     signals: &[(&str, Signal<'_, T>)],
-    span: (f64, f64),
+    (span, grid): ((f64, f64), &[f64]),
 ) -> Result<Inputs<T>, InputError> {
     let ordered = network
         .mechanism
@@ -174,7 +174,7 @@ fn join<T: Real>(
     for prescribed in &network.mechanism.prescribed {
         refuse_jump(ordered[prescribed.input])?;
     }
-    Inputs::join(&ordered, span)
+    Inputs::join(&ordered, span, grid)
 }
 
 fn check_grid(grid: &[f64]) -> Result<(), SimulateError> {

@@ -102,7 +102,7 @@ struct Formation<const N: usize> {
     x: [Lanes; N],
     carry: Carry<Lanes, MAX_ACTIVE>,
     guards: Guards<Lanes>,
-    trail: Box<Trail<Lanes, N>>,
+    trail: Trail<Lanes, N>,
 }
 
 impl<const N: usize> Formation<N> {
@@ -115,7 +115,7 @@ impl<const N: usize> Formation<N> {
             x: [zero; N],
             carry: Carry::zero(),
             guards: idle_guards(),
-            trail: Box::default(),
+            trail: Trail::with_room(BLOCK),
         }
     }
 
@@ -127,9 +127,8 @@ impl<const N: usize> Formation<N> {
             let ahead = |m: &Member<'_, '_, S>| if m.joined { m.until } else { m.run.segment };
             let until = members.iter().filter(|m| live(m)).map(ahead).min().unwrap_or(segment);
             let samples = (segment, (until - segment).min(BLOCK));
-            let Some(h) = members.iter().find_map(|m| m.ready.as_ref().map(|ready| ready.h)) else {
-                break;
-            };
+            let marching = members.iter().find(|m| m.joined).and_then(|m| m.ready.as_ref());
+            let Some(h) = marching.map(|ready| ready.h) else { break };
             let inputs: [&Inputs<f64>; WIDTH] = std::array::from_fn(|lane| {
                 members[if lane < members.len() { lane } else { 0 }].run.inputs
             });
@@ -147,7 +146,7 @@ impl<const N: usize> Formation<N> {
                 if fell || member.run.segment == member.until {
                     let x = if fell { &self.trail.states[passed] } else { &self.x };
                     let x: [f64; N] = std::array::from_fn(|i| x[i].0[lane]);
-                    self.leave(lane, member, &x);
+                    self.leave(lane, member, (&x, fell));
                 }
             }
         }
@@ -252,8 +251,13 @@ impl<const N: usize> Formation<N> {
         places
     }
 
-    /// Let a member go with its state `x` at the start of its segment.
-    fn leave<S: Recording>(&mut self, lane: usize, member: &mut Member<'_, '_, S>, x: &[f64; N]) {
+    /// Let a member go with its state `x` at the start of its segment, in which a guard may fall.
+    fn leave<S: Recording>(
+        &mut self,
+        lane: usize,
+        member: &mut Member<'_, '_, S>,
+        (x, fell): (&[f64; N], bool),
+    ) {
         let run = &mut *member.run;
         let n = run.x.len();
         run.x.copy_from_slice(&x[..n]);
@@ -261,15 +265,14 @@ impl<const N: usize> Formation<N> {
         let ended = run.segment == run.inputs.segments();
         if ended {
             let active = member.ready.take().map_or_else(Vec::new, |ready| ready.active);
-            let mut torques = [Lanes::all(0.0); MAX_ACTIVE];
-            self.carry.torques(&self.operators, &mut torques);
+            let torques = self.carry.torques(&self.operators);
             let end = LastSample { x, torques, lane, places: self.places(&active) };
             member.sink.passed(member.run, &active, &end, (member.run.segment, 1));
             member.run.segment -= 1;
             member.joined = false;
         } else {
             member.run.resume();
-            member.go_on(true);
+            member.go_on(fell);
         }
     }
 }

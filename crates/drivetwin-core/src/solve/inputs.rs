@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Inputs over time, linear between samples.
 
+use super::sprint::WORTH_WHILE;
 use crate::number::{Real, Series};
 use thiserror::Error;
 
@@ -48,6 +49,8 @@ pub struct Inputs<T> {
     sines: Vec<Option<Sine<T>>>,
     /// For every segment the number of segments of its length from it on.
     equal: Vec<u32>,
+    /// For every segment whether its length recurs often.
+    recurs: Vec<bool>,
     /// Least and largest value within every [`STRETCH`] segments, stretches × inputs.
     extremes: Vec<[f64; 2]>,
 }
@@ -121,10 +124,11 @@ pub enum InputError {
 
 impl<T: Real> Inputs<T> {
     /// Join named signals, in the order the network numbers its inputs, over the span
-    /// `(start, end)` [s].
+    /// `(start, end)` [s]; the increasing points of a grid within it become knots too.
     pub fn join(
         signals: &[(&str, Signal<'_, T>)],
         (start, end): (f64, f64),
+        grid: &[f64],
     ) -> Result<Self, InputError> {
         let (mut jumps, mut sines, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
         let mut checked: Option<(&[f64], f64)> = None;
@@ -150,7 +154,8 @@ impl<T: Real> Inputs<T> {
                 }
             }
         }
-        let knots = merge_knots(&inner_times(signals, (start, end)), &jumps, (start, end));
+        let inner = inner_times(signals, grid, (start, end));
+        let knots = merge_knots(&inner, &jumps, (start, end));
         let mut lines = vec![[0.0; 2]; (knots.len() - 1) * signals.len()];
         for (input, (_, signal)) in signals.iter().enumerate() {
             let Signal::Samples { times, values, delay } = *signal else { continue };
@@ -166,8 +171,9 @@ impl<T: Real> Inputs<T> {
         (shifts, sines): (Vec<T>, Vec<Option<Sine<T>>>),
     ) -> Self {
         let equal = equal_lengths(&knots);
+        let recurs = recurring(&knots, &equal);
         let extremes = extremes(&knots, &lines, shifts.len());
-        Self { knots, lines, shifts, sines, equal, extremes }
+        Self { knots, lines, shifts, sines, equal, recurs, extremes }
     }
 
     /// The same inputs over shorter segments: one of length l [s] becomes `parts(l)`.
@@ -195,6 +201,11 @@ impl<T: Real> Inputs<T> {
     /// Number of segments from `i` on, itself included, that are as long as it.
     pub fn equal_from(&self, i: usize) -> usize {
         self.equal[i] as usize
+    }
+
+    /// Whether segments as long as `i` are frequent, next to each other or not.
+    pub fn recurs(&self, i: usize) -> bool {
+        self.recurs[i]
     }
 
     /// Number of segments between knots.
@@ -271,6 +282,31 @@ impl<T: Real> Inputs<T> {
             }
         }
     }
+}
+
+/// Lengths of segments that are told apart.
+const LENGTHS: usize = 8;
+
+/// For every segment whether its length is one of the first [`LENGTHS`] and stands often.
+fn recurring(knots: &[f64], equal: &[u32]) -> Vec<bool> {
+    let mut known: Vec<(f64, usize)> = Vec::with_capacity(LENGTHS);
+    let mut class = vec![LENGTHS; equal.len()];
+    let mut i = 0;
+    while i < equal.len() {
+        let (length, count) = (knots[i + 1] - knots[i], equal[i] as usize);
+        // Short ones are differences of long times.
+        let same = |&(other, _): &(f64, usize)| (length - other).abs() <= 1e-12 + 1e-9 * length;
+        let place = known.iter().position(same).unwrap_or(known.len());
+        if place == known.len() && place < LENGTHS {
+            known.push((length, 0));
+        }
+        if let Some((_, number)) = known.get_mut(place) {
+            *number += count;
+        }
+        class[i..i + count].fill(place);
+        i += count;
+    }
+    class.iter().map(|&c| known.get(c).is_some_and(|known| known.1 >= WORTH_WHILE)).collect()
 }
 
 fn extremes(knots: &[f64], lines: &[[f64; 2]], inputs: usize) -> Vec<[f64; 2]> {
@@ -363,10 +399,16 @@ fn check_times(name: &str, times: &[f64], (start, end): (f64, f64)) -> Result<()
     Ok(())
 }
 
-/// Sample times of all signals within the span [s], sorted.
-fn inner_times<T: Real>(signals: &[(&str, Signal<'_, T>)], (start, end): (f64, f64)) -> Vec<f64> {
-    let mut sorted: Vec<f64> = Vec::new();
-    let mut last: Option<(&[f64], f64)> = None;
+/// Grid points and sample times of all signals within the span [s], sorted, with whether they are of the
+/// grid.
+fn inner_times<T: Real>(
+    signals: &[(&str, Signal<'_, T>)],
+    grid: &[f64],
+    (start, end): (f64, f64),
+) -> Vec<(f64, bool)> {
+    let within = |(t, _): &(f64, bool)| (start..end).contains(t);
+    let mut sorted: Vec<(f64, bool)> = grid.iter().map(|&t| (t, true)).filter(within).collect();
+    let mut last = (!grid.is_empty()).then_some((grid, 0.0));
     for (_, signal) in signals {
         let Signal::Samples { times, delay, .. } = *signal else { continue };
         if is_raster(last, (times, delay.re())) {
@@ -374,23 +416,27 @@ fn inner_times<T: Real>(signals: &[(&str, Signal<'_, T>)], (start, end): (f64, f
         }
         last = Some((times, delay.re()));
         let was_empty = sorted.is_empty();
-        sorted.extend(times.iter().map(|t| t + delay.re()).filter(|t| (start..end).contains(t)));
+        sorted.extend(times.iter().map(|t| (t + delay.re(), false)).filter(within));
         if !was_empty {
             // Stable, so that two sorted runs are merged in linear time.
-            sorted.sort_by(f64::total_cmp);
+            sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
     }
     sorted
 }
 
-/// Start, distinct inner times and end; times closer than round-off count as one; inner jumps stand
-/// twice.
-fn merge_knots(sorted: &[f64], jumps: &[f64], (start, end): (f64, f64)) -> Vec<f64> {
+/// Start, distinct inner times and end; times closer than round-off count as one, that of the grid; inner
+/// jumps stand twice.
+fn merge_knots(sorted: &[(f64, bool)], jumps: &[f64], (start, end): (f64, f64)) -> Vec<f64> {
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
     let mut knots: Vec<f64> = Vec::with_capacity(sorted.len() + 2);
     knots.push(start);
-    for &t in sorted {
-        if !near(knots[knots.len() - 1], t) && !near(t, end) {
+    for &(t, of_grid) in sorted {
+        if near(knots[knots.len() - 1], t) {
+            if of_grid {
+                knots.iter_mut().rev().take_while(|k| near(**k, t)).for_each(|k| *k = t);
+            }
+        } else if !near(t, end) {
             knots.push(t);
             if jumps.iter().any(|&jump| near(jump, t)) {
                 knots.push(t);

@@ -64,15 +64,29 @@ pub fn idle_guards<V: Values>() -> Guards<V> {
 /// Passed samples: states and carried torques at the start of each.
 pub struct Trail<L, const N: usize> {
     /// States.
-    pub states: [[L; N]; BLOCK],
+    pub states: Vec<[L; N]>,
     /// Torques of the carried channels.
-    pub torques: [[L; MAX_ACTIVE]; BLOCK],
+    pub torques: Vec<[L; MAX_ACTIVE]>,
 }
 
-impl<L: Lane, const N: usize> Default for Trail<L, N> {
-    fn default() -> Self {
-        let zero = L::all(0.0);
-        Self { states: [[zero; N]; BLOCK], torques: [[zero; MAX_ACTIVE]; BLOCK] }
+impl<L: Lane, const N: usize> Trail<L, N> {
+    /// Room for so many samples, at most [`BLOCK`].
+    pub fn with_room(samples: usize) -> Self {
+        let room = samples.min(BLOCK);
+        Self { states: Vec::with_capacity(room), torques: Vec::with_capacity(room) }
+    }
+
+    /// Add a sample.
+    #[inline(always)]
+    pub fn push<const A: usize>(&mut self, op: &Operators<L, N>, x: &[L; N], carry: &Carry<L, A>) {
+        self.states.push(*x);
+        self.torques.push(carry.torques(op));
+    }
+
+    /// Forget all samples.
+    pub fn clear(&mut self) {
+        self.states.clear();
+        self.torques.clear();
     }
 }
 
@@ -88,6 +102,7 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
     (x, carry, guards): (&mut [L; N], &mut Carry<L, A>, &mut Guards<L::Values>),
     (trail, live): (&mut Trail<L, N>, u32),
 ) -> (usize, u32) {
+    trail.clear();
     let mut u = [[L::all(0.0); 2]; MAX_INPUTS];
     let loaded = op.loads.iter().all(|load| {
         let bounds = source.bounds(load.input, (first, count));
@@ -98,8 +113,7 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
         if L::DERIVATIVES {
             *carry = Carry::start::<F, N>(op, (&u, h), x);
         }
-        trail.states[k] = *x;
-        carry.torques(op, &mut trail.torques[k]);
+        trail.push(op, x, carry);
         let mut guard = step::<L, F, N, A>(op, (&u, h), (x, carry));
         for (place, before) in guards.iter_mut().enumerate().take(op.watched.len()) {
             let after = op.guard::<F, A>(place, (&u, h), (x, carry));
@@ -213,10 +227,12 @@ impl<L: Lane, const A: usize> Carry<L, A> {
 
     /// The torques.
     #[inline(always)]
-    pub fn torques<const N: usize>(&self, op: &Operators<L, N>, out: &mut [L; MAX_ACTIVE]) {
+    pub fn torques<const N: usize>(&self, op: &Operators<L, N>) -> [L; MAX_ACTIVE] {
+        let mut torques = [L::all(0.0); MAX_ACTIVE];
         for a in 0..A {
-            out[a] = op.channels[a].law.sign * self.value[a].value;
+            torques[a] = op.channels[a].law.sign * self.value[a].value;
         }
+        torques
     }
 
     /// Everything at the start of a segment of length `h`.

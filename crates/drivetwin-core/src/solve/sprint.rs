@@ -115,29 +115,33 @@ impl<T: Real, const N: usize> Samples<T> for Trail<T, N> {
     }
 }
 
-/// Fewest samples of equal length ahead that make operators worth while.
-const WORTH_WHILE: usize = 8;
+/// Fewest samples of equal length that make operators worth while.
+pub const WORTH_WHILE: usize = 8;
 
 impl<T: Real> Integrator<'_, T> {
     /// Advance over as many whole samples as possible.
     pub(super) fn sprint(&mut self, sink: &mut impl Sink<T>) {
-        let Some(Ready { operators, active, h, count }) = self.ready_to_sprint() else { return };
-        let active = &active[..];
-        match &*operators {
-            AnySize::Four(operators) => self.pass(operators, active, (h, count), sink),
-            AnySize::Eight(operators) => self.pass(operators, active, (h, count), sink),
-            AnySize::Twelve(operators) => {
-                if !T::DERIVATIVES {
-                    self.pass(operators, active, (h, count), sink);
-                }
-            }
-            AnySize::Many(operators) => {
-                if !T::DERIVATIVES {
-                    self.pass(operators, active, (h, count), sink);
-                }
+        let mut passed = false;
+        while let Some(ready) = self.ready_to_sprint() {
+            passed = true;
+            if !self.pass_stretch(&ready, sink) || self.is_at_end() {
+                break;
             }
         }
-        self.resume();
+        if passed {
+            self.resume();
+        }
+    }
+
+    /// Pass samples of equal length; false where a guard could fall before their end.
+    fn pass_stretch(&mut self, ready: &Ready<T>, sink: &mut impl Sink<T>) -> bool {
+        match &*ready.operators {
+            AnySize::Four(operators) => self.pass(operators, ready, sink),
+            AnySize::Eight(operators) => self.pass(operators, ready, sink),
+            AnySize::Twelve(operators) if !T::DERIVATIVES => self.pass(operators, ready, sink),
+            AnySize::Many(operators) if !T::DERIVATIVES => self.pass(operators, ready, sink),
+            AnySize::Twelve(_) | AnySize::Many(_) => false,
+        }
     }
 
     /// Take up the Taylor expansion where a sprint has ended.
@@ -153,7 +157,8 @@ impl<T: Real> Integrator<'_, T> {
         let h = to - from;
         let count = self.inputs.equal_from(self.segment);
         let at_start = self.t.re() == from && h > 0.0 && h <= self.settings.max_step;
-        if !at_start || count < WORTH_WHILE || !self.is_simple() {
+        let worth_while = count >= WORTH_WHILE || self.inputs.recurs(self.segment);
+        if !at_start || !worth_while || !self.is_simple() {
             return None;
         }
         let on = |j: &usize| self.cells[*j] != Cell::Off;
@@ -166,11 +171,10 @@ impl<T: Real> Integrator<'_, T> {
     fn pass<const N: usize>(
         &mut self,
         operators: &Operators<T, N>,
-        active: &[usize],
-        steps: (f64, usize),
+        ready: &Ready<T>,
         sink: &mut impl Sink<T>,
-    ) {
-        let run = self;
+    ) -> bool {
+        let (run, active, steps) = (self, &ready.active[..], (ready.h, ready.count));
         match operators.channels.len() {
             0 => dispatch(Sprint::<_, _, N, 0> { run, operators, active, steps, sink }),
             1 => dispatch(Sprint::<_, _, N, 1> { run, operators, active, steps, sink }),
@@ -311,10 +315,10 @@ struct Sprint<'r, 'a, T, S, const N: usize, const A: usize> {
 }
 
 impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_, T, S, N, A> {
-    type Output = ();
+    type Output = bool;
 
     #[inline(always)]
-    fn run<const F: bool>(self) {
+    fn run<const F: bool>(self) -> bool {
         let Self { run, operators, active, steps: (h, mut count), sink } = self;
         let source = Lines(run.inputs);
         let first = source.sample(run.segment);
@@ -323,8 +327,9 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
         x[..n].copy_from_slice(&run.x);
         let mut carry = Carry::<T, A>::start::<F, N>(operators, (&first, h), &x);
         let mut guards = operators.guards::<F, A>(&first, (&x, &carry));
-        let mut trail = Trail::default();
-        while count > 0 {
+        let mut trail = Trail::with_room(count);
+        let mut whole = true;
+        while count > 0 && whole {
             let samples = (run.segment, count.min(BLOCK));
             let at = (&mut x, &mut carry, &mut guards);
             let (passed, fallen) =
@@ -334,17 +339,18 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
             count -= passed;
             if fallen != 0 {
                 x = trail.states[passed];
-                break;
+                whole = false;
             }
         }
         run.x.copy_from_slice(&x[..n]);
         run.t = T::of(run.inputs.knot(run.segment));
         if run.segment == run.inputs.segments() {
-            trail.states[0] = x;
-            carry.torques(operators, &mut trail.torques[0]);
+            trail.clear();
+            trail.push(operators, &x, &carry);
             sink.passed(run, active, &trail, (run.segment, 1));
             run.segment -= 1;
         }
+        whole
     }
 }
 
