@@ -203,3 +203,31 @@ fn coarse_samples_and_long_chains_are_followed_as_closely() {
         assert!(worst(&runs) < 1e-6, "{h} s, {masses} masses: {}", worst(&runs));
     }
 }
+
+/// Outputs between the samples of inputs that come late: every point of the grid is met, by exact
+/// operators over the pieces that recur.
+#[test]
+fn outputs_between_late_samples_are_those_of_the_exact_motion() {
+    let time = samples(5e-3, 300);
+    let grid: Vec<f64> = (0..1000).map(|i| 0.1 + 1.3e-3 * f64::from(i)).collect();
+    let elements = vec![
+        inertia("a", 2.0),
+        inertia("b", 9.0),
+        torque("a", "T"),
+        Element::Clutch(stribeck("C", "a", "b")),
+    ];
+    let network = compile(elements);
+    let torque: Vec<f64> = time.iter().map(|t| 60.0 + 25.0 * (9.0 * t).sin()).collect();
+    let pressure: Vec<f64> = time.iter().map(|t| 500.0 + 1500.0 * t).collect();
+    let late = Signal::Samples { times: &time, values: &torque, delay: 1.7e-3 };
+    let signals = [("T", late), ("P C", Signal::samples(&time, &pressure))];
+    let begin = start(&[("a", 80.0), ("b", 50.0)], &[]);
+    let outputs = [Output::Speed("a".into())];
+    let runs = [Settings::default(), Settings::exact()].map(|settings| {
+        run(&network, &signals, &begin, &grid, &outputs, (settings, false)).unwrap()
+    });
+    assert!(runs.iter().all(|run| run.time == grid && run.status == Status::Completed));
+    assert_eq!(kinds(&runs[0]), [EventKind::Lock]);
+    assert!((runs[0].events[0].time - runs[1].events[0].time).abs() < 1e-8);
+    assert!(worst(&runs) < 1e-6, "{}", worst(&runs));
+}
