@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,17 @@ def test_the_report_links_to_single_ones_with_one_library(
     assert len(list((fleet / "store" / "traces").glob("*.parquet"))) == COUNT
 
 
+@pytest.mark.parametrize("place", ["store/again.html", "elsewhere.html"])
+def test_links_lead_to_every_single_report_from_wherever_the_page_is(
+    fleet: Path, place: str
+) -> None:
+    page = fleet / place
+    assert main(["fleet", "report", str(fleet / "store"), "-o", str(page)]) == 0
+    links = set(re.findall(r'href="([^"#]+\.html)"', page.read_text("utf-8")))
+    singles = {path.resolve() for path in (fleet / "store" / "reports").glob("*.html")}
+    assert {(page.parent / link).resolve() for link in links} == singles
+
+
 def test_estimates_are_told(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
     store = str(fleet / "store")
     assert main(["fleet", "estimate", store, "--parameter", "eta", "--json"]) == 0
@@ -134,9 +146,7 @@ def test_dates_of_a_list_are_dates_everywhere(
     command += ["--vehicle", str(fleet / "logs" / "dated.toml"), "-o", str(fleet / "store")]
     assert main(command) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["computed"] == 0
-    sql = (
-        "SELECT max(date) - min(date) AS span, min(date) AS first FROM files"
-    )
+    sql = "SELECT max(date) - min(date) AS span, min(date) AS first FROM files"
     assert main(["fleet", "query", str(fleet / "store"), sql, "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
     assert row == {"span": "7 days, 0:00:00", "first": "2024-03-01 00:00:00"}

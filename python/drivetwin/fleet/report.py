@@ -62,7 +62,7 @@ def render_fleet(
         _overview(store),
         _parameters(found),
         _odd(store, found, folder),
-        _ageing(found),
+        ageing(found),
         _friction(store),
         singles(store, folder),
         _failed(store),
@@ -168,7 +168,7 @@ def _parameter_row(one: JointEstimate, *, several: bool) -> tuple[Cell, ...]:
         Cell(display.label),
         Cell(spread, number=True, note=between),
         Cell(slope, number=True, note=note),
-        Cell(_remark(one)),
+        Cell(remark(one)),
     )
 
 
@@ -176,7 +176,8 @@ def _between(ci95: Interval, factor: float) -> str:
     return f"{significant(ci95[0] * factor, 2)} to {significant(ci95[1] * factor, 2)}"
 
 
-def _remark(one: JointEstimate) -> str:
+def remark(one: JointEstimate) -> str:
+    """What there is to say of an estimate, in words."""
     parts = list(one.notes)
     if drift := _whole_drift(one):
         parts.append(_drift_text(one, drift) + _small(drift, one))
@@ -221,7 +222,7 @@ def _small(size: float, one: JointEstimate) -> str:
     return ", by less than one log's own error: an error of the method may look like that"
 
 
-def _ageing(found: Sequence[JointEstimate]) -> Section:
+def ageing(found: Sequence[JointEstimate]) -> Section:
     """Every parameter over the first field, and by unit where units differ."""
     several = _several_rules(found)
     blocks: list[Block] = []
