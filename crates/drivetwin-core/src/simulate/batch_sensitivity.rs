@@ -4,13 +4,16 @@
 use super::batch::{Batch, Keep, Outcome, check_names, last_lock, placed};
 use super::dual_clutch::DualClutchStart;
 use super::run::{Plan, SimulateError};
-use super::sensitivity::{Derived, LANES, Sampled, SensitivityError, delayed, variables};
+use super::sensitivity::{LANES, Sampled, SensitivityError, delayed, variables};
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
-use crate::number::Real;
+use crate::number::{Dual, Real};
 use crate::solve::{Settings, Status};
 use rayon::prelude::*;
+
+/// A number with its derivatives by the parameters of one pass.
+type Derived = Dual<LANES>;
 
 /// Inputs and start of a run.
 pub type Stated<'a> = (Vec<Sampled<'a>>, DualClutchStart<f64>);

@@ -9,11 +9,10 @@ use crate::number::{Dual, Real};
 use crate::solve::{Event, Settings, Signal};
 use thiserror::Error;
 
-/// Parameters that one pass differentiates for.
+/// Most parameters that one pass differentiates for.
 pub(super) const LANES: usize = 16;
-
-/// A number with its derivatives by the parameters of one pass.
-pub(super) type Derived = Dual<LANES>;
+/// The same of a pass for few.
+const FEW: usize = 8;
 
 /// Why sensitivities cannot be computed.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -57,24 +56,43 @@ pub fn dual_clutch_sensitivities(
     grid: &[f64],
     (settings, parameters): (Settings, &[&str]),
 ) -> Result<Sensitivities, SensitivityError> {
-    let (mut columns, mut events) = (Vec::new(), Vec::new());
-    let mut run = None;
+    let mut found: Option<Sensitivities> = None;
     // Without parameters one pass for the values.
     for k in 0..parameters.len().div_ceil(LANES).max(1) {
         let group = &parameters[k * LANES..parameters.len().min((k + 1) * LANES)];
-        let dual = differentiated(model, signals, start, grid, (settings, group))?;
-        run.get_or_insert_with(|| values_of(&dual));
-        append_derivatives(&dual.columns, group.len(), &mut columns);
-        for lane in 0..group.len() {
-            events.push(dual.events.iter().map(|e| e.time.eps[lane]).collect());
+        let scenario = (signals, start, grid, settings);
+        if group.len() <= FEW {
+            pass::<FEW>(model, scenario, group, &mut found)?;
+        } else {
+            pass::<LANES>(model, scenario, group, &mut found)?;
         }
     }
-    let run = run.expect("at least one pass");
-    Ok(Sensitivities { run, columns, events })
+    Ok(found.expect("at least one pass"))
+}
+
+/// One pass for up to `P` parameters, added to what others have found.
+fn pass<const P: usize>(
+    model: &DualClutch<f64>,
+    (signals, start, grid, settings): (&[Sampled<'_>], &DualClutchStart<f64>, &[f64], Settings),
+    parameters: &[&str],
+    found: &mut Option<Sensitivities>,
+) -> Result<(), SensitivityError> {
+    let (model, start, delays) = variables::<P>(model, signals, start, parameters)?;
+    let inputs = delayed(signals, &delays);
+    let dual = simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?;
+    let found = found.get_or_insert_with(|| {
+        let (columns, events) = (Vec::new(), Vec::new());
+        Sensitivities { run: values_of(&dual), columns, events }
+    });
+    append_derivatives(&dual.columns, parameters.len(), &mut found.columns);
+    for lane in 0..parameters.len() {
+        found.events.push(dual.events.iter().map(|e| e.time.eps[lane]).collect());
+    }
+    Ok(())
 }
 
 /// The first derivatives of all columns, lane by lane.
-fn append_derivatives(columns: &[Vec<Derived>], lanes: usize, to: &mut Vec<f64>) {
+fn append_derivatives<const P: usize>(columns: &[Vec<Dual<P>>], lanes: usize, to: &mut Vec<f64>) {
     let length = columns.first().map_or(0, Vec::len);
     let from = to.len();
     to.resize(from + lanes * columns.len() * length, 0.0);
@@ -94,9 +112,9 @@ fn append_derivatives(columns: &[Vec<Derived>], lanes: usize, to: &mut Vec<f64>)
 const STRETCH: usize = 16;
 
 /// The run without its derivatives.
-fn values_of(run: &DualClutchRun<Derived>) -> DualClutchRun<f64> {
-    let column = |c: &Vec<Derived>| c.iter().map(Real::re).collect();
-    let event = |e: &Event<Derived>| Event { time: e.time.re, element: e.element, kind: e.kind };
+fn values_of<const P: usize>(run: &DualClutchRun<Dual<P>>) -> DualClutchRun<f64> {
+    let column = |c: &Vec<Dual<P>>| c.iter().map(Real::re).collect();
+    let event = |e: &Event<Dual<P>>| Event { time: e.time.re, element: e.element, kind: e.kind };
     Trajectory {
         time: run.time.clone(),
         columns: run.columns.iter().map(column).collect(),
@@ -108,31 +126,20 @@ fn values_of(run: &DualClutchRun<Derived>) -> DualClutchRun<f64> {
     }
 }
 
-fn differentiated(
-    model: &DualClutch<f64>,
-    signals: &[Sampled<'_>],
-    start: &DualClutchStart<f64>,
-    grid: &[f64],
-    (settings, parameters): (Settings, &[&str]),
-) -> Result<DualClutchRun<Derived>, SensitivityError> {
-    let (model, start, delays) = variables(model, signals, start, parameters)?;
-    let inputs = delayed(signals, &delays);
-    Ok(simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?)
-}
-
 /// Model, start and delays [s].
-pub(super) type Variables = (DualClutch<Derived>, DualClutchStart<Derived>, Vec<Derived>);
+pub(super) type Variables<const P: usize> =
+    (DualClutch<Dual<P>>, DualClutchStart<Dual<P>>, Vec<Dual<P>>);
 
-/// Model, start and delays with the named parameters as variables, at most [`LANES`].
-pub(super) fn variables(
+/// Model, start and delays with the named parameters as variables, at most `P`.
+pub(super) fn variables<const P: usize>(
     model: &DualClutch<f64>,
     signals: &[Sampled<'_>],
     start: &DualClutchStart<f64>,
     parameters: &[&str],
-) -> Result<Variables, SensitivityError> {
-    let mut model = model.lifted::<Derived>();
-    let mut start = start.lifted::<Derived>();
-    let mut delays: Vec<Derived> = signals.iter().map(|s| Derived::of(s.3)).collect();
+) -> Result<Variables<P>, SensitivityError> {
+    let mut model = model.lifted::<Dual<P>>();
+    let mut start = start.lifted::<Dual<P>>();
+    let mut delays: Vec<Dual<P>> = signals.iter().map(|s| Dual::of(s.3)).collect();
     for (lane, &name) in parameters.iter().enumerate() {
         let place = match name.split_once('.') {
             Some(("start", field)) => start.field_mut(field),
@@ -148,11 +155,11 @@ pub(super) fn variables(
 }
 
 /// The inputs with delays as variables.
-pub(super) fn delayed<'a>(
+pub(super) fn delayed<'a, const P: usize>(
     signals: &[Sampled<'a>],
-    delays: &[Derived],
-) -> Vec<(&'a str, Signal<'a, Derived>)> {
-    let signal = |(&(name, times, values, _), &delay): (&Sampled<'a>, &Derived)| {
+    delays: &[Dual<P>],
+) -> Vec<(&'a str, Signal<'a, Dual<P>>)> {
+    let signal = |(&(name, times, values, _), &delay): (&Sampled<'a>, &Dual<P>)| {
         (name, Signal::Samples { times, values, delay })
     };
     signals.iter().zip(delays).map(signal).collect()
