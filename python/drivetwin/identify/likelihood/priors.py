@@ -59,6 +59,9 @@ PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
 """Efficiency of a gearbox where no output torque shows it."""
 AERO_SPREAD = 10.0
 """Plausible air drag at the wheel [N m s^2/rad^2]: of a lorry 1 to 3, of a car 0.1."""
+OFF_DESIGN = 10.0
+"""Factor beside the card's Jo′ within which it is sought. Of all inertias it alone may be so small
+that with the shaft's damping one run takes as long as a whole fit."""
 OFF_GOING_LEVEL = 0.03
 """Spread of the friction level of an element that only lets go, about that of the one coming on."""
 
@@ -104,7 +107,7 @@ def problem_of(
         values = (first["output_speed"], wheel, torque / guess["k_o"])
         start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
     point = Point(tuple(start), np.array(list(start.values())))
-    lower, upper = bounds_of(point.names)
+    lower, upper = _about_design(bounds_of(point.names), point.names, priors)
     entries = {
         k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
     }
@@ -184,6 +187,18 @@ def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
         else:
             pairs.append((-np.inf, np.inf))
     lower, upper = np.array(pairs, dtype=float).T
+    return lower, upper
+
+
+def _about_design(
+    bounds: tuple[FloatArray, FloatArray], names: Sequence[str], priors: Mapping[str, PriorValue]
+) -> tuple[FloatArray, FloatArray]:
+    """The bounds with those of Jo′ about its design value, where the card has one."""
+    lower, upper = bounds
+    if "J_out" in names and "J_out" in priors:
+        k, design = names.index("J_out"), priors["J_out"].value
+        lower[k] = max(lower[k], design / OFF_DESIGN)
+        upper[k] = min(upper[k], design * OFF_DESIGN)
     return lower, upper
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.fit import LikelihoodFit, fit, nearest
+from drivetwin.identify.likelihood.newton import minimise
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
@@ -25,6 +26,8 @@ from drivetwin.shifts.shift import Shift
 SIGNIFICANT = 3.0
 """Size of the growing part of the load, in its standard deviations, from which it is kept."""
 
+PLAINLY = 1.2
+"""Q of the other kind over that of the best from which on it is given up."""
 SMALL = 1e-3
 """Growing part of the load [N m s^2/rad^2] to start from: one that is zero has no derivative."""
 
@@ -70,10 +73,21 @@ def _fit_either(
     best = _tried(kinds[likely], start, shifts)
     if best is None:
         return fit(kinds[not likely], start, shifts), not likely
-    other = nearest(kinds[not likely], best.point)
+    other = _other(kinds[not likely], best)
     if other is not None and other.chi2 < best.chi2:
         return other, not likely
     return best, likely
+
+
+def _other(problem: Problem, best: LikelihoodFit) -> LikelihoodFit | None:
+    """The fit of the other kind from the point of the `best`; None where it is plainly worse.
+
+    A model that does not fit may creep for as long as a search lasts, so a rough one decides.
+    """
+    rough = minimise(problem, best.point, lambda _, at: problem.weighted_by(at), rough=True)
+    if rough is None or rough.normal.cost > PLAINLY * best.normal.cost:
+        return None
+    return nearest(problem, rough.point)
 
 
 def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit | None:
