@@ -60,6 +60,15 @@ def test_what_a_function_prints_is_not_taken_for_an_answer(cell: Cell, tmp_path:
     assert isinstance(cell.run(_task(tmp_path, "print")), Finished)
 
 
+def test_a_worker_behind_dask_keeps_the_memory_that_it_has(
+    cell: Cell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "65536")
+    reply = cell.run(_task(tmp_path, "one environment"))
+    assert isinstance(reply, Finished)
+    assert reply.outcome.shifts == (ShiftRow(True, 0.0, 2.0, "2", "3"),)
+
+
 def test_a_fault_that_nobody_thought_of_is_the_logs(cell: Cell, tmp_path: Path) -> None:
     reply = cell.run(_task(tmp_path, ""))
     assert isinstance(reply, Finished)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The function that takes the place of identification where only the fleet is tested.
 
-What a file says is what happens to it: `bad`, `hang`, `eat`, `die` and `slow` as words in it, or
-nothing of the kind.
+What a file says is what happens to it: `bad`, `hang`, `eat`, `die`, `slow`, or `environment`, which
+counts the settings of memory as words, or nothing of the kind.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ def toy(task: Task) -> Found:
     if "eat" in words:
         held = [bytearray(b"x" * (8 * 2**20)) for _ in range(1000)]
         raise AssertionError(f"{len(held)} pieces of memory were to be had")
+    if "environment" in words:
+        words += [name for name in os.environ if name.startswith("MALLOC_")]
     if "bad" in words:
         raise FileFormatError("it says that it is bad", "make it a good one")
     name = f"P0.{words[0]}"
