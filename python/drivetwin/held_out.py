@@ -117,7 +117,8 @@ def _one(
         told = _expected(fit, card, log, shift, number)
         mine, notes = _with_law(_of_log(found, log, number, told), shift)
         twin = Twin.from_identification(mine, card)
-        run = validate(twin, log, shift)
+        start = None if told is None else (told.time, told.start)
+        run = validate(twin, log, shift, start=start)
     except DrivetwinError as fault:
         return HeldOut(log.source, shift, None, notes=(fault.what,))
     own = {k: v for k, v in mine.estimates.items() if v.method == BEFORE}

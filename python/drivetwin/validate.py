@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.driveline import DualClutch, Signal, Trajectory, simulate
+from drivetwin.driveline import DualClutch, Signal, State, Trajectory, simulate
 from drivetwin.errors import MissingParameterError
 from drivetwin.identify.result import FloatArray, Identification, SignalFit
 from drivetwin.logs.held import fresh_samples
@@ -59,19 +59,31 @@ class Validation(Shown):
     warnings: tuple[str, ...]
 
 
+Start = tuple[float, State]
+"""Time [s] and state from which a simulation starts."""
+
+
 def validate(
-    twin: Twin, log: ShiftLog, shift: Shift, model: DualClutch | None = None
+    twin: Twin,
+    log: ShiftLog,
+    shift: Shift,
+    model: DualClutch | None = None,
+    start: Start | None = None,
 ) -> Validation:
     """Simulate one shift, from a calm moment in `before` to the end of `after`.
 
     The engine torque is moved by the twin's `te_delay`; the start state comes from the first
-    measured moments. `model` replaces the twin's own (e.g. the other loss law).
+    measured moments, unless `start` gives it. `model` replaces the twin's own (e.g. the other loss
+    law).
     Raises MissingChannelError, MissingParameterError, DamagedChannelError where an input has a gap
     in the shift; a run that fails returns its status.
     """
     model = model or twin.dual_clutch(shift)
     shift = recorded(log, shift, {one.name: PriorValue(one.P0) for one in model.elements})
-    return _simulated(twin, log, shift, model, _window(log, shift))
+    window = _window(log, shift)
+    if start is None:
+        return _simulated(twin, log, shift, model, window)
+    return _simulated(twin, log, shift, model, (start[0], window[1]), start[1])
 
 
 def simulated_again(before: Validation, twin: Twin, log: ShiftLog, model: DualClutch) -> Validation:
@@ -84,15 +96,20 @@ def simulated_again(before: Validation, twin: Twin, log: ShiftLog, model: DualCl
 
 
 def _simulated(
-    twin: Twin, log: ShiftLog, shift: Shift, model: DualClutch, window: tuple[float, float]
+    twin: Twin,
+    log: ShiftLog,
+    shift: Shift,
+    model: DualClutch,
+    window: tuple[float, float],
+    state: State | None = None,
 ) -> Validation:
-    """Run and comparison over `window` [s]."""
+    """Run and comparison over `window` [s], from `state` or from what the log shows there."""
     log = behind_converter(log, twin.card(), shift)
     engine_torque = _moved(log["engine_torque"], -twin.value("te_delay", 0.0))
     pressures = {name: _signal(each) for name, each in shift_pressures(log, shift).items()}
     count = int((window[1] - window[0]) / _GRID + 1e-6)
     time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
-    start = start_state(model, log, shift, window[0])
+    start = state or start_state(model, log, shift, window[0])
     trajectory = simulate(model, engine_torque, pressures, start, time)
     traces = _traces(model, log, trajectory)
     phases = phases_of(shift, window)

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin.driveline import State
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import driveline_of
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
@@ -54,13 +55,16 @@ class Expected:
     """What is expected of one shift held out.
 
     `own` are values and standard deviations of what its log has of its own, by plain name, where
-    the fit has not seen the log; T_v/i_f holds at `mean_speed` of the wheel [rad/s]. `bounds` go
+    the fit has not seen the log; T_v/i_f holds at `mean_speed` of the wheel [rad/s]. `start` is the
+    state at `time` [s] that the whole stretch before the shift tells. `bounds` go
     by compared signal; empty where the law of the on-coming element is another's, whose spread
     nobody knows.
     """
 
     own: Mapping[str, tuple[float, float]]
     mean_speed: float
+    time: float
+    start: State
     bounds: Mapping[str, Bound]
 
 
@@ -93,6 +97,8 @@ def expected(
         Expected(
             told,
             part.structure.mean_speed,
+            float(part.record.time[0]),
+            part.structure.start(point),
             _bounds(part, point, moved, rng) if _has_law(fit, part) else {},
         )
         for part in problem.parts
