@@ -190,3 +190,13 @@ def test_a_stated_element_must_be_on_the_card() -> None:
         resolve(
             columns(ENGLISH), {"pressure.B4": ChannelSpec("PrsBrk2")}, ELEMENTS, NEEDED, "log.csv"
         )
+
+
+def test_a_strange_sender_counts_where_no_other_has_numbers() -> None:
+    own, strange = Column("EngSpeed", group="EEC1 from 0x00"), "EEC1 from 0xF9"
+    other = Column("EngSpeed", group=strange, aside=True)
+    mapped = resolve([own, other], {}, {}, (), "bus.log")
+    assert mapped.channels["engine_speed"].group == own.group
+    assert strange in mapped.warnings[0]
+    never = Column("EngSpeed", group=own.group, empty=True)
+    assert guess([never, other], {}) == {"engine_speed": [other]}

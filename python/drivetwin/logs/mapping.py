@@ -113,7 +113,7 @@ def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, l
     for element, kind in elements.items():
         found[PRESSURE + element] = _pressure_candidates(columns, element, kind)
     return {
-        role: _with_numbers(_foremost(candidates))
+        role: _foremost(_with_numbers(candidates))
         for role, candidates in found.items()
         if candidates
     }
