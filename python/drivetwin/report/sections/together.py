@@ -178,7 +178,8 @@ def held_out_section(found: Identification, held: Sequence[HeldOut]) -> Section:
         "engine torque and pressures; only the state at the start, and for a log that was not "
         "fitted its load and the age of its engine torque, come from the gear held before the "
         "shift (runs of fitted shifts start from the state that a few samples show). Allowed is "
-        "the error that a right model would leave in 97.5 % of all cases, with the noise of inputs and sensors and the uncertainty of the parameters.",
+        "the error that a right model would leave in 97.5 % of all cases, with the noise of "
+        "inputs and sensors and the uncertainty of the parameters.",
         blocks,
     )
 
