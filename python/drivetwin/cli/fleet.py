@@ -191,15 +191,18 @@ def estimate(
     as_json: JsonFlag = False,
 ) -> None:
     """Estimate over all logs: shared values, spread over units, ageing, changes, outliers."""
-    from drivetwin.fleet.joint.estimate import joint_estimates
+    from drivetwin.fleet.joint.estimate import joint_estimates, untold
     from drivetwin.fleet.store import Store
 
     with step("estimating over the fleet"), Store(store) as opened:
         found = joint_estimates(opened, parameter or ())
+        missing = untold(opened, found, parameter or ())
     if as_json:
-        print_json({"estimates": [one.document() for one in found]})
+        print_json({"estimates": [one.document() for one in found], "untold": missing})
         return
     _print_estimates(found)
+    if missing:
+        note(f"too few logs tell a value of their own: {', '.join(missing)}")
 
 
 def _print_estimates(found: list[JointEstimate]) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from drivetwin.fleet.figures import drift_figure, unit_label, units_figure
 from drivetwin.fleet.friction import fleet_friction
-from drivetwin.fleet.joint.estimate import joint_estimates
+from drivetwin.fleet.joint.estimate import joint_estimates, untold
 from drivetwin.fleet.joint.result import Interval, JointEstimate, Outlier
 from drivetwin.fleet.pages import LIBRARY
 from drivetwin.fleet.readings import drift_unit, span_text
@@ -60,7 +60,7 @@ def render_fleet(
     """HTML text of the page, which will stand in `folder`: links count from there."""
     sections = [
         _overview(store),
-        _parameters(found),
+        _parameters(found, untold(store, found)),
         _odd(store, found, folder),
         ageing(found),
         _friction(store),
@@ -117,7 +117,7 @@ def _overview(store: Store) -> Section:
 _SHIFTS = "SELECT count(*) FROM shifts WHERE state = 'used' AND log IN (SELECT log FROM files)"
 
 
-def _parameters(found: Sequence[JointEstimate]) -> Section:
+def _parameters(found: Sequence[JointEstimate], missing: Sequence[str]) -> Section:
     several = _several_rules(found)
     per = " or ".join({drift_unit(one.drifts[0].field)[1]: 0 for one in found if one.drifts})
     rows = [_parameter_row(one, several=several) for one in found]
@@ -126,13 +126,18 @@ def _parameters(found: Sequence[JointEstimate]) -> Section:
         Cell("± 95 %", number=True), Cell("unit"), Cell("spread of units, 1 σ", number=True),
         Cell(f"drift per {per}" if per else "drift", number=True), Cell("remark"),
     )  # fmt: skip
-    blocks: list[Block] = [TableBlock("Shared values, at the fields' means.", head, rows)]
+    blocks: list[Block] = []
+    if rows:
+        blocks.append(TableBlock("Shared values, at the fields' means.", head, rows))
+    if missing:
+        names = ", ".join(map(parameter_label, missing))
+        blocks.append(NotesBlock("Too few logs tell a value of their own", [names]))
     return Section(
         "parameters",
         "What the logs say together",
         "Each log counts by what it states of its own error; units may differ, and age. Sensor "
         "errors that a unit keeps are part of the spread: logs alone cannot tell them apart.",
-        blocks if rows else [],
+        blocks,
     )
 
 

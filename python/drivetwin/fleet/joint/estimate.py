@@ -22,6 +22,7 @@ from drivetwin.fleet.joint.result import (
     Points,
     UnitValue,
 )
+from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
 from drivetwin.parameters import spec_of
 
@@ -50,6 +51,15 @@ def joint_estimates(store: Store, wanted: Sequence[str] = ()) -> list[JointEstim
             if one is not None:
                 found.append(one)
     return reasons(store, found)
+
+
+def untold(store: Store, found: Sequence[JointEstimate], wanted: Sequence[str] = ()) -> list[str]:
+    """Ids of the parameters of a store, or the `wanted` ones, that have no joint estimate: too few
+    logs tell them, or all have the card's design value.
+    """
+    names = store.rows(RowKind.PARAMETER).column("name").to_pylist()
+    told = {one.parameter for one in found}
+    return [name for name in dict.fromkeys(wanted or names) if name not in told]
 
 
 @dataclass(frozen=True)
