@@ -39,7 +39,7 @@ def test_correlated_unknowns_at_their_bounds(
 
 
 class Kinked(Problem):
-    """Q = x² + y² + z² + 5·|x + 2y - 1| + 5·|y - z - 1|, with the slopes of the side it is on."""
+    """Q = (x² + y² + z²)/2 + |x + 2y - 1| + |y - z - 1|, with the slopes of the side it is on."""
 
     _BENDS = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, -1.0]])
 
@@ -48,16 +48,17 @@ class Kinked(Problem):
 
     def cost(self, point: Point) -> float:
         """Q at a point."""
-        return float(point.values @ point.values + 5.0 * np.abs(self._sides(point)).sum())
+        return float(0.5 * point.values @ point.values + np.abs(self._sides(point)).sum())
 
     def normal(self, point: Point) -> Normal:
         """Half the gradient of the side that the point is on, and the smooth part's curvature."""
         signs = np.where(self._sides(point) >= 0.0, 1.0, -1.0)
-        gradient = point.values + 2.5 * signs @ self._BENDS
-        return Normal(self.cost(point), gradient, np.eye(3), np.eye(3), (), ())
+        gradient = 0.5 * point.values + 0.5 * signs @ self._BENDS
+        curvature = 0.5 * np.eye(3)
+        return Normal(self.cost(point), gradient, curvature, curvature, (), ())
 
 
-@given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3))
+@given(st.lists(st.floats(-1.5, 1.5), min_size=3, max_size=3))
 def test_a_search_goes_along_kinks_to_their_crossing(start: list[float]) -> None:
     free = np.full(3, np.inf)
     problem = Kinked((), Prior(np.zeros(3), np.zeros((3, 3))), -free, free)
@@ -66,4 +67,4 @@ def test_a_search_goes_along_kinks_to_their_crossing(start: list[float]) -> None
     assert found.converged
     # On both kinks: x = 1 - 2y, z = y - 1, of which x² + y² + z² is least at y = 1/2.
     best = Point(NAMES, np.array([0.0, 0.5, -0.5]))
-    assert problem.cost(found.point) == pytest.approx(problem.cost(best), abs=STALLED)
+    assert problem.cost(found.point) == pytest.approx(problem.cost(best), abs=0.5 * STALLED)

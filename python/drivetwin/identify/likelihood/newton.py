@@ -45,7 +45,8 @@ ROUGH_STEPS = 20
 REFRESHES = 3
 """Least number of points at which Q is formed anew: near the minimum it settles in two."""
 CLOSE = 10.0
-"""Expected fall of Q from which on it is no longer formed anew: it may alternate about a kink."""
+"""Expected fall of Q from which on it is no longer formed anew: it may alternate about a kink.
+Further off, what Q looks like from the other side of a kink cannot be told from here."""
 
 ROUGH = 1e-3
 """Fall of Q relative to Q at which a search ends that only prepares the next one."""
@@ -110,7 +111,7 @@ def minimise(
         trial, fall, damping = _better(problem, point, normal, damping)
         if rough and trial is not None and fall < ROUGH * normal.cost:
             return Found(problem, trial, normal, True, iteration)
-        if not rough and settled and fall < CRAWLING * expected:
+        if not rough and settled and fall < CRAWLING * expected < CRAWLING * CLOSE:
             along, expected = _along_kink(problem, point, normal)
             trial = along or trial
         if trial is None or (fall < ENOUGH and expected < STALLED and settled):
