@@ -28,6 +28,11 @@ def test_a_drift_is_told_over_the_range_of_its_field(drifting: JointEstimate) ->
     assert remark(drifting) == "drifts by −10 % between 0 and 200 odometer_Mm"
 
 
+def test_what_is_said_of_all_is_not_said_of_each(drifting: JointEstimate) -> None:
+    noted = replace(drifting, notes=("of all", "of this one"), drifts=())
+    assert remark(noted, ["of all"]) == "of this one"
+
+
 def test_a_drift_below_a_logs_own_error_is_doubted(drifting: JointEstimate) -> None:
     coarse = replace(drifting, points=replace(drifting.points, std=np.full(2, 0.02)))
     assert remark(coarse).endswith("an error of the method may look like that")

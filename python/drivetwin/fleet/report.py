@@ -120,7 +120,9 @@ _SHIFTS = "SELECT count(*) FROM shifts WHERE state = 'used' AND log IN (SELECT l
 def _parameters(found: Sequence[JointEstimate], missing: Sequence[str]) -> Section:
     several = _several_rules(found)
     per = " or ".join({drift_unit(one.drifts[0].field)[1]: 0 for one in found if one.drifts})
-    rows = [_parameter_row(one, several=several) for one in found]
+    notes = dict.fromkeys(note for one in found for note in one.notes)
+    shared = [note for note in notes if all(note in one.notes for one in found)]
+    rows = [_parameter_row(one, shared, several=several) for one in found]
     head = (
         Cell("parameter"), Cell("logs", number=True), Cell("fleet's mean", number=True),
         Cell("± 95 %", number=True), Cell("unit"), Cell("spread of units, 1 σ", number=True),
@@ -129,6 +131,8 @@ def _parameters(found: Sequence[JointEstimate], missing: Sequence[str]) -> Secti
     blocks: list[Block] = []
     if rows:
         blocks.append(TableBlock("Shared values, at the fields' means.", head, rows))
+    if shared:
+        blocks.append(NotesBlock("Of all parameters", shared))
     if missing:
         names = ", ".join(map(parameter_label, missing))
         blocks.append(NotesBlock("Too few logs tell a value of their own", [names]))
@@ -145,7 +149,7 @@ def _several_rules(found: Sequence[JointEstimate]) -> bool:
     return len({one.rule for one in found}) > 1
 
 
-def _parameter_row(one: JointEstimate, *, several: bool) -> tuple[Cell, ...]:
+def _parameter_row(one: JointEstimate, shared: Sequence[str], *, several: bool) -> tuple[Cell, ...]:
     display = display_of(one.si_unit)
     value, half = with_uncertainty(
         one.value * display.factor, 0.5 * (one.ci95[1] - one.ci95[0]) * display.factor
@@ -173,7 +177,7 @@ def _parameter_row(one: JointEstimate, *, several: bool) -> tuple[Cell, ...]:
         Cell(display.label),
         Cell(spread, number=True, note=between),
         Cell(slope, number=True, note=note),
-        Cell(remark(one)),
+        Cell(remark(one, shared)),
     )
 
 
@@ -181,9 +185,9 @@ def _between(ci95: Interval, factor: float) -> str:
     return f"{significant(ci95[0] * factor, 2)} to {significant(ci95[1] * factor, 2)}"
 
 
-def remark(one: JointEstimate) -> str:
-    """What there is to say of an estimate, in words."""
-    parts = list(one.notes)
+def remark(one: JointEstimate, shared: Sequence[str] = ()) -> str:
+    """What there is to say of an estimate, in words; `shared` is said of all elsewhere."""
+    parts = [note for note in one.notes if note not in shared]
     if drift := _whole_drift(one):
         parts.append(_drift_text(one, drift) + _small(drift, one))
     if spread := _sure_spread(one):
