@@ -104,6 +104,11 @@ picture: $(venv)/.native ## draw the pictures of the documents (needs Chromium)
 accuracy: $(venv)/.native ## Monte Carlo of the estimators against the bound, docs/accuracy.md (an hour)
 	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.estimation
 
+pairs ?= 40
+.PHONY: several
+several: $(venv)/.native ## pairs=40 of logs fitted together and predicted, over their noise (ten minutes)
+	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.several $(pairs)
+
 .PHONY: fmt
 fmt: $(venv)/.dev ## format Rust and Python sources
 	cargo fmt --all
