@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """`python -m benchmarks.fleet.scaling [LOGS]`: what the fleet costs beside the identification.
 
-Every figure is the difference of a run over many logs and one over few, so that starting processes,
-importing, connecting and the first use of everything count on neither side. Told are: coordinator
-memory with 1,000 and 10,000 logs that leave what a real log leaves, overhead per log, two workers
-against one, a local Dask cluster against processes. On a machine that others use wall times say
-little; processor times of all processes stand beside them.
+Told are: what the fleet does itself for each log, and the coordinator's memory, with 1,000 and
+10,000 logs that leave what a real log leaves; then, of logs that are identified, the overhead per
+log, two workers against one, a local Dask cluster against processes. The second group is counted
+from the 21st log to the last, so that starting processes, importing, connecting and the first use
+of everything count on neither side. On a machine that others use wall times say little; processor
+times of all processes stand beside them.
 
 `benchmarks/fleet/stand_in.py` is imported where it is used: with identification itself a
 coordinator would hold more than `drivetwin fleet` does.
@@ -18,21 +19,23 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from drivetwin.fleet.events import Event, Summary
+from drivetwin.fleet.cell import ONE_THREAD
+from drivetwin.fleet.events import Event, Settled, Started, Summary
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.run import FleetRun, run_fleet
 from drivetwin.fleet.scan import Scan, Scanned
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import Task, WorkerSpec
+from drivetwin.fleet.task import State, Task, WorkerSpec
 from drivetwin.identify.method import Method
 
 ROOT = Path(__file__).parents[2]
@@ -45,75 +48,99 @@ REAL_ROWS = "benchmarks.fleet.stand_in:real_rows"
 
 @dataclass(frozen=True)
 class Cost:
-    """Of a run over `logs`: wall time, processor time of all processes, that within identification
-    [s]; most memory of the coordinator [MiB].
-    """
+    """Of so many logs: wall time, and processor time of all processes [s]."""
 
     logs: int
     wall: float
     processor: float
+
+    def since(self, first: Cost) -> Cost:
+        """What came after an earlier moment of the run, or of a shorter one."""
+        times = self.wall - first.wall, self.processor - first.processor
+        return Cost(self.logs - first.logs, *times)
+
+    def __str__(self) -> str:
+        each = 1e3 * self.processor / self.logs
+        return f"{self.logs} logs in {self.wall:.1f} s, {each:.1f} ms of processor time each"
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A run: its cost to the end, that of the logs after the first ones, the processor time [s]
+    for each of these within identification, and the most memory of the coordinator [MiB].
+    """
+
+    whole: Cost
+    steady: Cost
     identifying: float
     memory: float
 
-    def beyond(self, first: Cost) -> Cost:
-        """What the logs cost that this run has beyond another."""
-        return replace(
-            self,
-            logs=self.logs - first.logs,
-            wall=self.wall - first.wall,
-            processor=self.processor - first.processor,
-            identifying=self.identifying - first.identifying,
-        )
 
-    def each(self, seconds: float) -> float:
-        """Milliseconds for each log."""
-        return 1e3 * seconds / self.logs
-
-    def __str__(self) -> str:
-        return (
-            f"{self.logs} logs in {self.wall:.1f} s, {self.each(self.processor):.1f} ms of "
-            f"processor time each; coordinator at most {self.memory:.0f} MiB"
-        )
-
-
-def _apart(logs: Path, function: str, workers: int, *, cluster: bool = False) -> Cost:
-    """A run in a process of its own."""
-    arguments = ["run", str(logs), function, str(workers), "cluster" if cluster else ""]
+def _apart(*arguments: str) -> Any:
+    """This program with these arguments in a process of its own; what it printed last."""
     command = [sys.executable, "-m", "benchmarks.fleet.scaling", *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, check=True)
-    return Cost(**json.loads(done.stdout.splitlines()[-1]))
+    return json.loads(done.stdout.splitlines()[-1])
 
 
-def _run(logs: Path, function: str, workers: int, cluster: bool) -> Cost:
+def _ran(logs: Path, function: str, workers: int, *, cluster: bool = False) -> Ran:
+    """A run in a process of its own."""
+    tree = _apart("run", str(logs), function, str(workers), "cluster" if cluster else "")
+    return Ran(**{**tree, "whole": Cost(**tree["whole"]), "steady": Cost(**tree["steady"])})
+
+
+class _Watch:
+    """Listens to a run; `costs` are those at the first logs, at the last one, and at the end."""
+
+    def __init__(self) -> None:
+        self.costs: list[Cost] = []
+        self.settled: list[str] = []
+        self._files = 0
+        self._start = perf_counter()
+
+    def hear(self, event: Event) -> None:
+        """Take in what the run tells."""
+        if isinstance(event, Started):
+            self._files = event.files
+        elif isinstance(event, Settled):
+            assert event.state is State.DONE, event
+            self.settled.append(event.log)
+            if len(self.settled) in (FIRST, self._files):
+                self._look()
+        elif isinstance(event, Summary):  # the workers are still there
+            self._look()
+
+    def _look(self) -> None:
+        wall = perf_counter() - self._start
+        self.costs.append(Cost(len(self.settled), wall, _processor()))
+
+
+def _run(logs: Path, function: str, workers: int, cluster: bool) -> Ran:
     """Run a fleet in this process."""
-    costs: list[Cost] = []
     with ExitStack() as stack:
         store = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "store"
         scheduler = stack.enter_context(_cluster(workers)).scheduler_address if cluster else None
-        start = perf_counter()
-
-        def hear(event: Event) -> None:
-            if isinstance(event, Summary):  # the workers are still there
-                assert event.done == event.files
-                wall = perf_counter() - start
-                costs.append(Cost(event.done, wall, _processor(), 0.0, _most_memory()))
-
         request = FleetRun(
             Sources([str(logs)]), read_rules(logs / "rules.toml"), store, Method.INTEGRAL,
             workers, scheduler, WorkerSpec(function),
         )  # fmt: skip
-        run_fleet(request, hear)
-        return replace(costs[0], identifying=_identifying(store))
+        watch = _Watch()
+        run_fleet(request, watch.hear)
+        memory = _most_memory()
+        identifying = _identifying(store, watch.settled[FIRST:])
+    first, last, end = watch.costs
+    return Ran(end, last.since(first), identifying, memory)
 
 
-def _identifying(store: Path) -> float:
-    """Processor time [s] that all logs of a store took to identify, as they say."""
+def _identifying(store: Path, logs: Sequence[str]) -> float:
+    """Processor time [s] that identifying these logs took, each on average, as they say."""
     from benchmarks.fleet.stand_in import CLOCK
 
     with Store(store) as opened:
         rows = opened.rows(RowKind.QUALITY).to_pylist()
-    return float(sum(row["value"] for row in rows if row["name"] == CLOCK))
+    clock = {row["log"]: float(row["value"]) for row in rows if row["name"] == CLOCK}
+    return sum(clock.get(log, 0.0) for log in logs) / len(logs)
 
 
 def _cluster(workers: int) -> Any:
@@ -158,35 +185,35 @@ def _bare(logs: Path) -> float:
 def _memory(folder: Path) -> None:
     from benchmarks.fleet.stand_in import make_small_files
 
-    costs = []
+    found = []
     for count in (FEW, MANY):
         logs = folder / f"small_{count}"
         make_small_files(logs, count)
-        costs.append(_apart(logs, REAL_ROWS, 2))
-        print(f"without identification: {costs[-1]}")
-    few, many = costs
-    beyond = many.beyond(few)
+        found.append(_ran(logs, REAL_ROWS, 2))
+        print(f"without identification: {found[-1].whole}, coordinator at most "
+              f"{found[-1].memory:.0f} MiB")  # fmt: skip
+    few, many = found
+    more = many.whole.since(few.whole)
     growth = 100 * (many.memory / few.memory - 1)
+    print(
+        f"the fleet's own work: {1e3 * more.processor / more.logs:.1f} ms of processor time a log"
+    )
     print(f"coordinator memory from {FEW} to {MANY} logs: {growth:+.1f} %")
-    print(f"the fleet's own work: {beyond.each(beyond.processor):.1f} ms of processor time a log")
 
 
 def _identification(folder: Path, count: int) -> None:
     from benchmarks.fleet.stand_in import make_healthy_logs
 
-    few, logs = folder / "few", folder / "logs"
-    make_healthy_logs(few, FIRST)
+    logs = folder / "logs"
     make_healthy_logs(logs, count + FIRST)
-
-    def beyond(workers: int, *, cluster: bool = False) -> Cost:
-        first = _apart(few, IDENTIFY, workers, cluster=cluster)
-        return _apart(logs, IDENTIFY, workers, cluster=cluster).beyond(first)
-
-    one, bare, two, dask = beyond(1), _bare(logs), beyond(2), beyond(2, cluster=True)
-    own = one.each(one.processor - one.identifying)
-    print(f"one worker: {one}")
-    print(f"of this, {one.each(one.identifying):.1f} ms are identification, {1e3 * bare:.1f} ms "
-          f"without a fleet; overhead {own:.1f} ms a log")  # fmt: skip
+    bare: float = _apart("bare", str(logs))
+    found = [_ran(logs, IDENTIFY, 1), _ran(logs, IDENTIFY, 2)]
+    found.append(_ran(logs, IDENTIFY, 2, cluster=True))
+    one, two, dask = (each.steady for each in found)
+    inside = found[0].identifying
+    print(f"one worker: {one}, of which {1e3 * inside:.1f} ms are identification "
+          f"({1e3 * bare:.1f} ms without a fleet); overhead "
+          f"{1e3 * (one.processor / one.logs - inside):.1f} ms")  # fmt: skip
     print(f"two workers: {two}; {one.wall / two.wall:.2f} times one by wall time, "
           f"{one.processor / two.processor:.2f} by processor time")  # fmt: skip
     print(f"two in a Dask cluster: {dask}; {100 * (dask.wall / two.wall - 1):+.0f} % wall time, "
@@ -198,6 +225,8 @@ def main() -> int:
     match sys.argv[1:]:
         case ["run", logs, function, workers, cluster]:
             print(json.dumps(asdict(_run(Path(logs), function, int(workers), bool(cluster)))))
+        case ["bare", logs]:
+            print(json.dumps(_bare(Path(logs))))
         case rest:
             print(f"load of the machine before: {os.getloadavg()[0]:.1f}")
             with tempfile.TemporaryDirectory() as temporary:

@@ -32,8 +32,13 @@ _LOOK = 0.1
 """Time [s] between two looks at a worker's memory."""
 _START = 120.0
 """Time [s] that a worker may take to import what it needs; a cold network drive is slow."""
-_THREADS = ("OPENBLAS", "OMP", "MKL", "VECLIB", "NUMEXPR", "RAYON")
-"""Libraries with threads of their own: one each, since the logs are what runs side by side."""
+ONE_THREAD = {
+    f"{library}_NUM_THREADS": "1"
+    for library in ("OPENBLAS", "OMP", "MKL", "VECLIB", "NUMEXPR", "RAYON")
+}
+"""Environment in which libraries with threads of their own have one each, since the logs are what
+runs side by side.
+"""
 _TRIMMING = "MALLOC_TRIM_THRESHOLD_"
 """A Dask nanny sets it for the Dask worker, so that freed memory goes back to the system at once. A
 worker of ours would get the same pages back with the next array, which costs some per cent."""
@@ -123,7 +128,6 @@ class Cell:
     def _spawn(self) -> None:
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the worker
         self._pending = b""
-        one_thread = {f"{name}_NUM_THREADS": "1" for name in _THREADS}
         inherited = {name: value for name, value in os.environ.items() if name != _TRIMMING}
         arguments = (self._spec.function, str(self._spec.limits.memory))
         self._process = subprocess.Popen(
@@ -131,7 +135,7 @@ class Cell:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._stderr,
-            env={**inherited, **one_thread},
+            env={**inherited, **ONE_THREAD},
             start_new_session=True,  # an interrupt at the keyboard is the coordinator's alone
         )
 
