@@ -20,6 +20,8 @@ from drivetwin.network import Element, Output, Sine, Start
 
 ROOT = Path(__file__).resolve().parents[2]
 _EXAMPLE = "one_shift"
+_WARMING = 50
+"""Runs of a process before those that count: the other programs are warm as well."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +84,10 @@ class Example:
 
     def run(self, scenario: Path, repeats: int, which: str) -> Sample:
         """Seconds of `which` (`prepared` or `whole`) runs, and the solution."""
-        command = [str(self.path), str(scenario), str(repeats)]
+        command = [str(self.path), str(scenario), str(_WARMING + repeats)]
         done = subprocess.run(command, check=True, capture_output=True, text=True)
         result = json.loads(done.stdout)
         if result["status"] != "completed":
             raise RuntimeError(f"{scenario.name}: {result['status']}")
         solution = Solution(np.array(result["columns"]), np.array(result["events"]))
-        return Sample(result[which], solution)
+        return Sample(result[which][_WARMING:], solution)
