@@ -67,4 +67,5 @@ def test_a_search_goes_along_kinks_to_their_crossing(start: list[float]) -> None
     assert found.converged
     # On both kinks: x = 1 - 2y, z = y - 1, of which x² + y² + z² is least at y = 1/2.
     best = Point(NAMES, np.array([0.0, 0.5, -0.5]))
-    assert problem.cost(found.point) == pytest.approx(problem.cost(best), abs=0.5 * STALLED)
+    # What the expansion can still promise where a search ends is what it can be away by.
+    assert problem.cost(found.point) == pytest.approx(problem.cost(best), abs=STALLED)

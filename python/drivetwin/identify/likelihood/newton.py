@@ -112,8 +112,9 @@ def minimise(
         if rough and trial is not None and fall < ROUGH * normal.cost:
             return Found(problem, trial, normal, True, iteration)
         if not rough and settled and fall < CRAWLING * expected < CRAWLING * CLOSE:
-            along, expected = _along_kink(problem, point, normal)
-            trial = along or trial
+            along, lower, expected = _along_kink(problem, point, normal)
+            if along is not None and lower > fall:
+                trial, fall = along, lower
         if trial is None or (fall < ENOUGH and expected < STALLED and settled):
             return Found(problem, point, normal, expected < STALLED, iteration)
         point = trial
@@ -121,8 +122,11 @@ def minimise(
     return None if last is None else Found(problem, point, last, False, most)
 
 
-def _along_kink(problem: Problem, point: Point, normal: Normal) -> tuple[Point | None, float]:
-    """A point with less Q along the kink that `point` lies at, and the fall expected on the way.
+def _along_kink(
+    problem: Problem, point: Point, normal: Normal
+) -> tuple[Point | None, float, float]:
+    """A point with less Q along the kink that `point` lies at, by how much less, and the fall
+    expected on the way.
 
     None where there is none: the sides that the steps reach are gathered until their least
     combination promises too little.
@@ -133,16 +137,17 @@ def _along_kink(problem: Problem, point: Point, normal: Normal) -> tuple[Point |
         least = replace(normal, gradient=gradient)
         expected = _expected(problem, point, least) + below
         if expected < ENOUGH or len(sides) == SIDES:
-            return None, expected
+            return None, 0.0, expected
         step = _step(problem, point, least, 0.0)
         for share in 0.5 ** np.arange(HALVINGS):
             values = np.clip(point.values + share * step, problem.lower, problem.upper)
             trial = point.moved(values)
-            if normal.cost - problem.cost(trial) > CRAWLING * share * expected:
-                return trial, expected
+            fall = normal.cost - problem.cost(trial)
+            if fall > CRAWLING * share * expected:
+                return trial, fall, expected
         behind = problem.normal(trial)
         if behind is None:
-            return None, expected
+            return None, 0.0, expected
         sides.append(_Side.seen(behind, normal, trial.values - point.values))
 
 
