@@ -73,7 +73,7 @@ pub struct Mode<T> {
     pub key: ModeKey,
     /// State derivatives, states × basis.
     pub derivative: Matrix<T>,
-    /// The same.
+    /// Its entries that are not zero, for products with the basis.
     pub rates: SparseRows<T>,
     /// About the spectral radius of the motion, 1/s.
     pub radius: f64,
