@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Runs many cases in a process of their own: a crash is a finding and not an end.
 
-Each case must end within 10 s and 1 GB.
+Each case must end within 10 s and 1 GB, without a warning of the interpreter or a failure in the
+background: a user would see either as lines of foreign source.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import resource
+import sys
 import tempfile
 import time
 import traceback
+import warnings
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -84,6 +87,9 @@ def _work(there: Connection, prepare: Prepare, first: int, end: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         outcome = prepare(Path(folder))
         before = _memory()
+        background: list[str] = []
+        sys.unraisablehook = lambda one: background.append(f"in the background: {one.exc_value!r}")
+        warnings.simplefilter("error")
         resource.setrlimit(resource.RLIMIT_DATA, (before + 3 * MOST_MEMORY, resource.RLIM_INFINITY))
         for seed in range(first, end):
             started, fault = time.process_time(), ""
@@ -91,6 +97,8 @@ def _work(there: Connection, prepare: Prepare, first: int, end: int) -> None:
                 what = outcome(seed)
             except BaseException:  # everything that is no DrivetwinError is what is looked for
                 what, fault = "untyped", traceback.format_exc()
+            fault += "\n".join(background)
+            background.clear()
             seconds, more = time.process_time() - started, _memory() - before
             if seconds > LONGEST or more > MOST_MEMORY:
                 fault += f"took {seconds:.1f} s and {more / 1e6:.0f} MB"

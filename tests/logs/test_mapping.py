@@ -32,6 +32,8 @@ def columns(names: Sequence[str]) -> list[Column]:
         ("engine_speed", "EngSpd nMot Motordrehzahl engine_speed n_eng n_mot_CAN omega_e"),
         ("output_speed", "SpdOut n_ab nGetrAus Abtriebsdrehzahl w_out output_speed N_Ab n_Kardan"),
         ("wheel_speed", "SpdWhl nRad Raddrehzahl w_wheel wheel_speed WheelSpeed n_Rad_HA"),
+        ("wheel_speed", "n_Rad_HL nRadHR WheelSpeedRL SpdWhlRight"),
+        ("engine_torque", "log.EngTrq TCU/MMot rec.can.TqEng"),
         ("throttle", "throttle AccelPedal Fahrpedal accel_pedal_pos Pedalwert"),
         ("gear", "gear Gang current_gear IstGang nGang ActualGear"),
         ("pressure.B2", "PrsBrk2 p2 pB2 p_B2 PBrake2 DruckBremse2 Druck_B2 B2_pressure"),
@@ -53,6 +55,16 @@ def test_a_plain_name_comes_before_one_with_a_source() -> None:
     found = guess(columns(["nMot_CAN", "nMot", "XCP_nRad", "nRad_Mittel"]), ELEMENTS)
     assert found["engine_speed"] == columns(["nMot"])
     assert found["wheel_speed"] == columns(["XCP_nRad", "nRad_Mittel"])
+
+
+def test_left_and_right_wheel_are_for_the_user_to_choose() -> None:
+    both = columns(["n_Rad_HL", "n_Rad_HR"])
+    assert guess(both, ELEMENTS)["wheel_speed"] == both
+
+
+def test_a_whole_name_comes_before_the_last_part_of_one() -> None:
+    found = guess(columns(["Soll.EngTrq", "EngTrq"]), ELEMENTS)
+    assert found["engine_torque"] == columns(["EngTrq"])
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from drivetwin.logs.shiftlog import ShiftLog
     from drivetwin.vehicle.card import VehicleCard
 
-LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="Shift log (CSV with a unit row).")]
+LogFile = Annotated[
+    Path, typer.Argument(metavar="LOG", help="Shift log: CSV, MDF, MAT, Parquet, bus log.")
+]
 VehicleFile = Annotated[
     Path, typer.Option("--vehicle", metavar="CARD", help="Vehicle card (TOML).")
 ]

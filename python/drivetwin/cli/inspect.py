@@ -42,13 +42,15 @@ def inspect(
     if write_mapping is not None:
         from drivetwin.logs import profile
 
-        profile.write_mapping(write_mapping, found.mapping, found.options)
+        profile.write_mapping(write_mapping, found.mapping, found.options, found.unitless)
     if as_json:
         print_json(found.document())
         return
     show(_table([column.document() for column in found.columns], log.name))
     for text in found.notes:
         note(text)
+    if found.unitless:
+        note(f"no unit for {', '.join(sorted(found.unitless))}: state it in a channel mapping")
     if write_mapping is not None:
         say(f"wrote {write_mapping}")
 

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 def shifts(
     log: LogFile, vehicle: VehicleFile, channels: ChannelsFile = None, as_json: JsonFlag = False
 ) -> None:
-    """Find the shifts of a log and their phases.
+    """Find the shifts of a log, their phases and figures of shift quality.
 
     For a log without output torque also the driveline's resonance after each shift and the total
     inertia over η in each gear held, where the log carries them.
     """
-    from drivetwin.cli.tables import shift_table
+    from drivetwin.cli.tables import quality_tables, shift_table
     from drivetwin.identify.held_gear import held_gears
     from drivetwin.identify.resonance import after_shift
     from drivetwin.results.result_file import RejectedRecord, ShiftRecord
@@ -55,6 +55,8 @@ def shifts(
         )
         return
     show(shift_table(found.shifts, log.name))
+    for table in quality_tables(found.shifts):
+        show(table)
     for closing in closings:
         text = f"; {closing.warning}" if closing.warning else ""
         note(f"converter lock-up at {closing.time:.3f} s ± {1e3 * closing.sigma:.0f} ms{text}")

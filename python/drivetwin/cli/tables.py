@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from drivetwin.cli.numbers import around, percent, quantity, shown
 from drivetwin.cli.output import table_of
+from drivetwin.shifts.quality import QUALITY_UNITS
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from drivetwin.identify.experiment.suggest import Suggestion
     from drivetwin.identify.result import Estimate, FrictionCurve, SignalFit
     from drivetwin.shifts.shift import Shift
+
+_BESIDE = 3
+"""So many shifts beside each other in a table."""
 
 _PHASES = ("all", "before", "torque", "inertia", "after")
 
@@ -42,6 +46,19 @@ def shift_table(shifts: Sequence[Shift], source: str) -> Table:
                 "" if sigma is None else f"{1e3 * sigma:.1f}",
             )
     return table
+
+
+def quality_tables(shifts: Sequence[Shift]) -> Iterator[Table]:
+    """Figures of shift quality, one column for each shift; several tables where they are many."""
+    for first in range(0, len(shifts), _BESIDE):
+        part = shifts[first : first + _BESIDE]
+        names = [f"{one.start_gear}→{one.end_gear}, {one.lockup_time:.2f} s" for one in part]
+        table = table_of("Shift quality", "figure", *names, right=tuple(names))
+        for figure, unit in QUALITY_UNITS.items():
+            if any(figure in one.quality for one in part):
+                values = [quantity(one.quality.get(figure), unit) for one in part]
+                table.add_row(figure.replace("_", " "), *values)
+        yield table
 
 
 def parameter_table(estimates: Mapping[str, Estimate], title: str) -> Table:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Reader of CSV and TSV logs.
 
-Delimiter `,` `;` or tab; decimal point or comma; units in a row under the names or in the names as
-`EngTrq [Nm]`; comment lines (# % //), the last of which may hold the names; byte order mark; quoted
-fields; time as a number or as a clock, with the date beside it. An empty cell is no sample of its
-column, so each column keeps its own time base.
+Delimiter `,` `;` `|`, tab or blanks; decimal point or comma; units in a row under the names or in
+the names as `EngTrq [Nm]`; comment lines (# % //), the last of which may hold the names; lines of
+another form above the names; byte order mark; quoted fields; time as a number or as a clock, with
+the date beside it. An empty cell is no sample of its column, so each keeps its own time base.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import codecs
 import contextlib
 import csv
 import re
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drivetwin.errors import FileFormatError, TimeError, Where
 from drivetwin.logs.cells import Numbers, decimal_sign, is_number, to_numbers
@@ -26,6 +27,18 @@ from drivetwin.logs.units import is_unit, time_factor
 
 _DATE_NAMES = frozenset(("date", "datum"))
 _COMMENT_MARKS = ("#", "%", "//")
+_BLANKS = " "
+"""Stands for any number of blanks; every text has some, so it counts only before numbers."""
+
+_SEPARATORS = ("\t", ";", ",", "|", _BLANKS)
+"""In the order tried."""
+
+_LOOKED_AT = 200
+"""Lines from which separator and width of the table are told."""
+
+_MOST_ROWS = 4
+"""Rows of names, units, comments and types at most."""
+
 _EXPORT = "export the log as text: one row of names, one of units, then one row for each sample"
 _NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 
@@ -47,7 +60,7 @@ class _Header:
     units: Sequence[str | None]
     time: int
     height: int
-    """How many rows it takes: names, perhaps units."""
+    """How many rows it takes: names, perhaps units, comments, types."""
 
 
 def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
@@ -127,8 +140,10 @@ def _table(text: str, file: str) -> _Table:
     ]
     if not kept:
         raise FileFormatError("the file holds only comments", _EXPORT, Where(file=file))
+    above: list[tuple[int, str]] = []
     if delimiter is None:
-        delimiter = _delimiter([line for _, line in kept], file)
+        delimiter, start = _delimiter([line for _, line in kept], file)
+        above, kept = kept[:start], kept[start:]
     kept = _names_in_comments(lines[: kept[0][0] - 1], delimiter, kept[0][1]) + kept
     numbers = [number for number, _ in kept]
     rows = []
@@ -138,7 +153,11 @@ def _table(text: str, file: str) -> _Table:
         except csv.Error as fault:
             what = f"line {number}: a quoted field does not end where it should ({fault})"
             raise FileFormatError(what, _EXPORT, Where(file=file)) from None
-    return _even(rows, numbers, file)
+    table = _even(rows, numbers, file)
+    if not above:
+        return table
+    note = f"{len(above)} lines above the names left out, the first {above[0][1].strip()[:40]!r}"
+    return replace(table, warnings=(note, *table.warnings))
 
 
 def _names_in_comments(lines: Sequence[str], delimiter: str, first: str) -> list[tuple[int, str]]:
@@ -167,24 +186,45 @@ def _names_in_comments(lines: Sequence[str], delimiter: str, first: str) -> list
 def _fields(line: str, delimiter: str) -> list[str]:
     """Fields of one line; raises csv.Error where a quote does not close on it."""
     if '"' not in line:
-        return line.split(delimiter)
-    reader = csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True)
+        return line.split() if delimiter == _BLANKS else line.split(delimiter)
+    reader = csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True, strict=True)
     return next(reader)
 
 
-def _delimiter(lines: Sequence[str], file: str) -> str:
-    """The sign that splits names and first row into equally many fields."""
-    for sign in ("\t", ";", ","):
-        with contextlib.suppress(csv.Error):
-            counts = [len(_fields(line, sign)) for line in lines[:2]]
-            if min(counts) > 1 and max(counts) - min(counts) <= 1:
-                return sign
+def _delimiter(lines: Sequence[str], file: str) -> tuple[str, int]:
+    """The sign that splits most lines into equally many fields, and the line of the names.
+
+    Lines of another form may stand above the names, rows of numbers may not.
+    """
+    lines = lines[:_LOOKED_AT]
+    for sign in _SEPARATORS:
+        widths = [_width(line, sign) for line in lines]
+        usual = max(Counter(widths).items(), key=lambda item: (item[1], item[0]))[0]
+        fitting = (i for i, width in enumerate(widths) if width > 1 and abs(width - usual) <= 1)
+        start = next(fitting, None)
+        data = [_is_data(line, sign) for line in lines]
+        if start is not None and not any(data[:start]) and (sign != _BLANKS or any(data)):
+            return sign, start
     raise FileFormatError(
-        f"no columns found: no tab, semicolon or comma splits {lines[0][:60]!r} and the line "
-        "below alike",
+        f"no columns found: no tab, semicolon, comma, bar or blank splits {lines[0][:60]!r} and "
+        "the lines below alike",
         _EXPORT,
         Where(file=file),
     )
+
+
+def _width(line: str, delimiter: str) -> int:
+    """Number of fields; none where a quote does not close."""
+    with contextlib.suppress(csv.Error):
+        return len(_fields(line, delimiter))
+    return 0
+
+
+def _is_data(line: str, delimiter: str) -> bool:
+    """Whether a line holds several fields and starts with a number or a clock."""
+    cells = line.split() if delimiter == _BLANKS else line.split(delimiter)
+    first = cells[0].strip()
+    return len(cells) > 1 and (is_number(first) or is_number(first, ",") or is_clock(first))
 
 
 def _even(rows: list[list[str]], lines: Sequence[int], file: str) -> _Table:
@@ -221,13 +261,17 @@ def _header(table: _Table, time: TimeColumn, file: str) -> _Header:
     names = [name for name, _ in split]
     units = [unit for _, unit in split]
     index = time_index(names, time, file)
-    if len(table.rows) < 2:
-        return _Header(names, units, index, height=1)
-    second = [cell.strip() for cell in table.rows[1]]
-    if is_number(second[index]) or is_number(second[index], ",") or is_clock(second[index]):
-        return _Header(names, units, index, height=1)
-    units = [below or beside for below, beside in zip(second, units, strict=True)]
-    return _Header(names, units, index, height=2)
+    below: list[list[str]] = []
+    for row in table.rows[1:_MOST_ROWS]:
+        # A unit may be the number 1; what stands below it is a row of numbers if any cell is one.
+        looked_at = row if below else [row[index]]
+        if any(is_number(cell) or is_number(cell, ",") or is_clock(cell) for cell in looked_at):
+            break
+        below.append([cell.strip() for cell in row])
+    if below:
+        stated = max(below, key=lambda row: sum(map(is_unit, row)))
+        units = [under or beside for under, beside in zip(stated, units, strict=True)]
+    return _Header(names, units, index, height=1 + len(below))
 
 
 def _clock(

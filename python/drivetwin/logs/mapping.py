@@ -60,6 +60,7 @@ _WHEEL = (
     "rearwheels|rearaxle"
 )
 _BESIDE = "(can|bus|xcp|ecu|tcu|mess|meas)*"
+_SIDE = "(h|v|f|r)(l|r)|left|right|links|rechts"
 _AFTER = "(ist|act|actual|can|bus|xcp|mess|meas|value|val|mean|avg|mittel|ha|rear|nm|rpm|bar)*"
 _STATE = "(ist|act|actual|mess|meas|val|c|avg|mw)*"
 
@@ -74,7 +75,7 @@ _NAMES: dict[str, str] = {
     "input_speed": _either_order(_INPUT, _SPEED),
     "engine_speed": f"{_either_order(_ENGINE, _SPEED)}|we|ne|omegae",
     "output_speed": _either_order(_OUTPUT, _SPEED),
-    "wheel_speed": f"{_either_order(_WHEEL, _SPEED)}|ww",
+    "wheel_speed": f"({_either_order(_WHEEL, _SPEED)}|ww)({_SIDE})?",
     "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|pwg)((pos1?)|stellung|wert)?" + _STATE,
     "gear": "(trans)?(current|act|actual|ist|n)?(gear|gang)(engaged)?" + _STATE,
     "shift_in_process": "(trans|getr)?(shift|schaltung)(inprocess|active|flag|aktiv)" + _STATE,
@@ -120,10 +121,15 @@ def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, l
 
 
 def _first(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
-    """Columns whose name has the first of the `forms` that any has."""
-    for form in forms:
-        if found := [column for column in columns if re.fullmatch(form, plain(column.name))]:
-            return found
+    """Columns whose name has the first of the `forms` that any has.
+
+    The last part of a name like `log.EngTrq` counts only where no whole name has any.
+    """
+    forms = tuple(forms)
+    for part in (plain, lambda name: plain(re.split(r"[./]", name)[-1])):
+        for form in forms:
+            if found := [column for column in columns if re.fullmatch(form, part(column.name))]:
+                return found
     return []
 
 

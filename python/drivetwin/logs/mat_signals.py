@@ -20,6 +20,9 @@ _UNIT_SUFFIXES = ("_unit", "_units", "_Unit", "_Units", "_einheit")
 _UNIT_FIELDS = ("unit", "units", "Unit", "Units", "einheit")
 _DATA_FIELDS = ("data", "values", "value", "Data", "Values", "Value", "signals", "samples")
 _NAME_FIELDS = ("name", "Name", "label", "title")
+_ENOUGH = 10
+"""Rows from which a matrix of two columns may be a signal with its time."""
+
 _DEPTH = 12
 """Structs nested deeper than this are no log."""
 
@@ -70,6 +73,8 @@ class _Search:
                 self._inner(value, prefix + name, depth)
             elif isinstance(value, list):
                 self._items(value, prefix + name, depth)
+            elif not used and (pair := _time_and_values(value)) is not None:
+                self._add(prefix + name, _unit(name, tree), pair, self._seconds(name, {}))
             elif name not in vectors:
                 self._told(prefix + name, value)
 
@@ -173,6 +178,15 @@ def _vector(value: Any) -> FloatArray | None:
     return squeezed.astype(np.float64) if squeezed.ndim == 1 and squeezed.size > 1 else None
 
 
+def _time_and_values(value: Any) -> tuple[FloatArray, FloatArray] | None:
+    """The columns of a matrix of two whose first one only grows, as CANape writes a signal."""
+    matrix = isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.ndim == 2
+    if not matrix or value.shape[1] != 2 or value.shape[0] < _ENOUGH:
+        return None
+    time, values = value.astype(np.float64).T
+    return (time, values) if np.all(np.diff(time) > 0.0) else None
+
+
 def _text(value: Any) -> str | None:
     return value.strip() or None if isinstance(value, str) else None
 
@@ -190,4 +204,9 @@ def _unit(name: str, tree: Mapping[str, Any]) -> str | None:
 
 
 def _field_unit(tree: Mapping[str, Any]) -> str | None:
-    return next((text for key in _UNIT_FIELDS if (text := _text(tree.get(key)))), None)
+    """Unit of a struct that is one signal; a time series keeps it in `DataInfo`."""
+    info = tree.get("DataInfo")
+    tables = (tree, info) if isinstance(info, Mapping) else (tree,)
+    return next(
+        (text for table in tables for key in _UNIT_FIELDS if (text := _text(table.get(key)))), None
+    )

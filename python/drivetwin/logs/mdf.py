@@ -36,6 +36,10 @@ _MOST_INFLATION = 1100
 """Deflate packs zeros about 1030 to 1; a group that claims more than this is damaged."""
 
 
+_LISTED = 8
+"""So many texts of a table are told."""
+
+
 @dataclass(frozen=True)
 class _Place:
     group: int
@@ -131,7 +135,7 @@ class MdfRecording:
                 last += int(last < time.size and time[last] == window[1])
                 count = int(last - first)
                 time = time[first:last]
-            values, invalid = self._samples(place, int(first), count)
+            values, invalid, codes = self._samples(place, int(first), count)
         where = Where(file=str(self._path), channel=str(column))
         if values.dtype.kind not in "iufb" or values.ndim != 1:
             raise DamagedChannelError(
@@ -144,9 +148,13 @@ class MdfRecording:
                 f"{values.size} values for {time.size} time stamps", "record the log again", where
             )
         numbers = values.astype(np.float64)
-        notes: tuple[str, ...] = ()
+        notes = (codes,) if codes else ()
         if invalid is not None and invalid.any():
-            notes = (f"{int(invalid.sum())} samples that the recorder marks invalid left out",)
+            if invalid.all():
+                what = f"the recorder marks all {invalid.size} samples invalid"
+                raise DamagedChannelError(what, "map another channel", where)
+            left = f"{int(invalid.sum())} samples that the recorder marks invalid left out"
+            notes = (*notes, left)
             time, numbers = time[~invalid], numbers[~invalid]
         return RawChannel(column.name, column.unit, time, numbers, column.group, notes)
 
@@ -157,10 +165,11 @@ class MdfRecording:
             self._stamps = (group, master * self._factor)
         return self._stamps[1]
 
-    def _samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any]:
-        """Values with the conversion of the file, and the recorder's marks for invalid ones.
+    def _samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:
+        """Values with the conversion of the file, the recorder's marks for invalid ones, a note.
 
-        Of conversions into texts the numbers before them are taken.
+        A text among numbers, such as `not available`, is no number. Where all are texts their codes
+        are the values, and the note tells them.
         """
         wanted = {
             "group": place.group,
@@ -170,10 +179,16 @@ class MdfRecording:
             "samples_only": True,
             "ignore_invalidation_bits": True,  # marked samples are left out here, and counted
         }
+        note = ""
         samples, marks = self._mdf.get(raw=False, **wanted)
         if samples.dtype.kind in "SUO":
-            samples, marks = self._mdf.get(raw=True, **wanted)
-        return samples, None if marks is None else np.asarray(marks, dtype=np.bool_)
+            conversion = self._mdf.groups[place.group].channels[place.index].conversion
+            if _holds_numbers(conversion):
+                samples = np.full(samples.shape, np.nan)
+            else:
+                samples, marks = self._mdf.get(raw=True, **wanted)
+                note = _codes(conversion)
+        return samples, None if marks is None else np.asarray(marks, dtype=np.bool_), note
 
     def _check_size(self, group: Any, name: str) -> None:
         """Refuse a group that claims more records than the file can hold, before it is loaded."""
@@ -203,3 +218,21 @@ def _group_name(block: Any) -> str:
     name = str(getattr(block, "acq_name", "") or "").strip()
     comment = str(block.comment or "").strip()
     return name or ("" if comment.startswith("<") else comment.partition("\n")[0])
+
+
+def _holds_numbers(conversion: Any) -> bool:
+    """Whether some codes of a table of texts stand for numbers."""
+    blocks = getattr(conversion, "referenced_blocks", None) or {}
+    return any(hasattr(block, "convert") for block in blocks.values())
+
+
+def _codes(conversion: Any) -> str:
+    """Words for a table of texts: `codes of texts: 0 = off, 1 = on`."""
+    blocks = getattr(conversion, "referenced_blocks", None) or {}
+    pairs = []
+    for index in range(_LISTED):
+        text = blocks.get(f"text_{index}")
+        code = getattr(conversion, f"val_{index}", getattr(conversion, f"lower_{index}", None))
+        if isinstance(text, bytes) and code is not None:
+            pairs.append(f"{code:g} = {text.decode('utf-8', 'replace').strip(chr(0))}")
+    return f"codes of texts: {', '.join(pairs)}" if pairs else ""

@@ -20,7 +20,7 @@ _MOST_INFLATION = 1100
 """Deflate packs zeros about 1030 to 1; a block that claims more is damaged."""
 
 _LINKS4: dict[bytes, dict[int, bytes]] = {
-    b"##HD": {0: b"##DG"},
+    b"##HD": {0: b"##DG", 5: b""},
     b"##DG": {0: b"##DG", 1: b"##CG"},
     b"##CG": {0: b"##CG", 1: b"##CN"},
     b"##CN": {0: b"##CN", 1: b"", 4: b"##CC"},

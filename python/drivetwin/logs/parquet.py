@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,16 @@ import numpy as np
 
 from drivetwin.errors import DamagedChannelError, FileFormatError, TimeError, Where
 from drivetwin.logs.extras import foreign_parser, require
-from drivetwin.logs.names import name_and_unit, time_index
+from drivetwin.logs.names import is_time_name, name_and_unit, time_index
 from drivetwin.logs.raw import Column, RawChannel, ReadOptions, Recording, Window
 from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.units import time_factor
 
 _KIND = "a Parquet file"
 _UNIT_KEYS = ("unit", "units", "Unit")
+_PANDAS = "PANDAS_ATTRS"
+"""Where pandas keeps the attributes of a frame, `units` perhaps among them."""
+
 _NANOSECONDS = 1e-9
 
 
@@ -28,9 +31,9 @@ def open_parquet(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Open a Parquet table with one time column.
 
     The unit of a column stands in its field metadata (`unit`), in the table's metadata (`units`, a
-    JSON object by column), or in its name (`TqEng [Nm]`). Raises MissingExtraError without pyarrow,
-    FileFormatError for a damaged file, MissingChannelError, MappingError, UnitError and TimeError
-    for its time column.
+    JSON object by column; pandas keeps `attrs["units"]` there), or in its name (`TqEng [Nm]`).
+    Raises MissingExtraError without pyarrow, FileFormatError for a damaged file,
+    MissingChannelError, MappingError, UnitError and TimeError for its time column.
     """
     parquet = require("pyarrow.parquet", "io", _KIND, path)
     with foreign_parser(_KIND, path):
@@ -53,10 +56,26 @@ class ParquetRecording:
         schema = table.schema_arrow
         units = _table_units(schema.metadata or {})
         columns = [_column(field, units) for field in schema]
-        time = time_index([column.name for column in columns], options.time, str(path))
+        time = self._time_index(columns, options)
         self._fields = [index for index in range(len(columns)) if index != time]
         self.columns = tuple(columns[index] for index in self._fields)
         self._seconds = self._stamps(time, columns[time], options.time.unit)
+
+    def _time_index(self, columns: Sequence[Column], options: ReadOptions) -> int:
+        """The column with a name for time, else the only one whose type is a time."""
+        import pyarrow as pa
+
+        names = [column.name for column in columns]
+        kinds = [field.type for field in self._table.schema_arrow]
+        temporal = [
+            index
+            for index, kind in enumerate(kinds)
+            if pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
+        ]
+        named = options.time.source is not None or any(map(is_time_name, names))
+        if not named and len(temporal) == 1:
+            return temporal[0]
+        return time_index(names, options.time, str(self._path))
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one column; rows without a value are no samples. See `Recording`."""
@@ -116,12 +135,19 @@ def _column(field: Any, units: Mapping[str, str]) -> Column:
 
 def _table_units(metadata: Mapping[bytes, bytes]) -> dict[str, str]:
     """Units by column from the table's metadata; what is no JSON object of texts is passed over."""
-    text = next((_texts(metadata)[key] for key in _UNIT_KEYS if key in _texts(metadata)), "{}")
-    try:
-        units = json.loads(text)
-    except ValueError:
-        return {}
+    texts = _texts(metadata)
+    units = next((_parsed(texts[key]) for key in _UNIT_KEYS if key in texts), None)
+    attributes = _parsed(texts.get(_PANDAS, ""))
+    if units is None and isinstance(attributes, dict):
+        units = next((attributes[key] for key in _UNIT_KEYS if key in attributes), None)
     return {k: v for k, v in units.items() if isinstance(v, str)} if isinstance(units, dict) else {}
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return None
 
 
 def _texts(metadata: Mapping[bytes, bytes]) -> dict[str, str]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Generic, Literal, TypeVar
 
@@ -13,7 +13,8 @@ from pydantic import Field
 from drivetwin.errors import MappingError
 from drivetwin.logs.mapping import ChannelSpec, Mapped
 from drivetwin.logs.raw import BusOptions, ReadOptions, TimeColumn
-from drivetwin.logs.roles import PRESSURE, ROLES
+from drivetwin.logs.roles import PRESSURE, ROLES, quantity_of
+from drivetwin.logs.units import first_spellings
 from drivetwin.tomlfile import StrictModel, raise_faults, read_toml, schema_faults
 
 Entry = TypeVar("Entry")
@@ -108,11 +109,15 @@ def read_mapping(path: Path) -> Mapped:
 
 
 def write_mapping(
-    path: Path, channels: Mapping[str, ChannelSpec], options: ReadOptions | None = None
+    path: Path,
+    channels: Mapping[str, ChannelSpec],
+    options: ReadOptions | None = None,
+    unitless: Collection[str] = (),
 ) -> None:
     """Write `channels` (by role) as a mapping file to edit; an existing file is replaced.
 
-    `options` for the file as a whole stand before them, DBC files with their full path.
+    `options` for the file as a whole stand before them, DBC files with their full path. Roles that
+    are `unitless` in the log get a line for their unit to be filled in.
     """
     document = tomlkit.document()
     document.add(tomlkit.comment("Channel mapping: which column is what to the driveline."))
@@ -124,10 +129,11 @@ def write_mapping(
     tables = tomlkit.table(is_super_table=True)
     pressures = tomlkit.table(is_super_table=True)
     for role, spec in channels.items():
+        table = _table(spec, role if role in unitless else None)
         if role.startswith(PRESSURE):
-            pressures.add(role.removeprefix(PRESSURE), _table(spec))
+            pressures.add(role.removeprefix(PRESSURE), table)
         else:
-            tables.add(role, _table(spec))
+            tables.add(role, table)
     if pressures:
         tables.add(PRESSURE.rstrip("."), pressures)
     document.add("channels", tables)
@@ -147,13 +153,17 @@ def _options(options: ReadOptions) -> dict[str, dict[str, object]]:
     }
 
 
-def _table(spec: ChannelSpec) -> tomlkit.items.Table:
+def _table(spec: ChannelSpec, unitless: str | None) -> tomlkit.items.Table:
+    """The table of a spec; with a line to fill in where `unitless` is the role it plays."""
     table = tomlkit.table()
     table.add("source", spec.source)
     if spec.group is not None:
         table.add("group", spec.group)
     if spec.unit is not None:
         table.add("unit", spec.unit)
+    elif unitless is not None:
+        usual = ", ".join(map(repr, first_spellings(quantity_of(unitless))))
+        table.add(tomlkit.comment(f'unit = "..."  # the log names none; one of {usual}'))
     table.add("sign", spec.sign)
     table.add("scale", spec.scale)
     table.add("offset", spec.offset)

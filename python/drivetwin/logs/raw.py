@@ -58,9 +58,15 @@ class RawChannel:
     notes: tuple[str, ...] = ()
 
     @property
+    def stamps(self) -> FloatArray:
+        """The time stamps that are numbers [s]."""
+        return self.time[np.isfinite(self.time)]
+
+    @property
     def step(self) -> float | None:
         """Median sample interval [s]; None below two samples."""
-        return float(np.median(np.diff(self.time))) if self.time.size > 1 else None
+        stamps = self.stamps
+        return float(np.median(np.diff(stamps))) if stamps.size > 1 else None
 
     @property
     def rate(self) -> float | None:
@@ -78,13 +84,14 @@ class RawChannel:
     def gaps(self) -> tuple[Window, ...]:
         """Spans of time [s] without a number, from the sample before to the sample after."""
         stamps = self.time[np.isfinite(self.values) & np.isfinite(self.time)]
-        wide = np.flatnonzero(np.diff(stamps) > gap_limit(self.time))
+        wide = np.flatnonzero(np.diff(stamps) > gap_limit(self.stamps))
         return tuple((float(stamps[index]), float(stamps[index + 1])) for index in wide)
 
     @property
     def pauses(self) -> int:
         """Number of interruptions in time, whether or not numbers stand beside them."""
-        return int(np.count_nonzero(np.diff(self.time) > gap_limit(self.time)))
+        stamps = self.stamps
+        return int(np.count_nonzero(np.diff(stamps) > gap_limit(stamps)))
 
     def within(self, window: Window | None) -> RawChannel:
         """Return the samples in a window of time, both ends included; all without a window."""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,9 +28,9 @@ from drivetwin.logs.mapping import ChannelSpec, Mapped, resolve
 from drivetwin.logs.profile import read_mapping
 from drivetwin.logs.raw import RawChannel, RawLog, ReadOptions, Recording, Window
 from drivetwin.logs.roles import AUXILIARY, FOR_SHIFTS, quantity_of
-from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.logs.torque_delay import torque_warnings
-from drivetwin.logs.units import channel_unit, lookup
+from drivetwin.logs.units import channel_unit, first_spellings, lookup
 from drivetwin.logs.validate import Checked, check_channel
 from drivetwin.progress import tell
 from drivetwin.vehicle.card import VehicleCard
@@ -61,11 +61,14 @@ def read_log(
     with open_recording(path, stated.options) as recording:
         specs = {**card.channels, **stated.channels}
         mapped = resolve(recording.columns, specs, kinds, needed, str(path))
+        _refuse_unitless(recording, mapped.channels, specs, str(path))
         warnings = [*recording.warnings, *mapped.warnings]
         for count, (role, spec) in enumerate(mapped.channels.items()):
             tell(count / len(mapped.channels))
             try:
-                checked = _checked(role, spec, _load(recording, spec, window), str(path))
+                checked = _checked(
+                    role, spec, recording.load(_picked(recording, spec), window), str(path)
+                )
             except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
                 if role in specs or quantity_of(role) not in AUXILIARY:
                     raise
@@ -79,6 +82,36 @@ def read_log(
     warnings += torque_balance(channels, card)
     warnings += [*clock_warnings(channels, card), *torque_warnings(channels)]
     return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
+
+
+def _refuse_unitless(
+    recording: Recording,
+    channels: Mapping[str, ChannelSpec],
+    stated: Mapping[str, ChannelSpec],
+    file: str,
+) -> None:
+    """Name all channels without a unit at once, but those that may be left out."""
+    without = {
+        role: spec.source
+        for role, spec in channels.items()
+        if spec.unit is None
+        and not (recording.columns[_picked(recording, spec)].unit or "").strip()
+        and quantity_of(role) is not Quantity.STATE
+        and (role in stated or quantity_of(role) not in AUXILIARY)
+    }
+    if len(without) < 2:
+        return
+    units = {role: first_spellings(quantity_of(role))[0] for role in without}
+    examples = "; ".join(
+        f'channels.{role} = {{ source = "{name}", unit = "{units[role]}" }}'
+        for role, name in without.items()
+    )
+    raise UnitError(
+        f"the file names no unit for {', '.join(map(repr, without.values()))}",
+        "assert the units in a channel mapping (--channels; `drivetwin inspect --write-mapping` "
+        f"begins one), if they are these: {examples}",
+        Where(file=file),
+    )
 
 
 def read_raw(path: Path, options: ReadOptions | None = None) -> RawLog:
@@ -99,11 +132,10 @@ def _digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _load(recording: Recording, spec: ChannelSpec, window: Window | None) -> RawChannel:
+def _picked(recording: Recording, spec: ChannelSpec) -> int:
     """The column of a spec; `resolve` saw to it that it is the only one, or one with numbers."""
     picked = [index for index, column in enumerate(recording.columns) if spec.picks(column)]
-    index = min(picked, key=lambda one: recording.columns[one].empty)
-    return recording.load(index, window)
+    return min(picked, key=lambda one: recording.columns[one].empty)
 
 
 def _channel(role: str, spec: ChannelSpec, source: RawChannel, file: str) -> Channel:

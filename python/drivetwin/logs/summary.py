@@ -12,7 +12,7 @@ from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.formats import open_recording
 from drivetwin.logs.held import find_raster
 from drivetwin.logs.raw import Column, RawChannel, ReadOptions, Window
-from drivetwin.logs.shiftlog import Channel, Quantity
+from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 
 
 @dataclass(frozen=True)
@@ -70,5 +70,9 @@ def _update_rate(channel: RawChannel) -> float | None:
     if step is None or step <= 0.0:
         return None
     sent = Channel("", Quantity.FRACTION, channel.time, channel.values, channel.name, "")
-    raster = find_raster(sent) if np.all(np.diff(channel.time) > 0.0) else None
+    raster = find_raster(sent) if _in_order(channel.time) else None
     return 1.0 / (step if raster is None else raster.period)
+
+
+def _in_order(time: FloatArray) -> bool:
+    return bool(np.isfinite(time).all() and np.all(np.diff(time) > 0.0))

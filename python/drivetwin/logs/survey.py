@@ -11,7 +11,8 @@ from typing import Any
 from drivetwin.logs.mapping import ChannelSpec, Mapped, guess, spec_of
 from drivetwin.logs.raw import Column as LogColumn
 from drivetwin.logs.raw import ReadOptions
-from drivetwin.logs.roles import NEEDED, PRESSURE
+from drivetwin.logs.roles import NEEDED, PRESSURE, quantity_of
+from drivetwin.logs.shiftlog import Quantity
 from drivetwin.logs.summary import ColumnSummary, summarise
 from drivetwin.vehicle.spec import VehicleCard
 
@@ -45,6 +46,19 @@ class Survey:
     mapping: Mapping[str, ChannelSpec]
     options: ReadOptions
     notes: tuple[str, ...]
+
+    @property
+    def unitless(self) -> frozenset[str]:
+        """Roles of the mapping that need a unit which neither file nor mapping names."""
+        return frozenset(
+            role
+            for column in self.columns
+            for role in column.roles
+            if not (column.unit or "").strip()
+            and role in self.mapping
+            and self.mapping[role].unit is None
+            and quantity_of(role) is not Quantity.STATE
+        )
 
     def document(self) -> dict[str, Any]:
         """For JSON."""

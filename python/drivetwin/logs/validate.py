@@ -33,8 +33,8 @@ MIN_SOUND = 0.5
 MAX_WRAPS = 3
 """So few steps back suggest a counter that wrapped, more suggest disorder."""
 
-SHORTEST_STEP, LONGEST_STEP = 1e-6, 0.9
-"""Sample intervals [s] between which a channel can show a shift."""
+SHORTEST_STEP, LONGEST_STEP = 2.5e-5, 0.9
+"""Sample intervals [s] between which a channel can show a shift; 50 Hz told in ms are below."""
 
 MAX_SPARSE = 100.0
 """Time from first to last sample in units of samples times interval; more is mostly gap."""
@@ -288,7 +288,7 @@ def _check_rate(channel: Channel, where: Where) -> None:
         f'the stamps would fit "{fitting[0]}": assert it in the channel mapping, '
         f'time = {{ unit = "{fitting[0]}" }}'
         if fitting
-        else "check the time base of this channel"
+        else 'check its unit of time; time = { unit = "s" } in the channel mapping asserts another'
     )
     raise TimeError(f"samples lie {step:.4g} s apart, no log of a shift does that", remedy, where)
 

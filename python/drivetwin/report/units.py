@@ -38,6 +38,10 @@ _BY_SI = {
     "Pa": BAR,
     "rad/s": RPM,
     "s": Display("ms", 1e3),
+    "N*m*s": Display("Nm·s"),
+    "N*m/s": Display("kNm/s", 1e-3),
+    "J": Display("kJ", 1e-3),
+    "W": Display("kW", 1e-3),
 }
 
 

@@ -25,7 +25,10 @@ def holds_frames(group: Any) -> bool:
 
 
 def bus_frames(mdf: Any) -> Frames | None:
-    """Return the data frames of all groups in order of time; None where the file has none."""
+    """Return the data frames of all groups in order of time; None where the file has none.
+
+    Frames whose stamp is no number are left out and counted.
+    """
     parts = [
         part
         for number in range(len(mdf.groups))
@@ -36,6 +39,8 @@ def bus_frames(mdf: Any) -> Frames | None:
     width = max(part.data.shape[1] for part in parts)
     time = np.concatenate([part.time for part in parts])
     order = np.argsort(time, kind="stable")
+    order = order[np.isfinite(time[order])]
+    lost = time.size - order.size
     names = tuple(dict.fromkeys(name for part in parts for name in part.buses))
     bus = [np.array([names.index(name) for name in part.buses])[part.bus] for part in parts]
     padded = [
@@ -50,6 +55,7 @@ def bus_frames(mdf: Any) -> Frames | None:
         length=np.concatenate([part.length for part in parts])[order],
         bus=np.concatenate(bus)[order],
         buses=names,
+        warnings=(f"{lost} frames without a time stamp left out",) if lost else (),
     )
 
 
