@@ -30,6 +30,8 @@ _CLEAR = 10.0
 """Standard deviations by which the slip has left rest at the end of the first window."""
 _WIDEN = 4
 """Most times `hinge_window` that the first window may be."""
+_BUS = 8e-3
+"""Sample interval [s] from which speeds are taken for those of a bus."""
 _ROUNDING = 2e-5
 """Least noise of a speed, relative: resolution of two decimals in rpm."""
 
@@ -52,16 +54,22 @@ def break_away(
     first, last = held
     rest = slice(max(first, last + 1 - speeds.samples(_REST, 8)), last + 1)
     slip = _slip(speeds, ratio, rest)
+    part = slice(first, stop + 1)
+    seen = begun(slip.time[part], slip.error[part] - slip.level, slip.noise)
     if _is_sparse(speeds, settings):
-        part = slice(first, stop + 1)
-        return _boundary(begun(slip.time[part], slip.error[part] - slip.level, slip.noise))
+        return _boundary(seen)
     run = speeds.samples(_QUIET, 3)
     still = _runs_of_true(slip.departure[: last + 1] < _LIMIT, run)
     anchor = max(int(still.max()) + run - 1, first) if len(still) else last
     window = _first_window(
         slip, anchor, Moving.AFTER, speeds.samples(settings.hinge_window, _LEAST)
     )
-    return _locate(slip, (anchor, window), Moving.AFTER, (first, stop))
+    found = _locate(slip, (anchor, window), Moving.AFTER, (first, stop))
+    if found is None or seen is None or speeds.step < _BUS:
+        return found
+    # On a bus the two speeds contradict each other a little before an element lets go for good.
+    doubt = 0.5 * max(seen.time - found.time, 0.0)
+    return Boundary(found.time, float(np.hypot(found.sigma, doubt)))
 
 
 def lock_up(

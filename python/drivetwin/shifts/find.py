@@ -18,7 +18,7 @@ from drivetwin.shifts.candidate import (
 )
 from drivetwin.shifts.flags import checked
 from drivetwin.shifts.held import Run, gear_runs
-from drivetwin.shifts.kinematics import GearboxSpeeds, gear_ratios, gearbox_speeds
+from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds, gear_ratios, gearbox_speeds
 from drivetwin.shifts.quality import shift_quality
 from drivetwin.shifts.settings import ShiftSettings
 from drivetwin.shifts.shift import RejectedShift, Shift
@@ -55,7 +55,7 @@ def find_shifts(
         for index, run in enumerate(runs)
         if (reason := _unfinished(search, runs, index))
     ]
-    held = [run for run in runs if run.gear is not None]
+    held = _lasting([run for run in runs if run.gear is not None], speeds.time, search.settings)
     for before, after in pairwise(held):
         if _interrupted(runs, before, after):
             continue
@@ -88,6 +88,20 @@ def _interrupted(runs: list[Run], before: Run, after: Run) -> bool:
     between = [run for run in runs if before.last < run.first and run.last < after.first]
     missing = (after.first - before.last - 1) - sum(run.last - run.first + 1 for run in between)
     return missing > 0
+
+
+def _lasting(held: list[Run], time: FloatArray, settings: ShiftSettings) -> list[Run]:
+    """Without gears that are passed once more on the way to another: a slip that first turned."""
+    return [
+        run
+        for before, run, after in zip([None, *held], held, [*held[1:], None], strict=False)
+        if before is None
+        or after is None
+        or before.gear != run.gear
+        or after.gear == run.gear
+        or time[run.last] - time[run.first] > 2.0 * settings.min_hold
+        or time[after.first] - time[before.last] > settings.max_inertia_phase
+    ]
 
 
 def _unfinished(search: Search, runs: list[Run], index: int) -> str:

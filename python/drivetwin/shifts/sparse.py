@@ -19,6 +19,8 @@ _SHARE = 0.05
 """Slip, as a part of what it changes by over the shift, that counts as begun."""
 _LIMIT = 4.0
 """Standard deviations of the noise beyond which a slip is no longer at rest."""
+_STEEP = 3.0
+"""By this factor above what counts as begun the pace of a slip is told."""
 _LASTING = 3
 """So many samples at rest in a row are a gear held."""
 
@@ -38,18 +40,27 @@ def begun(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
     """
     moved = np.abs(slip)
     limit = max(_SHARE * float(moved[-1]), _LIMIT * noise)
-    below = np.flatnonzero(moved < limit)
-    if not len(below) or below[-1] + 1 >= len(slip):
+    at, last = _crossing(time, moved, limit)
+    if last is None:
         return None
-    last = int(below[-1])
-    at = float(np.interp(limit, moved[last : last + 2], time[last : last + 2]))
     calm = np.flatnonzero(moved[: last + 1] < _LIMIT * noise)
-    rest = float(time[calm[-1]]) if len(calm) else float(time[0])
-    # At the pace of the next samples the slip took so long to reach the limit.
-    ahead = min(last + _LASTING, len(slip) - 1)
-    hidden = limit * (float(time[ahead]) - at) / max(float(moved[ahead]) - limit, noise)
-    early = 0.5 * max(at - rest, hidden)
+    rest = int(calm[-1]) if len(calm) else 0
+    # A slip that creeps is seen before it is large.
+    at = min(at, float(time[min(rest + _LASTING, len(time) - 1)]))
+    # The capacity falls steadily, so a slip grows at least with the square of the time.
+    steep, _ = _crossing(time, moved, min(_STEEP * limit, 0.5 * float(moved[-1])))
+    hidden = (steep - at) / (np.sqrt(_STEEP) - 1.0)
+    early = 0.5 * max(at - float(time[rest]), hidden)
     return Crossing(at, float(np.hypot(early, _step_error(time, last))))
+
+
+def _crossing(time: FloatArray, moved: FloatArray, limit: float) -> tuple[float, int | None]:
+    """When `moved` (n,) passes `limit` for good [s], and the sample before; None where never."""
+    below = np.flatnonzero(moved < limit)
+    if not len(below) or below[-1] + 1 >= len(moved):
+        return float(time[-1]), None
+    last = int(below[-1])
+    return float(np.interp(limit, moved[last : last + 2], time[last : last + 2])), last
 
 
 def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
@@ -57,7 +68,8 @@ def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
 
     `slip` [rad/s] is that of the on-coming element, 0 where it is locked.
     """
-    calm = (np.abs(slip) < _LIMIT * noise).astype(np.int64)
+    limit = max(0.5 * _SHARE * float(np.abs(slip[0])), _LIMIT * noise)
+    calm = (np.abs(slip) < limit).astype(np.int64)
     lasting = np.flatnonzero(np.convolve(calm, np.ones(_LASTING), "valid") >= _LASTING)
     moving = np.flatnonzero(calm[: lasting[0]] == 0) if len(lasting) else np.empty(0, np.intp)
     if not len(moving):
@@ -67,7 +79,7 @@ def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
     step = float(time[last + 1] - time[last])
     share = float(np.clip(slip[last] / pace, 0.0, 1.0)) if pace != 0.0 else 1.0
     # Half of what the limit of rest hides, at the pace of the last step.
-    reach = min(0.5 * _LIMIT * noise / abs(pace), 1.0) if pace != 0.0 else 1.0
+    reach = min(0.5 * limit / abs(pace), 1.0) if pace != 0.0 else 1.0
     return Crossing(
         float(time[last]) + share * step, float(np.hypot(reach * step, _step_error(time, last)))
     )
