@@ -128,7 +128,7 @@ def test_the_default_method_agrees_with_the_linear_one_and_knows_more() -> None:
 def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise IdentificationError("the simulation went astray", "nothing")
 
     monkeypatch.setattr("drivetwin.identify.likelihood.variants.fit", fail)

@@ -49,7 +49,8 @@ def run(scenario: Scenario, seed: int = 0, *, noise: float = 1.0) -> DynoRun:
         )
     stamps = {sensor.role: sensor.stamps(scenario.duration) for sensor in scenario.sensors}
     looks = {sensor.role: _looks(sensor, stamps[sensor.role]) for sensor in scenario.sensors}
-    trajectory, inputs = _simulate(scenario, np.unique(np.concatenate(list(looks.values()))))
+    seen = np.unique(np.concatenate([instants.ravel() for instants in looks.values()]))
+    trajectory, inputs = _simulate(scenario, seen)
     generators = np.random.SeedSequence(seed).spawn(len(scenario.sensors))
     channels = tuple(
         sensor.read(
@@ -64,8 +65,8 @@ def run(scenario: Scenario, seed: int = 0, *, noise: float = 1.0) -> DynoRun:
 
 
 def _looks(sensor: Sensor, stamps: FloatArray) -> FloatArray:
-    """When a sensor looks [s], to the nanosecond, so that sensors of one rate share instants."""
-    return np.asarray(np.round(np.maximum(stamps - sensor.delay, 0.0), 9), dtype=np.float64)
+    """When a sensor looks (n, m) [s], to the nanosecond: sensors of one rate share instants."""
+    return np.asarray(np.round(sensor.looks(stamps), 9), dtype=np.float64)
 
 
 def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[str, Signal]]:
@@ -99,18 +100,23 @@ def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[st
 def _quantity(
     sensor: Sensor, at: FloatArray, motion: tuple[Trajectory, float], inputs: dict[str, Signal]
 ) -> FloatArray:
-    """The exact quantity that `sensor` sees at the instants `at` (n,).
+    """The exact quantity (n,) that `sensor` sees as means over the instants `at` (n, m).
 
     `motion` is the trajectory and i_in.
     """
     trajectory, i_in = motion
     if sensor.role in inputs:
         signal = inputs[sensor.role]
-        return np.interp(at, signal.time, signal.values)
+        return _mean_at(at, signal.time, signal.values)
     outputs = {
         "output_torque": trajectory.shaft_torque,
         "input_speed": trajectory.engine_speed / i_in,
         "output_speed": trajectory.output_speed,
         "wheel_speed": trajectory.wheel_speed,
     }
-    return np.asarray(np.interp(at, trajectory.time, outputs[sensor.role]), dtype=np.float64)
+    return _mean_at(at, trajectory.time, outputs[sensor.role])
+
+
+def _mean_at(at: FloatArray, time: FloatArray, values: FloatArray) -> FloatArray:
+    """Means (n,) of a quantity over each row of the instants `at` (n, m)."""
+    return np.asarray(np.mean(np.interp(at, time, values), axis=1), dtype=np.float64)

@@ -12,6 +12,9 @@ from drivetwin.logs.shiftlog import Channel, Quantity
 
 FloatArray = NDArray[np.float64]
 
+LOOKS = 20
+"""Instants within a window whose mean a sample shows: their sum is exact to its square inverse."""
+
 
 @dataclass(frozen=True)
 class Sensor:
@@ -30,6 +33,16 @@ class Sensor:
     noise: float
     resolution: float = 0.0
     delay: float = 0.0
+    window: float = 0.0
+    """Time [s] before the stamp over which a sample is the mean, as encoders on a bus send it."""
+
+    def looks(self, stamps: FloatArray) -> FloatArray:
+        """Instants (n, m) [s] whose mean each sample shows; none before 0."""
+        if self.window == 0.0:
+            before = np.zeros(1)
+        else:
+            before = self.window * (np.arange(LOOKS) + 0.5) / LOOKS
+        return np.maximum(stamps[:, None] - self.delay - before, 0.0)
 
     def stamps(self, duration: float) -> FloatArray:
         """Time stamps (n,) [s] from 0 to `duration`, exact multiples of the period."""

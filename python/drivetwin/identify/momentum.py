@@ -76,6 +76,9 @@ LEAST_SPAN = 0.05
 """A shorter stretch [s] holds no window that says anything."""
 DELAY_STD_MAX = 0.005
 """Standard error [s] above which the age of the engine torque is taken as not shown."""
+NO_ROUNDING = 1e-3
+"""Mean error of rounding over the noise of a sample that counts as none: a thousand samples leave
+thirty times as much in their mean."""
 DELAY_Q_MIN = 30.0
 """Least rise of Q over the scanned ages for the minimum to mean anything."""
 
@@ -304,12 +307,13 @@ def rounding_error(torque: Sampled, step: float) -> float:
 
     Noise of standard deviation σ dithers the rounding; what stays of its mean error is periodic
     in the level with amplitude (step/π)·exp(-2π²σ²/step²) (Widrow and Kollár 2008). `torque.sigma`
-    holds noise and rounding together.
+    holds noise and rounding together. 0 where it is lost in the noise.
     """
     if step == 0.0:
         return 0.0
     square = max(torque.sigma**2 - step**2 / 12.0, 0.0)
-    return float(step / np.pi * np.exp(-2.0 * np.pi**2 * square / step**2) / np.sqrt(2.0))
+    left = float(step / np.pi * np.exp(-2.0 * np.pi**2 * square / step**2) / np.sqrt(2.0))
+    return left if left > NO_ROUNDING * torque.sigma else 0.0
 
 
 def _prior(signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings) -> Prior:

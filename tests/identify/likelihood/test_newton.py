@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
@@ -58,6 +58,7 @@ class Kinked(Problem):
         return Normal(self.cost(point), gradient, curvature, curvature, (), ())
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-1.5, 1.5), min_size=3, max_size=3))
 def test_a_search_goes_along_kinks_to_their_crossing(start: list[float]) -> None:
     free = np.full(3, np.inf)

@@ -46,3 +46,21 @@ def test_disturbed_inputs_move_the_run_as_the_response_says(name: str) -> None:
     weight = clear / part.record.sigma
     miss = np.linalg.norm((found - expected) * weight) / np.linalg.norm(found * weight)
     assert miss < 0.03
+
+
+@pytest.mark.parametrize("level", [0.97, 0.99, 1.01, 1.03])
+def test_no_slip_is_left_over_wherever_in_a_step_the_element_locks(level: float) -> None:
+    posed, point = problem(bench(noise=0.0))
+    values = point.values.copy()
+    values[point.names.index("B3.mu_c")] *= level
+    point, part = point.moved(values), posed.parts[0]
+    run = part.run(point)
+    assert run is not None
+    lock = next(event.time for event in run.events if event.kind == "lock")
+    model = part.structure.model(point)
+    element = next(one for one in model.elements if one.name == "B3")
+    disturbance = {"engine torque": np.ones(run.time.size - 1)}
+    z = part.response(point, run).to(disturbance)
+    slip = z[:, 0] / element.i_c - element.i_out * z[:, 1]
+    assert np.max(np.abs(slip)) > 1e-2
+    assert np.max(np.abs(slip[run.time > lock])) < 1e-12

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the log decides: a growing load, and speeds that are means over their period."""
+"""What the log decides: a growing load, and what its signals are between their samples."""
 
 from __future__ import annotations
 
@@ -7,26 +7,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
 
 from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import RoadLoad
-from drivetwin.dyno.scenarios import throttle_steps
+from drivetwin.dyno.actuators import Program
+from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenarios import paper_steps, throttle_steps
 from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.kinds import SPEEDS
+from drivetwin.identify.likelihood.record import TORQUE
 from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.likelihood.variants import choose
-from drivetwin.identify.signals import Sampled
+from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import truth_of
 
 GROWTH = 4.0
-WINDOW = 10
 
 
-def _means(signal: Sampled) -> Sampled:
-    """What an encoder on a bus sends of a 1 kHz signal: means over the past 10 ms."""
-    count = (signal.values.size - 1) // WINDOW
-    means = signal.values[1 : 1 + count * WINDOW].reshape(count, WINDOW).mean(axis=1)
-    sigma = signal.sigma / np.sqrt(WINDOW)
-    return Sampled(signal.time[WINDOW : 1 + count * WINDOW : WINDOW], means, sigma)
+def _sent(scenario: Scenario, rate: float, means: bool) -> Scenario:
+    """The scenario with speeds sent at `rate` [Hz], as means since the one before or as samples."""
+    sensors = [
+        replace(one, rate=rate, window=means / rate) if one.quantity is Quantity.SPEED else one
+        for one in scenario.sensors
+    ]
+    return replace(scenario, sensors=tuple(sensors))
 
 
 def _chosen(made: Bench) -> tuple[LikelihoodFit, tuple[str, ...]]:
@@ -51,20 +56,34 @@ def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
     assert _deviation(fit, "J_vehicle", base.model.J_v) < 3.5
 
 
-def test_speeds_sent_as_means_are_taken_for_means() -> None:
-    made = realise(throttle_steps(), 0, Knowledge())
-    signals = made.signals
-    assert signals.wheel_speed is not None
-    slow = replace(
-        signals,
-        engine_speed=_means(signals.engine_speed),
-        output_speed=_means(signals.output_speed),
-        wheel_speed=_means(signals.wheel_speed),
-    )
-    fit, notes = _chosen(replace(made, signals=slow))
-    assert any("means over their period" in note for note in notes)
+@pytest.mark.parametrize("rate", [100.0, 500.0, 1000.0])
+@pytest.mark.parametrize("means", [True, False])
+def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
+    made = realise(_sent(paper_steps(), rate, means), 0, Knowledge())
+    fit, notes = _chosen(made)
+    assert any("means over their period" in note for note in notes) == means
+    assert fit.problem.kinds == (frozenset(SPEEDS) if means else frozenset())
     assert AERO not in fit.point.names
     assert fit.chi2 == pytest.approx(1.0, abs=0.05)
     truth = truth_of(made)
-    for name in ("eta", "J_e", "J_vehicle", "k_o", "te_delay"):
+    for name in ("eta", "J_e", "J_vehicle", "k_o", "c_o", "te_delay"):
+        assert _deviation(fit, name, truth[name]) < 3.5, name
+
+
+def test_an_engine_torque_that_comes_rarely_is_taken_for_a_curve() -> None:
+    base = paper_steps()
+    time = np.arange(0.0, base.duration, 2e-3)
+    smooth = uniform_filter1d(uniform_filter1d(base.engine_torque.at(time), 25), 25)
+    pedal = Program(tuple(zip(time.tolist(), smooth.tolist(), strict=True)))
+    sensors = [
+        replace(one, rate=50.0, noise=0.5, resolution=0.0) if one.role == "engine_torque" else one
+        for one in base.sensors
+    ]
+    scenario = replace(base, engine_torque=pedal, sensors=tuple(sensors))
+    made = realise(scenario, 0, Knowledge())
+    fit, _ = _chosen(made)
+    assert fit.problem.kinds == frozenset({TORQUE})
+    assert fit.chi2 == pytest.approx(1.0, abs=0.05)
+    truth = truth_of(made)
+    for name in ("eta", "J_e", "J_vehicle", "k_o", "c_o", "te_delay"):
         assert _deviation(fit, name, truth[name]) < 3.5, name

@@ -181,6 +181,7 @@ def _in_gear(base: Base, demand: Signal, length: float) -> Record:
         pressures,
         tuple(_blank(out, record.time, time) for out in record.outputs),
         torque,
+        np.zeros(torque.time.size),
         record.input_sigma,
     )
 

@@ -3,7 +3,9 @@
 
 The simulation of a whole shift with wrong parameters locks at the wrong time, and Q has local
 minima. Fitted piece by piece it has none in practice: first the lower gear alone, which fixes
-inertia, load and shaft; then up to lock-up, which fixes the friction; then all.
+inertia, load and shaft; then up to lock-up, which fixes the friction; then all. Of friction the
+lower gear shows nothing, so it is held there; and since Q has minima over its level too, that is
+looked for by simulation alone before the search goes on from the best.
 """
 
 from __future__ import annotations
@@ -25,24 +27,51 @@ SOUGHT = ("J_e", "J_out", "J_vehicle", "k_o", "c_o")
 far off the driveline is so stiff that one run takes as long as a whole fit."""
 ABOUT = 10.0
 """Factor on either side of the start within which they are sought."""
+LEVEL = "mu_c"
+LEVELS = np.geomspace(0.5, 2.0, 13)
+"""Factors on the level of an element's friction that are looked at."""
+LOOKS = 2
+"""How often each element is looked at: the instant at which one lets go hangs on the other."""
 
 
 def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found | None:
     """Output error over growing spans, weighted by sensor noise; None where a run fails."""
-    stages = (
-        [shift.before[1] - CLEAR for shift in shifts],
-        [shift.lockup_time - CLEAR for shift in shifts],
-    )
-    point, problem = start, _about(problem, start)
-    for ends in stages:
-        found = minimise(problem.until(ends), point, rough=True)
-        if found is None:
-            return None
-        point = found.point
+    problem = _about(problem, start)
+    gear = _without_friction(problem, start).until([s.before[1] - CLEAR for s in shifts])
+    found = minimise(gear, start, rough=True)
+    if found is None:
+        return None
+    slipping = problem.until([s.lockup_time - CLEAR for s in shifts])
+    found = minimise(slipping, _levelled(slipping, found.point), rough=True)
+    if found is None:
+        return None
     plain = replace(
         problem, parts=tuple(Part.unweighted(p.structure, p.record) for p in problem.parts)
     )
-    return minimise(plain, point, rough=True)
+    return minimise(plain, found.point, rough=True)
+
+
+def _without_friction(problem: Problem, start: Point) -> Problem:
+    """The problem with all that belongs to the elements held at the start."""
+    prior = problem.prior
+    elements = {one.name for part in problem.parts for one in part.structure.elements}
+    for k, name in enumerate(start.names):
+        if name.rpartition(".")[0] in elements:
+            prior = prior.held(k, start[name])
+    return replace(problem, prior=prior)
+
+
+def _levelled(problem: Problem, point: Point) -> Point:
+    """The point with the friction levels, of those looked at, that leave least."""
+    levels = [k for k, name in enumerate(point.names) if name.endswith(f".{LEVEL}")]
+    for k in levels * LOOKS:
+        trials = []
+        for factor in LEVELS:
+            values = point.values.copy()
+            values[k] = np.clip(factor * values[k], problem.lower[k], problem.upper[k])
+            trials.append(point.moved(values))
+        point = min(trials, key=problem.cost)
+    return point
 
 
 def _about(problem: Problem, start: Point) -> Problem:

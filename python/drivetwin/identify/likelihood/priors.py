@@ -62,8 +62,9 @@ AERO_SPREAD = 10.0
 OFF_DESIGN = 10.0
 """Factor beside the card's Jo′ within which it is sought. Of all inertias it alone may be so small
 that with the shaft's damping one run takes as long as a whole fit."""
-OFF_GOING_LEVEL = 0.03
-"""Spread of the friction level of an element that only lets go, about that of the one coming on."""
+OFF_GOING = {"mu_c": 0.03, "mu_drop": 0.02}
+"""Spread of the friction of an element that only lets go, about that of the one coming on: what
+shows of it is at what pressure it breaks away, and how its torque then falls with slip."""
 
 
 def problem_of(
@@ -106,8 +107,8 @@ def problem_of(
         torque = first.get("output_torque", guess["Tv_over_if"])
         values = (first["output_speed"], wheel, torque / guess["k_o"])
         start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
-    point = Point(tuple(start), np.array(list(start.values())))
-    lower, upper = _about_design(bounds_of(point.names), point.names, priors)
+    lower, upper = _about_design(bounds_of(tuple(start)), tuple(start), priors)
+    point = Point(tuple(start), np.clip(list(start.values()), lower, upper))
     entries = {
         k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
     }
@@ -206,7 +207,8 @@ def _laws(signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]) -> l
     """Free coefficients of the friction laws."""
     shown = all_carriers(signals, drivelines)
     leaving = [d.offgoing.name for d in drivelines if d.offgoing.name not in shown]
-    return [f"{e}.{key}" for e in shown for key in LAW] + [f"{e}.mu_c" for e in leaving]
+    free = [f"{e}.{key}" for e in shown for key in LAW]
+    return free + [f"{e}.{key}" for e in leaving for key in OFF_GOING]
 
 
 def _fills(drivelines: Sequence[Driveline]) -> list[str]:
@@ -244,8 +246,8 @@ def _priors(
             drum = e.drum if signals[0].scale_known else over_eta(e.drum, d)
             found[f"{e.name}.drum"] = drum
         if d.offgoing.name not in shown:
-            level = guess[f"{d.offgoing.name}.mu_c"]
-            found[f"{d.offgoing.name}.mu_c"] = PriorValue(level, OFF_GOING_LEVEL)
+            names = {f"{d.offgoing.name}.{key}": std for key, std in OFF_GOING.items()}
+            found |= {name: PriorValue(guess[name], std) for name, std in names.items()}
     return found
 
 

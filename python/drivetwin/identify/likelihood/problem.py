@@ -15,7 +15,7 @@ is the joint maximum over parameters and inputs (total least squares as in regre
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -225,13 +225,13 @@ class Problem:
         return sum(part.record.size for part in self.parts)
 
     @property
-    def slow(self) -> bool:
-        """Whether some output is sampled so slowly that it may be a mean over its period."""
-        return any(part.record.slow for part in self.parts)
+    def kinds(self) -> frozenset[str]:
+        """Names of the signals that are of another kind than read, as in `Record.kinds`."""
+        return frozenset[str]().union(*(part.record.kinds for part in self.parts))
 
-    def averaged(self) -> Problem:
-        """The problem with its slow outputs taken as means over their period."""
-        parts = [Part.unweighted(p.structure, p.record.averaged()) for p in self.parts]
+    def of_kinds(self, names: Collection[str]) -> Problem:
+        """This problem, all of whose signals are as read, with the kinds of `names`."""
+        parts = [Part.unweighted(p.structure, p.record.of_kinds(names)) for p in self.parts]
         return replace(self, parts=tuple(parts))
 
     def until(self, ends: Sequence[float]) -> Problem:

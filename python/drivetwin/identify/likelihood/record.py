@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from drivetwin.driveline import Signal, Trajectory
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.smooth import local_cubic, local_mean, smooth_pressure
+from drivetwin.identify.likelihood.smooth import (
+    bend_of,
+    local_cubic,
+    local_mean,
+    smooth_pressure,
+)
 from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
 
 IndexArray = NDArray[np.intp]
@@ -22,10 +27,10 @@ OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
 """Compared signals, in the order in which residuals are stacked."""
 LATEST = 0.06
 """Greatest age of an engine torque value [s]: so much of the end of a log has no input."""
-SLOW = 4e-3
-"""Sampling time of an output [s] above which its samples may be means over it."""
 GRID = 1e-3
-"""Step of the simulation's grid [s] where all outputs are slow."""
+"""Step of the simulation's grid [s] where outputs are sampled more slowly."""
+SLOW = 1.5 * GRID
+"""Distance of outputs' stamps [s] above which there are points of the grid between them."""
 FLOOR = 2e-5
 """Least noise of a compared signal as a share of its range: what an ideal sensor is given."""
 
@@ -57,9 +62,13 @@ class Output:
             self, place=self.place[:keep], values=self.values[:keep], centre=self.centre[:keep]
         )
 
+    def period(self, time: FloatArray) -> float:
+        """Time from sample to sample [s]."""
+        return float(np.median(np.diff(time[self.place])))
+
     def averaged(self, time: FloatArray) -> Output:
         """The same samples taken as means over the time since the one before."""
-        window = float(np.median(np.diff(time[self.place])))
+        window = self.period(time)
         first = int(np.searchsorted(time[self.place], time[0] + window))
         place = self.place[first:]
         centre = np.searchsorted(time, time[place] - 0.5 * window)
@@ -69,9 +78,21 @@ class Output:
         """What a sensor of this kind shows (n,) of a quantity (N,) over the grid `time` (N,)."""
         if self.window == 0.0:
             return column[self.place]
+        return self._mean(time, column, self.window)
+
+    def otherwise(self, time: FloatArray, column: FloatArray) -> FloatArray:
+        """What it would show (n,) if its samples were means where they are none, or the reverse."""
+        if self.window > 0.0:
+            return column[self.place]
+        window = self.period(time)
+        means = self._mean(time, column, window)
+        return np.where(time[self.place] - window < time[0], column[self.place], means)
+
+    def _mean(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
+        """Means (n,) over the `window` [s] before each stamp."""
         total = np.concatenate([[0.0], np.cumsum(0.5 * (column[1:] + column[:-1]) * np.diff(time))])
-        before = np.interp(time[self.place] - self.window, time, total)
-        return np.asarray((total[self.place] - before) / self.window)
+        before = np.interp(time[self.place] - window, time, total)
+        return np.asarray((total[self.place] - before) / window)
 
 
 @dataclass(frozen=True)
@@ -89,11 +110,14 @@ class Record:
     outputs: tuple[Output, ...]
     steady_torque: Signal
     """Engine torque without its noise: what its rate of change is taken from."""
+    bend: FloatArray
+    """What to add to the samples of the engine torque where it is a curve between them."""
     input_sigma: Mapping[str, float]
     """White noise of an input sample by name; the engine torque is `engine torque`."""
     held_back: Mapping[str, FloatArray] = field(default_factory=dict)
     """What was taken off the samples of an input before it drives a run, by name: read less
     driving. An input without an entry drives as it was read."""
+    curved: bool = False
 
     @property
     def size(self) -> int:
@@ -112,26 +136,31 @@ class Record:
 
     def stacked(self, run: Trajectory) -> FloatArray:
         """The same samples of a run or of its derivative (size,)."""
-        columns = {
-            "output_torque": run.shaft_torque,
-            "engine_speed": run.engine_speed,
-            "output_speed": run.output_speed,
-            "wheel_speed": run.wheel_speed,
-        }
+        columns = columns_of(run)
         return np.concatenate([out.seen(run.time, columns[out.name]) for out in self.outputs])
 
     @property
-    def slow(self) -> bool:
-        """Whether some output is sampled so slowly that it may be a mean over its period."""
-        return any(self._slow(out) for out in self.outputs)
+    def kinds(self) -> frozenset[str]:
+        """Names of the outputs that are taken as means over their period, and `TORQUE` where the
+        engine torque is a curve between its samples and not a straight line."""
+        means = frozenset(out.name for out in self.outputs if out.window > 0.0)
+        return means | {TORQUE} if self.curved else means
 
-    def averaged(self) -> Record:
-        """The record with its slow outputs taken as means over their period."""
-        outputs = [out.averaged(self.time) if self._slow(out) else out for out in self.outputs]
-        return replace(self, outputs=tuple(outputs))
+    def of_kinds(self, names: Collection[str]) -> Record:
+        """This record, which has samples and straight lines alone, with the kinds of `names`."""
+        outputs = [out.averaged(self.time) if out.name in names else out for out in self.outputs]
+        found = replace(self, outputs=tuple(outputs))
+        if TORQUE not in names:
+            return found
+        torque = self.engine_torque
+        return replace(
+            found, engine_torque=replace(torque, values=torque.values + self.bend), curved=True
+        )
 
-    def _slow(self, out: Output) -> bool:
-        return bool(np.median(np.diff(self.time[out.place])) > SLOW)
+    def bend_over(self, age: float) -> FloatArray:
+        """What a curved engine torque adds to a straight one (N-1,) over each step of the grid."""
+        middle = 0.5 * (self.time[1:] + self.time[:-1])
+        return np.interp(middle, self.engine_torque.time - age, self.bend)
 
     def less(self, noise: Mapping[str, FloatArray], age: float) -> Record:
         """The record with expected `noise` (N-1,) per step of the grid held back from its inputs.
@@ -166,6 +195,16 @@ class Record:
         count = int(np.searchsorted(self.time, end, side="right"))
         outputs = tuple(out.cut(count) for out in self.outputs)
         return replace(self, time=self.time[:count], outputs=outputs)
+
+
+def columns_of(run: Trajectory) -> dict[str, FloatArray]:
+    """What may be compared (N,) of a run, by name of the output."""
+    return {
+        "output_torque": run.shaft_torque,
+        "engine_speed": run.engine_speed,
+        "output_speed": run.output_speed,
+        "wheel_speed": run.wheel_speed,
+    }
 
 
 def record_of(signals: ShiftSignals, span: Span) -> Record:
@@ -207,6 +246,7 @@ def record_of(signals: ShiftSignals, span: Span) -> Record:
         {name: Signal(p.time, smooth[name]) for name, p in signals.pressures.items()},
         outputs,
         _held(replace(torque, values=local_mean(torque))),
+        np.pad(bend_of(torque.time, torque.values), 1),
         {TORQUE: torque.sigma} | {n: p.sigma for n, p in signals.pressures.items()},
         {name: p.values - smooth[name] for name, p in signals.pressures.items()},
     )

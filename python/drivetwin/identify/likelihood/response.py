@@ -6,7 +6,8 @@ State z = (ω_e, ω_out, ω_w, twist). In one friction mode
     z' = A·z + Σ B_u·δu,   u: engine torque and pressures
 
 A locked element takes the motion along its slip out of the accelerations. When an element locks,
-the disturbance jumps so that its slip ends (saltation); at break-away it goes on unchanged.
+the disturbance jumps so that its slip ends (saltation), and with it what pushed during that step:
+a slip left over would stay and seem to be seen. At break-away it goes on unchanged.
 Only the spread of the residuals is built on this: the run itself and its derivatives are the
 core's.
 """
@@ -119,9 +120,9 @@ def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
     rate[:, 3] = (0.0, 1.0, -model.i_f, 0.0)
     with np.errstate(over="ignore", invalid="ignore"):
         transition, mean = exponential(rate * step[:, None, None])
-    for k, jump in _jumps(model, run):
-        transition[k] = jump @ transition[k]
     effect = mean @ inverse * step[:, None, None]
+    for k, jump in _jumps(model, run):
+        transition[k], effect[k] = jump @ transition[k], jump @ effect[k]
     drive = {name: np.einsum("kij,kj->ki", effect, f) for name, f in force.items()}
     return Response(step, transition, drive, effect)
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What the log itself decides about the model: how the load grows, what slow speeds show.
+"""What the log itself decides about the model: how the load grows, what outputs show.
 
 A part of the model that is wrongly left out biases everything (a load that grows with speed moves
 J3 by several per cent), and one that is wrongly left in widens intervals. The growing part is
-kept where it is significant; what slow speeds show is the variant that leaves less.
+kept where it is significant; outputs are samples or means, whichever leaves less.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fit import LikelihoodFit, fit, nearest
-from drivetwin.identify.likelihood.newton import minimise
+from drivetwin.identify.likelihood.fit import GOOD, LikelihoodFit, fit
+from drivetwin.identify.likelihood.kinds import in_words, likely_kinds, with_kinds
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
@@ -26,8 +26,6 @@ from drivetwin.shifts.shift import Shift
 SIGNIFICANT = 3.0
 """Size of the growing part of the load, in its standard deviations, from which it is kept."""
 
-PLAINLY = 1.2
-"""Q of the other kind over that of the best from which on it is given up."""
 SMALL = 1e-3
 """Growing part of the load [N m s^2/rad^2] to start from: one that is zero has no derivative."""
 
@@ -46,48 +44,29 @@ def choose(
     problem, start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
     notes = []
     with part(0.0, 0.6):
-        best, means = _fit_either(problem, start, shifts)
+        best = _fit_either(problem, start, shifts)
     with part(0.6, 1.0):
         if _grows(best):
             notes.append(_growth(best))
         else:
             problem, start = problem_of(signals, drivelines, loss_law, guess)
-            problem = problem.averaged() if means else problem
+            problem = problem.of_kinds(best.problem.kinds)
             best = fit(problem, _taken(start, best.point), shifts)
-    if means:
-        notes.append("slow speeds are taken as means over their period: that fits better")
-    return best, tuple(notes)
+    return best, (*notes, *in_words(best.problem.kinds))
 
 
-def _fit_either(
-    problem: Problem, start: Point, shifts: Sequence[Shift]
-) -> tuple[LikelihoodFit, bool]:
-    """The fit that leaves less, and whether slow speeds are means over their period in it.
+def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:
+    """The fit with every signal of the kind that leaves less.
 
-    Raises IdentificationError where neither converges.
+    Raises IdentificationError where it does not converge with the likeliest kinds.
     """
-    if not problem.slow:
-        return fit(problem, start, shifts), False
-    kinds = {False: problem, True: problem.averaged()}
-    likely = min(kinds, key=lambda means: kinds[means].cost(start) / kinds[means].size)
-    best = _tried(kinds[likely], start, shifts)
-    if best is None:
-        return fit(kinds[not likely], start, shifts), not likely
-    other = _other(kinds[not likely], best)
-    if other is not None and other.chi2 < best.chi2:
-        return other, not likely
-    return best, likely
-
-
-def _other(problem: Problem, best: LikelihoodFit) -> LikelihoodFit | None:
-    """The fit of the other kind from the point of the `best`; None where it is plainly worse.
-
-    A model that does not fit may creep for as long as a search lasts, so a rough one decides.
-    """
-    rough = minimise(problem, best.point, lambda _, at: problem.weighted_by(at), rough=True)
-    if rough is None or rough.normal.cost > PLAINLY * best.normal.cost:
-        return None
-    return nearest(problem, rough.point)
+    likely, *others = likely_kinds(problem, start)
+    best = _tried(likely, start, shifts) or fit(others[0], start, shifts)
+    best = with_kinds(problem, best)
+    if best.chi2 < GOOD:
+        return best
+    again = fit(problem.of_kinds(best.problem.kinds), start, shifts)
+    return with_kinds(problem, min(best, again, key=lambda one: one.chi2))
 
 
 def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit | None:

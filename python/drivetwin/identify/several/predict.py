@@ -78,8 +78,7 @@ def expected(
     """
     drivelines = [driveline_of(card, s.shift) for s in held]
     problem, point = problem_of(held, drivelines, card.loss_law, _known(fit, drivelines))
-    if any(out.window > 0.0 for part in fit.problem.parts for out in part.record.outputs):
-        problem = problem.averaged()
+    problem = problem.of_kinds(fit.problem.kinds)
     unseen = _unseen(fit, problem, point)
     before = _before(problem, point, unseen, [s.shift.before[1] - CLEAR for s in held])
     point, own = before.point, own_of(held[0].log)

@@ -156,9 +156,7 @@ def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
 
 def _measured(part: Part, signals: ShiftSignals, span: Span) -> Record:
     """The record with its inputs as measured: those of a fit are the expected ones."""
-    record = record_of(signals, span)
-    means = any(out.window > 0.0 for out in part.record.outputs)
-    return record.averaged() if means else record
+    return record_of(signals, span).of_kinds(part.record.kinds)
 
 
 def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) -> Prior:
