@@ -29,3 +29,12 @@ def test_table(bench_files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     text = capsys.readouterr().out
     assert "inertia phase" in text
     assert max(len(line) for line in text.splitlines()) <= 80
+
+
+def test_quality_figures_are_shown_in_units_of_engineers(
+    bench_files: Files, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["shifts", str(bench_files.log), "--vehicle", str(bench_files.card)]) == 0
+    rows = {line.split("  ")[0].strip(): line for line in capsys.readouterr().out.splitlines()}
+    assert rows["friction work"].rstrip().endswith("kJ")
+    assert rows["torque hole depth"].rstrip().endswith("Nm")

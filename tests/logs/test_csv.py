@@ -53,6 +53,10 @@ PLAIN = "time,EngTrq,nAb\ns,Nm,1/min\n0.0,1000,700.5\n0.1,1001,701\n"
         "time,EngTrq,nAb\n[s],[Nm],[1/min]\n0.0,1000,700.5\n0.1,1001,701\n",
         '"time","EngTrq","nAb"\n"s","Nm","1/min"\n"0,0","1000","700,5"\n"0,1","1001","701,0"\n',
         "EngTrq,nAb,time\nNm,1/min,ms\n1000,700.5,0\n1001,701,100\n",
+        PLAIN.replace(",", "|"),
+        PLAIN.replace(",", "   "),
+        PLAIN.replace("0.0,", "seconds,double,double\n0.0,", 1),
+        PLAIN.replace("s,Nm", "elapsed,crankshaft,tail\ns,Nm"),
         "Zeit;EngTrq;nAb\ns;Nm;1/min\n0,0;1,000E3;7,005e2\n,1;1001,;701\n",
     ],
 )
@@ -186,3 +190,27 @@ def test_names_and_units_in_comment_lines() -> None:
     log = read("% made by hand\n% time [s];n_in [rpm]\n0,0;1200\n0,1;1201\n")
     assert [(one.name, one.unit) for one in log.channels] == [("n_in", "rpm")]
     assert log.channels[0].time.tolist() == [0.0, 0.1]
+
+
+ROWS = "".join(f"{k / 10},{1000 + k},700.5\n" for k in range(20))
+
+
+@pytest.mark.parametrize(
+    "head", ["Recorded by: N.N.\n\n", "Recorded by,N.N.\nVehicle,A 123\n", "a;b;c;d;e\n"]
+)
+def test_lines_of_another_form_above_the_names_are_told(head: str) -> None:
+    log = read(head + "time,EngTrq,nAb\ns,Nm,1/min\n" + ROWS)
+    assert [one.name for one in log.channels] == ["EngTrq", "nAb"]
+    assert len(values(log, "EngTrq")) == 20
+    (warning,) = log.warnings
+    assert "above the names left out, the first" in warning
+
+
+def test_rows_of_numbers_above_the_names_are_no_head() -> None:
+    with pytest.raises(FileFormatError):
+        read("0.0,1000,700.5,3\n0.1,1000,700.5,3\ntime,EngTrq,nAb\n" + ROWS)
+
+
+def test_a_row_without_time_below_the_units_is_no_row_of_types() -> None:
+    with pytest.raises(TimeError, match="line 3"):
+        read(PLAIN.replace("0.0,1000", "x,1000"))

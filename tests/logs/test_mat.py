@@ -175,3 +175,15 @@ def test_a_recorded_log_without_torque_sensor() -> None:
     assert log.pressure("B3").values.max() == pytest.approx(12.23e5, rel=1e-3)
     assert log["input_speed"].values[0] == pytest.approx(1432.657 * np.pi / 30.0, rel=1e-6)
     assert log.warnings == ()
+
+
+def test_a_matrix_of_time_and_values_is_a_signal(tmp_path: Path) -> None:
+    found = by_name(read(tmp_path, {"te": np.column_stack((T, T * 2)), "te_unit": "Nm"}))
+    assert found["te"].unit == "Nm"
+    assert np.array_equal(found["te"].time, T)
+    assert np.array_equal(found["te"].values, T * 2)
+
+
+def test_a_time_series_keeps_its_unit_in_its_data_info(tmp_path: Path) -> None:
+    series = {"Time": T, "Data": T * 2, "DataInfo": {"Units": "bar"}}
+    assert by_name(read(tmp_path, {"p": series}))["p"].unit == "bar"

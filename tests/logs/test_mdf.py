@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import warnings
 from collections.abc import Sequence
@@ -181,3 +182,71 @@ def test_a_recorded_log_with_german_names_and_three_time_bases() -> None:
     )
     # Its torque is rounded to 12.5 N·m and rests for half a second, as its noise lets it.
     assert log.warnings == ()
+
+
+LINEAR: dict[str, object] = {"a": 0.125, "b": 10.0}
+NOT_AVAILABLE = 65535
+
+
+def converted(folder: Path, codes: NDArray[Any], conversion: dict[str, Any]) -> RawChannel:
+    made = asammdf.Signal(
+        samples=codes,
+        timestamps=np.arange(codes.size) * 0.01,
+        name="n",
+        unit="rpm",
+        conversion=asammdf.blocks.conversion_utils.from_dict(conversion),
+    )
+    (found,) = read_raw(save(folder / "log.mf4", [("g", [made])], "4.10")).channels
+    return found
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"val_0": NOT_AVAILABLE, "text_0": b"not available"},
+        {"lower_0": 65000, "upper_0": NOT_AVAILABLE, "text_0": b"error"},
+    ],
+)
+@pytest.mark.parametrize("missing", [slice(3, 6), slice(None)])
+def test_a_text_among_numbers_is_no_number(
+    table: dict[str, Any], missing: slice, tmp_path: Path
+) -> None:
+    codes = np.arange(1500, 1700).astype(np.uint16)
+    codes[missing] = NOT_AVAILABLE
+    default = asammdf.blocks.conversion_utils.from_dict(LINEAR)
+    found = converted(tmp_path, codes, {**table, "default_addr": default})
+    expected = np.where(codes == NOT_AVAILABLE, np.nan, 0.125 * codes + 10.0)
+    np.testing.assert_array_equal(found.values, expected)
+
+
+def test_the_texts_of_codes_are_told(tmp_path: Path) -> None:
+    codes = np.repeat([0, 1], 20).astype(np.uint8)
+    gears = {"val_0": 0, "text_0": b"2nd", "val_1": 1, "text_1": b"3rd", "default_addr": b"?"}
+    found = converted(tmp_path, codes, gears)
+    assert found.values.tolist() == codes.tolist()
+    assert found.notes == ("codes of texts: 0 = 2nd, 1 = 3rd",)
+
+
+def test_a_channel_that_is_invalid_throughout_is_refused(tmp_path: Path) -> None:
+    made = asammdf.Signal(
+        samples=FAST, timestamps=FAST, name="n", invalidation_bits=np.ones(FAST.size, np.bool_)
+    )
+    raw = read_raw(save(tmp_path / "log.mf4", [("g", [made])], "4.10"))
+    assert raw.unreadable == {"n (g)": "the recorder marks all 2000 samples invalid"}
+
+
+def test_a_damaged_comment_of_the_file_leaves_nothing_behind(tmp_path: Path) -> None:
+    path = save(tmp_path / "log.mf4", [("g", [signal("x", FAST, FAST)])], "4.10")
+    body = bytearray(path.read_bytes())
+    comment = int.from_bytes(body[64 + 24 + 5 * 8 :][:8], "little")
+    body[comment + 8 : comment + 16] = (1 << 40).to_bytes(8, "little")
+    path.write_bytes(body)
+    late: list[object] = []
+    hook, sys.unraisablehook = sys.unraisablehook, late.append
+    try:
+        with pytest.raises(FileFormatError, match="damaged"):
+            read_raw(path)
+        gc.collect()
+    finally:
+        sys.unraisablehook = hook
+    assert late == []

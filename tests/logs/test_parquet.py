@@ -127,3 +127,16 @@ def test_round_trip(tmp_path: Path, rows: list[float | None]) -> None:
     assert channel.unit == "Nm"
     assert channel.time.tolist() == [stamp for stamp, _ in kept]
     assert np.array_equal(channel.values, [value for _, value in kept], equal_nan=True)
+
+
+def test_the_only_column_of_times_needs_no_name_for_time(tmp_path: Path) -> None:
+    index = pa.array([int(1e9 * t) for t in T], pa.duration("ns"))
+    raw = read(tmp_path, pa.table({"te": T, "__index_level_0__": index}))
+    assert raw.channels[0].time.tolist() == T
+
+
+def test_units_among_the_attributes_that_pandas_keeps(tmp_path: Path) -> None:
+    made = table(time=T, te=T).replace_schema_metadata(
+        {"PANDAS_ATTRS": json.dumps({"units": {"time": "s", "te": "Nm"}})}
+    )
+    assert read(tmp_path, made).channels[0].unit == "Nm"

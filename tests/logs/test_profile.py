@@ -68,3 +68,12 @@ def test_all_faults_are_told_with_their_keys(tmp_path: Path) -> None:
 def test_a_missing_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(MappingError, match="cannot read the file"):
         read_mapping(tmp_path / "none.toml")
+
+
+def test_a_unit_that_the_log_does_not_name_has_a_line_to_fill_in(tmp_path: Path) -> None:
+    path = tmp_path / "map.toml"
+    write_mapping(path, {"input_speed": ChannelSpec("n")}, unitless={"input_speed"})
+    text = path.read_text(encoding="utf-8")
+    assert read_mapping(path).channels == {"input_speed": ChannelSpec("n")}
+    path.write_text(text.replace('# unit = "..."', 'unit = "rpm"'), encoding="utf-8")
+    assert read_mapping(path).channels == {"input_speed": ChannelSpec("n", "rpm")}

@@ -242,3 +242,16 @@ def test_a_window_leaves_the_rest_out(tmp_path: Path) -> None:
     assert {(one.time[0], one.time[-1], one.time.size) for one in log.channels.values()} == {
         (0.5, 1.5, 101)
     }
+
+
+def test_all_channels_without_a_unit_are_named_at_once(tmp_path: Path) -> None:
+    units = {**UNITS, "EngTrq": "", "SpdIn": ""}
+    with pytest.raises(UnitError, match="no unit for 'EngTrq', 'SpdIn'") as caught:
+        read(tmp_path, units=units)
+    assert 'channels.input_speed = { source = "SpdIn", unit = "rad/s" }' in caught.value.remedy
+
+
+def test_seconds_that_are_told_in_ms_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(TimeError, match="1e-05 s apart") as caught:
+        read(tmp_path, units={**UNITS, "time": "ms"})
+    assert 'time = { unit = "s" }' in caught.value.remedy

@@ -308,3 +308,18 @@ def test_missing_speed_is_a_typed_error() -> None:
 def test_settings_must_be_positive() -> None:
     with pytest.raises(InputError, match="min_hold"):
         ShiftSettings(min_hold=0.0)
+
+
+def test_a_gear_that_the_slip_passes_once_more_is_not_held_again() -> None:
+    """Without power the engine first runs ahead, then falls through the gear it has left."""
+    time = np.arange(0.0, 4.0, 0.01)
+    output = np.full_like(time, 90.0)
+    off = 3.0 * np.clip((time - 1.0) / 0.2, 0.0, 1.0) - 12.0 * np.clip(time - 1.4, 0.0, None)
+    fast = np.clip((time - 1.9) / 0.5, 0.0, 1.0)
+    inlet = np.where(time < 2.4, (1.0 - fast) * (1.91 * output + off) + fast * 1.43 * output, 0.0)
+    inlet = np.where(time < 2.4, inlet, 1.43 * output)
+    log = make_log({"input_speed": (time, inlet), "output_speed": (time, output)})
+    (shift,), rejected = find_shifts(log, make_card({"2": 1.91, "3": 1.43}))
+    assert rejected == ()
+    assert shift.before[0] == 0.0
+    assert shift.lockup_time == pytest.approx(2.4, abs=0.02)

@@ -53,3 +53,43 @@ def test_a_slip_that_never_moves_or_never_rests_has_no_boundary() -> None:
     assert ended(time, np.full(time.size, 20.0), 0.2) is None
     assert ended(time, np.zeros(time.size), 0.2) is None
     assert begun(time, np.full(time.size, 20.0), 0.2) is None
+
+
+@settings(deadline=None)
+@given(
+    start=st.floats(1.0, 1.02),
+    duration=st.floats(0.3, 1.0),
+    change=st.floats(20.0, 60.0),
+    power=st.floats(1.0, 2.0),
+    seed=st.integers(0, 1000),
+)
+def test_the_uncertainty_of_a_beginning_holds_a_soft_onset(
+    start: float, duration: float, change: float, power: float, seed: int
+) -> None:
+    time = np.arange(0.0, 3.0, STEP)
+    slip = change * np.clip((time - start) / duration, 0.0, 1.0) ** power
+    error = 0.1 * np.random.default_rng(seed).normal(size=time.size)
+    found = begun(time, (slip + error)[time < start + duration], 0.1)
+    assert found is not None
+    assert abs(found.time - start) < 3.0 * found.sigma
+
+
+def test_a_slip_that_creeps_for_long_begins_where_it_is_first_seen() -> None:
+    time = np.arange(0.0, 3.0, STEP)
+    creep = 4.0 * np.clip(time - 1.0, 0.0, None)
+    slip = creep + 40.0 * np.clip((time - 1.5) / 0.4, 0.0, 1.0)
+    found = begun(time, slip[time < 1.9], 0.05)
+    assert found is not None
+    assert found.time == pytest.approx(1.1, abs=0.02)
+
+
+def test_one_sample_that_swings_after_lock_up_moves_it_little() -> None:
+    time = np.arange(0.0, 2.0, STEP)
+    slip = -40.0 * np.clip((1.2 - time) / 0.4, 0.0, 1.0)
+    swinging = slip.copy()
+    swinging[62] = 0.8
+    found = [ended(time, one, 0.15) for one in (slip, swinging)]
+    assert found[0] is not None
+    assert found[1] is not None
+    assert found[0].time == pytest.approx(1.2, abs=STEP)
+    assert found[1].time == pytest.approx(1.2, abs=STEP)

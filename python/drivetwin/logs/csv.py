@@ -198,10 +198,10 @@ def _delimiter(lines: Sequence[str], file: str) -> tuple[str, int]:
     """
     lines = lines[:_LOOKED_AT]
     for sign in _SEPARATORS:
-        widths = [_width(line, sign) for line in lines]
-        usual = max(Counter(widths).items(), key=lambda item: (item[1], item[0]))[0]
-        fitting = (i for i, width in enumerate(widths) if width > 1 and abs(width - usual) <= 1)
-        start = next(fitting, None)
+        rows = [_split(line, sign) for line in lines]
+        usual = max(Counter(map(len, rows)).items(), key=lambda item: (item[1], item[0]))[0]
+        last = all(not row[-1].strip() for row in rows if len(row) == usual)
+        start = next((i for i, row in enumerate(rows) if _may_be_names(row, usual, last)), None)
         data = [_is_data(line, sign) for line in lines]
         if start is not None and not any(data[:start]) and (sign != _BLANKS or any(data)):
             return sign, start
@@ -213,11 +213,20 @@ def _delimiter(lines: Sequence[str], file: str) -> tuple[str, int]:
     )
 
 
-def _width(line: str, delimiter: str) -> int:
-    """Number of fields; none where a quote does not close."""
+def _split(line: str, delimiter: str) -> list[str]:
+    """Fields of a line; a single empty one where a quote does not close."""
     with contextlib.suppress(csv.Error):
-        return len(_fields(line, delimiter))
-    return 0
+        return _fields(line, delimiter)
+    return [""]
+
+
+def _may_be_names(row: Sequence[str], usual: int, last_empty: bool) -> bool:
+    """Whether a row is as wide as the others but for a separator at the line's end.
+
+    `last_empty`: the others of the `usual` width have one.
+    """
+    ends = len(row) == usual + 1 and not row[-1].strip()
+    return len(row) > 1 and (len(row) == usual or ends or (len(row) == usual - 1 and last_empty))
 
 
 def _is_data(line: str, delimiter: str) -> bool:

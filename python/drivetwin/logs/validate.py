@@ -281,14 +281,14 @@ def _check_rate(channel: Channel, where: Where) -> None:
         return
     fitting = [
         unit
-        for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("ps", 1e-12), ("min", 60.0))
+        for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("ps", 1e-12))
         if TYPICAL_STEP[0] <= factor * step <= TYPICAL_STEP[1]
     ]
     remedy = (
         f'the stamps would fit "{fitting[0]}": assert it in the channel mapping, '
         f'time = {{ unit = "{fitting[0]}" }}'
         if fitting
-        else 'check its unit of time; time = { unit = "s" } in the channel mapping asserts another'
+        else 'check its unit of time; the channel mapping asserts one: time = { unit = "s" }'
     )
     raise TimeError(f"samples lie {step:.4g} s apart, no log of a shift does that", remedy, where)
 

@@ -102,3 +102,10 @@ def test_an_unknown_bus_asks_for_its_database(tmp_path: Path) -> None:
 def test_no_frame_and_no_signal(tmp_path: Path) -> None:
     with pytest.raises(MissingChannelError, match="no channel with a time base"):
         read_raw(write(tmp_path / "bus.mf4", [[]]))
+
+
+def test_frames_without_a_stamp_are_counted(tmp_path: Path) -> None:
+    sent = [(np.inf if k == 3 else one[0], one[1], one[2]) for k, one in enumerate(frames())]
+    raw = read_raw(write(tmp_path / "bus.mf4", [sent]))
+    assert "1 frames without a time stamp left out" in raw.warnings
+    assert all(np.isfinite(one.time).all() for one in raw.channels)
