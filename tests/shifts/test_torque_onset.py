@@ -3,12 +3,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivetwin.logs.shiftlog import Channel, Quantity
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.files import card_text
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.shifts.find import find_shifts
 from drivetwin.shifts.torque_onset import pressure_onset, smoothed, torque_dip_onset
+from drivetwin.vehicle.card import load_card
 
 _TIME = np.arange(0.0, 1.0, 1e-3)
 _SPAN = (0.0, 1.0)
@@ -69,7 +77,7 @@ def test_onset_after_break_away_and_never() -> None:
 
 def test_torque_dip() -> None:
     dip = 2400.0 - 3e3 * np.clip(_TIME - 0.6, 0.0, None)
-    onset = torque_dip_onset(smoothed(_channel(dip, noise=10.0), _SPAN), 0.8)
+    onset = torque_dip_onset(smoothed(_channel(dip, noise=10.0), _SPAN), 0.8, 0.75)
     assert onset is not None
     assert abs(onset.time - 0.6) < 3.0 * onset.sigma
     assert onset.sigma < 0.02
@@ -79,4 +87,30 @@ def test_torque_dip() -> None:
 def test_no_clear_dip(course: float) -> None:
     """A steady or a rising torque tells no onset."""
     steady = _channel(2400.0 + course * _TIME, noise=10.0)
-    assert torque_dip_onset(smoothed(steady, _SPAN), 0.8) is None
+    assert torque_dip_onset(smoothed(steady, _SPAN), 0.8, 0.75) is None
+
+
+def test_a_fall_of_the_engine_torque_before_is_not_taken_for_the_shift() -> None:
+    driver = np.where(_TIME < 0.3, 3200.0, 2400.0)
+    dip = driver - 3e3 * np.clip(_TIME - 0.6, 0.0, None)
+    onset = torque_dip_onset(smoothed(_channel(dip, noise=10.0), _SPAN), 0.8, 0.75)
+    assert onset is not None
+    assert abs(onset.time - 0.6) < 3.0 * onset.sigma
+
+
+@pytest.mark.parametrize(
+    "name", [ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS, ScenarioName.GEARBOX_CHAIN]
+)
+def test_without_pressures_the_output_torque_tells_the_onset(
+    name: ScenarioName, tmp_path: Path
+) -> None:
+    bench = run(scenario_of(name), seed=0)
+    (tmp_path / "card.toml").write_text(card_text(bench.scenario))
+    roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
+    channels = {one.role: one for one in bench.channels if one.role in roles}
+    found = find_shifts(ShiftLog(channels, "made", ""), load_card(tmp_path / "card.toml"))
+    assert len(found.shifts) == len(bench.truth.shifts)
+    for shift, true in zip(found.shifts, bench.truth.shifts, strict=True):
+        assert true.torque_start is not None
+        late = shift.torque_phase[0] - true.torque_start
+        assert abs(late) < min(3.0 * shift.sigma["torque_start"], 0.04)

@@ -70,7 +70,9 @@ def build_shift(search: Search, before: Run, after: Run) -> Shift:
     kind, warnings = shift_kind(
         search.log, search.ratios[start_gear] > search.ratios[end_gear], begin.time
     )
-    onset, more = _torque_start(search, (kind, (offgoing, oncoming)), span[0], (begin, lock))
+    step = search.ratios[end_gear] / search.ratios[start_gear]
+    what = (kind, (offgoing, oncoming), step)
+    onset, more = _torque_start(search, what, span[0], (begin, lock))
     if onset.time - span[0] < settings.min_hold:
         raise CandidateRefusedError(
             f"gear {start_gear} is recorded for {onset.time - span[0]:.3f} s before the torque "
@@ -148,18 +150,18 @@ def gear_list(search: Search) -> str:
 
 def _torque_start(
     search: Search,
-    what: tuple[ShiftKind, tuple[str, str]],
+    what: tuple[ShiftKind, tuple[str, str], float],
     earliest: float,
     phase: tuple[Boundary, Boundary],
 ) -> tuple[Boundary, tuple[str, ...]]:
-    """Onset of the on-coming element's torque in a shift `what` (kind, both elements).
+    """Onset of the on-coming element's torque in a shift `what` (kind, elements, ratios' step).
 
     The warnings say where it is not what it should be, and where it was not told by the pressure.
 
     Where the on-coming element takes hold only after break-away (power-off upshift, power-on
     downshift) the torque phase before it is empty and starts at break-away.
     """
-    kind, (offgoing, oncoming) = what
+    kind, (offgoing, oncoming), step = what
     begin, lock = phase
     if one_clutch(search.log, offgoing, oncoming):
         reason = f"one clutch is {offgoing} and {oncoming} in turn: the torque phase is empty"
@@ -184,7 +186,7 @@ def _torque_start(
         return begin, (f"{oncoming} exceeds P0 {when}: the torque phase is empty",)
     if "output_torque" in search.log and kind is ShiftKind.POWER_ON_UP:
         torque = smoothed(search.log["output_torque"], (earliest, begin.time))
-        dip = torque_dip_onset(torque, begin.time)
+        dip = torque_dip_onset(torque, begin.time, step)
         if dip is not None:
             return dip, (f"no pressure of {oncoming}: torque phase read from the output torque",)
     flag = flag_before(search.log, begin.time, begin.time - earliest)

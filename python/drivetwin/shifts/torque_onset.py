@@ -17,7 +17,13 @@ FloatArray = NDArray[np.float64]
 
 _SMOOTH = 0.01
 _DIP = 0.03
-"""A torque dip must be this part of the torque before, and clear of its noise."""
+"""A torque dip must be this part of the torque after it, and clear of its noise."""
+_BEGUN = 0.8
+"""Part of the fall that is still ahead where its beginning is looked for."""
+_AROUND = 0.15
+"""Span [s] before that place in which the fall may have begun."""
+_SHAFT = 0.015
+"""A shaft of 10 Hz passes a fall on by so much later [s]."""
 
 
 class OnsetSource(StrEnum):
@@ -93,21 +99,32 @@ def _crossing(pressure: Smoothed, level: float, break_away: float) -> float | No
     return float(t[0] + (level - p[0]) / (p[1] - p[0]) * (t[1] - t[0]))
 
 
-def torque_dip_onset(torque: Smoothed, break_away: float) -> Boundary | None:
+def torque_dip_onset(torque: Smoothed, break_away: float, step: float) -> Boundary | None:
     """Where the output torque begins to fall towards break-away; None if it does not clearly.
 
-    Only for power-on upshifts, whose torque phase lowers the output torque at a steady engine
-    torque. Sigma is that of the hinge fit, doubled because the fall need not be smooth.
+    Only for power-on upshifts, whose torque phase lowers the output torque by the ratios' `step`
+    (new over old) at a steady engine torque. The onset lies where the last such fall begins, since
+    an earlier fall is the driver's, and before the hinge by what the shaft delays it. Sigma is that
+    of the hinge fit, doubled because the fall need not be smooth, and that delay again.
     """
     keep = torque.time <= break_away
     time, values = torque.time[keep], torque.values[keep]
     if len(values) < 12:
         return None
-    third = len(values) // 3
-    level, spread = float(np.median(values[:third])), float(np.std(values[:third]))
-    dip = level - float(values[-1])
-    if dip < max(_DIP * abs(level), 5.0 * spread, 5.0 * torque.noise):
+    end = float(values[-1])
+    fall = end * (1.0 / step - 1.0)
+    if fall < max(_DIP * abs(end), 5.0 * torque.noise):
         return None
-    search = (float(time[third]), float(time[-3]))
-    hinge = fit_hinge(time, values, Moving.AFTER, search, max(torque.noise, 1e-3 * abs(level)))
-    return None if hinge is None else Boundary(hinge.time, 2.0 * hinge.sigma)
+    whole = np.flatnonzero(values >= end + _BEGUN * fall)
+    if not len(whole):
+        return None
+    at = float(time[whole[-1]])
+    near = time >= at - _AROUND
+    search = (max(at - 0.7 * _AROUND, float(time[near][2])), min(at + _SHAFT, float(time[-3])))
+    if search[0] >= search[1]:
+        return None
+    floor = max(torque.noise, 1e-3 * abs(end))
+    hinge = fit_hinge(time[near], values[near], Moving.AFTER, search, floor)
+    if hinge is None:
+        return None
+    return Boundary(hinge.time - _SHAFT, float(np.hypot(2.0 * hinge.sigma, _SHAFT)))
