@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 from pathlib import Path
 
@@ -68,10 +69,23 @@ def main() -> int:
 
 
 def _write(section: str) -> None:
-    """Bring the page up to date."""
+    """Bring the page up to date; the section says from what code it is."""
     before = PAGE.read_text(encoding="utf-8")
-    write_text(PAGE, updated(before, section))
+    write_text(PAGE, updated(before, f"{section}\nCode of commit {_commit()}.\n"))
     print(f"{section.partition(chr(10))[0]}: written", flush=True)
+
+
+def _commit() -> str:
+    """The commit that runs, and whether its code was changed."""
+    changed = _git("status", "--porcelain", "--", "python", "crates", "benchmarks")
+    return _git("rev-parse", "--short=10", "HEAD") + (", changed" if changed else "")
+
+
+def _git(*words: str) -> str:
+    found = subprocess.run(
+        ["git", *words], cwd=PAGE.parent, check=True, capture_output=True, text=True
+    )
+    return found.stdout.strip()
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ outputs and inputs and the priors of the card in it, computed by disturbing ever
 the simulation; nothing of it is taken from the fits. Design values that the card knows only
 roughly are drawn about the truth. Coverage is that of the stated 95 % intervals from noise.
 From n realisations RMSE/bound has a standard error of 1/√(2n), coverage one of √(475/n) %.
+Each section names the code that it is from.
 """
 
 STARTS = """## From bad start values

@@ -32,9 +32,15 @@ class Stribeck:
 
     def at(self, slip: FloatArray) -> FloatArray:
         """μ at slips (n,) [rad/s] of either sign."""
+        linear = np.array([self.mu_c, self.mu_s - self.mu_c, self.mu_v])
+        return np.asarray(np.tensordot(linear, self.slopes(slip)[:3], axes=1), dtype=np.float64)
+
+    def slopes(self, slip: FloatArray) -> FloatArray:
+        """Derivatives (4, n) of μ by mu_c, mu_s - mu_c, mu_v, in which it is linear, and ln v_s."""
         size = np.abs(slip)
-        stiction = (self.mu_s - self.mu_c) * np.exp(-size / self.v_s)
-        return np.asarray(self.mu_c + stiction + self.mu_v * size, dtype=np.float64)
+        fall = np.exp(-size / self.v_s)
+        bend = (self.mu_s - self.mu_c) * fall * size / self.v_s
+        return np.stack([np.ones_like(size), fall, size, bend])
 
 
 @dataclass(frozen=True)

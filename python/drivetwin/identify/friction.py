@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
+from drivetwin.driveline import Stribeck
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.modulating import Quadrature, Windows, hann_kernels, join, windows_in
 from drivetwin.identify.momentum import FIRST_DRUM, MomentumFit, known
@@ -66,11 +67,9 @@ class FrictionFit:
 
 def stribeck(theta: FloatArray, slip: FloatArray) -> tuple[FloatArray, FloatArray]:
     """μ (n,) over |slip| (n,) and its derivatives (4, n) by (mu_c, mu_drop, mu_v, ln v_s)."""
-    s = np.abs(slip)
-    fall = np.exp(-s / np.exp(theta[LOG_V]))
-    bend = theta[MU_DROP] * fall * s / np.exp(theta[LOG_V])
-    slopes = np.vstack([np.ones_like(s), fall, s, bend])
-    return theta[MU_C] + theta[MU_DROP] * fall + theta[MU_V] * s, slopes
+    mu_c, drop, mu_v, ln_v_s = (float(theta[k]) for k in (MU_C, MU_DROP, MU_V, LOG_V))
+    law = Stribeck(mu_c, mu_c + drop, float(np.exp(ln_v_s)), mu_v)
+    return law.at(slip), law.slopes(slip)
 
 
 def stribeck_at(fit: FrictionFit, slip: FloatArray) -> FloatArray:

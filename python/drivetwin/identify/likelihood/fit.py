@@ -19,7 +19,7 @@ from drivetwin.shifts.shift import Shift
 
 NEAR = 50.0
 """Q per sample at the start below which the direct way is tried first."""
-GOOD = 1.05
+GOOD = 1.03
 """Q per sample from which on no other start is tried."""
 SAME = 1e-3
 """Difference of Q per sample below which two starts have led to the same minimum."""

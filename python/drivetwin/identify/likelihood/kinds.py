@@ -4,8 +4,8 @@
 An output may be the mean over the time since the sample before, as encoders on a bus send it. That
 is half a sample late, and half a millisecond between torque and speed moves k_o and c_o by several
 standard deviations. Between its samples an engine torque may be straight or a curve (`bend_of`).
-Which kind fits better is told by the expansion of Q at the minimum of one of them: what the others
-would show differs by a known column each.
+Which kind fits better is told by the expansion of Q for one of them: what the others would show
+differs by a known column each.
 """
 
 from __future__ import annotations
@@ -16,27 +16,26 @@ import numpy as np
 
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.newton import step_of
-from drivetwin.identify.likelihood.problem import Part, Problem
+from drivetwin.identify.likelihood.problem import Normal, Part, Problem
 from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import FloatArray
 
 SIGNALS = (*OUTPUTS, TORQUE)
 SPEEDS = tuple(name for name in OUTPUTS if name.endswith("speed"))
-LIKELY = tuple(
-    frozenset(means) | bent for means in ((), SPEEDS) for bent in (frozenset({TORQUE}), frozenset())
-)
-"""Kinds that a search may start with: all speeds alike."""
 GAIN = 4.0
 """Promised fall of Q from which on signals change their kind: two standard deviations."""
 ROUNDS = 3
 """Most changes of kind: far off, the expansion promises the way, not the end of it."""
 
 
-def likely_kinds(problem: Problem, start: Point) -> list[Problem]:
-    """The problem, which has signals as read, with each of `LIKELY`; the likelier first."""
-    found = [problem.of_kinds(kinds) for kinds in LIKELY]
-    return sorted(found, key=lambda one: one.cost(start) / one.size)
+def likely_kinds(problem: Problem, start: Point) -> tuple[Problem, Problem]:
+    """The problem, which has signals as read, with the kinds that promise least from `start`, and
+    with the speeds of the other kind."""
+    weighted = problem.weighted_by(start)
+    normal = weighted.normal(start)
+    kinds = frozenset[str]() if normal is None else _promising(weighted, start, normal)
+    return problem.of_kinds(kinds), problem.of_kinds(kinds ^ frozenset(SPEEDS))
 
 
 def with_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
@@ -44,12 +43,16 @@ def with_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
 
     `problem` has signals as read, `best` is its fit with some kinds.
     """
+
+    def left(fit: LikelihoodFit) -> float:
+        return fit.chi2 * problem.size + GAIN * len(fit.problem.kinds)
+
     for _ in range(ROUNDS):
-        kinds = best.problem.kinds ^ _promising(best)
+        kinds = _promising(best.problem, best.point, best.normal)
         if kinds == best.problem.kinds:
             break
         other = nearest(problem.of_kinds(kinds), best.point)
-        if other is None or other.chi2 >= best.chi2:
+        if other is None or left(other) >= left(best):
             break
         best = other
     return best
@@ -61,34 +64,34 @@ def in_words(kinds: frozenset[str]) -> list[str]:
     return [f"samples are means over their period, which fits better: {means}"] if means else []
 
 
-def _promising(fit: LikelihoodFit) -> frozenset[str]:
-    """Names of the signals that, taken for the other kind together, promise the least Q.
+def _promising(problem: Problem, point: Point, normal: Normal) -> frozenset[str]:
+    """Names of the signals that are better taken for something else than read.
 
-    None unless they promise `GAIN`. With the residual r - B·s, where s picks columns of B, Q is
-    Q(0) - 2·sᵀBᵀΣ⁻¹r + sᵀBᵀΣ⁻¹B·s before the parameters follow.
+    `normal` is the expansion at `point`. With the residual r - B·s, where s picks columns of B, Q
+    changes by sᵀBᵀΣ⁻¹B·s - 2·sᵀBᵀΣ⁻¹r before the parameters follow.
     """
     count = len(SIGNALS)
     through, square = np.zeros(count), np.zeros((count, count))
-    pull = np.zeros((len(fit.point.names), count))
+    pull = np.zeros((len(point.names), count))
     for part, residual, regressors in zip(
-        fit.problem.parts, fit.normal.residuals, fit.normal.regressors, strict=True
+        problem.parts, normal.residuals, normal.regressors, strict=True
     ):
-        change = _changes(part, fit.point)
+        change = _changes(part, point)
         weighted = part.weighting.weighted(change)
         through += weighted.T @ residual
         square += change.T @ weighted
         pull += regressors.T @ change
 
-    def left(choice: FloatArray) -> float:
-        gradient = fit.normal.gradient + pull @ choice
-        followed = gradient @ step_of(fit.normal.information, gradient)
-        return float(-2.0 * choice @ through + choice @ square @ choice + followed)
+    def left(choice: tuple[int, ...]) -> float:
+        s = np.array(choice, dtype=float)
+        gradient = normal.gradient + pull @ s
+        followed = gradient @ step_of(normal.information, gradient)
+        return float(s @ square @ s - 2.0 * s @ through + followed) + GAIN * len(changed(choice))
 
-    choices = [np.array(each, dtype=float) for each in product((0, 1), repeat=count)]
-    best = min(choices, key=left)
-    if left(choices[0]) - left(best) < GAIN:
-        return frozenset()
-    return frozenset(name for name, chosen in zip(SIGNALS, best, strict=True) if chosen)
+    def changed(choice: tuple[int, ...]) -> frozenset[str]:
+        return problem.kinds ^ {name for name, flip in zip(SIGNALS, choice, strict=True) if flip}
+
+    return changed(min(product((0, 1), repeat=count), key=left))
 
 
 def _changes(part: Part, point: Point) -> FloatArray:

@@ -60,8 +60,8 @@ def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Like
 
     Raises IdentificationError where it does not converge with the likeliest kinds.
     """
-    likely, *others = likely_kinds(problem, start)
-    best = _tried(likely, start, shifts) or fit(others[0], start, shifts)
+    likely, other = likely_kinds(problem, start)
+    best = _tried(likely, start, shifts) or fit(other, start, shifts)
     best = with_kinds(problem, best)
     if best.chi2 < GOOD:
         return best
