@@ -157,7 +157,10 @@ def test_engine_and_wheel_speed_stand_in_with_warnings() -> None:
 def test_torque_phase_from_output_torque_without_pressures() -> None:
     log = _without(_UP.log(), "pressure.B2", "pressure.B3")
     (shift,), _ = find_shifts(log, _UP.card())
-    assert shift.torque_phase[0] == pytest.approx(1.35, abs=0.01)
+    # This fall comes without the delay of a shaft, which a measured one has.
+    delay = 0.015
+    assert shift.torque_phase[0] == pytest.approx(1.35 - delay, abs=0.01)
+    assert shift.sigma["torque_start"] > delay
     assert any("output torque" in warning for warning in shift.warnings)
 
 
