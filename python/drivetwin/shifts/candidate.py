@@ -71,8 +71,8 @@ def build_shift(search: Search, before: Run, after: Run) -> Shift:
         search.log, search.ratios[start_gear] > search.ratios[end_gear], begin.time
     )
     step = search.ratios[end_gear] / search.ratios[start_gear]
-    what = (kind, (offgoing, oncoming), step)
-    onset, more = _torque_start(search, what, span[0], (begin, lock))
+    passage = (kind, (offgoing, oncoming), step)
+    onset, more = _torque_start(search, passage, span[0], (begin, lock))
     if onset.time - span[0] < settings.min_hold:
         raise CandidateRefusedError(
             f"gear {start_gear} is recorded for {onset.time - span[0]:.3f} s before the torque "
@@ -150,18 +150,18 @@ def gear_list(search: Search) -> str:
 
 def _torque_start(
     search: Search,
-    what: tuple[ShiftKind, tuple[str, str], float],
+    passage: tuple[ShiftKind, tuple[str, str], float],
     earliest: float,
     phase: tuple[Boundary, Boundary],
 ) -> tuple[Boundary, tuple[str, ...]]:
-    """Onset of the on-coming element's torque in a shift `what` (kind, elements, ratios' step).
+    """Onset of the on-coming element's torque in a `passage` (kind, elements, ratios' step).
 
     The warnings say where it is not what it should be, and where it was not told by the pressure.
 
     Where the on-coming element takes hold only after break-away (power-off upshift, power-on
     downshift) the torque phase before it is empty and starts at break-away.
     """
-    kind, (offgoing, oncoming), step = what
+    kind, (offgoing, oncoming), step = passage
     begin, lock = phase
     if one_clutch(search.log, offgoing, oncoming):
         reason = f"one clutch is {offgoing} and {oncoming} in turn: the torque phase is empty"
