@@ -14,18 +14,20 @@ from benchmarks.estimation.report import (
     faults_section,
     starts_section,
     study_section,
+    unseen_section,
     updated,
 )
 from benchmarks.estimation.starts import count_outcomes
 from benchmarks.estimation.study import run_study
+from benchmarks.estimation.unseen import identify_unseen
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.results.atomic import write_text
 
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
-COUNT, TRIES, FAULTY = 200, 200, 20
-"""Realisations of a case, tries of bad starts, realisations of a fault: a shift of the mean needs
-few."""
+COUNT, TRIES, FAULTY, VEHICLES = 200, 200, 20, 100
+"""Realisations of a case, tries of bad starts, realisations of a fault (a shift of the mean needs
+few), vehicles drawn at random."""
 ROUGH = Knowledge(J_out=0.1, P0=5e3)
 CASES = (
     (ScenarioName.THROTTLE_STEPS, Knowledge(), "Jo′ and P0 known"),
@@ -42,8 +44,8 @@ CASES = (
 
 APART = 10_000
 """Seeds of one case begin so far behind those of the case before."""
-STARTS, FAULTS_TOO = "starts", "faults"
-PARTS = (*(str(place) for place in range(1, len(CASES) + 1)), STARTS, FAULTS_TOO)
+STARTS, FAULTS_TOO, UNSEEN = "starts", "faults", "vehicles"
+PARTS = (*(str(place) for place in range(1, len(CASES) + 1)), STARTS, UNSEEN, FAULTS_TOO)
 
 
 def main() -> int:
@@ -52,6 +54,7 @@ def main() -> int:
     parser.add_argument("count", type=int, nargs="?", default=COUNT, help="realisations of a case")
     parser.add_argument("--tries", type=int, default=TRIES, help="fits from bad start values")
     parser.add_argument("--faulty", type=int, default=FAULTY, help="realisations of a fault")
+    parser.add_argument("--vehicles", type=int, default=VEHICLES, help="drawn at random")
     parser.add_argument(
         "--only", nargs="+", choices=PARTS, default=PARTS, help="cases by number, other sections"
     )
@@ -62,6 +65,8 @@ def main() -> int:
             _write(study_section(run_study(SCENARIOS[name](), know, seeds), text))
     if STARTS in asked.only:
         _write(starts_section(count_outcomes(asked.tries)))
+    if UNSEEN in asked.only:
+        _write(unseen_section(identify_unseen(range(asked.vehicles))))
     if FAULTS_TOO in asked.only:
         shifts = [shift_of(fault, asked.faulty) for fault in FAULTS]
         _write(faults_section(shifts, asked.faulty))

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: MIT
+"""Vehicles that no estimator was made with: driveline, pedal, shift and logger drawn at random.
+
+Inertias, ratios and noise go from a small truck to a heavy one; loggers from 1 kHz samples to means
+over 10 ms on a bus. The card knows what a drawing tells, each value drawn about the truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import tomlkit
+
+from drivetwin.driveline import DualClutch, RoadLoad, ShiftElement, Stribeck
+from drivetwin.dyno.actuators import Actuator, Program, Vibration
+from drivetwin.dyno.files import card_text
+from drivetwin.dyno.scenario import HeldGear, Scenario
+from drivetwin.dyno.sensors import Sensor
+from drivetwin.logs.shiftlog import Quantity
+from drivetwin.vehicle.schema import BAR
+
+GEARS = (HeldGear("2", "B2"), HeldGear("3", "B3"))
+SHIFT, FILL, MAIN = 3.5, 0.2, 1.5e6
+"""Start of the shift and length of the fill [s], pressure of a held element [Pa]."""
+TAIL = 1.8
+"""Time from lock-up to the end of the log [s]."""
+PEDALS = (0, 3, 7, 11)
+"""Throttle steps in the lower gear."""
+LOGGERS = (
+    (1000.0, 1000.0, 1000.0),
+    (1000.0, 200.0, 1000.0),
+    (500.0, 500.0, 500.0),
+    (200.0, 1000.0, 1000.0),
+    (100.0, 1000.0, 1000.0),
+    (100.0, 500.0, 500.0),
+)
+"""Rates [Hz] of speeds, pressures and output torque."""
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A scenario with what its card knows: standard deviations of P0 [Pa] and drums [kg m^2], and
+    Jo′ relative; `card` is the text."""
+
+    scenario: Scenario
+    card: str
+
+
+def vehicle(seed: int) -> Vehicle:
+    """The vehicle of `seed`."""
+    rng = np.random.default_rng([seed, 77])
+    torque = float(rng.uniform(400.0, 1800.0))
+    model = _model(rng, torque)
+    speed = float(rng.uniform(120.0, 190.0))
+    shift = _Shift(model, torque, speed, rng)
+    drive = Scenario(
+        name=f"vehicle {seed}",
+        model=model,
+        gears=GEARS,
+        duration=round(SHIFT + FILL + shift.handover + shift.slipping + TAIL, 1),
+        engine_speed=speed,
+        engine_torque=_pedal(rng, torque),
+        actuators=shift.actuators(),
+        sensors=_sensors(rng, torque, model),
+        J_prime_range=_range(rng, model.J1 * model.eta),
+        J_vehicle_range=_range(rng, model.J_v),
+        reductions=(),
+    )
+    return Vehicle(drive, _card(rng, drive))
+
+
+def _range(rng: np.random.Generator, value: float) -> tuple[float, float]:
+    """A plausible range about a value."""
+    low, high = rng.uniform(0.3, 0.7), rng.uniform(1.5, 2.5)
+    return float(low * value), float(high * value)
+
+
+def _model(rng: np.random.Generator, torque: float) -> DualClutch:
+    """A driveline for an engine of this torque [N m]."""
+    upper = float(rng.uniform(1.0, 2.0)) * 1.15
+    lower = upper * float(rng.uniform(1.25, 1.5))
+    final, eta = float(rng.uniform(3.5, 5.8)), float(rng.uniform(0.8, 0.96))
+    J_e = torque / 1545.0 * float(rng.uniform(8.0, 18.0))
+    J_out, J_v = 0.06 * J_e * float(rng.uniform(0.5, 2.0)), torque * float(rng.uniform(2.0, 4.5))
+    J4, J5 = J_e * upper**2 + J_out, J_v / final**2
+    J = J4 * J5 / (J4 + J5)
+    omega, zeta = 2.0 * np.pi * float(rng.uniform(9.0, 17.0)), float(rng.uniform(0.03, 0.12))
+    load = final * eta * torque * lower * float(rng.uniform(0.2, 0.6))
+    aero = float(rng.choice([0.0, rng.uniform(0.5, 4.0)]))
+    drum = float(rng.choice([0.0, 0.0, rng.uniform(0.02, 0.08)]))
+    law = [_law(rng), _law(rng)]
+    return DualClutch(
+        J1=J_e / eta, J2e=0.0, eta=eta, loss_law="paper", i_in=1.0, J_out=J_out, i_f=final, J_v=J_v,
+        k_o=J * omega**2, c_o=2.0 * zeta * omega * J, load=RoadLoad(constant=load, aero=aero),
+        elements=tuple(
+            _brake(name, ratio, torque, law[k], (float(rng.uniform(0.5, 1.0)) * BAR, drum))
+            for k, (name, ratio) in enumerate((("B2", lower), ("B3", upper)))
+        ),
+    )  # fmt: skip
+
+
+def _law(rng: np.random.Generator) -> Stribeck:
+    level, drop = float(rng.uniform(0.09, 0.14)), float(rng.uniform(-0.01, 0.025))
+    return Stribeck(level, level + drop, float(rng.uniform(5.0, 20.0)), float(rng.uniform(0, 3e-4)))
+
+
+def _brake(
+    name: str, ratio: float, torque: float, law: Stribeck, fill: tuple[float, float]
+) -> ShiftElement:
+    """A brake that holds a gear of `ratio` with a third of its main pressure; P0 and drum."""
+    gain = torque * (ratio - 1.0) / (0.3 * MAIN * law.mu_c)
+    P0, drum = fill
+    return ShiftElement(name, ratio - 1.0, ratio / (ratio - 1.0), gain, P0, law, drum_inertia=drum)
+
+
+@dataclass(frozen=True)
+class _Shift:
+    """Pressures that take the engine from one gear to the other."""
+
+    model: DualClutch
+    torque: float
+    speed: float
+    rng: np.random.Generator
+
+    @property
+    def handover(self) -> float:
+        """Length of the torque phase [s]."""
+        return 0.18
+
+    @property
+    def slipping(self) -> float:
+        """Length at most of the inertia phase [s]."""
+        return 1.0
+
+    def actuators(self) -> dict[str, Actuator]:
+        """Both brakes: the one vents while the other takes the torque, and a part of J' with it."""
+        going, coming = self.model.elements
+        fall = self.speed * (1.0 - self._ratio(coming) / self._ratio(going)) * 1.5
+        length = float(self.rng.uniform(0.25, 0.6))
+        more = self.model.J1 * fall / length
+        level = coming.P0 + (self.torque + more) * coming.i_c / (coming.gain * self._mu(coming))
+        holding = going.P0 + 1.3 * self.torque * going.i_c / (going.gain * self._mu(going))
+        start, hand = SHIFT + FILL, self.handover
+        off = Program(((start - 0.06, MAIN), (start, holding), (start + hand, 0.0)))
+        kiss, end = 0.95 * coming.P0, start + hand + self.slipping
+        on = Program(
+            (
+                (SHIFT, 0.0), (SHIFT + 0.02, kiss), (start, kiss), (start + hand, level),
+                (end, level), (end + 0.08, MAIN),
+            )
+        )  # fmt: skip
+        size = float(self.rng.uniform(0.0, 0.05)) * level
+        shaking = Vibration(size, float(self.rng.uniform(12, 25)), start + hand, end - 0.3)
+        dead, lag = float(self.rng.uniform(0.005, 0.02)), float(self.rng.uniform(0.01, 0.04))
+        return {
+            going.name: Actuator(off, dead, lag),
+            coming.name: Actuator(on, dead, lag, shaking),
+        }
+
+    @staticmethod
+    def _ratio(one: ShiftElement) -> float:
+        return one.i_c * one.i_out
+
+    @staticmethod
+    def _mu(one: ShiftElement) -> float:
+        law = one.friction
+        assert isinstance(law, Stribeck)
+        return law.mu_c
+
+
+def _pedal(rng: np.random.Generator, torque: float) -> Program:
+    """Steps in the lower gear, as an engine follows them, back at `torque` [N m] for the shift."""
+    count = int(rng.choice(PEDALS))
+    if count == 0:
+        return Program(((0.0, torque),))
+    levels = np.append(torque * rng.uniform(0.3, 1.25, count - 1), torque)
+    starts = 0.4 + (SHIFT - 0.8) / count * np.arange(count)
+    time = np.arange(0.0, SHIFT, 2e-3)
+    share = np.clip((time[:, None] - starts) / float(rng.uniform(0.06, 0.15)), 0.0, 1.0)
+    steps = np.diff(levels, prepend=torque)
+    values = torque + (share**2 * (3.0 - 2.0 * share)) @ steps
+    return Program(tuple(zip(time.tolist(), values.tolist(), strict=True)))
+
+
+def _sensors(rng: np.random.Generator, torque: float, model: DualClutch) -> tuple[Sensor, ...]:
+    """A logger; speeds are samples or means over their period."""
+    speed, pressure = Quantity.SPEED, Quantity.PRESSURE
+    rate, inputs, shown = LOGGERS[int(rng.integers(len(LOGGERS)))]
+    window = float(rng.choice([0.0, 1.0])) / rate
+    noise = float(rng.uniform(0.03, 0.3))
+    rpm = np.pi / 30.0
+    step = float(rng.choice([1e-4, 0.1 * rpm, 0.5 * rpm]))
+    full = torque * model.eta * 2.5
+    age, resolution = float(rng.uniform(0.0, 0.03)), float(rng.choice([1.0, 0.5, 0.005 * torque]))
+    can = float(rng.choice([50.0, 100.0]))
+    p_noise = float(rng.uniform(2e3, 1e4))
+    lower = model.elements[0].i_c * model.elements[0].i_out
+    seen = [
+        Sensor("engine_torque", Quantity.TORQUE, "EngTrq", "Nm", can,
+               0.002 * torque, resolution, age),
+        *(Sensor(f"pressure.{one.name}", pressure, f"Prs{one.name}", "bar", inputs, p_noise, 10.0)
+          for one in model.elements),
+        Sensor("input_speed", speed, "SpdIn", "rpm", rate, noise, step, window=window),
+        Sensor("output_speed", speed, "SpdOut", "rpm", rate, noise / lower, step, window=window),
+        Sensor("wheel_speed", speed, "SpdWhl", "rpm", rate, noise / lower / model.i_f, step / 4.0,
+               window=window),
+    ]  # fmt: skip
+    if rng.uniform() < 0.8:
+        spread = full * float(rng.uniform(0.002, 0.01))
+        seen.append(Sensor("output_torque", Quantity.TORQUE, "TrqOut", "Nm", shown, spread, 0.01))
+    return tuple(seen)
+
+
+def _card(rng: np.random.Generator, drive: Scenario) -> str:
+    """The card with design values drawn about the truth."""
+    J_out, P0 = float(rng.choice([0.1, 0.15])), float(rng.choice([0.0, 5e3, 1e4]))
+    model = drive.model
+    value = model.J_out * (1.0 + J_out * float(rng.standard_normal()))
+    card = tomlkit.parse(card_text(drive)).unwrap()
+    card["inertia"]["J_out_kgm2"] = {"value": value, "std": J_out * value}
+    for one in model.elements:
+        entry = card["elements"][one.name]
+        if P0 > 0.0:
+            about = one.P0 + P0 * float(rng.standard_normal())
+            entry["P0_bar"] = {"value": about / BAR, "std": P0 / BAR}
+        if one.drum_inertia > 0.0:
+            about = max(0.0, one.drum_inertia + 0.03 * float(rng.standard_normal()))
+            entry["drum_inertia_kgm2"] = {"value": about, "std": 0.03}
+    return tomlkit.dumps(card)
