@@ -83,7 +83,7 @@ class Example:
         return path
 
     def run(self, scenario: Path, repeats: int, which: str) -> Sample:
-        """Seconds of `which` (`prepared` or `whole`) runs, and the solution."""
+        """Seconds of `which` (`again`, `first` or `whole`) runs, and the solution."""
         command = [str(self.path), str(scenario), str(_WARMING + repeats)]
         done = subprocess.run(command, check=True, capture_output=True, text=True)
         result = json.loads(done.stdout)

@@ -54,7 +54,7 @@ def _entry(
     return Entry(
         PROGRAM,
         name,
-        lambda: example.run(path, _REPEATS, "prepared"),
+        lambda: example.run(path, _REPEATS, "again"),
         judge or _against_exact(scenario),
         Group.GENERAL,
     )

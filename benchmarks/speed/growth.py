@@ -61,6 +61,6 @@ def _times(
     points = []
     for size, scenario in scenarios.items():
         path = example.store(f"{name}{size:g}", scenario)
-        seconds = example.run(path, _REPEATS, "prepared").seconds
+        seconds = example.run(path, _REPEATS, "again").seconds
         points.append((float(size), float(np.median(seconds))))
     return tuple(points)

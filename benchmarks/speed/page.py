@@ -28,7 +28,9 @@ of the times of all events.
 _LEGEND = {
     Group.SHIFT: (
         "drivetwin simulates the general network; nothing in it is written for this problem. The\n"
-        "C program is written for nothing else. Programs that smooth friction find no events."
+        "C program is written for nothing else. Programs that smooth friction find no events.\n"
+        "A network that is ready has been compiled, and runs before have left their modes and\n"
+        "step operators with it; its first run compiles these on the way."
     ),
     Group.GENERAL: (
         "Times inside Rust, network ready. Errors are against the same core at round-off\n"

@@ -24,7 +24,8 @@ from drivetwin.export.modelica.dual_clutch import ENGINE_TORQUE, SHAFT, network_
 from drivetwin.network import Output
 
 PROGRAM = "drivetwin"
-PREPARED = "in Rust, network ready"
+READY = "in Rust, network ready"
+FIRST = "in Rust, first run of a network"
 WHOLE = "in Rust, from the elements on"
 PYTHON = "called from Python, nine columns"
 _REPEATS = 20
@@ -112,7 +113,8 @@ def entries(of: Problem, given: Inputs, reference: Judge, example: Example) -> l
         return sensitivities(model, torque, signals, begin, given.time, PARAMETERS)
 
     return [
-        Entry(PROGRAM, PREPARED, lambda: example.run(path, _REPEATS, "prepared"), reference),
+        Entry(PROGRAM, READY, lambda: example.run(path, _REPEATS, "again"), reference),
+        Entry(PROGRAM, FIRST, lambda: example.run(path, _REPEATS, "first"), reference),
         Entry(
             PROGRAM,
             WHOLE,

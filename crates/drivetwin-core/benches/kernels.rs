@@ -11,7 +11,7 @@ use drivetwin_core::network::{ModeKey, Network};
 use drivetwin_core::simulate::{
     Keep, Plan, dual_clutch_batch, dual_clutch_outputs, dual_clutch_sensitivities,
 };
-use drivetwin_core::solve::{Settings, Signal};
+use drivetwin_core::solve::{Known, Settings, Signal};
 use std::hint::black_box;
 
 /// Time [s], engine torque [N·m] and pressures [Pa] of a shift from second to third.
@@ -58,6 +58,10 @@ fn kernels(criterion: &mut Criterion) {
         b.iter(|| Plan::new(&network, black_box(&signals), &time, &outputs[4..5], options));
     });
     criterion.bench_function("one shift", |b| b.iter(|| plan.run(&network, black_box(&state))));
+    criterion.bench_function("one shift, modes known", |b| {
+        let mut known = Known::of(&network);
+        b.iter(|| plan.run_again(&mut known, black_box(&state)));
+    });
     let sampled = [("engine torque", &torque), ("B2", &off), ("B3", &on)]
         .map(|(n, v)| (n, &time[..], &v[..], 0.0));
     let names = ["eta", "J1", "k_o", "B3.P0", "B3.mu_c", "B3.mu_s", "start.twist", "delay.B3"];

@@ -34,7 +34,7 @@ pub enum Row {
 }
 
 /// Which friction elements are stuck and how the lossy gears move, as bits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ModeKey {
     stuck: u32,
     held: u32,

@@ -12,13 +12,7 @@ use crate::number::{Lane, Real};
 pub const MAX_INPUTS: usize = 16;
 
 /// Value at the start of a sample and rate within it, of every input.
-pub type Sample<L> = [[L; 2]; MAX_INPUTS];
-
-/// Inputs have few enough numbers to need no check.
-#[inline(always)]
-pub fn input_of<L: Copy>(sample: &Sample<L>, input: usize) -> [L; 2] {
-    sample[input % MAX_INPUTS]
-}
+pub type Sample<L> = [[L; 2]];
 
 /// `gain · u + offset`.
 #[derive(Clone, Copy, Debug)]
@@ -159,7 +153,9 @@ impl<L: Lane> Friction<L> {
     #[inline(always)]
     pub fn at<const F: bool>(&self, dm: L, normal: L) -> Value<L> {
         let (half, sixth) = (self.bend.times(0.5), self.third.times(1.0 / 6.0));
-        let mu = sixth.fma::<F>(dm, half).fma::<F>(dm, self.slope).fma::<F>(dm, self.mu);
+        // Low and high powers apart, for a shorter chain of dependent products.
+        let (low, high) = (self.slope.fma::<F>(dm, self.mu), sixth.fma::<F>(dm, half));
+        let mu = high.fma::<F>(dm * dm, low);
         let slope = self.third.times(0.5).fma::<F>(dm, self.bend).fma::<F>(dm, self.slope);
         Value {
             value: normal * mu,
@@ -191,12 +187,11 @@ impl<L: Lane> Value<L> {
         Self { value: zero, by_argument: zero, bend: zero, by_normal: zero, mixed: zero }
     }
 
-    /// Value and slopes where the argument is larger by a small `ds`.
+    /// Value and slopes where the argument is larger by a `ds` of which the square is nothing.
     #[inline(always)]
     pub fn moved<const F: bool>(&self, ds: L) -> Self {
-        let half = self.bend.times(0.5);
         Self {
-            value: half.fma::<F>(ds, self.by_argument).fma::<F>(ds, self.value),
+            value: self.by_argument.fma::<F>(ds, self.value),
             by_argument: self.bend.fma::<F>(ds, self.by_argument),
             by_normal: self.mixed.fma::<F>(ds, self.by_normal),
             ..*self
@@ -213,7 +208,7 @@ impl<L: Lane> Line<L> {
     /// Value at the start of a sample and rate within it.
     #[inline(always)]
     pub fn line<const F: bool>(&self, sample: &Sample<L>) -> [L; 2] {
-        let [start, rate] = input_of(sample, self.input);
+        let [start, rate] = sample[self.input];
         [self.gain.fma::<F>(start, self.offset), self.gain * rate]
     }
 }

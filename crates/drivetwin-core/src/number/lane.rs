@@ -30,6 +30,10 @@ pub trait Lane:
     /// `e^x` to a few units in the last place for |x| < 700, beyond that of the bound.
     fn exponential<const F: bool>(self) -> Self;
 
+    /// `self · e^x` by the series where |x| is small, else by `full`, which gives the same by another
+    /// way.
+    fn grown<const F: bool>(self, x: Self, full: impl FnOnce() -> Self) -> Self;
+
     /// The values without derivatives.
     fn values(self) -> Self::Values;
 }
@@ -98,6 +102,19 @@ pub(super) fn exponential<const F: bool>(x: f64) -> f64 {
     fused::<F>(odd, r, even) * power
 }
 
+/// Largest |x| for which [`growth`] is exact to 3e-14.
+pub(super) const SMALL: f64 = 0.125;
+
+/// `e^x` for |x| up to [`SMALL`], by its series; powers of x² apart, for a short chain of products.
+#[inline(always)]
+pub(super) fn growth<const F: bool>(x: f64) -> f64 {
+    let (c, square) = (&EXPONENTIAL, x * x);
+    let pair = |k: usize| fused::<F>(c[12 - k], x, c[13 - k]);
+    let (low, high) = (fused::<F>(pair(2), square, pair(0)), fused::<F>(pair(6), square, pair(4)));
+    let high = fused::<F>(c[5], square * square, high);
+    fused::<F>(high, square * square, low)
+}
+
 impl Lane for f64 {
     const DERIVATIVES: bool = false;
 
@@ -118,6 +135,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn exponential<const F: bool>(self) -> Self {
         exponential::<F>(self)
+    }
+    #[inline(always)]
+    fn grown<const F: bool>(self, x: Self, full: impl FnOnce() -> Self) -> Self {
+        if x.abs() <= SMALL { self * growth::<F>(x) } else { full() }
     }
     #[inline(always)]
     fn values(self) -> Self {
@@ -176,6 +197,14 @@ impl<const P: usize> Lane for Dual<P> {
         self.chain(value, value)
     }
     #[inline(always)]
+    fn grown<const F: bool>(self, x: Self, full: impl FnOnce() -> Self) -> Self {
+        if x.re.abs() > SMALL {
+            return full();
+        }
+        let factor = growth::<F>(x.re);
+        self * x.chain(factor, factor)
+    }
+    #[inline(always)]
     fn values(self) -> f64 {
         self.re
     }
@@ -191,6 +220,15 @@ mod tests {
         fn the_exponential_agrees_with_the_library(x in -600.0..600.0_f64) {
             for value in [exponential::<false>(x), exponential::<true>(x)] {
                 prop_assert!((value / x.exp() - 1.0).abs() < 4.0 * f64::EPSILON);
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn small_growth_agrees_with_the_library(x in -SMALL..SMALL) {
+            for value in [growth::<false>(x), growth::<true>(x)] {
+                prop_assert!((value / x.exp() - 1.0).abs() < 3e-14);
             }
         }
     }

@@ -45,6 +45,9 @@ pub trait Real:
         Self::of(0.0)
     }
 
+    /// The same numbers where they need no derivatives.
+    fn plain(values: &[[f64; 2]]) -> Option<&[[Self; 2]]>;
+
     /// The value.
     fn re(&self) -> f64;
 
@@ -71,6 +74,10 @@ impl Real for f64 {
     #[inline(always)]
     fn of(value: f64) -> Self {
         value
+    }
+    #[inline(always)]
+    fn plain(values: &[[f64; 2]]) -> Option<&[[Self; 2]]> {
+        Some(values)
     }
     #[inline(always)]
     fn re(&self) -> f64 {

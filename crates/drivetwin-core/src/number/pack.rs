@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Values of several runs side by side.
 
-use super::lane::{Lane, Values};
+use super::lane::{Lane, SMALL, Values, growth};
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// `K` values, one of each run. The loops over the runs compile to vector instructions of the set that
@@ -26,6 +26,13 @@ impl<const K: usize> Pack<K> {
             bits |= f(self.0[i]) << i;
         }
         bits
+    }
+
+    /// The values of another in the runs named by bits.
+    #[inline(always)]
+    fn with(self, runs: u32, other: Self) -> Self {
+        let own = |i: usize| runs >> i & 1 == 0;
+        Self(std::array::from_fn(|i| if own(i) { self.0[i] } else { other.0[i] }))
     }
 
     #[inline(always)]
@@ -94,6 +101,12 @@ impl<const K: usize> Lane for Pack<K> {
     #[inline(always)]
     fn exponential<const F: bool>(self) -> Self {
         self.each(|a| a.exponential::<F>())
+    }
+    #[inline(always)]
+    fn grown<const F: bool>(self, x: Self, full: impl FnOnce() -> Self) -> Self {
+        let far = x.bits(|x| u32::from(x.abs() > SMALL));
+        let grown = self.zip(x, |value, x| value * growth::<F>(x));
+        if far == 0 { grown } else { grown.with(far, full()) }
     }
     #[inline(always)]
     fn values(self) -> Self {

@@ -8,7 +8,7 @@ use super::trajectory::{Output, Recorder, Target, Trajectory};
 use crate::network::{CompileError, Mode, ModeKey, Network};
 use crate::number::Real;
 use crate::solve::{
-    InputError, Inputs, Integrator, MAX_SLIPPING, Settings, Signal, Status, can_march,
+    InputError, Inputs, Integrator, Known, MAX_SLIPPING, Settings, Signal, Status, can_march,
 };
 use thiserror::Error;
 
@@ -83,25 +83,31 @@ impl<T: Real> Plan<T> {
         network: &'r Network<T>,
         start: &State<T>,
     ) -> Result<(Integrator<'r, T>, Recorder<'r, T>), Status> {
-        let run = self.integrator(network, start)?;
+        let run = self.integrator(Known::of(network), start)?;
         Ok((run, Recorder::new(network, &self.targets, &self.grid)))
     }
 
     fn integrator<'r>(
         &'r self,
-        network: &'r Network<T>,
+        known: Known<'r, T>,
         start: &State<T>,
     ) -> Result<Integrator<'r, T>, Status> {
-        Integrator::start(network, &self.inputs, self.settings, start.x.clone(), &start.locked)
+        Integrator::start(known, &self.inputs, self.settings, (start.x.clone(), &start.locked))
     }
 
     /// One run. If it fails on the way it ends with its status, and with NaN from there on.
     pub fn run(&self, network: &Network<T>, start: &State<T>) -> Trajectory<T> {
+        self.run_again(&mut Known::of(network), start)
+    }
+
+    /// The same, with what runs before have compiled of the network.
+    pub fn run_again<'r>(&'r self, known: &mut Known<'r, T>, start: &State<T>) -> Trajectory<T> {
+        let network = known.network;
         let mut recorder = Recorder::new(network, &self.targets, &self.grid);
         let mut events = Vec::new();
         let (mut balance, mut grazing) = (None, None);
         let mut integrate = || -> Result<(), Status> {
-            let mut run = self.integrator(network, start)?;
+            let mut run = self.integrator(std::mem::replace(known, Known::of(network)), start)?;
             let outcome = if self.audit {
                 let mut auditor = Auditor::new(network, &run.x);
                 let outcome =
@@ -113,6 +119,7 @@ impl<T: Real> Plan<T> {
             };
             events = std::mem::take(&mut run.events);
             grazing = run.grazing.take();
+            *known = run.known;
             outcome
         };
         let status = integrate().err().unwrap_or(Status::Completed);

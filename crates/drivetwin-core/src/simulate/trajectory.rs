@@ -7,7 +7,7 @@ use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
 use crate::network::{Network, Row};
 use crate::number::Real;
-use crate::solve::{BLOCK, Event, Integrator, Recording, RowState, Samples, Sink, Status, Step};
+use crate::solve::{Event, Integrator, Recording, RowState, Samples, Sink, Status, Step};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -191,30 +191,34 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
         samples: &impl Samples<T>,
         (first, count): (usize, usize),
     ) {
-        let picked = Picked::of(&self.grid[self.next..], &run.knots()[first..first + count]);
+        let knots = &run.knots()[first..first + count];
+        let picked = if self.grid.len() == run.knots().len() && self.next == first {
+            // The knots contain the grid: as many are the same.
+            Picked::All(count)
+        } else {
+            Picked::of(&self.grid[self.next..], knots)
+        };
         self.next += picked.count();
         let (states, inputs) = (run.x.len(), run.network.first_input());
         for (column, values) in &mut self.columns {
             let from = values.len();
-            values.resize(from + picked.count(), T::zero_());
-            let out = &mut values[from..];
             for &(position, c) in &*passing_terms(column, run) {
-                // Most coefficients have no derivatives.
-                let constant = c.is_constant();
-                let scaled = |value: T| if constant { value * c.re() } else { c * value };
+                let out = (&mut *values, from);
                 if position < states {
-                    picked.add(out, |k| scaled(samples.state(k, position)));
+                    picked.add(out, samples.states(position), c);
                 } else if position < run.network.one() {
-                    picked.add(out, |k| scaled(run.input_at(first + k, position - inputs)));
+                    let input = |k| run.input_at(first + k, position - inputs);
+                    picked.add(out, (0..count).map(input), c);
                 } else if position == run.network.one() {
-                    picked.add(out, |_| c);
+                    picked.add(out, std::iter::repeat_n(T::of(1.0), count), c);
                 } else {
                     let channel = position - run.network.first_channel();
                     if let Some(slot) = active.iter().position(|&j| j == channel) {
-                        picked.add(out, |k| scaled(samples.torque(k, slot)));
+                        picked.add(out, samples.torques(slot), c);
                     }
                 }
             }
+            values.resize(from + picked.count(), T::zero_());
         }
     }
 }
@@ -223,8 +227,8 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
 enum Picked {
     /// All: their number.
     All(usize),
-    /// Some: their places, and how many.
-    Some([u8; BLOCK], usize),
+    /// Those whose bits are set.
+    Some(u64),
 }
 
 impl Picked {
@@ -233,30 +237,46 @@ impl Picked {
         if grid.get(..knots.len()) == Some(knots) {
             return Self::All(knots.len());
         }
-        let (mut places, mut count) = ([0; BLOCK], 0);
+        let mut bits = 0_u64;
         for (k, knot) in knots.iter().enumerate() {
-            if grid.get(count) == Some(knot) {
-                places[count] = k as u8;
-                count += 1;
-            }
+            bits |= u64::from(grid.get(bits.count_ones() as usize) == Some(knot)) << k;
         }
-        Self::Some(places, count)
+        Self::Some(bits)
     }
 
     fn count(&self) -> usize {
-        let (Self::All(count) | Self::Some(_, count)) = *self;
-        count
+        match self {
+            Self::All(count) => *count,
+            Self::Some(bits) => bits.count_ones() as usize,
+        }
     }
 
-    /// Add the values at the picked samples.
-    #[inline(always)]
-    fn add<T: Real>(&self, out: &mut [T], value: impl Fn(usize) -> T) {
-        match self {
-            Self::All(_) => out.iter_mut().enumerate().for_each(|(k, v)| *v += value(k)),
-            Self::Some(places, _) => {
-                out.iter_mut().zip(places).for_each(|(v, &k)| *v += value(usize::from(k)));
+    /// Add multiples of the picked samples to the values from `from` on, the first ones to nothing.
+    fn add<T: Real>(
+        &self,
+        (values, from): (&mut Vec<T>, usize),
+        samples: impl Iterator<Item = T>,
+        factor: T,
+    ) {
+        // Most coefficients have no derivatives.
+        let constant = factor.is_constant();
+        let scaled = |value: T| if constant { value * factor.re() } else { factor * value };
+        match *self {
+            Self::All(count) => add(values, from, samples.take(count).map(scaled)),
+            Self::Some(bits) => {
+                let picked = samples.enumerate().filter(|(k, _)| bits >> k & 1 == 1);
+                add(values, from, picked.map(|(_, value)| scaled(value)));
             }
         }
+    }
+}
+
+/// Add to the values from `from` on, or append where there are none.
+fn add<T: Real>(values: &mut Vec<T>, from: usize, terms: impl Iterator<Item = T>) {
+    if values.len() == from {
+        values.extend(terms);
+    } else {
+        values[from..].iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
     }
 }
 

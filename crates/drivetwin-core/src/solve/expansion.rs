@@ -18,6 +18,8 @@ pub struct Expansion<T> {
     pub order: usize,
     /// One coefficient of the whole basis.
     basis: Vec<T>,
+    /// 1 over the scale of each state.
+    scales: Vec<f64>,
 }
 
 /// What the step control needs.
@@ -38,6 +40,7 @@ impl<T: Real> Expansion<T> {
             inputs: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             order: 0,
             basis: Vec::with_capacity(network.basis()),
+            scales: vec![0.0; network.states()],
         }
     }
 
@@ -66,6 +69,7 @@ impl<T: Real> Expansion<T> {
         for (series, &value) in self.states.iter_mut().zip(x) {
             series[0] = value;
         }
+        self.set_scales(network);
         let last = accuracy.order.unwrap_or(TERMS - 1);
         let products = network.channels.iter().any(Channel::is_product);
         // Successive terms that must be small: every other one of an even or odd motion is zero, and
@@ -77,7 +81,7 @@ impl<T: Real> Expansion<T> {
             self.channel_terms(network, cells, k);
             self.next_term(network, mode, k);
             power *= h;
-            sizes[k + 1] = self.relative_size(network, k + 1).max(self.input_size(k + 1)) * power;
+            sizes[k + 1] = self.relative_size(k + 1).max(self.input_size(k + 1)) * power;
             let recent = largest(&sizes[(k + 2).saturating_sub(window)..k + 2]);
             if accuracy.order.is_none() && recent <= accuracy.tolerance {
                 self.finish(network, cells, k + 1);
@@ -170,13 +174,19 @@ impl<T: Real> Expansion<T> {
         curved.map(|input| input[k].re().abs() / scale(input)).fold(0.0, f64::max)
     }
 
-    /// Largest coefficient `k` relative to the scale of its state: speeds to 1 rad/s, twists to
-    /// 1 mrad, lagging torques to 1 N·m at least.
-    fn relative_size(&self, network: &Network<T>, k: usize) -> f64 {
+    /// Scales are the states now: speeds of 1 rad/s, twists of 1 mrad, lagging torques of 1 N·m at least.
+    fn set_scales(&mut self, network: &Network<T>) {
         let twists = network.speeds()..network.first_lag();
-        let floor = |i: usize| if twists.contains(&i) { 1e-3 } else { 1.0 };
-        let size = |(i, s): (usize, &Series<T>)| s[k].re().abs() / s[0].re().abs().max(floor(i));
-        self.states.iter().enumerate().map(size).fold(0.0, f64::max)
+        for (i, (scale, state)) in self.scales.iter_mut().zip(&self.states).enumerate() {
+            let floor = if twists.contains(&i) { 1e-3 } else { 1.0 };
+            *scale = 1.0 / state[0].re().abs().max(floor);
+        }
+    }
+
+    /// Largest coefficient `k` relative to the scale of its state.
+    fn relative_size(&self, k: usize) -> f64 {
+        let sizes = self.states.iter().zip(&self.scales).map(|(s, scale)| s[k].re().abs() * scale);
+        sizes.fold(0.0, |largest, size| if size > largest { size } else { largest })
     }
 }
 

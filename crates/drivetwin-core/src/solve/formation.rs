@@ -9,7 +9,7 @@
 use super::inputs::Inputs;
 use super::integrator::{Integrator, Step};
 use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Guards, Source, Trail, idle_guards, march};
+use super::march::{BLOCK, Carry, Guards, Room, Source, Trail, idle_guards, march, room};
 use super::operators::{MAX_ACTIVE, Operators};
 use super::sprint::{Ready, Samples, Sink};
 use super::status::Status;
@@ -115,7 +115,7 @@ impl<const N: usize> Formation<N> {
             x: [zero; N],
             carry: Carry::zero(),
             guards: idle_guards(),
-            trail: Trail::with_room(BLOCK),
+            trail: Trail::with_channels(MAX_ACTIVE),
         }
     }
 
@@ -144,8 +144,8 @@ impl<const N: usize> Formation<N> {
                 self.deliver(lane, member, (segment, count));
                 member.run.segment = segment + count;
                 if fell || member.run.segment == member.until {
-                    let x = if fell { &self.trail.states[passed] } else { &self.x };
-                    let x: [f64; N] = std::array::from_fn(|i| x[i].0[lane]);
+                    let x = |i| if fell { self.trail.states(i)[passed] } else { self.x[i] };
+                    let x: [f64; N] = std::array::from_fn(|i| x(i).0[lane]);
                     self.leave(lane, member, (&x, fell));
                 }
             }
@@ -265,8 +265,13 @@ impl<const N: usize> Formation<N> {
         let ended = run.segment == run.inputs.segments();
         if ended {
             let active = member.ready.take().map_or_else(Vec::new, |ready| ready.active);
-            let torques = self.carry.torques(&self.operators);
-            let end = LastSample { x, torques, lane, places: self.places(&active) };
+            let torque = |(place, _)| {
+                let slot: usize = self.places(&active)[place];
+                self.operators.channels[slot].law.sign.0[lane]
+                    * self.carry.value[slot].value.0[lane]
+            };
+            let torques = active.iter().enumerate().map(torque).collect();
+            let end = LastSample { x, torques };
             member.sink.passed(member.run, &active, &end, (member.run.segment, 1));
             member.run.segment -= 1;
             member.joined = false;
@@ -299,9 +304,10 @@ impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
         let Formation { operators, x, carry: kept, guards, trail, .. } = formation;
         let mut carry = kept.first::<A>();
         if joining != 0 {
-            let sample = source.sample(samples.0);
-            let fresh = Carry::<Lanes, A>::start::<F, N>(operators, (&sample, h), x);
-            let first = operators.guards::<F, A>(&sample, (x, &fresh));
+            let mut room = room();
+            let sample = source.read(samples.0, &mut room);
+            let fresh = Carry::<Lanes, A>::start::<F, N>(operators, (sample, h), x);
+            let first = operators.guards::<F, A>(sample, (x, &fresh));
             for lane in (0..WIDTH).filter(|lane| joining >> lane & 1 == 1) {
                 carry.take_lane(lane, &fresh);
                 for (guard, first) in guards.as_flattened_mut().iter_mut().zip(first.as_flattened())
@@ -311,7 +317,8 @@ impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
             }
         }
         let at = (&mut *x, &mut carry, &mut *guards);
-        let outcome = march::<Lanes, F, N, A>(operators, (source, h), samples, at, (trail, live));
+        let outcome =
+            march::<Lanes, F, N, A, 1>(operators, (source, h), samples, at, (trail, live));
         kept.set_first(&carry);
         outcome
     }
@@ -326,18 +333,17 @@ struct Together<'a> {
 
 impl Source<Lanes> for Together<'_> {
     #[inline(always)]
-    fn read(&self, segment: usize, sample: &mut Sample<Lanes>) {
-        for (to, &[start, rate]) in sample.iter_mut().zip(self.inputs[0].lines(segment)) {
+    fn read<'s>(&'s self, segment: usize, room: &'s mut Room<Lanes>) -> &'s Sample<Lanes> {
+        let first = self.inputs[0].lines(segment);
+        for (to, &[start, rate]) in room.iter_mut().zip(first) {
             *to = [Pack::all(start), Pack::all(rate)];
         }
-        if self.shared {
-            return;
-        }
-        for (lane, inputs) in self.inputs.iter().enumerate() {
-            for (to, &[start, rate]) in sample.iter_mut().zip(inputs.lines(segment)) {
+        for (lane, inputs) in self.inputs.iter().enumerate().filter(|_| !self.shared) {
+            for (to, &[start, rate]) in room.iter_mut().zip(inputs.lines(segment)) {
                 (to[0].0[lane], to[1].0[lane]) = (start, rate);
             }
         }
+        &room[..first.len()]
     }
 
     #[inline(always)]
@@ -355,29 +361,25 @@ struct LaneView<'f, const N: usize> {
 }
 
 impl<const N: usize> Samples<f64> for LaneView<'_, N> {
-    #[inline(always)]
-    fn state(&self, k: usize, i: usize) -> f64 {
-        self.trail.states[k][i].0[self.lane]
+    fn states(&self, i: usize) -> impl Iterator<Item = f64> {
+        self.trail.states(i).iter().map(|x| x.0[self.lane])
     }
-    #[inline(always)]
-    fn torque(&self, k: usize, slot: usize) -> f64 {
-        self.trail.torques[k][self.places[slot]].0[self.lane]
+    fn torques(&self, slot: usize) -> impl Iterator<Item = f64> {
+        self.trail.torques(self.places[slot]).iter().map(|torque| torque.0[self.lane])
     }
 }
 
 /// The end of one lane.
 struct LastSample<'f, const N: usize> {
     x: &'f [f64; N],
-    torques: [Lanes; MAX_ACTIVE],
-    lane: usize,
-    places: [usize; MAX_ACTIVE],
+    torques: Vec<f64>,
 }
 
 impl<const N: usize> Samples<f64> for LastSample<'_, N> {
-    fn state(&self, _: usize, i: usize) -> f64 {
-        self.x[i]
+    fn states(&self, i: usize) -> impl Iterator<Item = f64> {
+        std::iter::once(self.x[i])
     }
-    fn torque(&self, _: usize, slot: usize) -> f64 {
-        self.torques[self.places[slot]].0[self.lane]
+    fn torques(&self, slot: usize) -> impl Iterator<Item = f64> {
+        std::iter::once(self.torques[slot])
     }
 }

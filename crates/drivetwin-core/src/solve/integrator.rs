@@ -4,11 +4,11 @@
 use super::expansion::{Accuracy, Expansion};
 use super::guard::{Cause, Watch, earliest};
 use super::inputs::Inputs;
-use super::sprint::{Cache, Sink};
+use super::known::Known;
+use super::sprint::Sink;
 use super::status::Status;
 use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
 use crate::number::{Real, Series, TERMS};
-use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Friction mode of one element (paper eqs. 4-6).
@@ -135,8 +135,8 @@ pub struct Integrator<'a, T> {
     pub gears: Vec<GearState>,
     pub(super) inputs: &'a Inputs<T>,
     pub(super) settings: Settings,
-    pub(super) sprints: Cache<T>,
-    modes: HashMap<ModeKey, Arc<Mode<T>>>,
+    /// Modes and operators, also those of this run.
+    pub known: Known<'a, T>,
     pub(super) segment: usize,
     pub(super) pending: Option<Cause>,
     stalled: usize,
@@ -149,17 +149,16 @@ impl<'a, T: Real> Integrator<'a, T> {
     /// Start at state `x` with the elements `locked` brought to zero slip; which of these hold is
     /// decided by their capacities.
     pub fn start(
-        network: &'a Network<T>,
+        mut known: Known<'a, T>,
         inputs: &'a Inputs<T>,
         settings: Settings,
-        x: Vec<T>,
-        locked: &[usize],
+        (x, locked): (Vec<T>, &[usize]),
     ) -> Result<Self, Status> {
+        let network = known.network;
         let t = inputs.span(0).0;
         let frictions = network.frictions.len();
-        let none = vec![T::zero_(); frictions];
-        let mode = network.mode(ModeKey::default(), &none);
-        let mode = Arc::new(mode.ok_or_else(|| self_locking(network, t))?);
+        let none = || vec![T::zero_(); frictions];
+        let mode = known.mode(ModeKey::default(), none).ok_or_else(|| self_locking(network, t))?;
         let mut run = Self {
             rows: vec![RowState::Open; frictions],
             expansion: Expansion::new(network),
@@ -177,9 +176,8 @@ impl<'a, T: Real> Integrator<'a, T> {
             network,
             inputs,
             settings,
-            modes: HashMap::from([(mode.key, Arc::clone(&mode))]),
             mode,
-            sprints: Cache::new(),
+            known,
             segment: 0,
             pending: None,
             stalled: 0,
@@ -283,15 +281,9 @@ impl<'a, T: Real> Integrator<'a, T> {
 
     /// Mode of a key, compiled once.
     pub(super) fn mode(&mut self, key: ModeKey) -> Result<Arc<Mode<T>>, Status> {
-        if let Some(mode) = self.modes.get(&key) {
-            return Ok(Arc::clone(mode));
-        }
-        let mode = self.network.mode(key, &self.capacities());
-        let mode = Arc::new(mode.ok_or_else(|| self_locking(self.network, self.t.re()))?);
-        if !mode.redundant {
-            self.modes.insert(key, Arc::clone(&mode));
-        }
-        Ok(mode)
+        let capacities = self.capacities();
+        let mode = self.known.mode(key, || capacities);
+        mode.ok_or_else(|| self_locking(self.network, self.t.re()))
     }
 
     fn watch<'w>(&'w self, mode: &'w Mode<T>) -> Watch<'w, T> {

@@ -4,12 +4,12 @@
 //! The torque φ of a slipping element is a cubic in time over a sample, through value and rate at both
 //! ends. Its argument at the end is predicted with the second derivative of φ at the start, which
 //! leaves an error of fourth order; the cubic through the predicted end corrects it, and the law is
-//! moved to the corrected argument by its own derivatives. One exponential a sample and channel, taken
-//! a sample ahead at about the argument that it is needed at, so that nothing waits for it.
+//! moved to the corrected argument by its own derivatives. One exponential a sample and channel, grown
+//! from the last a sample ahead, at about the argument that it is needed at, so that nothing waits for it.
 
 use super::operators::{Carried, MAX_ACTIVE, MAX_WATCHED, Operators, Watched};
 use super::step::{over_channels, step};
-use crate::network::smooth::{Line, MAX_INPUTS, Sample, Value, input_of};
+use crate::network::smooth::{Line, MAX_INPUTS, Sample, Value};
 use crate::number::{Lane, Pack, Values};
 
 /// Samples that are passed before they are handed on.
@@ -17,25 +17,22 @@ pub const BLOCK: usize = 64;
 
 /// Inputs of one run or several.
 pub trait Source<L> {
-    /// Fill in the inputs of a segment.
-    fn read(&self, segment: usize, sample: &mut Sample<L>);
+    /// The inputs of a segment, in `room` where they stand nowhere.
+    fn read<'s>(&'s self, segment: usize, room: &'s mut Room<L>) -> &'s Sample<L>;
 
     /// The least and the largest value of an input over `count` segments from `first` on, or bounds of
     /// these.
     fn bounds(&self, input: usize, samples: (usize, usize)) -> [L::Values; 2]
     where
         L: Lane;
+}
 
-    /// The inputs of a segment.
-    #[inline(always)]
-    fn sample(&self, segment: usize) -> Sample<L>
-    where
-        L: Lane,
-    {
-        let mut sample = [[L::all(0.0); 2]; MAX_INPUTS];
-        self.read(segment, &mut sample);
-        sample
-    }
+/// Room for the inputs of a segment.
+pub type Room<L> = [[L; 2]; MAX_INPUTS];
+
+/// [`Room`] without inputs.
+pub fn room<L: Lane>() -> Room<L> {
+    [[L::all(0.0); 2]; MAX_INPUTS]
 }
 
 /// Carried channels at the start of a sample.
@@ -61,73 +58,111 @@ pub fn idle_guards<V: Values>() -> Guards<V> {
     [[V::all(1.0), V::all(0.0)]; MAX_WATCHED]
 }
 
-/// Passed samples: states and carried torques at the start of each.
+/// States and torques of the carried channels at the start of passed samples, and at the end of the last,
+/// each as a column over the samples.
 pub struct Trail<L, const N: usize> {
     /// States.
-    pub states: Vec<[L; N]>,
-    /// Torques of the carried channels.
-    pub torques: Vec<[L; MAX_ACTIVE]>,
+    states: Box<[Column<L>; N]>,
+    /// Torques.
+    torques: Vec<Column<L>>,
 }
+
+/// One value at every sample.
+pub type Column<L> = [L; BLOCK + 1];
 
 impl<L: Lane, const N: usize> Trail<L, N> {
-    /// Room for so many samples, at most [`BLOCK`].
-    pub fn with_room(samples: usize) -> Self {
-        let room = samples.min(BLOCK);
-        Self { states: Vec::with_capacity(room), torques: Vec::with_capacity(room) }
+    /// Empty columns, for so many carried channels.
+    pub fn with_channels(channels: usize) -> Self {
+        let empty = [L::all(0.0); BLOCK + 1];
+        let states = vec![empty; N].into_boxed_slice();
+        let states = states.try_into().unwrap_or_else(|_| unreachable!("as many as asked for"));
+        Self { states, torques: vec![empty; channels] }
     }
 
-    /// Add a sample.
+    /// Set sample `k`.
     #[inline(always)]
-    pub fn push<const A: usize>(&mut self, op: &Operators<L, N>, x: &[L; N], carry: &Carry<L, A>) {
-        self.states.push(*x);
-        self.torques.push(carry.torques(op));
+    pub fn put<const A: usize>(
+        &mut self,
+        op: &Operators<L, N>,
+        k: usize,
+        (x, carry): (&[L; N], &Carry<L, A>),
+    ) {
+        for i in 0..op.columns() {
+            self.states[i][k] = x[i];
+        }
+        for a in 0..A {
+            self.torques[a][k] = op.channels[a].law.sign * carry.value[a].value;
+        }
     }
 
-    /// Forget all samples.
-    pub fn clear(&mut self) {
-        self.states.clear();
-        self.torques.clear();
+    /// State `i`.
+    #[inline(always)]
+    pub fn states(&self, i: usize) -> &Column<L> {
+        &self.states[i]
+    }
+
+    /// Torque of the carried channel number `slot`.
+    #[inline(always)]
+    pub fn torques(&self, slot: usize) -> &Column<L> {
+        &self.torques[slot]
     }
 }
 
+/// Inputs at the ends of `W` samples.
+type Ends<V, const W: usize> = [[V; W]; MAX_INPUTS];
+
 /// Pass up to `count` (at most [`BLOCK`]) samples from segment `first`. Returns how many were passed
-/// and, as bits, the runs of which a guard could have fallen within the next one. State and carry are
-/// those after that sample all the same; its start stands in the trail. Only the runs `live`, as bits,
-/// count.
+/// and, as bits, the runs of which a guard could have fallen within the next one. Only the runs `live`,
+/// as bits, count.
+///
+/// Guards are looked at over `W` samples together, which run ahead of them: with `W = 1` state and carry
+/// are those after the sample that was not passed, else the trail alone knows where that began.
 #[inline(always)]
-pub fn march<L: Lane, const F: bool, const N: usize, const A: usize>(
+pub fn march<L: Lane, const F: bool, const N: usize, const A: usize, const W: usize>(
     op: &Operators<L, N>,
     (source, h): (&impl Source<L>, f64),
     (first, count): (usize, usize),
     (x, carry, guards): (&mut [L; N], &mut Carry<L, A>, &mut Guards<L::Values>),
     (trail, live): (&mut Trail<L, N>, u32),
 ) -> (usize, u32) {
-    trail.clear();
-    let mut u = [[L::all(0.0); 2]; MAX_INPUTS];
-    let loaded = op.loads.iter().all(|load| {
-        let bounds = source.bounds(load.input, (first, count));
-        op.stays_loaded::<F>(load, bounds)
-    });
-    for k in 0..count {
-        source.read(first + k, &mut u);
-        if L::DERIVATIVES {
-            *carry = Carry::start::<F, N>(op, (&u, h), x);
+    let mut room = room();
+    let mut ends: Ends<L::Values, W> = [[L::Values::all(0.0); W]; MAX_INPUTS];
+    // No iterators in here: their bodies would be compiled apart, for the least of all processors.
+    let mut loaded = true;
+    for load in &op.loads {
+        loaded &= load.stays_positive::<F>(source.bounds(load.input, (first, count)));
+    }
+    trail.put(op, 0, (x, carry));
+    for from in (0..count).step_by(W) {
+        let some = W.min(count - from);
+        let mut fallen = [L::Values::all(0.0); W];
+        for (k, fallen) in fallen.iter_mut().enumerate().take(some) {
+            let u = source.read(first + from + k, &mut room);
+            if L::DERIVATIVES {
+                *carry = Carry::start::<F, N>(op, (u, h), x);
+                trail.put(op, from + k, (x, carry));
+            }
+            *fallen = step::<L, F, N, A>(op, (u, h), (x, carry));
+            trail.put(op, from + k + 1, (x, carry));
+            for (ends, [start, rate]) in ends.iter_mut().zip(u) {
+                ends[k] = rate.values().times(h) + start.values();
+            }
         }
-        trail.push(op, x, carry);
-        let mut guard = step::<L, F, N, A>(op, (&u, h), (x, carry));
         for (place, before) in guards.iter_mut().enumerate().take(op.watched.len()) {
-            let after = op.guard::<F, A>(place, (&u, h), (x, carry));
-            guard = guard.negative_with(op.falls(place, (*before, after)));
-            *before = after;
+            let after = op.guards_after::<F, A, W>(place, &ends, (trail, from));
+            op.falls(place, (before, &after), &mut fallen);
+            *before = after.map(|values| values[some - 1]);
         }
         if !loaded {
             for load in &op.loads {
-                guard = guard.negative_with(op.unloads::<F>(load, (&u, h)));
+                load.falls::<F, W>(&ends[load.input % MAX_INPUTS], &mut fallen);
             }
         }
-        let fallen = guard.negative() & live;
-        if fallen != 0 {
-            return (k, fallen);
+        for (k, fallen) in fallen.iter().enumerate().take(some) {
+            let fallen = fallen.negative() & live;
+            if fallen != 0 {
+                return (from + k, fallen);
+            }
         }
     }
     // What has grown beyond all bounds is left to the expansion, which says so.
@@ -148,67 +183,130 @@ impl<L: Lane, const N: usize> Operators<L, N> {
     ) -> Guards<L::Values> {
         let mut guards = idle_guards();
         for (place, guard) in guards.iter_mut().enumerate().take(self.watched.len()) {
-            *guard = self.guard::<F, A>(place, (sample, 0.0), at);
+            *guard = self.guard::<F, A>(place, sample, at);
         }
         guards
     }
 
-    /// Whether a load stays above zero in all runs while its input stays within bounds.
-    #[inline(always)]
-    fn stays_loaded<const F: bool>(&self, load: &Line<L>, bounds: [L::Values; 2]) -> bool {
-        let (gain, offset) = (load.gain.values(), load.offset.values());
-        let [low, high] = bounds.map(|u| -gain.fma::<F>(u, offset));
-        // Above zero where its negative is below.
-        low.negative() & high.negative() == L::Values::all(-1.0).negative()
-    }
-
-    /// Something negative where a load falls below zero within a sample.
-    #[inline(always)]
-    fn unloads<const F: bool>(&self, load: &Line<L>, (sample, h): (&Sample<L>, f64)) -> L::Values {
-        let [before, rate] = load.line::<F>(sample).map(Lane::values);
-        // A load of -0 is none that has fallen.
-        let none = L::Values::all(0.0);
-        (before + none).negative_with(rate.times(h) + before + none)
-    }
-
-    /// Limit and value of a watched form `elapsed` seconds into a segment.
+    /// Limit and value of a watched form at the start of a segment.
     #[inline(always)]
     fn guard<const F: bool, const A: usize>(
         &self,
         place: usize,
-        (sample, elapsed): (&Sample<L>, f64),
+        sample: &Sample<L>,
         (x, carry): (&[L; N], &Carry<L, A>),
     ) -> [L::Values; 2] {
         let Watched { form, limit, .. } = &self.watched[place];
         let mut torque = form.constant.values();
         for drive in &self.drives {
-            let [start, rate] = input_of(sample, drive.input);
-            let u = rate.values().times(elapsed) + start.values();
+            let u = sample[drive.input][0].values();
             torque = drive.watched[place].values().fma::<F>(u, torque);
         }
         for i in 0..self.columns() {
             torque = form.state[i].values().fma::<F>(x[i].values(), torque);
         }
         for a in 0..A {
-            torque = form.channels[a].values().fma::<F>(carry.value[a].value.values(), torque);
+            let carried = self.channels[a].law.sign * carry.value[a].value;
+            torque = form.channels[a].values().fma::<F>(carried.values(), torque);
         }
-        let [start, rate] = limit.line::<F>(sample);
-        [rate.values().times(elapsed) + start.values(), torque]
+        [limit.line::<F>(sample)[0].values(), torque]
     }
 
-    /// Something negative where a watched form may leave its limits within a sample, by these at both
-    /// ends.
+    /// The same at the end of `W` samples from `from` on.
     #[inline(always)]
-    fn falls(&self, place: usize, (before, after): ([L::Values; 2], [L::Values; 2])) -> L::Values {
+    fn guards_after<const F: bool, const A: usize, const W: usize>(
+        &self,
+        place: usize,
+        ends: &Ends<L::Values, W>,
+        (trail, from): (&Trail<L, N>, usize),
+    ) -> [[L::Values; W]; 2] {
+        let Watched { form, limit, .. } = &self.watched[place];
+        let of_input = |input: usize| &ends[input % MAX_INPUTS];
+        let mut torque = [form.constant.values(); W];
+        for drive in &self.drives {
+            add::<L, F, W>(&mut torque, drive.watched[place], |k| of_input(drive.input)[k]);
+        }
+        for i in 0..self.columns() {
+            let column: &[L; W] = after(&trail.states[i], from);
+            add::<L, F, W>(&mut torque, form.state[i], |k| column[k].values());
+        }
+        for a in 0..A {
+            let column: &[L; W] = after(&trail.torques[a], from);
+            add::<L, F, W>(&mut torque, form.channels[a], |k| column[k].values());
+        }
+        let mut limits = [limit.offset.values(); W];
+        add::<L, F, W>(&mut limits, limit.gain, |k| of_input(limit.input)[k]);
+        [limits, torque]
+    }
+
+    /// Make negative where a watched form may leave its limits within a sample, by these before and after
+    /// each.
+    #[inline(always)]
+    fn falls<const W: usize>(
+        &self,
+        place: usize,
+        (before, after): (&[L::Values; 2], &[[L::Values; W]; 2]),
+        fallen: &mut [L::Values; W],
+    ) {
         let side = self.watched[place].side.values();
-        let rise = (after[1] - before[1]).magnitude();
-        let size = before[1].magnitude().larger(after[1].magnitude());
-        let bow = self.bow[0].values() * rise + self.bow[1].values() * size;
-        let falls = |[limit, value]: [L::Values; 2]| {
-            let left = limit - bow;
-            (left - side * value).negative_with(left + value)
-        };
-        falls(before).negative_with(falls(after))
+        let [mut limit, mut value] = *before;
+        for k in 0..W {
+            let (limit_after, value_after) = (after[0][k], after[1][k]);
+            let rise = (value_after - value).magnitude();
+            let size = value.magnitude().larger(value_after.magnitude());
+            let bow = self.bow[0].values() * rise + self.bow[1].values() * size;
+            let falls = |limit: L::Values, value: L::Values| {
+                let left = limit - bow;
+                (left - side * value).negative_with(left + value)
+            };
+            let fell = falls(limit, value).negative_with(falls(limit_after, value_after));
+            fallen[k] = fallen[k].negative_with(fell);
+            (limit, value) = (limit_after, value_after);
+        }
+    }
+}
+
+/// The samples after those from `from` on.
+#[inline(always)]
+fn after<L, const W: usize>(column: &Column<L>, from: usize) -> &[L; W] {
+    column[from + 1..].first_chunk().expect("stretches that divide a block")
+}
+
+/// Add a multiple to every value.
+#[inline(always)]
+fn add<L: Lane, const F: bool, const W: usize>(
+    sums: &mut [L::Values; W],
+    factor: L,
+    value: impl Fn(usize) -> L::Values,
+) {
+    for k in 0..W {
+        sums[k] = factor.values().fma::<F>(value(k), sums[k]);
+    }
+}
+
+impl<L: Lane> Line<L> {
+    /// Whether the line stays above zero in all runs while its input stays within bounds.
+    #[inline(always)]
+    fn stays_positive<const F: bool>(&self, [low, high]: [L::Values; 2]) -> bool {
+        let (gain, offset) = (self.gain.values(), self.offset.values());
+        // Above zero where its negative is below.
+        let below = |u| (-gain.fma::<F>(u, offset)).negative();
+        below(low) & below(high) == L::Values::all(-1.0).negative()
+    }
+
+    /// Make negative where the line falls below zero at the end of a sample.
+    #[inline(always)]
+    fn falls<const F: bool, const W: usize>(
+        &self,
+        ends: &[L::Values; W],
+        fallen: &mut [L::Values; W],
+    ) {
+        // A load of -0 is none that has fallen.
+        let none = L::Values::all(0.0);
+        for k in 0..W {
+            let load = self.gain.values().fma::<F>(ends[k], self.offset.values()) + none;
+            fallen[k] = fallen[k].negative_with(load);
+        }
     }
 }
 
@@ -223,16 +321,6 @@ impl<L: Lane, const A: usize> Carry<L, A> {
             near: [none; A],
             stiction: [none; A],
         }
-    }
-
-    /// The torques.
-    #[inline(always)]
-    pub fn torques<const N: usize>(&self, op: &Operators<L, N>) -> [L; MAX_ACTIVE] {
-        let mut torques = [L::all(0.0); MAX_ACTIVE];
-        for a in 0..A {
-            torques[a] = op.channels[a].law.sign * self.value[a].value;
-        }
-        torques
     }
 
     /// Everything at the start of a segment of length `h`.
@@ -260,7 +348,7 @@ impl<L: Lane, const A: usize> Carry<L, A> {
                 rate = form.state[i].fma::<F>(x[i], rate);
             }
             for drive in &op.drives {
-                rate = drive.now[a].fma::<F>(input_of(sample, drive.input)[0], rate);
+                rate = drive.now[a].fma::<F>(sample[drive.input][0], rate);
             }
             out.rate[a] = rate;
             out.near[a] = rate.times(h) + out.argument[a];

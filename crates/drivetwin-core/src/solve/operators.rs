@@ -2,7 +2,7 @@
 //! Exact step operators of one mode over samples of equal length h.
 //!
 //! In one mode `x' = A x + B u + c + E φ`. Over a sample the inputs are linear and a channel φ is a
-//! cubic in `t/h` with the coefficients a0 .. a3, so that the state at the end, the argument of every
+//! cubic, the sum of [`SHAPES`] with the coefficients a, so that the state at the end, the argument of every
 //! channel there and its rate are linear in x, u, u', a. Channels count in their direction of motion:
 //! `τ = sign · φ` over `m = sign · s`.
 
@@ -11,8 +11,11 @@ use crate::network::smooth::{Law, Line};
 use crate::network::{Mode, Network};
 use crate::number::{Lane, Real};
 
-/// Coefficients of a channel's cubic over a sample.
-pub const CUBIC: usize = 4;
+/// Powers of time that a force is integrated with.
+const CUBIC: usize = 4;
+/// What a channel's cubic over a sample is a sum of, with `t` from 0 to 1 over it: 1, t, t², and Hermite's
+/// `3t² - 2t³` and `t³ - t²`, which raise the value and the slope at its end and nothing else.
+pub const SHAPES: usize = 5;
 /// Most channels that are carried at once.
 pub const MAX_ACTIVE: usize = 4;
 /// Most torques and speeds that are watched at once.
@@ -69,7 +72,7 @@ pub struct StepForm<L, const N: usize> {
     /// Constant.
     pub constant: L,
     /// Over the cubics of the carried channels.
-    pub cubics: [[L; CUBIC]; MAX_ACTIVE],
+    pub cubics: [[L; SHAPES]; MAX_ACTIVE],
 }
 
 /// A linear form over state, constant and channels at one instant.
@@ -87,7 +90,7 @@ pub struct Form<L, const N: usize> {
 #[derive(Clone, Copy, Debug)]
 pub struct Carried<L, const N: usize> {
     /// Response of the state at the end to the coefficients of the cubic.
-    pub moments: [[L; N]; CUBIC],
+    pub moments: [[L; N]; SHAPES],
     /// Argument `m = sign · s` at any instant, over the state.
     pub argument: [L; N],
     /// Argument at the end.
@@ -102,7 +105,7 @@ pub struct Carried<L, const N: usize> {
     pub law: Law<L>,
 }
 
-/// A guard: `limit(u) - |form|` where both signs are bounded, else `limit(u) + form`. In lanes that do not
+/// A guard, over the torques of the carried channels: `limit(u) - |form|` where both signs are bounded, else `limit(u) + form`. In lanes that do not
 /// watch it the limit is 1 and the form 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<L, const N: usize> {
@@ -145,7 +148,7 @@ impl<T: Real, const N: usize> Operators<T, N> {
         &mut self,
         slot: usize,
         (network, mode): (&Network<T>, &Mode<T>),
-        (active, moments): (&[usize], &[[[T; N]; CUBIC]]),
+        (active, moments): (&[usize], &[[[T; N]; SHAPES]]),
         (argument, law): ([T; N], Law<T>),
     ) {
         let now = over_basis(network, mode, &argument);
@@ -160,7 +163,7 @@ impl<T: Real, const N: usize> Operators<T, N> {
             drive.second[slot] = second[network.first_input() + drive.input];
         }
         let step_form = |row: &[T; N]| {
-            let mut cubics = [[T::zero_(); CUBIC]; MAX_ACTIVE];
+            let mut cubics = [[T::zero_(); SHAPES]; MAX_ACTIVE];
             for (cubic, moments) in cubics.iter_mut().zip(moments) {
                 *cubic = std::array::from_fn(|k| dot(row, &moments[k]));
             }
@@ -192,7 +195,7 @@ impl<T: Real, const N: usize> Operators<T, N> {
             drive.watched[place] =
                 row.get(network.first_input() + drive.input).map_or(T::zero_(), |&c| c);
         }
-        let form = Form::over(network, (active, &self.signs), row);
+        let form = Form::over(network, (active, &[T::of(1.0); MAX_ACTIVE]), row);
         let side = T::of(if both { 1.0 } else { -1.0 });
         self.watched.push(Watched { form, limit, side, id });
     }
@@ -240,7 +243,7 @@ impl<T: Real, const N: usize> Task for Build<'_, T, N> {
             .iter()
             .zip(signs)
             .map(|(&j, sign)| forcing(network.first_channel() + j).map(|f| f * sign));
-        let moments: Vec<[[T; N]; CUBIC]> = forces.map(|force| moments(&s, &force, h)).collect();
+        let moments: Vec<[[T; N]; SHAPES]> = forces.map(|force| moments(&s, &force, h)).collect();
         // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
         let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
         let mut operators = Operators {
@@ -293,9 +296,9 @@ impl<L: Lane, const N: usize> Carried<L, N> {
     pub fn idle() -> Self {
         let none = L::all(0.0);
         let step_form =
-            StepForm { state: [none; N], constant: none, cubics: [[none; CUBIC]; MAX_ACTIVE] };
+            StepForm { state: [none; N], constant: none, cubics: [[none; SHAPES]; MAX_ACTIVE] };
         Self {
-            moments: [[none; N]; CUBIC],
+            moments: [[none; N]; SHAPES],
             argument: [none; N],
             argument_end: step_form,
             rate_end: step_form,
@@ -346,17 +349,20 @@ impl<L: Copy, const N: usize> Operators<L, N> {
     }
 }
 
-/// Response of the state at the end to a force `e (t/h)^k`, for k = 0 .. 3.
+/// Response of the state at the end to a force `e` times each of the [`SHAPES`].
 fn moments<T: Real, const N: usize>(
     s: &[Square<T, N>; CUBIC + 1],
     force: &[T; N],
     h: f64,
-) -> [[T; N]; CUBIC] {
+) -> [[T; N]; SHAPES] {
     let mut weight = 1.0;
-    std::array::from_fn(|k| {
+    let [m0, m1, m2, m3]: [[T; N]; CUBIC] = std::array::from_fn(|k| {
         weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
         apply(&s[k + 1], force).map(|v| v * weight)
-    })
+    });
+    let value = std::array::from_fn(|i| m2[i] * 3.0 - m3[i] * 2.0);
+    let slope = std::array::from_fn(|i| m3[i] - m2[i]);
+    [m0, m1, m2, value, slope]
 }
 
 /// A form over the states, differentiated: over the basis.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Operators of several runs in the lanes of one set.
 
-use super::operators::{CUBIC, Carried, Drive, Form, MAX_ACTIVE, Operators, StepForm, Watched};
+use super::operators::{Carried, Drive, Form, MAX_ACTIVE, Operators, SHAPES, StepForm, Watched};
 use crate::network::smooth::{Law, Line};
 use crate::number::{Lane, Pack};
 
@@ -148,7 +148,7 @@ impl<const K: usize, const N: usize> StepForm<Pack<K>, N> {
         put(&mut self.state, &from.state, lane);
         self.constant.0[lane] = from.constant;
         for (slot, cubic) in self.cubics.iter_mut().enumerate() {
-            put(cubic, &own(slot).map_or([0.0; CUBIC], |own| from.cubics[own]), lane);
+            put(cubic, &own(slot).map_or([0.0; SHAPES], |own| from.cubics[own]), lane);
         }
     }
 }

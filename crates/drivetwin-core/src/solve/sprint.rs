@@ -6,13 +6,12 @@
 use super::inputs::Inputs;
 use super::integrator::{Integrator, RowState};
 use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Source, Trail, march};
+use super::march::{BLOCK, Carry, Room, Source, Trail, march, room};
 use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
 use crate::network::channel::{self, Channel};
 use crate::network::smooth::{Law, Line, MAX_INPUTS, Sample, line_of};
 use crate::network::{Cell, GearState, ModeKey, Network, Row};
 use crate::number::Real;
-use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Operators for the number of states at hand.
@@ -57,11 +56,8 @@ impl AnySize<f64> {
     }
 }
 
-/// Operators by mode, active channels with their branches, and step length.
-pub(super) type Cache<T> = HashMap<Key, Option<Arc<AnySize<T>>>>;
-
-/// See [`Cache`].
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+/// What operators belong to: mode, active channels with their branches, and step length.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key {
     mode: ModeKey,
     /// Bits of the active channels, of their directions, and of what is watched or pressed.
@@ -95,25 +91,26 @@ pub trait Sink<T> {
     );
 }
 
-/// States and torques of the active channels at the start of samples, counted from the first.
+/// States and torques of the active channels at the start of samples, at least of those passed.
 pub trait Samples<T> {
-    /// State `i` at sample `k`.
-    fn state(&self, k: usize, i: usize) -> T;
+    /// State `i`.
+    fn states(&self, i: usize) -> impl Iterator<Item = T>;
 
-    /// Torque of the active channel number `slot` at sample `k`.
-    fn torque(&self, k: usize, slot: usize) -> T;
+    /// Torque of the active channel number `slot`.
+    fn torques(&self, slot: usize) -> impl Iterator<Item = T>;
 }
 
 impl<T: Real, const N: usize> Samples<T> for Trail<T, N> {
-    #[inline(always)]
-    fn state(&self, k: usize, i: usize) -> T {
-        self.states[k][i]
+    fn states(&self, i: usize) -> impl Iterator<Item = T> {
+        self.states(i).iter().copied()
     }
-    #[inline(always)]
-    fn torque(&self, k: usize, slot: usize) -> T {
-        self.torques[k][slot]
+    fn torques(&self, slot: usize) -> impl Iterator<Item = T> {
+        self.torques(slot).iter().copied()
     }
 }
+
+/// Samples that a run without derivatives passes before it looks at their guards.
+const AHEAD: usize = 16;
 
 /// Fewest samples of equal length that make operators worth while.
 pub const WORTH_WHILE: usize = 8;
@@ -189,7 +186,7 @@ impl<T: Real> Integrator<'_, T> {
             return None;
         }
         let key = self.key(active, h);
-        if let Some(known) = self.sprints.get(&key) {
+        if let Some(known) = self.known.operators.get(&key) {
             return known.clone();
         }
         let laws = active.iter().map(|&j| Law::of(&self.network.channels[j], self.cells[j]));
@@ -207,7 +204,7 @@ impl<T: Real> Integrator<'_, T> {
             };
             built.map(Arc::new)
         });
-        self.sprints.insert(key, built.clone());
+        self.known.operators.insert(key, built.clone());
         built
     }
 
@@ -321,32 +318,37 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
     fn run<const F: bool>(self) -> bool {
         let Self { run, operators, active, steps: (h, mut count), sink } = self;
         let source = Lines(run.inputs);
-        let first = source.sample(run.segment);
+        let mut room = room();
+        let first = source.read(run.segment, &mut room);
         let n = run.x.len();
         let mut x = [T::zero_(); N];
         x[..n].copy_from_slice(&run.x);
-        let mut carry = Carry::<T, A>::start::<F, N>(operators, (&first, h), &x);
-        let mut guards = operators.guards::<F, A>(&first, (&x, &carry));
-        let mut trail = Trail::with_room(count);
+        let mut carry = Carry::<T, A>::start::<F, N>(operators, (first, h), &x);
+        let mut guards = operators.guards::<F, A>(first, (&x, &carry));
+        let mut trail = Trail::with_channels(A);
         let mut whole = true;
         while count > 0 && whole {
             let samples = (run.segment, count.min(BLOCK));
             let at = (&mut x, &mut carry, &mut guards);
-            let (passed, fallen) =
-                march::<T, F, N, A>(operators, (&source, h), samples, at, (&mut trail, 1));
+            let source = (&source, h);
+            // Samples with derivatives are dear.
+            let (passed, fallen) = if T::DERIVATIVES {
+                march::<T, F, N, A, 1>(operators, source, samples, at, (&mut trail, 1))
+            } else {
+                march::<T, F, N, A, AHEAD>(operators, source, samples, at, (&mut trail, 1))
+            };
             sink.passed(run, active, &trail, (run.segment, passed));
             run.segment += passed;
             count -= passed;
             if fallen != 0 {
-                x = trail.states[passed];
+                x = std::array::from_fn(|i| trail.states(i)[passed]);
                 whole = false;
             }
         }
         run.x.copy_from_slice(&x[..n]);
         run.t = T::of(run.inputs.knot(run.segment));
         if run.segment == run.inputs.segments() {
-            trail.clear();
-            trail.push(operators, &x, &carry);
+            trail.put(operators, 0, (&x, &carry));
             sink.passed(run, active, &trail, (run.segment, 1));
             run.segment -= 1;
         }
@@ -359,10 +361,15 @@ struct Lines<'a, T>(&'a Inputs<T>);
 
 impl<T: Real> Source<T> for Lines<'_, T> {
     #[inline(always)]
-    fn read(&self, segment: usize, sample: &mut Sample<T>) {
-        for (to, line) in sample.iter_mut().zip(self.0.lines_at(segment)) {
+    fn read<'s>(&'s self, segment: usize, room: &'s mut Room<T>) -> &'s Sample<T> {
+        let lines = self.0.lines(segment);
+        if let Some(plain) = T::plain(lines) {
+            return plain;
+        }
+        for (to, line) in room.iter_mut().zip(self.0.lines_at(segment)) {
             *to = line;
         }
+        &room[..lines.len()]
     }
 
     #[inline(always)]

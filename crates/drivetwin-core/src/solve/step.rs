@@ -2,8 +2,8 @@
 //! One sample: the torques of slipping elements as cubics, predicted and corrected.
 
 use super::march::Carry;
-use super::operators::{CUBIC, Carried, Form, Operators, StepForm};
-use crate::network::smooth::{Sample, Value, input_of};
+use super::operators::{Carried, Form, Operators, SHAPES, StepForm};
+use crate::network::smooth::{Law, Sample, Value};
 use crate::number::{Lane, Values};
 
 /// Largest cubic part of a channel over a sample, relative to its size.
@@ -12,6 +12,10 @@ const MAX_CUBIC: f64 = 2e-4;
 const MAX_MOVE: f64 = 0.05;
 /// Largest change of a channel by the correction, relative to its size.
 const MAX_CORRECTION: f64 = 1e-6;
+
+/// Places among the shapes of what raises the value and the slope at the end.
+const VALUE: usize = 3;
+const SLOPE: usize = 4;
 
 /// What a sample leads to, as far as it is known.
 struct Sampling<L: Lane, const N: usize, const A: usize> {
@@ -27,7 +31,7 @@ struct Sampling<L: Lane, const N: usize, const A: usize> {
     /// Normal loads at the start and their rates.
     normal: [[L; 2]; A],
     /// Cubics of the torques.
-    cubics: [[L; CUBIC]; A],
+    cubics: [[L; SHAPES]; A],
     /// Torques at the end.
     value: [Value<L>; A],
     /// Negative where a guard has fallen.
@@ -66,7 +70,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             direct: [none; A],
             second: [none; A],
             normal: [[none; 2]; A],
-            cubics: [[none; CUBIC]; A],
+            cubics: [[none; SHAPES]; A],
             value: [Value::zero(); A],
             guard: L::Values::all(0.0),
         };
@@ -79,7 +83,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             s.normal[a] = c.law.normal.line::<F>(sample);
         }
         for drive in &op.drives {
-            let [u, du] = input_of(sample, drive.input);
+            let [u, du] = sample[drive.input];
             let u_end = du.times(h) + u;
             for i in 0..N {
                 s.end[i] = drive.step[0][i].fma::<F>(u, drive.step[1][i].fma::<F>(du, s.end[i]));
@@ -134,25 +138,30 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let mixed = v.mixed * self.normal[a][1];
             let turn = v.bend.fma::<F>(ds, mixed + mixed);
             let half = 0.5 * h * h;
-            let turned = (turn * ds).times(half);
+            let turned = turn * ds.times(half);
             self.cubics[a][2] = v.by_argument.times(half).fma::<F>(second, turned);
             // With derivatives every sample starts anew.
             if !L::DERIVATIVES {
-                let ahead = second.times(h) + ds;
-                carry.near[a] = ahead.times(2.0 * h) + carry.argument[a];
-                carry.stiction[a] = channels[a].law.stiction::<F>(carry.near[a]);
+                // The second derivative comes late: all else is summed up before it.
+                let (straight, bend) = (ds.times(2.0 * h) + carry.argument[a], 2.0 * h * h);
+                let Law { rate, .. } = channels[a].law;
+                let decay = (near[a] - straight) * rate;
+                carry.near[a] = second.fma::<F>(L::all(bend), straight);
+                carry.stiction[a] = stiction[a]
+                    .grown::<F>(rate.times(-bend).fma::<F>(second, decay), || {
+                        channels[a].law.stiction::<F>(carry.near[a])
+                    });
             }
         }
         add_moments::<L, F, N, A, 0, 3>(op, &self.cubics, &mut self.end);
         for a in 0..A {
             let Carried { argument_end, rate_end, law, .. } = &channels[a];
-            let cubics = &self.cubics;
-            self.argument[a] =
-                over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, self.argument[a]);
+            let (cubics, from_near) = (&self.cubics, self.argument[a] - near[a]);
+            let distance = over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, from_near);
+            self.argument[a] = near[a] + distance;
             self.rate[a] = over_cubics::<L, F, N, A, 0, 3>(rate_end, cubics, self.rate[a]);
             let normal = self.normal[a][1].times(h) + self.normal[a][0];
             let friction = law.about::<F>(near[a], stiction[a]);
-            let distance = self.argument[a] - near[a];
             self.value[a] = friction.at::<F>(distance, normal);
             let moved = law.rate * distance;
             let guard = L::Values::all(MAX_MOVE) - moved.values().magnitude();
@@ -169,28 +178,30 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         carry: &mut Carry<L, A>,
         h: f64,
     ) {
-        let mut change = [[L::all(0.0); CUBIC]; A];
+        let mut missing = [[L::all(0.0); SHAPES]; A];
         for a in 0..A {
-            let (v, cubic) = (&self.value[a], &self.cubics[a]);
+            let (v, [a0, a1, a2, ..]) = (&self.value[a], self.cubics[a]);
             let known = self.rate[a] + self.direct[a];
             let ds = over_channels::<L, F, N, A>(&channels[a].rate, &self.value, known);
             let drift = (v.by_normal * self.normal[a][1]).times(h);
-            let slope = v.by_argument.times(h).fma::<F>(ds, drift);
-            let rise = v.value - cubic[0];
-            change[a][2] = rise.times(3.0) - cubic[1].times(2.0) - cubic[2] - slope;
-            change[a][3] = cubic[1] - rise.times(2.0) + slope;
+            missing[a][VALUE] = v.value - (a0 + a1 + a2);
+            missing[a][SLOPE] = v.by_argument.times(h).fma::<F>(ds, drift - (a1 + a2 + a2));
         }
-        add_moments::<L, F, N, A, 2, 4>(op, &change, &mut self.end);
+        add_moments::<L, F, N, A, VALUE, SHAPES>(op, &missing, &mut self.end);
         let before = (carry.argument, carry.rate);
         for a in 0..A {
             let Carried { argument_end, rate_end, .. } = &channels[a];
-            let ds = over_cubics::<L, F, N, A, 2, 4>(argument_end, &change, L::all(0.0));
-            self.rate[a] = over_cubics::<L, F, N, A, 2, 4>(rate_end, &change, self.rate[a]);
+            let none = L::all(0.0);
+            let ds = over_cubics::<L, F, N, A, VALUE, SHAPES>(argument_end, &missing, none);
+            let rate = self.rate[a];
+            self.rate[a] = over_cubics::<L, F, N, A, VALUE, SHAPES>(rate_end, &missing, rate);
             let corrected = self.value[a].moved::<F>(ds);
             let size = carry.value[a].value.values().magnitude() + L::Values::all(1.0);
             let correction = (corrected.value - self.value[a].value).values().magnitude();
-            let guard = size.times(MAX_CUBIC) - change[a][3].values().magnitude();
+            let [.., value, slope] = missing[a];
+            let cubic = (slope - (value + value)).values().magnitude();
             let close = size.times(MAX_CORRECTION) - correction;
+            let guard = size.times(MAX_CUBIC) - cubic;
             self.guard = self.guard.negative_with(guard).negative_with(close);
             self.value[a] = corrected;
             carry.argument[a] = self.argument[a] + ds;
@@ -227,11 +238,11 @@ fn add_moments<
     const TO: usize,
 >(
     op: &Operators<L, N>,
-    cubics: &[[L; CUBIC]; A],
+    cubics: &[[L; SHAPES]; A],
     end: &mut [L; N],
 ) {
-    for a in 0..A {
-        for k in FROM..TO {
+    for k in FROM..TO {
+        for a in 0..A {
             for i in 0..N {
                 end[i] = op.channels[a].moments[k][i].fma::<F>(cubics[a][k], end[i]);
             }
@@ -249,12 +260,12 @@ fn over_cubics<
     const TO: usize,
 >(
     form: &StepForm<L, N>,
-    cubics: &[[L; CUBIC]; A],
+    cubics: &[[L; SHAPES]; A],
     sum: L,
 ) -> L {
     let mut sum = sum;
-    for a in 0..A {
-        for k in FROM..TO {
+    for k in FROM..TO {
+        for a in 0..A {
             sum = form.cubics[a][k].fma::<F>(cubics[a][k], sum);
         }
     }
