@@ -9,11 +9,12 @@ from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
 
+from drivetwin.logs.can.asc import is_asc, read_asc
+from drivetwin.logs.can.blf import read_blf
 from drivetwin.logs.can.candump import is_candump, read_candump
 from drivetwin.logs.can.database import Message, read_database
 from drivetwin.logs.can.frames import Frames
 from drivetwin.logs.can.recording import BusRecording
-from drivetwin.logs.can.vector import is_asc, read_asc, read_blf
 from drivetwin.logs.raw import ReadOptions, Recording
 
 
@@ -26,7 +27,8 @@ def is_bus_text(head: bytes) -> bool:
 def open_bus_text(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Open a candump or ASC log; raises FileFormatError, MissingExtraError, MissingChannelError."""
     data = path.read_bytes()
-    frames = read_candump(data, str(path)) if is_candump(data[:8192]) else read_asc(path)
+    read = read_candump if is_candump(data[:8192]) else read_asc
+    frames = read(data, str(path))
     yield bus_recording(frames, options, path)
 
 

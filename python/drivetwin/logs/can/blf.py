@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Reader of Vector bus logs, ASC (text) and BLF (binary), by python-can."""
+"""Reader of Vector's binary bus logs, BLF, by python-can."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -11,36 +10,6 @@ from typing import Any
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.can.frames import LONGEST, Frames, frame_table
 from drivetwin.logs.extras import foreign_parser, require
-
-_ASC = re.compile(
-    rb"^(?:date [A-Z][a-z]{2} |base\s+(?:hex|dec)\b|Begin Triggerblock"
-    rb"|[ \t]*\d+\.\d+[ \t]+(?:CANFD[ \t]+)?\d+[ \t]+[0-9A-Fa-f]+x?[ \t]+(?:Rx|Tx)\b)",
-    re.MULTILINE | re.IGNORECASE,
-)
-_RELATIVE = re.compile(rb"^base\s+\w+\s+timestamps\s+relative", re.MULTILINE | re.IGNORECASE)
-
-
-def is_asc(head: bytes) -> bool:
-    """Tell whether the first bytes of a file are an ASC log."""
-    return _ASC.search(head) is not None
-
-
-def read_asc(path: Path) -> Frames:
-    """Read the data frames of an ASC file.
-
-    Raises MissingExtraError without python-can; FileFormatError for a damaged file, one without
-    frames, and one whose stamps count from the event before, of which some may be missing.
-    """
-    kind = "an ASC bus log"
-    with path.open("rb") as file:
-        if _RELATIVE.search(file.read(4096)):
-            raise FileFormatError(
-                "its time stamps count from event to event", "export with absolute time stamps",
-                Where(file=str(path)),
-            )  # fmt: skip
-    can = require("can", "can", kind, path)
-    with path.open(encoding="utf-8", errors="replace") as file, foreign_parser(kind, path):
-        return _read(can.ASCReader(file, relative_timestamp=True), kind, path)
 
 
 def read_blf(path: Path) -> Frames:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""ASC and BLF by python-can: other frames counted, damage typed, the library optional."""
+"""BLF by python-can: other frames counted, damage typed, the library optional."""
 
 from __future__ import annotations
 
@@ -10,21 +10,13 @@ import can
 import pytest
 
 from drivetwin.errors import FileFormatError, MissingExtraError
-from drivetwin.logs.can.vector import is_asc, read_asc, read_blf
+from drivetwin.logs.can.blf import read_blf
 from tests.fuzz.seeds import SEEDS
 
 
-def test_what_is_asc() -> None:
-    assert is_asc(b"date Fri May 3 12:00:00.000 am 2024\nbase hex  timestamps absolute\n")
-    assert is_asc(b"   0.010000 1  123  Rx   d 2 01 02\n")
-    assert not is_asc(b"time,n\n0.01,1\n")
-
-
-@pytest.mark.parametrize("suffix", [".asc", ".blf"])
-def test_frames_without_signals_are_counted(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"bus{suffix}"
-    writer = can.ASCWriter(str(path)) if suffix == ".asc" else can.BLFWriter(str(path))
-    with writer:
+def test_frames_without_signals_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "bus.blf"
+    with can.BLFWriter(str(path)) as writer:
         for number in range(4):
             writer.on_message_received(
                 can.Message(
@@ -36,7 +28,7 @@ def test_frames_without_signals_are_counted(tmp_path: Path, suffix: str) -> None
                     channel=0,
                 )
             )
-    frames = read_asc(path) if suffix == ".asc" else read_blf(path)
+    frames = read_blf(path)
     assert frames.time.size == 3
     assert frames.identifier.tolist() == [0x123] * 3
     assert frames.warnings == ("1 remote or error frames left out",)
@@ -50,23 +42,20 @@ def test_a_cut_blf_is_told(tmp_path: Path, keep: int) -> None:
         read_blf(path)
 
 
-@pytest.mark.parametrize("form", ["asc", "blf"])
 def test_without_the_library_the_install_command_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / f"bus.{form}"
-    path.write_bytes(SEEDS[form](tmp_path))
+    path = tmp_path / "bus.blf"
+    path.write_bytes(SEEDS["blf"](tmp_path))
     monkeypatch.setitem(sys.modules, "can", None)
     with pytest.raises(MissingExtraError) as caught:
-        (read_asc if form == "asc" else read_blf)(path)
+        read_blf(path)
     assert caught.value.remedy == 'pip install "drivetwin[can]"'
 
 
-@pytest.mark.parametrize("suffix", [".asc", ".blf"])
-def test_frames_of_can_fd_are_longer(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"bus{suffix}"
-    writer = can.ASCWriter(str(path)) if suffix == ".asc" else can.BLFWriter(str(path))
-    with writer:
+def test_frames_of_can_fd_are_longer(tmp_path: Path) -> None:
+    path = tmp_path / "bus.blf"
+    with can.BLFWriter(str(path)) as writer:
         for number, data in enumerate((bytes(range(32)), b"\1\2")):
             writer.on_message_received(
                 can.Message(
@@ -78,7 +67,7 @@ def test_frames_of_can_fd_are_longer(tmp_path: Path, suffix: str) -> None:
                     channel=0,
                 )
             )
-    frames = read_asc(path) if suffix == ".asc" else read_blf(path)
+    frames = read_blf(path)
     assert frames.length.tolist() == [32, 2]
     assert frames.data[0].tobytes() == bytes(range(32))
     assert frames.warnings == ()
