@@ -107,7 +107,8 @@ def _payload(digits: bytes, base: int) -> bytes:
     """The bytes; those before the first that is more than a byte."""
     if base == 16:
         return bytes.fromhex(digits.decode())
-    return bytes(takewhile(lambda one: one < 256, map(int, digits.split())))
+    numbers = [int(one) for one in digits.split()]
+    return bytes(takewhile(lambda one: one < 256, numbers))
 
 
 def _number(digits: bytes, base: int) -> int:
