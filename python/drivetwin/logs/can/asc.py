@@ -108,7 +108,8 @@ def _payload(digits: bytes, base: int) -> bytes:
     if base == 16:
         return bytes.fromhex(digits.decode())
     numbers = [int(one) for one in digits.split()]
-    return bytes(takewhile(lambda one: one < 256, numbers))
+    whole = list(takewhile(lambda one: one < 256, numbers))
+    return bytes(whole)
 
 
 def _number(digits: bytes, base: int) -> int:
