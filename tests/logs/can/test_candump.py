@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -77,6 +78,32 @@ def test_other_texts_are_no_candump(head: bytes) -> None:
 def test_no_frame_at_all() -> None:
     with pytest.raises(FileFormatError, match="no frame can be read"):
         read_candump(b"nothing\n", "log")
+
+
+def test_dates_are_stamps() -> None:
+    lines = [
+        f" (2026-11-21 {clock})  can0  123   [1]  0{k}"
+        for k, clock in enumerate(("23:59:59.900000", "23:59:60.100000", "99:59:59.000000"))
+    ]
+    frames = read_candump(("\n".join(lines) + "\n").encode(), "log")
+    assert frames.time == pytest.approx([0.0, 0.2], abs=1e-6)
+    assert frames.warnings == ("1 damaged lines left out of 3",)
+
+
+@pytest.mark.parametrize(
+    ("form", "reason"),
+    [
+        (" ({:.6f})  can0  0CF00203   [2]  00 01\n", "count from frame to frame"),
+        ("  can0  0CF00203   [2]  00 01\n", "no time stamps"),
+    ],
+)
+def test_stamps_of_no_clock_are_refused(form: str, reason: str) -> None:
+    steps = np.random.default_rng(3).uniform(1e-4, 2e-3, 300)
+    data = "".join(form.format(step) for step in steps).encode()
+    assert is_candump(data)
+    with pytest.raises(FileFormatError, match=reason) as caught:
+        read_candump(data, "log")
+    assert "candump -L" in caught.value.remedy
 
 
 FRAMES = st.lists(
