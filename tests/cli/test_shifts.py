@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -38,3 +39,14 @@ def test_quality_figures_are_shown_in_units_of_engineers(
     rows = {line.split("  ")[0].strip(): line for line in capsys.readouterr().out.splitlines()}
     assert rows["friction work"].rstrip().endswith("kJ")
     assert rows["torque hole depth"].rstrip().endswith("Nm")
+
+
+def test_a_log_without_a_shift_says_which_gear_is_held(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = bench_files.log.read_text().splitlines(keepends=True)
+    part = tmp_path / "part.csv"
+    part.write_text("".join(lines[:1500]))
+    assert main(["shifts", str(part), "--vehicle", str(bench_files.card)]) == 0
+    captured = capsys.readouterr()
+    assert "no gear shift; gear held: 2" in captured.out + captured.err

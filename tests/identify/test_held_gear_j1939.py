@@ -28,3 +28,12 @@ def test_total_inertia_in_4th_and_nowhere_else() -> None:
     assert fourth.value is not None
     assert fourth.half is not None
     assert abs(fourth.value - 70.0) < fourth.half < 30.0
+
+
+def test_a_log_without_shifts_tells_of_the_gears_that_it_holds() -> None:
+    log, card = recording("normal")
+    *_, last = held_gears(log, card, ())
+    assert last.gear == "4"
+    assert last.value is not None
+    assert last.half is not None
+    assert abs(last.value - 70.0) < last.half < 30.0

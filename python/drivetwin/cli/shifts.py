@@ -30,7 +30,7 @@ def shifts(
     from drivetwin.identify.resonance import after_shift
     from drivetwin.results.result_file import RejectedRecord, ShiftRecord
     from drivetwin.shifts.converter import lock_ups
-    from drivetwin.shifts.find import find_shifts
+    from drivetwin.shifts.find import find_shifts, held_spans
 
     with step(f"reading {log.name}"):
         recording, card = load(log, vehicle, channels)
@@ -54,7 +54,11 @@ def shifts(
             }
         )
         return
-    show(shift_table(found.shifts, log.name))
+    if found.shifts:
+        show(shift_table(found.shifts, log.name))
+    else:
+        held = ", ".join(dict.fromkeys(gear for gear, _ in held_spans(recording, card)))
+        note(f"no gear shift; gear held: {held or 'none'}")
     for table in quality_tables(found.shifts):
         show(table)
     for closing in closings:

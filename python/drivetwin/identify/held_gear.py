@@ -23,6 +23,7 @@ from drivetwin.identify.result import Verdict
 from drivetwin.identify.signals import FloatArray, Sampled, Span
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.shifts.converter import CLOSED, converter_slip, lock_ups
+from drivetwin.shifts.find import held_spans
 from drivetwin.shifts.recorded import parts_between
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import VehicleCard
@@ -62,13 +63,17 @@ class HeldGear:
 def held_gears(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> tuple[HeldGear, ...]:
     """What the gears before and between the shifts of a log tell, while the converter is closed.
 
-    Empty without an engine torque or an output speed.
+    Of a log without shifts the gears that it holds. Empty without an engine torque or an output
+    speed.
     """
-    if not shifts or not {"engine_torque", "output_speed"} <= log.channels.keys():
+    if not {"engine_torque", "output_speed"} <= log.channels.keys():
         return ()
     torque, speed = sampled(log["engine_torque"]), sampled(log["output_speed"])
-    spans = [(shifts[0].start_gear, shifts[0].before)]
-    spans += [(s.end_gear, (s.lockup_time + SETTLED, s.after[1])) for s in shifts]
+    if shifts:
+        spans = [(shifts[0].start_gear, shifts[0].before)]
+        spans += [(s.end_gear, (s.lockup_time + SETTLED, s.after[1])) for s in shifts]
+    else:
+        spans = held_spans(log, card)
     return tuple(
         held_gear(gear, card.ratio(gear), _closed(log, card, span), torque, speed)
         for gear, span in spans

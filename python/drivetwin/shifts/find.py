@@ -70,6 +70,16 @@ def find_shifts(
     return FoundShifts(finished, tuple(sorted(refused, key=lambda item: item.time)))
 
 
+def held_spans(log: ShiftLog, card: VehicleCard) -> list[tuple[str, tuple[float, float]]]:
+    """The gears that a log holds, in order of time, with first and last time [s] of each.
+
+    Raises as `find_shifts`.
+    """
+    speeds = gearbox_speeds(log, card)
+    runs = gear_runs(speeds, gear_ratios(card), ShiftSettings())
+    return [(run.gear, _span(speeds, run)) for run in runs if run.gear is not None]
+
+
 def _standing(search: Search) -> RejectedShift:
     speeds = search.speeds
     return RejectedShift(
