@@ -19,6 +19,7 @@ from drivetwin.identify.likelihood.kinds import SPEEDS
 from drivetwin.identify.likelihood.record import TORQUE
 from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.likelihood.variants import choose
+from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import truth_of
 
@@ -68,6 +69,14 @@ def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
     truth = truth_of(made)
     for name in ("eta", "J_e", "J_vehicle", "k_o", "c_o", "te_delay"):
         assert _deviation(fit, name, truth[name]) < 3.5, name
+
+
+def test_without_an_output_torque_speeds_are_told_apart_all_the_same() -> None:
+    made = realise(_sent(paper_steps(), 100.0, True), 0, Knowledge(J_out=0.1))
+    nothing = Sampled(np.empty(0), np.empty(0))
+    fit, _ = _chosen(replace(made, signals=replace(made.signals, output_torque=nothing)))
+    assert fit.problem.kinds == frozenset(SPEEDS)
+    assert _deviation(fit, "te_delay", truth_of(made)["te_delay"]) < 3.5
 
 
 def test_an_engine_torque_that_comes_rarely_is_taken_for_a_curve() -> None:

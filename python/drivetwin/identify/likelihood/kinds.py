@@ -41,21 +41,27 @@ def likely_kinds(problem: Problem, start: Point) -> tuple[Problem, Problem]:
 def with_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
     """The fit with every signal of the kind that leaves less.
 
-    `problem` has signals as read, `best` is its fit with some kinds.
+    `problem` has signals as read, `best` is its fit with some kinds. Without an output torque half
+    a period of all speeds is an age of the engine torque, too far away for an expansion to tell
+    which it is: there the other kind of speeds is tried.
     """
 
-    def left(fit: LikelihoodFit) -> float:
-        return fit.chi2 * problem.size + GAIN * len(fit.problem.kinds)
+    def better_of(one: LikelihoodFit, kinds: frozenset[str]) -> LikelihoodFit:
+        if kinds == one.problem.kinds:
+            return one
+        other = nearest(problem.of_kinds(kinds), one.point)
+        return one if other is None or left(other) >= left(one) else other
+
+    def left(one: LikelihoodFit) -> float:
+        return one.chi2 * problem.size + GAIN * len(one.problem.kinds)
 
     for _ in range(ROUNDS):
-        kinds = _promising(best.problem, best.point, best.normal)
-        if kinds == best.problem.kinds:
+        known, best = best, better_of(best, _promising(best.problem, best.point, best.normal))
+        if best is known:
             break
-        other = nearest(problem.of_kinds(kinds), best.point)
-        if other is None or left(other) >= left(best):
-            break
-        best = other
-    return best
+    if problem.parts[0].scale_known:
+        return best
+    return better_of(best, best.problem.kinds ^ frozenset(SPEEDS))
 
 
 def in_words(kinds: frozenset[str]) -> list[str]:
