@@ -54,6 +54,7 @@ PLAIN = "time,EngTrq,nAb\ns,Nm,1/min\n0.0,1000,700.5\n0.1,1001,701\n"
         '"time","EngTrq","nAb"\n"s","Nm","1/min"\n"0,0","1000","700,5"\n"0,1","1001","701,0"\n',
         "EngTrq,nAb,time\nNm,1/min,ms\n1000,700.5,0\n1001,701,100\n",
         PLAIN.replace(",", "|"),
+        PLAIN.replace(",", "\t").replace("EngTrq", '"EngTrq"').replace("\n", "\t\n"),
         PLAIN.replace(",", "   "),
         PLAIN.replace("0.0,", "seconds,double,double\n0.0,", 1),
         PLAIN.replace("s,Nm", "elapsed,crankshaft,tail\ns,Nm"),

@@ -185,9 +185,11 @@ def _names_in_comments(lines: Sequence[str], delimiter: str, first: str) -> list
 
 def _fields(line: str, delimiter: str) -> list[str]:
     """Fields of one line; raises csv.Error where a quote does not close on it."""
+    if delimiter == _BLANKS:
+        return line.split()
     if '"' not in line:
-        return line.split() if delimiter == _BLANKS else line.split(delimiter)
-    reader = csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True, strict=True)
+        return line.split(delimiter)
+    reader = csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True)
     return next(reader)
 
 
