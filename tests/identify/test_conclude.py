@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""What a still engine torque in the lower gear costs."""
+"""What a still engine torque in the lower gear costs, and values that physics excludes."""
 
 from __future__ import annotations
 
-from drivetwin.identify.conclude import low_gear_notes
+from dataclasses import replace
+
+from drivetwin.identify.conclude import Conclusions, conclude, low_gear_notes
+from drivetwin.identify.result import Verdict
+from drivetwin.vehicle.spec import PriorValue
 from tests.identify.asked import stepped, still
 
 
@@ -16,3 +20,26 @@ def test_a_gear_with_still_torque_is_named() -> None:
 def test_another_shift_from_that_gear_with_steps_tells_it() -> None:
     both = (*still().evidence["signals"], *stepped().evidence["signals"])
     assert low_gear_notes(both) == {}
+
+
+def _with_negative_J_out(known: PriorValue | None) -> Conclusions:
+    """The conclusions of the linear fit of a log as if it had found Jo′ below zero."""
+    found = stepped()
+    (shift,), signals = found.evidence["integral"], found.evidence["signals"]
+    values = shift.values.copy()
+    values[shift.ids.index("J_out")] = -0.2
+    driveline = found.evidence["likelihood"].problem.parts[0].structure.driveline
+    driveline = replace(driveline, J_out=known)
+    return conclude([replace(shift, values=values)], signals, [driveline], {})
+
+
+def test_where_the_linear_fit_gives_the_impossible_the_card_stands() -> None:
+    told = _with_negative_J_out(PriorValue(0.9, 0.09)).estimates["J_out"]
+    assert (told.value, told.std_noise, told.verdict) == (0.9, 0.09, Verdict.DESIGN)
+    assert "-0.2 kg*m^2, which is impossible" in told.reason
+
+
+def test_what_is_impossible_and_not_on_the_card_is_refused() -> None:
+    told = _with_negative_J_out(None).estimates["J_out"]
+    assert told.value is None
+    assert "impossible" in told.reason

@@ -14,6 +14,7 @@ from drivetwin.identify.known import with_known
 from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import correlation, designed, judge, refused
+from drivetwin.parameters import spec_of
 from drivetwin.vehicle.spec import PriorValue
 
 METHOD = "integral"
@@ -68,16 +69,18 @@ def conclude(
     std = np.sqrt(np.diag(covariance))
     notes = low_gear_notes(signals)
     estimates = {}
-    for name, value, noise in zip(ids, values, std, strict=True):
+    for name, value, noise in zip(ids, values.tolist(), std.tolist(), strict=True):
         prior = beforehand.get(name, J_out if name == "J_out" else _fill_prior(name, drivelines))
-        if prior is not None and noise >= PRIOR_SHARE * prior.std:
+        if (instead := _impossible(name, value, prior)) is not None:
+            estimates[name] = instead
+        elif prior is not None and noise >= PRIOR_SHARE * prior.std:
             known = prior.std == 0.0
             estimates[name] = designed(
-                name, float(value), 0.0 if known else float(noise), KNOWN if known else ADDS_LITTLE
+                name, value, 0.0 if known else noise, KNOWN if known else ADDS_LITTLE
             )
         else:
             estimates[name] = judge(
-                name, float(value), float(noise), METHOD, systematic.get(name), notes.get(name, "")
+                name, value, noise, METHOD, systematic.get(name), notes.get(name, "")
             )
     estimates |= _card_values(estimates, drivelines)
     estimates |= _refusals(shifts, signals, estimates)
@@ -88,6 +91,20 @@ def conclude(
         correlation(covariance),
         (*doubts, *_warnings(shifts, signals, notes)),
     )
+
+
+def _impossible(name: str, value: float, prior: PriorValue | None) -> Estimate | None:
+    """What stands for a value that physics excludes: the card's, else none; None for others.
+
+    A fit of least squares that has no bounds may end there where the model does not hold.
+    """
+    spec = spec_of(name)
+    if spec.lower <= value <= spec.upper:
+        return None
+    text = f"the linear fit gives {value:.3g} {spec.unit}, which is impossible"
+    if prior is None:
+        return refused(name, METHOD, text)
+    return designed(name, prior.value, prior.std, f"design value of the card: {text}")
 
 
 def low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
