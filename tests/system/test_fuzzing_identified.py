@@ -41,10 +41,15 @@ def test_damage_ends_as_a_result_or_a_typed_error(kind: str, sound: Base, tmp_pa
     assert kind not in TELLING or told(found, sound.found)
 
 
-def test_a_gap_shortly_before_the_end_costs_nothing_else(sound: Base, tmp_path: Path) -> None:
-    speed = sound.table.columns["SpdOut"].copy()
-    speed[-29:-16] = np.nan
-    log = written(sound.table.with_column("SpdOut", speed), tmp_path)
+@pytest.mark.parametrize(
+    ("name", "gap"), [("SpdOut", slice(-29, -16)), ("SpdIn", slice(-108, -49))]
+)
+def test_a_gap_shortly_before_the_end_costs_nothing_else(
+    name: str, gap: slice, sound: Base, tmp_path: Path
+) -> None:
+    speed = sound.table.columns[name].copy()
+    speed[gap] = np.nan
+    log = written(sound.table.with_column(name, speed), tmp_path)
     assert not parted(identified(log, sound.card, Method.INTEGRAL), sound.found)
 
 

@@ -32,7 +32,7 @@ from drivetwin.identify.modulating import (
 )
 from drivetwin.identify.regression import Fit, Prior, Term, regressors, solve, whitening
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
-from drivetwin.shifts.recorded import LEAST, parts_between
+from drivetwin.shifts.recorded import parts_between
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
 
@@ -74,6 +74,8 @@ class Stretch:
 
 LEAST_SPAN = 0.05
 """A shorter stretch [s] holds no window that says anything."""
+LEAST_BESIDE = 0.25
+"""A gear held for less [s] beside a gap has windows that a torque as late as it may be leaves."""
 DELAY_STD_MAX = 0.005
 """Standard error [s] above which the age of the engine torque is taken as not shown."""
 NO_ROUNDING = 1e-3
@@ -194,7 +196,7 @@ def stretches(
     for name, span, tied in spans:
         ratio = driveline.i_before if name == "before" else driveline.i_after
         for part in parts_between(span, signals.output_gaps):
-            if tied and part != span and part[1] - part[0] < LEAST:
+            if tied and part != span and part[1] - part[0] < LEAST_BESIDE:
                 continue
             windows = _windows(part, settings)
             if driveline.loss_law == "dissipative":
