@@ -21,7 +21,8 @@ outputs and inputs and the priors of the card in it, computed by disturbing ever
 the simulation; nothing of it is taken from the fits. Design values that the card knows only
 roughly are drawn about the truth. Coverage is that of the stated 95 % intervals from noise.
 From n realisations RMSE/bound has a standard error of 1/√(2n), coverage one of √(475/n) %.
-Each section names the code that it is from.
+Each section names the code that it is from; one that names none is older than the choice between
+samples and means, curves and lines, and than the off-going element's own drop of friction.
 """
 
 STARTS = """## From bad start values

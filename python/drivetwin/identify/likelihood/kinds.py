@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
+from drivetwin.identify.likelihood.fit import NEAR, LikelihoodFit, nearest
 from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.problem import Normal, Part, Problem
 from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
@@ -31,10 +31,13 @@ ROUNDS = 3
 
 def likely_kinds(problem: Problem, start: Point) -> tuple[Problem, Problem]:
     """The problem, which has signals as read, with the kinds that promise least from `start`, and
-    with the speeds of the other kind."""
+    with the speeds of the other kind. From far off nothing is promised."""
     weighted = problem.weighted_by(start)
     normal = weighted.normal(start)
-    kinds = frozenset[str]() if normal is None else _promising(weighted, start, normal)
+    if normal is None or normal.cost > NEAR * problem.size:
+        kinds = frozenset[str]()
+    else:
+        kinds = _promising(weighted, start, normal)
     return problem.of_kinds(kinds), problem.of_kinds(kinds ^ frozenset(SPEEDS))
 
 
