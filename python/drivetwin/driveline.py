@@ -142,8 +142,9 @@ class Accuracy:
     By default samples without events are passed by exact operators, slipping torques being cubics
     in time: an error of a few 1e-3 N·m on 1 ms samples. `exact` integrates to round-off instead, as
     does an energy audit. `tolerance` is the truncation error allowed per step relative to the
-    states, `max_step` [s] the longest step, `order` a fixed order in place of one that follows the
-    tolerance (it implies `exact`).
+    states (1e-10 at least unless `exact`, for networks that operators pass), `max_step` [s] the
+    longest step, `order` a fixed order in place of one that follows the tolerance (it implies
+    `exact`).
     """
 
     exact: bool = False

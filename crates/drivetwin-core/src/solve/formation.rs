@@ -348,8 +348,12 @@ impl Source<Lanes> for Together<'_> {
 
     #[inline(always)]
     fn bounds(&self, input: usize, samples: (usize, usize)) -> [Lanes; 2] {
-        let of = self.inputs.map(|inputs| inputs.bounds(input, samples));
-        [Pack(of.map(|[low, _]| low)), Pack(of.map(|[_, high]| high))]
+        let mut bounds = self.inputs[0].bounds(input, samples).map(Pack::all);
+        for (lane, inputs) in self.inputs.iter().enumerate().filter(|_| !self.shared) {
+            let [low, high] = inputs.bounds(input, samples);
+            (bounds[0].0[lane], bounds[1].0[lane]) = (low, high);
+        }
+        bounds
     }
 }
 

@@ -5,7 +5,7 @@ use super::expansion::{Accuracy, Expansion};
 use super::guard::{Cause, Watch, earliest};
 use super::inputs::Inputs;
 use super::known::Known;
-use super::sprint::Sink;
+use super::sprint::{Sink, can_march};
 use super::status::Status;
 use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
 use crate::number::{Real, Series, TERMS};
@@ -59,7 +59,8 @@ pub struct Event<T> {
 /// Accuracy of the integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Truncation error allowed per step, relative to the states.
+    /// Truncation error allowed per step, relative to the states; [`AMID_SAMPLES`] at least where a run
+    /// passes samples by operators.
     pub tolerance: f64,
     /// Longest step, s.
     pub max_step: f64,
@@ -82,6 +83,10 @@ impl Default for Settings {
         Self { tolerance: 1e-12, max_step: f64::INFINITY, order: None, sprint: true }
     }
 }
+
+/// Truncation error allowed in steps between samples that are passed by operators, whose own error is
+/// larger.
+pub const AMID_SAMPLES: f64 = 1e-10;
 
 /// One step: the expansion of the integrator holds from `start` for `length` seconds.
 #[derive(Clone, Copy, Debug)]
@@ -135,6 +140,8 @@ pub struct Integrator<'a, T> {
     pub gears: Vec<GearState>,
     pub(super) inputs: &'a Inputs<T>,
     pub(super) settings: Settings,
+    /// Whether samples are passed by operators.
+    marches: bool,
     /// Modes and operators, also those of this run.
     pub known: Known<'a, T>,
     pub(super) segment: usize,
@@ -175,6 +182,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             gears: vec![GearState::Rolling { sign: 1.0, backward: false }; network.losses.len()],
             network,
             inputs,
+            marches: settings.sprint && inputs.is_sampled() && can_march(network),
             settings,
             mode,
             known,
@@ -221,7 +229,9 @@ impl<'a, T: Real> Integrator<'a, T> {
         let end = self.inputs.span(self.segment).1;
         let remaining = (-self.t + end).re();
         let wish = remaining.min(self.settings.max_step);
-        let accuracy = Accuracy { tolerance: self.settings.tolerance, order: self.settings.order };
+        let least = if self.marches { AMID_SAMPLES } else { 0.0 };
+        let tolerance = self.settings.tolerance.max(least);
+        let accuracy = Accuracy { tolerance, order: self.settings.order };
         let mode = Arc::clone(&self.mode);
         let (cells, x) = (&self.cells, &self.x);
         let h = self.expansion.expand(self.network, &mode, cells, x, (wish, accuracy));

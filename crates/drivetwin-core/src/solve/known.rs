@@ -16,7 +16,7 @@ pub struct Known<'n, T> {
     /// Modes, but for those that depend on capacities.
     modes: BTreeMap<ModeKey, Arc<Mode<T>>>,
     /// Step operators; none where a step is too long for its mode.
-    pub(super) operators: BTreeMap<Key, Option<Arc<AnySize<T>>>>,
+    pub(super) operators: BTreeMap<Key, Option<AnySize<T>>>,
 }
 
 impl<'n, T> Known<'n, T> {

@@ -15,16 +15,16 @@ use crate::number::Real;
 use std::sync::Arc;
 
 /// Operators for the number of states at hand.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum AnySize<T> {
     /// Up to 4.
-    Four(Operators<T, 4>),
+    Four(Arc<Operators<T, 4>>),
     /// Up to 8.
-    Eight(Operators<T, 8>),
+    Eight(Arc<Operators<T, 8>>),
     /// Up to 12; not with derivatives, for which the gain no longer pays for the code.
-    Twelve(Operators<T, 12>),
+    Twelve(Arc<Operators<T, 12>>),
     /// Up to [`MAX_STATES`]; likewise.
-    Many(Operators<T, MAX_STATES>),
+    Many(Arc<Operators<T, MAX_STATES>>),
 }
 
 /// Most states of a network that is marched.
@@ -47,10 +47,10 @@ impl AnySize<f64> {
     /// The operators over `N` states, if these are they.
     pub fn of_size<const N: usize>(&self) -> Option<&Operators<f64, N>> {
         let any: &dyn std::any::Any = match self {
-            Self::Four(operators) => operators,
-            Self::Eight(operators) => operators,
-            Self::Twelve(operators) => operators,
-            Self::Many(operators) => operators,
+            Self::Four(operators) => &**operators,
+            Self::Eight(operators) => &**operators,
+            Self::Twelve(operators) => &**operators,
+            Self::Many(operators) => &**operators,
         };
         any.downcast_ref()
     }
@@ -70,7 +70,7 @@ pub(super) struct Key {
 /// A sprint that is possible.
 pub(super) struct Ready<T> {
     /// Operators of the present mode.
-    pub operators: Arc<AnySize<T>>,
+    pub operators: AnySize<T>,
     /// Channels that are not off.
     pub active: Vec<usize>,
     /// Step length, s.
@@ -132,7 +132,7 @@ impl<T: Real> Integrator<'_, T> {
 
     /// Pass samples of equal length; false where a guard could fall before their end.
     fn pass_stretch(&mut self, ready: &Ready<T>, sink: &mut impl Sink<T>) -> bool {
-        match &*ready.operators {
+        match &ready.operators {
             AnySize::Four(operators) => self.pass(operators, ready, sink),
             AnySize::Eight(operators) => self.pass(operators, ready, sink),
             AnySize::Twelve(operators) if !T::DERIVATIVES => self.pass(operators, ready, sink),
@@ -181,7 +181,7 @@ impl<T: Real> Integrator<'_, T> {
     }
 
     /// Operators of the present mode, if they apply.
-    fn operators(&mut self, active: &[usize], h: f64) -> Option<Arc<AnySize<T>>> {
+    fn operators(&mut self, active: &[usize], h: f64) -> Option<AnySize<T>> {
         if active.len() > MAX_ACTIVE {
             return None;
         }
@@ -192,17 +192,19 @@ impl<T: Real> Integrator<'_, T> {
         let laws = active.iter().map(|&j| Law::of(&self.network.channels[j], self.cells[j]));
         let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| {
             let built = match self.network.states() {
-                0..=4 => self.build::<4>(active, &laws, h).map(AnySize::Four),
-                5..=MAX_DERIVED => self.build::<8>(active, &laws, h).map(AnySize::Eight),
+                0..=4 => self.build::<4>(active, &laws, h).map(|o| AnySize::Four(Arc::new(o))),
+                5..=MAX_DERIVED => {
+                    self.build::<8>(active, &laws, h).map(|o| AnySize::Eight(Arc::new(o)))
+                }
                 9..=12 if !T::DERIVATIVES => {
-                    self.build::<12>(active, &laws, h).map(AnySize::Twelve)
+                    self.build::<12>(active, &laws, h).map(|o| AnySize::Twelve(Arc::new(o)))
                 }
                 13..=MAX_STATES if !T::DERIVATIVES => {
-                    self.build::<MAX_STATES>(active, &laws, h).map(AnySize::Many)
+                    self.build::<MAX_STATES>(active, &laws, h).map(|o| AnySize::Many(Arc::new(o)))
                 }
                 _ => None,
             };
-            built.map(Arc::new)
+            built
         });
         self.known.operators.insert(key, built.clone());
         built
