@@ -7,9 +7,12 @@ several per cent at no cost is named by the parameters that make it up.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.unknowns import LAW
 from drivetwin.identify.signals import FloatArray
 
 LOOSE = 0.2
@@ -23,7 +26,7 @@ SHOWN = {"eta": "η", "J_e": "J′", "J_out": "Jo′", "J_vehicle": "J3", "Tv_ov
 def null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
     """One sentence for each direction that the log leaves open without its priors."""
     names = fit.point.names
-    keep = [k for k, name in enumerate(names) if name.split(".")[-1] in NAMED]
+    keep = [k for k, name in enumerate(names) if _is_told(name, names)]
     rest = [k for k in range(len(names)) if k not in keep]
     size = np.abs(fit.point.values[keep])
     relative = reduced(fit.normal.data, keep, rest) * np.outer(size, size)
@@ -40,6 +43,12 @@ def null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
             + ("together: only their combination is told" if len(strong) > 1 else "")
         )
     return tuple(text.strip() for text in texts)
+
+
+def _is_told(name: str, names: Sequence[str]) -> bool:
+    """Whether a result tells this unknown: of μ that of elements whose whole law is free."""
+    element, _, key = name.rpartition(".")
+    return key in NAMED and (key != LAW[0] or f"{element}.{LAW[-1]}" in names)
 
 
 def reduced(matrix: FloatArray, keep: list[int], rest: list[int]) -> FloatArray:
