@@ -70,7 +70,8 @@ def read_candump(data: bytes, file: str) -> Frames:
         bare = any(_BARE.match(line) for line in data[:8192].splitlines())
         what = "its lines have no time stamps" if bare else "no frame can be read"
         raise FileFormatError(what, _RECORD, Where(file=file))
-    if np.count_nonzero(np.diff(stamps) < 0.0) > _BACKWARD * max(len(stamps), _ENOUGH):
+    backward = np.count_nonzero(np.diff(stamps) < 0.0)
+    if len(stamps) >= _ENOUGH and backward > _BACKWARD * len(stamps):
         what = "its time stamps run back again and again: they count from frame to frame"
         raise FileFormatError(what, _RECORD, Where(file=file))
     other = len(_OTHER.findall(data))
