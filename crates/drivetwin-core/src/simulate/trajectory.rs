@@ -7,7 +7,9 @@ use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
 use crate::network::{Network, Row};
 use crate::number::Real;
-use crate::solve::{Event, Integrator, Recording, RowState, Samples, Sink, Status, Step};
+use crate::solve::{
+    Event, Integrator, Recording, RowState, Samples, Sink, Status, Step, Task, dispatch,
+};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -199,8 +201,29 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
             Picked::of(&self.grid[self.next..], knots)
         };
         self.next += picked.count();
+        let columns = &mut self.columns;
+        dispatch(Passed { columns, run, active, samples, picked, range: (first, count) });
+    }
+}
+
+/// Samples to be added to the columns, with the widest instructions.
+struct Passed<'p, 'a, T, S> {
+    columns: &'p mut [(Column<T>, Vec<T>)],
+    run: &'p Integrator<'a, T>,
+    active: &'p [usize],
+    samples: &'p S,
+    picked: Picked,
+    range: (usize, usize),
+}
+
+impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const F: bool>(self) {
+        let Self { columns, run, active, samples, picked, range: (first, count) } = self;
         let (states, inputs) = (run.x.len(), run.network.first_input());
-        for (column, values) in &mut self.columns {
+        for (column, values) in columns {
             let from = values.len();
             for &(position, c) in &*passing_terms(column, run) {
                 let out = (&mut *values, from);
@@ -252,6 +275,7 @@ impl Picked {
     }
 
     /// Add multiples of the picked samples to the values from `from` on, the first ones to nothing.
+    #[inline(always)]
     fn add<T: Real>(
         &self,
         (values, from): (&mut Vec<T>, usize),
@@ -272,11 +296,19 @@ impl Picked {
 }
 
 /// Add to the values from `from` on, or append where there are none.
+#[inline(always)]
 fn add<T: Real>(values: &mut Vec<T>, from: usize, terms: impl Iterator<Item = T>) {
-    if values.len() == from {
-        values.extend(terms);
+    if values.len() > from {
+        for (sum, term) in values[from..].iter_mut().zip(terms) {
+            *sum += term;
+        }
+    } else if T::DERIVATIVES {
+        // In a loop of its own, which keeps its instructions.
+        for term in terms {
+            values.push(term);
+        }
     } else {
-        values[from..].iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        values.extend(terms);
     }
 }
 

@@ -27,6 +27,7 @@ pub use formation::{Recording, WIDTH, run_together};
 pub use inputs::{InputError, Inputs, Signal};
 pub use integrator::{Event, EventKind, Integrator, RowState, Settings, Step};
 pub use known::Known;
+pub(crate) use lanes::{Task, dispatch};
 pub use march::BLOCK;
 pub use operators::MAX_SLIPPING;
 pub use sprint::{Samples, Sink, can_march};
