@@ -127,7 +127,7 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize, const W: us
 ) -> (usize, u32) {
     let mut room = room();
     let mut ends: Ends<L::Values, W> = [[L::Values::all(0.0); W]; MAX_INPUTS];
-    // No iterators in here: their bodies would be compiled apart, for the least of all processors.
+    // A loop: the body of `all` would be compiled apart, for the least of all processors.
     let mut loaded = true;
     for load in &op.loads {
         loaded &= load.stays_positive::<F>(source.bounds(load.input, (first, count)));
