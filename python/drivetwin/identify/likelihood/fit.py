@@ -23,21 +23,28 @@ GOOD = 1.03
 """Q per sample from which on no other start is tried."""
 SAME = 1e-3
 """Difference of Q per sample below which two starts have led to the same minimum."""
-RESTARTS: tuple[tuple[float, float], ...] = (
-    (1.0, 1.0),
-    (1.0, 0.7),
-    (1.0, 1.5),
-    (0.6, 1.0),
-    (1.6, 1.0),
-)
-"""Factors on shaft stiffness and friction level: what a wrong minimum hangs on."""
+RESTARTS = (1.0, 0.6, 1.6)
+"""Factors on shaft stiffness: a wrong minimum hangs on it, and on the level of friction, which the
+stages look for."""
 HOPELESS = 100.0
 """Q per sample after the stages above which the full fit is not tried."""
 DOUBTFUL = 3.0
-"""Q per sample after the stages above which every other start comes first: where the stages end
-well, input noise that they leave out makes it a little more than one."""
+"""Q per sample after the stages above which every other start comes first, and only the best of
+these is fitted: where the stages end well, input noise that they leave out makes it a little more
+than one."""
+ENOUGH = 2
+"""First starts after which no other is tried where none of them is promising: this driveline has no
+such log."""
 PLAUSIBLE = 2.0
 """Q per sample above which a minimum is taken for a wrong one."""
+_FAILED = (
+    "the simulation could not be brought onto the measurement",
+    "check ratios, clutch gains and P0 on the card against the log, or use the integral method",
+)
+
+
+class Hopeless(IdentificationError):
+    """No start leads anywhere near the measurement, whatever its signals are taken for."""
 
 
 @dataclass(frozen=True)
@@ -57,15 +64,20 @@ class LikelihoodFit:
 
 
 def fit(
-    problem: Problem, start: Point, shifts: Sequence[Shift], thorough: bool = True
+    problem: Problem,
+    start: Point,
+    shifts: Sequence[Shift],
+    thorough: bool = True,
+    restarts: Sequence[float] = RESTARTS,
 ) -> LikelihoodFit:
     """Fit from `start`: directly where it is near, by stages and from other starts where not.
 
-    Unless `thorough` the first plausible minimum is taken, good or not.
-    Raises IdentificationError where no minimum is plausible.
+    Unless `thorough` the first plausible minimum is taken, good or not. `restarts` are factors on
+    the shaft's stiffness, the first of them 1.
+    Raises IdentificationError where no minimum is plausible, Hopeless where none is near.
     """
     best: LikelihoodFit | None = None
-    for found in _told(_attempts(problem, start, shifts)):
+    for found in _told(_attempts(problem, start, shifts, restarts)):
         if found is None:
             continue
         if best is not None and abs(found.chi2 - best.chi2) < SAME:
@@ -75,11 +87,7 @@ def fit(
         if best.chi2 < GOOD or not thorough:
             return best
     if best is None:
-        raise IdentificationError(
-            "the simulation could not be brought onto the measurement",
-            "check ratios, clutch gains and P0 on the card against the log, or use the integral "
-            "method",
-        )
+        raise IdentificationError(*_FAILED)
     return best
 
 
@@ -97,29 +105,34 @@ def _told(attempts: Iterator[LikelihoodFit | None]) -> Iterator[LikelihoodFit | 
 
 
 def _attempts(
-    problem: Problem, start: Point, shifts: Sequence[Shift]
+    problem: Problem, start: Point, shifts: Sequence[Shift], restarts: Sequence[float]
 ) -> Iterator[LikelihoodFit | None]:
-    """Fits from `start` and from points beside it, the most promising first."""
-    restarts = RESTARTS
+    """Fits from `start` and from points beside it, the most promising first.
+
+    Raises Hopeless where the first of these show that none will do.
+    """
     if problem.cost(start) < NEAR * problem.size:
         direct = nearest(problem, start)
         yield direct
-        restarts = RESTARTS if direct is None else RESTARTS[:1]
+        restarts = restarts if direct is None else restarts[:1]
     doubtful: list[Found] = []
-    for shaft, friction in restarts:
-        factor = [
-            shaft if name == "k_o" else friction if name.endswith(".mu_c") else 1.0
-            for name in start.names
-        ]
+    promising = 0
+    for tried, shaft in enumerate(restarts, 1):
+        factor = [shaft if name == "k_o" else 1.0 for name in start.names]
         near = staged(problem, start.moved(start.values * np.array(factor)), shifts)
         if near is None or near.normal.cost > HOPELESS * problem.size:
             yield None
         elif near.normal.cost > DOUBTFUL * problem.size:
             doubtful.append(near)
         else:
+            promising += 1
             yield nearest(problem, near.point)
-    for near in sorted(doubtful, key=lambda one: one.normal.cost):
-        yield nearest(problem, near.point)
+        if tried == ENOUGH and promising == 0:
+            break
+    if promising == 0 and not doubtful and len(restarts) >= ENOUGH:
+        raise Hopeless(*_FAILED)
+    if doubtful:
+        yield nearest(problem, min(doubtful, key=lambda one: one.normal.cost).point)
 
 
 def nearest(problem: Problem, start: Point) -> LikelihoodFit | None:

@@ -251,15 +251,16 @@ class Problem:
         return replace(self, parts=tuple(part.with_expected_inputs(point) for part in self.parts))
 
     def cost(self, point: Point) -> float:
-        """Q; infinite where a simulation fails."""
+        """Q; infinite where a simulation fails, or where it is no number."""
         total = self.prior.cost(point.values)
         for part in self.parts:
             run = part.run(point)
             if run is None:
                 return float("inf")
             residual = part.residual(run)
-            total += float(residual @ part.weighting.weighted(residual))
-        return total
+            with np.errstate(over="ignore", invalid="ignore"):
+                total += float(residual @ part.weighting.weighted(residual))
+        return total if np.isfinite(total) else float("inf")
 
     def normal(self, point: Point) -> Normal | None:
         """Expansion of Q at `point`; None where a simulation fails."""
@@ -272,13 +273,14 @@ class Problem:
             if found is None:
                 return None
             residual, slopes = found
-            weighted = part.weighting.weighted(np.column_stack([residual, slopes]))
-            cost += float(residual @ weighted[:, 0])
-            gradient = gradient - slopes.T @ weighted[:, 0]
-            data += slopes.T @ weighted[:, 1:]
+            with np.errstate(over="ignore", invalid="ignore"):
+                weighted = part.weighting.weighted(np.column_stack([residual, slopes]))
+                cost += float(residual @ weighted[:, 0])
+                gradient = gradient - slopes.T @ weighted[:, 0]
+                data += slopes.T @ weighted[:, 1:]
             residuals.append(residual)
             regressors.append(weighted[:, 1:])
-        if not np.all(np.isfinite(data)):
+        if not (np.isfinite(cost) and np.all(np.isfinite(data))):
             return None
         data = 0.5 * (data + data.T)
         information = data + self.prior.precision

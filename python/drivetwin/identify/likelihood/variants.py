@@ -14,7 +14,7 @@ import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fit import GOOD, LikelihoodFit, fit
+from drivetwin.identify.likelihood.fit import GOOD, RESTARTS, Hopeless, LikelihoodFit, fit
 from drivetwin.identify.likelihood.kinds import in_words, likely_kinds, with_kinds
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
@@ -61,7 +61,7 @@ def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Like
     Raises IdentificationError where it does not converge with the likeliest kinds.
     """
     likely, other = likely_kinds(problem, start)
-    best = _tried(likely, start, shifts) or fit(other, start, shifts)
+    best = _tried(likely, start, shifts) or fit(other, start, shifts, restarts=RESTARTS[:1])
     best = with_kinds(problem, best)
     if best.chi2 < GOOD:
         return best
@@ -70,9 +70,14 @@ def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Like
 
 
 def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit | None:
-    """The first plausible minimum; None where there is none."""
+    """The first plausible minimum; None where there is none.
+
+    Raises Hopeless where none is near.
+    """
     try:
         return fit(problem, start, shifts, thorough=False)
+    except Hopeless:
+        raise
     except IdentificationError:
         return None
 
