@@ -10,7 +10,8 @@ import pytest
 
 from benchmarks.estimation.bench import Knowledge
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fit import fit
+from drivetwin.identify.likelihood import fit as fitting
+from drivetwin.identify.likelihood.fit import NEAR, Hopeless, fit
 from tests.identify.likelihood.made import bench, fitted, problem, truth_of
 
 DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -59,3 +60,19 @@ def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
     wrong = replace(part, structure=replace(part.structure, driveline=driveline))
     with pytest.raises(IdentificationError, match="could not be brought onto the measurement"):
         fit(replace(posed, parts=(wrong,)), start, [made.signals.shift])
+
+
+def test_two_starts_that_lead_nowhere_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = bench()
+    posed, start = problem(made)
+    seen = []
+    monkeypatch.setattr(fitting, "staged", lambda *given: seen.append(given))
+    heavy = [5.0 if name == "J_e" else 1.0 for name in start.names]
+    far = start.moved(start.values * np.array(heavy))
+    assert posed.cost(far) > NEAR * posed.size
+    with pytest.raises(Hopeless):
+        fit(posed, far, [made.signals.shift])
+    assert len(seen) == fitting.ENOUGH
+    with pytest.raises(IdentificationError) as one:
+        fit(posed, far, [made.signals.shift], restarts=fitting.RESTARTS[:1])
+    assert not isinstance(one.value, Hopeless)
