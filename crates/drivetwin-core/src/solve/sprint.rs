@@ -190,21 +190,18 @@ impl<T: Real> Integrator<'_, T> {
             return known.clone();
         }
         let laws = active.iter().map(|&j| Law::of(&self.network.channels[j], self.cells[j]));
-        let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| {
-            let built = match self.network.states() {
-                0..=4 => self.build::<4>(active, &laws, h).map(|o| AnySize::Four(Arc::new(o))),
-                5..=MAX_DERIVED => {
-                    self.build::<8>(active, &laws, h).map(|o| AnySize::Eight(Arc::new(o)))
-                }
-                9..=12 if !T::DERIVATIVES => {
-                    self.build::<12>(active, &laws, h).map(|o| AnySize::Twelve(Arc::new(o)))
-                }
-                13..=MAX_STATES if !T::DERIVATIVES => {
-                    self.build::<MAX_STATES>(active, &laws, h).map(|o| AnySize::Many(Arc::new(o)))
-                }
-                _ => None,
-            };
-            built
+        let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| match self.network.states() {
+            0..=4 => self.build::<4>(active, &laws, h).map(|o| AnySize::Four(Arc::new(o))),
+            5..=MAX_DERIVED => {
+                self.build::<8>(active, &laws, h).map(|o| AnySize::Eight(Arc::new(o)))
+            }
+            9..=12 if !T::DERIVATIVES => {
+                self.build::<12>(active, &laws, h).map(|o| AnySize::Twelve(Arc::new(o)))
+            }
+            13..=MAX_STATES if !T::DERIVATIVES => {
+                self.build::<MAX_STATES>(active, &laws, h).map(|o| AnySize::Many(Arc::new(o)))
+            }
+            _ => None,
         });
         self.known.operators.insert(key, built.clone());
         built
