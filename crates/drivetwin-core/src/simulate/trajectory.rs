@@ -8,7 +8,7 @@ use crate::network::channel::form;
 use crate::network::{Network, Row};
 use crate::number::Real;
 use crate::solve::{
-    Event, Integrator, Recording, RowState, Samples, Sink, Status, Step, Task, dispatch,
+    BLOCK, Event, Integrator, Recording, RowState, Samples, Sink, Status, Step, Task, dispatch,
 };
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -250,7 +250,7 @@ impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
 enum Picked {
     /// All: their number.
     All(usize),
-    /// Those whose bits are set.
+    /// Those whose bits are set, of [`BLOCK`].
     Some(u64),
 }
 
@@ -288,7 +288,8 @@ impl Picked {
         match *self {
             Self::All(count) => add(values, from, samples.take(count).map(scaled)),
             Self::Some(bits) => {
-                let picked = samples.enumerate().filter(|(k, _)| bits >> k & 1 == 1);
+                let passed = samples.take(BLOCK).enumerate();
+                let picked = passed.filter(|(k, _)| bits >> k & 1 == 1);
                 add(values, from, picked.map(|(_, value)| scaled(value)));
             }
         }
