@@ -265,12 +265,9 @@ impl<const N: usize> Formation<N> {
         let ended = run.segment == run.inputs.segments();
         if ended {
             let active = member.ready.take().map_or_else(Vec::new, |ready| ready.active);
-            let torque = |(place, _)| {
-                let slot: usize = self.places(&active)[place];
-                self.operators.channels[slot].law.sign.0[lane]
-                    * self.carry.value[slot].value.0[lane]
-            };
-            let torques = active.iter().enumerate().map(torque).collect();
+            let places = self.places(&active);
+            let torque = |&slot: &usize| self.carry.torque(&self.operators, slot).0[lane];
+            let torques = places[..active.len()].iter().map(torque).collect();
             let end = LastSample { x, torques };
             member.sink.passed(member.run, &active, &end, (member.run.segment, 1));
             member.run.segment -= 1;

@@ -91,7 +91,7 @@ impl<L: Lane, const N: usize> Trail<L, N> {
             self.states[i][k] = x[i];
         }
         for a in 0..A {
-            self.torques[a][k] = op.channels[a].law.sign * carry.value[a].value;
+            self.torques[a][k] = carry.torque(op, a);
         }
     }
 
@@ -206,8 +206,8 @@ impl<L: Lane, const N: usize> Operators<L, N> {
             torque = form.state[i].values().fma::<F>(x[i].values(), torque);
         }
         for a in 0..A {
-            let carried = self.channels[a].law.sign * carry.value[a].value;
-            torque = form.channels[a].values().fma::<F>(carried.values(), torque);
+            let carried = carry.torque(self, a).values();
+            torque = form.channels[a].values().fma::<F>(carried, torque);
         }
         [limit.line::<F>(sample)[0].values(), torque]
     }
@@ -321,6 +321,12 @@ impl<L: Lane, const A: usize> Carry<L, A> {
             near: [none; A],
             stiction: [none; A],
         }
+    }
+
+    /// Torque of channel `a`.
+    #[inline(always)]
+    pub fn torque<const N: usize>(&self, op: &Operators<L, N>, a: usize) -> L {
+        op.channels[a].law.sign * self.value[a].value
     }
 
     /// Everything at the start of a segment of length `h`.

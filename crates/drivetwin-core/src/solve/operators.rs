@@ -2,9 +2,9 @@
 //! Exact step operators of one mode over samples of equal length h.
 //!
 //! In one mode `x' = A x + B u + c + E φ`. Over a sample the inputs are linear and a channel φ is a
-//! cubic, the sum of [`SHAPES`] with the coefficients a, so that the state at the end, the argument of every
-//! channel there and its rate are linear in x, u, u', a. Channels count in their direction of motion:
-//! `τ = sign · φ` over `m = sign · s`.
+//! cubic, the sum of [`SHAPES`] with the coefficients a, so that the state at the end, the argument of
+//! every channel there and its rate are linear in x, u, u', a. Channels count in their direction of
+//! motion: `τ = sign · φ` over `m = sign · s`.
 
 use super::lanes::{Task, dispatch};
 use crate::network::smooth::{Law, Line};
@@ -105,8 +105,8 @@ pub struct Carried<L, const N: usize> {
     pub law: Law<L>,
 }
 
-/// A guard, over the torques of the carried channels: `limit(u) - |form|` where both signs are bounded, else `limit(u) + form`. In lanes that do not
-/// watch it the limit is 1 and the form 0.
+/// A guard, over the torques of the carried channels: `limit(u) - |form|` where both signs are bounded,
+/// else `limit(u) + form`. In lanes that do not watch it the limit is 1 and the form 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<L, const N: usize> {
     /// Torque or speed.
