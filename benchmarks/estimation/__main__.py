@@ -88,7 +88,7 @@ def _commit() -> str:
 
 def _git(*words: str) -> str:
     found = subprocess.run(
-        ["git", *words], cwd=PAGE.parent, check=True, capture_output=True, text=True
+        ["git", *words], cwd=PAGE.parents[1], check=True, capture_output=True, text=True
     )
     return found.stdout.strip()
 

@@ -23,6 +23,8 @@ from drivetwin.vehicle.schema import BAR
 GEARS = (HeldGear("2", "B2"), HeldGear("3", "B3"))
 SHIFT, FILL, MAIN = 3.5, 0.2, 1.5e6
 """Start of the shift and length of the fill [s], pressure of a held element [Pa]."""
+HANDOVER, SLIPPING = 0.18, 1.0
+"""Length of the torque phase and, at most, of the inertia phase [s]."""
 TAIL = 1.8
 """Time from lock-up to the end of the log [s]."""
 PEDALS = (0, 3, 7, 11)
@@ -58,7 +60,7 @@ def vehicle(seed: int) -> Vehicle:
         name=f"vehicle {seed}",
         model=model,
         gears=GEARS,
-        duration=round(SHIFT + FILL + shift.handover + shift.slipping + TAIL, 1),
+        duration=round(SHIFT + FILL + HANDOVER + SLIPPING + TAIL, 1),
         engine_speed=speed,
         engine_torque=_pedal(rng, torque),
         actuators=shift.actuators(),
@@ -123,16 +125,6 @@ class _Shift:
     speed: float
     rng: np.random.Generator
 
-    @property
-    def handover(self) -> float:
-        """Length of the torque phase [s]."""
-        return 0.18
-
-    @property
-    def slipping(self) -> float:
-        """Length at most of the inertia phase [s]."""
-        return 1.0
-
     def actuators(self) -> dict[str, Actuator]:
         """Both brakes: the one vents while the other takes the torque, and a part of J' with it."""
         going, coming = self.model.elements
@@ -141,9 +133,9 @@ class _Shift:
         more = self.model.J1 * fall / length
         level = coming.P0 + (self.torque + more) * coming.i_c / (coming.gain * self._mu(coming))
         holding = going.P0 + 1.3 * self.torque * going.i_c / (going.gain * self._mu(going))
-        start, hand = SHIFT + FILL, self.handover
+        start, hand = SHIFT + FILL, HANDOVER
         off = Program(((start - 0.06, MAIN), (start, holding), (start + hand, 0.0)))
-        kiss, end = 0.95 * coming.P0, start + hand + self.slipping
+        kiss, end = 0.95 * coming.P0, start + hand + SLIPPING
         on = Program(
             (
                 (SHIFT, 0.0), (SHIFT + 0.02, kiss), (start, kiss), (start + hand, level),
