@@ -99,7 +99,7 @@ def truth_of(bench: Bench) -> dict[str, float]:
 
 def told(fit: LikelihoodFit, bench: Bench) -> dict[str, tuple[float, float]]:
     """Value and standard deviation of every parameter of a fit."""
-    return _with_std(fit.problem, fit.point, fit.covariance, bench)
+    return _with_std(fit.problem, fit.mean, fit.covariance, bench)
 
 
 def bounds_of(scenario: Scenario, know: Knowledge) -> dict[str, float]:

@@ -83,7 +83,7 @@ def _posterior(found: Identification, element: str) -> tuple[FloatArray, FloatAr
         if not set(wanted) <= set(fit.point.names):
             return None
         place = [fit.point.names.index(name) for name in wanted]
-        return fit.point.values[place], fit.covariance[np.ix_(place, place)]
+        return fit.mean.values[place], fit.covariance[np.ix_(place, place)]
     for shift in found.evidence.get("integral", ()):
         if shift.friction is not None and shift.friction.element == element:
             size = _LAW_SIZE + 1

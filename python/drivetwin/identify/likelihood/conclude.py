@@ -53,8 +53,8 @@ def conclude(
     systematic = sum(
         (np.outer(shift, shift) for shift in shifts.values()), np.zeros_like(fit.covariance)
     )
-    values = parameters(fit.problem, fit.point, signals)
-    matrix = slopes(fit.problem, fit.point, np.sqrt(np.diag(fit.covariance)), signals)
+    values = parameters(fit.problem, fit.mean, signals)
+    matrix = slopes(fit.problem, fit.mean, np.sqrt(np.diag(fit.covariance)), signals)
     covariance = matrix @ fit.covariance @ matrix.T
     spread = _systematic(matrix, systematic) if shifts else {}
     notes = low_gear_notes(signals)
@@ -96,7 +96,7 @@ def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
     k, part = fit.point.names.index(AERO), fit.problem.parts[0]
     std = float(np.sqrt(fit.covariance[k, k] + systematic[k, k]))
     mean_speed = part.structure.mean_speed
-    return LoadLaw(fit.point[AERO], std, mean_speed, over_eta=not part.scale_known)
+    return LoadLaw(fit.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
 
 
 def _estimate(

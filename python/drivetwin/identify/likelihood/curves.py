@@ -37,7 +37,7 @@ def curves_of(
             continue
         base = linear.get(name) or _seen(fit, part, name)
         index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
-        theta, square = fit.point.values[index], np.ix_(index, index)
+        theta, square = fit.mean.values[index], np.ix_(index, index)
         mu, slopes = stribeck(theta, base.slip)
         total = (fit.covariance + systematic)[square]
         half = 1.96 * np.sqrt(np.einsum("pn,pq,qn->n", slopes, total, slopes))

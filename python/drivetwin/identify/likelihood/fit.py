@@ -49,14 +49,16 @@ class Hopeless(IdentificationError):
 
 @dataclass(frozen=True)
 class LikelihoodFit:
-    """The minimum of Q: `point` with `covariance` (p, p), both of the unknowns of the fit.
+    """The minimum of Q at `point`, and what is told of the unknowns: `mean`, `covariance` (p, p).
 
+    `mean` is the minimum, or the average with minima that the log hardly tells from it (kinds.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
     the expansion of Q there. The covariance is widened where chi2 exceeds 1.
     """
 
     problem: Problem
     point: Point
+    mean: Point
     covariance: FloatArray
     normal: Normal
     chi2: float
@@ -153,7 +155,8 @@ def nearest(problem: Problem, start: Point) -> LikelihoodFit | None:
         return None
     covariance = max(chi2, 1.0) * covariance_of(found.normal.information)
     iterations += found.iterations
-    return LikelihoodFit(found.problem, found.point, covariance, found.normal, chi2, iterations)
+    point = found.point
+    return LikelihoodFit(found.problem, point, point, covariance, found.normal, chi2, iterations)
 
 
 def covariance_of(matrix: FloatArray) -> FloatArray:

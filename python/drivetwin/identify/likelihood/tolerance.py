@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.signals import FloatArray
 from drivetwin.vehicle.spec import SensorTolerance
@@ -25,6 +25,7 @@ def sensor_shifts(
     Keys are `<role> gain` and `<role> offset`; a sensor that the fit does not use has none.
     """
     found = {}
+    follows = covariance_of(fit.normal.information)
     for role, tolerance in tolerances.items():
         for kind, size in (("gain", tolerance.gain), ("offset", tolerance.offset)):
             if size == 0.0:
@@ -35,7 +36,7 @@ def sensor_shifts(
                 if error is not None:
                     pull += regressors.T @ error
             if np.any(pull):
-                found[f"{role} {kind}"] = size * (fit.covariance @ pull) / max(fit.chi2, 1.0)
+                found[f"{role} {kind}"] = size * (follows @ pull)
     return found
 
 

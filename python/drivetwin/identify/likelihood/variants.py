@@ -15,7 +15,7 @@ import numpy as np
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.fit import GOOD, RESTARTS, Hopeless, LikelihoodFit, fit
-from drivetwin.identify.likelihood.kinds import in_words, likely_kinds, with_kinds
+from drivetwin.identify.likelihood.kinds import averaged, in_words, likely_kinds, with_kinds
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
@@ -52,7 +52,8 @@ def choose(
             problem, start = problem_of(signals, drivelines, loss_law, guess)
             problem = problem.of_kinds(best.problem.kinds)
             best = fit(problem, _taken(start, best.point), shifts)
-    return best, (*notes, *in_words(best.problem.kinds))
+    best, doubts = averaged(best)
+    return best, (*notes, *in_words(best.problem.kinds), *doubts)
 
 
 def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:

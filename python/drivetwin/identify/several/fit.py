@@ -196,7 +196,7 @@ def _shared(fit: LikelihoodFit) -> _Told:
     starts = {f"{part.structure.label}.{key}" for part in fit.problem.parts for key in START}
     keep = [k for k, name in enumerate(fit.point.names) if name not in {*starts, *OWN, AERO}]
     names = [fit.point.names[k] for k in keep]
-    return names, fit.point.values[keep], covariance_of(fit.covariance[np.ix_(keep, keep)])
+    return names, fit.mean.values[keep], covariance_of(fit.covariance[np.ix_(keep, keep)])
 
 
 def _mean(told: Sequence[_Told]) -> dict[str, float]:
