@@ -6,12 +6,12 @@ use super::operators::{Carried, Form, Operators, SHAPES, StepForm};
 use crate::network::smooth::{Law, Sample, Value};
 use crate::number::{Lane, Values};
 
-/// Largest cubic part of a channel over a sample, relative to its size.
+/// Largest cubic part of a channel over a sample, relative to the largest of all.
 const MAX_CUBIC: f64 = 2e-4;
 /// Largest distance over which stiction is moved by its series, relative to its decay.
 const MAX_MOVE: f64 = 0.05;
-/// Largest change of a channel by the correction, relative to its size.
-const MAX_CORRECTION: f64 = 1e-6;
+/// Largest change of a channel by the correction, likewise.
+const MAX_CORRECTION: f64 = 4e-6;
 
 /// Places among the shapes of what raises the value and the slope at the end.
 const VALUE: usize = 3;
@@ -188,6 +188,11 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             missing[a][SLOPE] = v.by_argument.times(h).fma::<F>(ds, drift - (a1 + a2 + a2));
         }
         add_moments::<L, F, N, A, VALUE, SHAPES>(op, &missing, &mut self.end);
+        let mut size = L::Values::all(0.0);
+        for a in 0..A {
+            size = size.larger(carry.value[a].value.values().magnitude());
+        }
+        size = size + L::Values::all(1.0);
         let before = (carry.argument, carry.rate);
         for a in 0..A {
             let Carried { argument_end, rate_end, .. } = &channels[a];
@@ -196,7 +201,6 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let rate = self.rate[a];
             self.rate[a] = over_cubics::<L, F, N, A, VALUE, SHAPES>(rate_end, &missing, rate);
             let corrected = self.value[a].moved::<F>(ds);
-            let size = carry.value[a].value.values().magnitude() + L::Values::all(1.0);
             let correction = (corrected.value - self.value[a].value).values().magnitude();
             let [.., value, slope] = missing[a];
             let cubic = (slope - (value + value)).values().magnitude();
