@@ -120,7 +120,7 @@ def bounds_of(scenario: Scenario, know: Knowledge) -> dict[str, float]:
     bench = replace(clean, driveline=driveline)
     law = scenario.model.loss_law
     problem, start = problem_of([bench.signals], [driveline], law, guess_from_truth(bench))
-    truth = _at_truth(problem, start, bench)
+    truth = at_truth(problem, start, bench)
     covariance = bound(bench, problem.parts[0], truth, problem.prior)
     found = _with_std(problem, truth, covariance, bench)
     return {name: std for name, (_, std) in found.items()}
@@ -148,7 +148,7 @@ def guess_from_truth(bench: Bench) -> dict[str, float]:
     return values
 
 
-def _at_truth(problem: Problem, start: Point, bench: Bench) -> Point:
+def at_truth(problem: Problem, start: Point, bench: Bench) -> Point:
     """The point of the truth, its start state included."""
     run, time = bench.run.trajectory, problem.parts[0].record.time[0]
     k = int(np.searchsorted(run.time, time))

@@ -6,12 +6,13 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.estimation.vehicles import vehicle
+from benchmarks.estimation.unseen_bound import bounds_of, mu_name, slips_of
+from benchmarks.estimation.vehicles import sensor_errors, vehicle, with_tolerances
 from drivetwin.cli.synth import write_run
 from drivetwin.driveline import Stribeck
 from drivetwin.dyno.dyno import DynoRun, run
@@ -19,6 +20,8 @@ from drivetwin.errors import DrivetwinError
 from drivetwin.identify.method import DEFAULT_METHOD
 from drivetwin.identify.pipeline import identify
 from drivetwin.identify.result import Identification
+from drivetwin.identify.signals import FloatArray
+from drivetwin.identify.uncertainty import DELAY_IDENTIFIED
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.find import find_shifts
 from drivetwin.vehicle.card import load_card
@@ -26,17 +29,24 @@ from drivetwin.vehicle.card import load_card
 HALF = 1.96
 """Half width of a 95 % interval in standard deviations."""
 OVER_ETA = "_over_eta"
-MU_PLACES = (0.1, 0.5, 0.9)
-"""Where in the slip range of a curve its band is compared."""
+LIMIT = 4.0 * DELAY_IDENTIFIED
+"""Half width of the interval of a delay [s] from which it is refused; others at their value."""
+CLEAR = 0.5
+"""Share of that limit below which a half width by the bound counts as clear of it."""
 
 
 @dataclass(frozen=True)
 class Told:
-    """What one log told: errors over stated standard deviations by parameter, what it refused, and
+    """What one log told, by parameter: errors over stated standard deviations, also where its
+    sensors have errors within the card's tolerances (`misread`), and stated standard deviations
+    from noise over their bound (`widths`); what it refused, what of that could have been told, and
     what failed in words, if anything."""
 
     deviates: Mapping[str, float]
+    misread: Mapping[str, float]
+    widths: Mapping[str, float]
     refused: tuple[str, ...]
+    needlessly: tuple[str, ...]
     failure: str = ""
 
 
@@ -50,55 +60,94 @@ def told_of(seed: int) -> Told:
     """One vehicle: recorded, written, read, its shift found, identified by the default method."""
     made = vehicle(seed)
     recorded = run(made.scenario, seed)
+    try:
+        found = _identified(recorded, made.card)
+        card = with_tolerances(made.card, made.scenario)
+        misread = _identified(_misread(recorded, seed), card)
+    except DrivetwinError as fault:
+        return Told({}, {}, {}, (), (), fault.what)
+    for one in (found, misread):
+        if one.method is not DEFAULT_METHOD:
+            return Told({}, {}, {}, (), (), one.warnings[0])
+    least = bounds_of(found, recorded)
+    refused = [one.id for one in found.estimates.values() if one.value is None]
+    return Told(
+        _deviates(found, recorded),
+        _deviates(misread, recorded),
+        {_plain(name): stated / bound for name, (stated, bound) in least.items() if bound > 0.0},
+        tuple(refused),
+        tuple(name for name in refused if _tellable(name, found, recorded, least)),
+    )
+
+
+def _identified(recorded: DynoRun, card_text: str) -> Identification:
     with tempfile.TemporaryDirectory() as folder:
         file, card_file, _ = write_run(Path(folder) / "log.csv", recorded)
-        card_file.write_text(made.card, encoding="utf-8")
-        try:
-            card = load_card(card_file)
-            log = read_log(file, card)
-            found = identify(log, card, find_shifts(log, card))
-        except DrivetwinError as fault:
-            return Told({}, (), fault.what)
-    failure = "" if found.method is DEFAULT_METHOD else found.warnings[0]
-    refused = [one.id for one in found.estimates.values() if one.value is None]
-    return Told(_deviates(found, recorded), tuple(refused), failure)
+        card_file.write_text(card_text, encoding="utf-8")
+        card = load_card(card_file)
+        log = read_log(file, card)
+        return identify(log, card, find_shifts(log, card))
+
+
+def _misread(recorded: DynoRun, seed: int) -> DynoRun:
+    """The same run as read by sensors with errors of gain and offset."""
+    errors = sensor_errors(seed, recorded.scenario)
+    channels = []
+    for channel in recorded.channels:
+        gain, offset = errors.get(channel.role, (0.0, 0.0))
+        channels.append(replace(channel, values=(1.0 + gain) * channel.values + offset))
+    return replace(recorded, channels=tuple(channels))
+
+
+def _tellable(
+    name: str,
+    found: Identification,
+    recorded: DynoRun,
+    least: Mapping[str, tuple[float, float]],
+) -> bool:
+    """Whether the bound leaves a refused parameter well below what is refused for its width."""
+    if name not in least:
+        return False
+    value = LIMIT if name == "te_delay" else abs(_true(name, found, recorded))
+    return 0.0 < HALF * least[name][1] < CLEAR * value
 
 
 def _deviates(found: Identification, recorded: DynoRun) -> dict[str, float]:
-    truth, eta = _truth(found, recorded), recorded.scenario.model.eta
-    scale = 1.0 if found.estimates["eta"].value is not None else eta
+    scale = 1.0 if found.estimates["eta"].value is not None else recorded.scenario.model.eta
     deviates = {}
     for name, one in found.estimates.items():
-        if one.value is None or not one.std_total:
-            continue
-        true = truth[name.removesuffix(OVER_ETA)]
-        true = true / eta if name.endswith(OVER_ETA) else true
-        deviates[name.removesuffix(OVER_ETA)] = (one.value - true) / one.std_total
+        if one.value is not None and one.std_total:
+            error = one.value - _true(name, found, recorded)
+            deviates[_plain(name)] = error / one.std_total
     for name, curve in found.friction.items():
         law = recorded.truth.friction[name]
         assert isinstance(law, Stribeck)
-        for place in MU_PLACES:
-            k = int(place * (curve.slip.size - 1))
-            std = (curve.mu_hi[k] - curve.mu_lo[k]) / (2.0 * HALF)
-            true = float(law.at(curve.slip[k : k + 1])[0]) / scale
-            deviates[f"mu at {100 * place:.0f} % of the slip"] = (curve.mu[k] - true) / std
+        slips = slips_of(curve)
+        mu, low, high = (
+            np.interp(slips, curve.slip, one) for one in (curve.mu, curve.mu_lo, curve.mu_hi)
+        )
+        far = (mu - law.at(slips) / scale) / ((high - low) / (2.0 * HALF))
+        deviates |= {mu_name(k): float(z) for k, z in enumerate(far)}
     return deviates
 
 
-def _truth(found: Identification, recorded: DynoRun) -> dict[str, float]:
-    """Truth by id, the load at the speed for which it is told."""
+def _true(name: str, found: Identification, recorded: DynoRun) -> float:
+    """Truth of a parameter by its id, the load at the speed for which it is told."""
     model = recorded.scenario.model
     drums = {f"drum.{one.name}": one.drum_inertia for one in model.elements}
     truth = {**recorded.truth.parameters, **drums}
     if found.load is not None:
         truth["Tv_over_if"] += model.load.aero * found.load.mean_speed**2 / model.i_f
-    return truth
+    true = truth[_plain(name)]
+    return true / model.eta if name.endswith(OVER_ETA) else true
 
 
-def by_parameter(logs: Sequence[Told]) -> dict[str, np.ndarray[tuple[int], np.dtype[np.float64]]]:
-    """Deviates (n,) of all logs by parameter."""
-    names = dict.fromkeys(name for log in logs for name in log.deviates)
-    return {
-        name: np.array([log.deviates[name] for log in logs if name in log.deviates])
-        for name in names
-    }
+def _plain(name: str) -> str:
+    """Id without what says that it is over η."""
+    return name.removesuffix(OVER_ETA)
+
+
+def by_parameter(logs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
+    """What each of the logs says (n,), by parameter."""
+    names = dict.fromkeys(name for log in logs for name in log)
+    return {name: np.array([log[name] for log in logs if name in log]) for name in names}

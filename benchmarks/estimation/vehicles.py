@@ -38,6 +38,10 @@ LOGGERS = (
     (100.0, 500.0, 500.0),
 )
 """Rates [Hz] of speeds, pressures and output torque."""
+TORQUES = {"engine_torque": (0.02, 5.0), "output_torque": (0.01, 20.0)}
+"""Standard deviations of gain and offset [N m] of the torque sensors."""
+PRESSURE = (0.005, 2e3)
+"""Those of every pressure sensor, the offset in Pa."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,30 @@ def vehicle(seed: int) -> Vehicle:
         reductions=(),
     )
     return Vehicle(drive, _card(rng, drive))
+
+
+def sensor_errors(seed: int, scenario: Scenario) -> dict[str, tuple[float, float]]:
+    """Gain and offset errors of the sensors of `seed` by role, drawn from their tolerances."""
+    rng = np.random.default_rng([seed, 78])
+    roles = (sensor.role for sensor in scenario.sensors)
+    stated = {role: TORQUES.get(role, PRESSURE) for role in roles if not role.endswith("speed")}
+    return {
+        role: (gain * float(rng.standard_normal()), offset * float(rng.standard_normal()))
+        for role, (gain, offset) in stated.items()
+    }
+
+
+def with_tolerances(text: str, scenario: Scenario) -> str:
+    """The card `text` with the tolerances that sensor errors are drawn from."""
+    card = tomlkit.parse(text).unwrap()
+    card["sensors"] = {
+        role: {"gain_tolerance": gain, "offset_tolerance_Nm": offset}
+        for role, (gain, offset) in TORQUES.items()
+    }
+    gain, offset = PRESSURE
+    stated = {"gain_tolerance": gain, "offset_tolerance_bar": offset / BAR}
+    card["sensors"]["pressure"] = {one.name: stated for one in scenario.model.elements}
+    return tomlkit.dumps(card)
 
 
 def _range(rng: np.random.Generator, value: float) -> tuple[float, float]:

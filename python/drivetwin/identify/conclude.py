@@ -74,9 +74,10 @@ def conclude(
         if (instead := _impossible(name, value, prior)) is not None:
             estimates[name] = instead
         elif prior is not None and noise >= PRIOR_SHARE * prior.std:
-            known = prior.std == 0.0
-            estimates[name] = designed(
-                name, value, 0.0 if known else noise, KNOWN if known else ADDS_LITTLE
+            estimates[name] = (
+                designed(name, value, 0.0, KNOWN)
+                if prior.std == 0.0
+                else designed(name, value, noise, ADDS_LITTLE, systematic.get(name))
             )
         else:
             estimates[name] = judge(

@@ -79,9 +79,15 @@ def judge(
     return Estimate(parameter_id, value, std_noise, verdict, method, std_systematic, text)
 
 
-def designed(parameter_id: str, value: float, std: float, note: str) -> Estimate:
-    """A value that the vehicle card states and the log adds nothing to; `std` 0: known."""
-    return Estimate(parameter_id, value, std, Verdict.DESIGN, "card", reason=note)
+def designed(
+    parameter_id: str, value: float, std: float, note: str, std_systematic: float | None = None
+) -> Estimate:
+    """A value that the vehicle card states and the log adds little to; `std` 0: known.
+
+    What the log adds is as wrong as its sensors: `std_systematic`, where their tolerances are
+    stated.
+    """
+    return Estimate(parameter_id, value, std, Verdict.DESIGN, "card", std_systematic, note)
 
 
 def refused(parameter_id: str, method: str, why: str) -> Estimate:

@@ -105,8 +105,9 @@ def _estimate(
     """Verdict on (id, value, standard deviation from noise)."""
     name, value, std = told
     if design is not None and (design.std == 0.0 or std >= PRIOR_SHARE * design.std):
-        known = design.std == 0.0
-        return designed(name, value, 0.0 if known else std, KNOWN if known else ADDS_LITTLE)
+        if design.std == 0.0:
+            return designed(name, value, 0.0, KNOWN)
+        return designed(name, value, std, ADDS_LITTLE, systematic)
     method = METHOD if design is None else WITH_PRIOR
     return judge(name, value, std, method, systematic, note)
 
@@ -126,7 +127,7 @@ def _without_scale(name: str, eta: PriorValue | None, ratio: Estimate | None) ->
     spread = float(np.hypot(eta.value * (ratio.std_systematic or 0.0), eta.std * ratio.value))
     value, noise = eta.value * ratio.value, eta.value * ratio.std_noise
     if ratio.verdict is Verdict.DESIGN:
-        return replace(ratio, id=name, value=value, std_noise=float(np.hypot(noise, spread)))
+        return replace(ratio, id=name, value=value, std_noise=noise, std_systematic=spread)
     return judge(name, value, noise, WITH_ETA, spread, ratio.reason)
 
 

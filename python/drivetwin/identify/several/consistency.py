@@ -24,7 +24,7 @@ from scipy.stats import chi2
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.friction import stribeck
 from drivetwin.identify.likelihood.derived import parameters, slopes
-from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.null_space import reduced
 from drivetwin.identify.likelihood.unknowns import LAW, START, own_of
 from drivetwin.identify.regression import Prior
@@ -99,7 +99,8 @@ def consistency(
     """Test the logs of `fit` against each other; `signals` as fitted, in the order of its parts."""
     logs = tuple(dict.fromkeys(s.log for s in signals))
     shared = shared_of(fit)
-    root = _root(fit.covariance[np.ix_(shared, shared)] / max(fit.chi2, 1.0))
+    covariance = covariance_of(fit.normal.information)
+    root = _root(covariance[np.ix_(shared, shared)])
     pulls = [_pull(fit, log, shared, root) for log in logs]
     square, freedom = homogeneity(pulls)
     square /= max(fit.chi2, 1.0)

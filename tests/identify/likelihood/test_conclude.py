@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""What is concluded from a fit where the card's design values and tolerances matter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.estimation.bench import Knowledge
+from drivetwin.identify.inputs import disturbed
+from drivetwin.identify.likelihood.conclude import conclude
+from drivetwin.identify.likelihood.fit import nearest
+from drivetwin.identify.result import Estimate, Verdict
+from drivetwin.vehicle.spec import SensorTolerance
+from tests.identify.likelihood.made import bench, problem
+
+CLOSE = Knowledge(J_out=0.02)
+"""A card that knows Jo′ better than the log does."""
+OFFSET = 50.0
+"""Error of the output torque [N m], one standard deviation of its tolerance."""
+
+
+def _inertia(offset: float) -> Estimate:
+    made = bench(know=CLOSE)
+    signals = disturbed(made.signals, "output_torque", 0.0, offset)
+    posed, start = problem(replace(made, signals=signals))
+    fit = nearest(posed, start)
+    assert fit is not None
+    tolerances = {"output_torque": SensorTolerance(offset=OFFSET)}
+    return conclude(fit, [signals], [made.driveline], {}, tolerances).estimates["J_out"]
+
+
+def test_a_design_value_that_the_log_moves_is_as_wrong_as_its_sensors() -> None:
+    sound, moved = _inertia(0.0), _inertia(OFFSET)
+    assert sound.verdict is moved.verdict is Verdict.DESIGN
+    assert sound.value is not None
+    assert moved.value is not None
+    assert sound.std_noise is not None
+    assert sound.std_systematic is not None
+    assert sound.std_total == pytest.approx(np.hypot(sound.std_noise, sound.std_systematic))
+    assert abs(moved.value - sound.value) == pytest.approx(sound.std_systematic, rel=0.1)
+    assert sound.std_systematic > 0.5 * sound.std_noise
