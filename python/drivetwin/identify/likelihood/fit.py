@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from drivetwin.identify.likelihood.newton import Found, minimise
 from drivetwin.identify.likelihood.output_error import staged
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.likelihood.work import OutOfWork
 from drivetwin.identify.signals import FloatArray
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
@@ -26,8 +27,6 @@ SAME = 1e-3
 RESTARTS = (1.0, 0.6, 1.6)
 """Factors on shaft stiffness: a wrong minimum hangs on it, and on the level of friction, which the
 stages look for."""
-HOPELESS = 100.0
-"""Q per sample after the stages above which the full fit is not tried."""
 DOUBTFUL = 3.0
 """Q per sample after the stages above which every other start comes first, and only the best of
 these is fitted: where the stages end well, input noise that they leave out makes it a little more
@@ -37,6 +36,8 @@ ENOUGH = 2
 such log."""
 PLAUSIBLE = 2.0
 """Q per sample above which a minimum is taken for a wrong one."""
+FAR = 2.0 * PLAUSIBLE
+"""Q per sample from which no search with input noise has come down to a plausible one."""
 _FAILED = (
     "the simulation could not be brought onto the measurement",
     "check ratios, clutch gains and P0 on the card against the log, or use the integral method",
@@ -78,18 +79,38 @@ def fit(
     the shaft's stiffness, the first of them 1.
     Raises IdentificationError where no minimum is plausible, Hopeless where none is near.
     """
-    best: LikelihoodFit | None = None
-    for found in _told(_attempts(problem, start, shifts, restarts)):
-        if found is None:
-            continue
-        if best is not None and abs(found.chi2 - best.chi2) < SAME:
-            return min(best, found, key=lambda one: one.chi2)
-        if best is None or found.chi2 < best.chi2:
-            best = found
-        if best.chi2 < GOOD or not thorough:
-            return best
+    best = _best_of(_attempts(problem, start, shifts, restarts), thorough=thorough)
     if best is None:
         raise IdentificationError(*_FAILED)
+    return best
+
+
+def checked(
+    known: LikelihoodFit, problem: Problem, start: Point, shifts: Sequence[Shift]
+) -> LikelihoodFit:
+    """The fit that is `known`, or a better one, by starts other than the one that led to it."""
+    return _best_of(_other_attempts(problem, start, shifts), known) or known
+
+
+def _best_of(
+    attempts: Iterator[LikelihoodFit | None],
+    best: LikelihoodFit | None = None,
+    thorough: bool = True,
+) -> LikelihoodFit | None:
+    """The best of the attempts and of what is known: a good one, or one that is found twice."""
+    try:
+        for found in _told(attempts):
+            if found is None:
+                continue
+            if best is not None and abs(found.chi2 - best.chi2) < SAME:
+                return min(best, found, key=lambda one: one.chi2)
+            if best is None or found.chi2 < best.chi2:
+                best = found
+            if best.chi2 < GOOD or not thorough:
+                return best
+    except OutOfWork:
+        if best is None:
+            raise
     return best
 
 
@@ -117,12 +138,29 @@ def _attempts(
         direct = nearest(problem, start)
         yield direct
         restarts = restarts if direct is None else restarts[:1]
+    led = yield from _by_stages(problem, start, shifts, restarts)
+    if not led and len(restarts) >= ENOUGH:
+        raise Hopeless(*_FAILED)
+
+
+def _other_attempts(
+    problem: Problem, start: Point, shifts: Sequence[Shift]
+) -> Iterator[LikelihoodFit | None]:
+    """Fits by stages; not the first where that is what `_attempts` began with."""
+    near = problem.cost(start) < NEAR * problem.size
+    yield from _by_stages(problem, start, shifts, RESTARTS[:1] if near else RESTARTS[1:])
+
+
+def _by_stages(
+    problem: Problem, start: Point, shifts: Sequence[Shift], restarts: Sequence[float]
+) -> Generator[LikelihoodFit | None, None, bool]:
+    """Fits from where stages lead; whether any of them came near the measurement."""
     doubtful: list[Found] = []
     promising = 0
     for tried, shaft in enumerate(restarts, 1):
         factor = [shaft if name == "k_o" else 1.0 for name in start.names]
         near = staged(problem, start.moved(start.values * np.array(factor)), shifts)
-        if near is None or near.normal.cost > HOPELESS * problem.size:
+        if near is None:
             yield None
         elif near.normal.cost > DOUBTFUL * problem.size:
             doubtful.append(near)
@@ -131,23 +169,23 @@ def _attempts(
             yield nearest(problem, near.point)
         if tried == ENOUGH and promising == 0:
             break
-    if promising == 0 and not doubtful and len(restarts) >= ENOUGH:
-        raise Hopeless(*_FAILED)
     if doubtful:
         yield nearest(problem, min(doubtful, key=lambda one: one.normal.cost).point)
+    return promising > 0 or bool(doubtful)
 
 
-def nearest(problem: Problem, start: Point) -> LikelihoodFit | None:
-    """Minimum of Q with input noise.
+def nearest(problem: Problem, start: Point, most: float = FAR) -> LikelihoodFit | None:
+    """Minimum of Q with input noise; None where Q per sample stays above `most`.
 
     First with the inputs as measured, the weighting following the point; then from there with the
     inputs expected at that minimum. Formed elsewhere they would explain a wrong model away.
     """
-    found = minimise(problem, start, lambda _, point: problem.weighted_by(point))
-    if found is None:
+    limit = most * problem.size
+    found = minimise(problem, start, lambda _, point: problem.weighted_by(point), limit=limit)
+    if found is None or found.normal.cost > limit:
         return None
     iterations = found.iterations
-    found = minimise(found.problem.with_expected_inputs(found.point), found.point)
+    found = minimise(found.problem.with_expected_inputs(found.point), found.point, limit=limit)
     if found is None or not found.converged:
         return None
     chi2 = (found.normal.cost - problem.prior.cost(found.point.values)) / problem.size

@@ -20,6 +20,7 @@ from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.problem import Normal, Part, Problem
 from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
 from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.likelihood.work import OutOfWork
 from drivetwin.identify.signals import FloatArray
 
 SIGNALS = (*OUTPUTS, TORQUE)
@@ -32,6 +33,8 @@ UNSURE = (
     "the log hardly tells whether samples show an instant or the time since the sample before, "
     "values and intervals allow for both: {}"
 )
+WORSE = 1.1
+"""Q per sample, as a factor, from which on other kinds are surely no better."""
 ROUNDS = 3
 """Most changes of kind: far off, the expansion promises the way, not the end of it."""
 
@@ -56,10 +59,18 @@ def with_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
     which it is: there the other kind of speeds is tried.
     """
 
+    tried = {best.problem.kinds}
+
     def better_of(one: LikelihoodFit, kinds: frozenset[str]) -> LikelihoodFit:
-        if kinds == one.problem.kinds:
+        if kinds in tried:
             return one
-        other = nearest(problem.of_kinds(kinds), one.point)
+        tried.add(kinds)
+        try:
+            other = nearest(
+                problem.of_kinds(kinds), one.point, WORSE * one.normal.cost / problem.size
+            )
+        except OutOfWork:
+            return one
         return one if other is None or left(other) >= left(one) else other
 
     def left(one: LikelihoodFit) -> float:

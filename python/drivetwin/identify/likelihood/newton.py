@@ -42,6 +42,9 @@ LARGEST = 1e8
 MAX_STEPS = 40
 ROUGH_STEPS = 20
 """Steps after which a rough search ends: one that crawls prepares nothing."""
+FAR_STEPS = 8
+"""Steps after which a search ends whose Q is above what is asked for: by then those that come in
+from far off have not only come near but ended."""
 REFRESHES = 3
 """Least number of points at which Q is formed anew: near the minimum it settles in two."""
 CLOSE = 10.0
@@ -85,13 +88,17 @@ def unchanged(problem: Problem, _: Point) -> Problem:
 
 
 def minimise(
-    problem: Problem, start: Point, refresh: Refresh = unchanged, rough: bool = False
+    problem: Problem,
+    start: Point,
+    refresh: Refresh = unchanged,
+    rough: bool = False,
+    limit: float = np.inf,
 ) -> Found | None:
     """Search from `start`; None where the simulation fails there.
 
     `refresh` gives Q anew at every point until the minimum is close, for a weighting that follows.
-    A `rough` search ends where Q hardly falls any more. Not converged after `MAX_STEPS` says so;
-    the values are then no estimate.
+    A `rough` search ends where Q hardly falls any more. Not converged after `MAX_STEPS`, or after
+    `FAR_STEPS` with Q above `limit`, says so; the values are then no estimate.
     """
     point = start.moved(np.clip(start.values, problem.lower, problem.upper))
     damping, first, settled = DAMPING, None, refresh is unchanged
@@ -118,8 +125,10 @@ def minimise(
         if trial is None or (fall < ENOUGH and expected < STALLED and settled):
             return Found(problem, point, normal, expected < STALLED, iteration)
         point = trial
+        if iteration + 1 == FAR_STEPS and normal.cost > limit:
+            break
     last = problem.normal(point)
-    return None if last is None else Found(problem, point, last, False, most)
+    return None if last is None else Found(problem, point, last, False, iteration + 1)
 
 
 def _along_kink(

@@ -27,6 +27,8 @@ SOUGHT = ("J_e", "J_out", "J_vehicle", "k_o", "c_o")
 far off the driveline is so stiff that one run takes as long as a whole fit."""
 ABOUT = 10.0
 """Factor on either side of the start within which they are sought."""
+HOPELESS = 30.0
+"""Q per sample with input noise after a stage above which no other follows."""
 LEVEL = "mu_c"
 LEVELS = np.geomspace(0.5, 2.0, 13)
 """Factors on the level of an element's friction that are looked at."""
@@ -35,20 +37,30 @@ LOOKS = 2
 
 
 def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found | None:
-    """Output error over growing spans, weighted by sensor noise; None where a run fails."""
+    """Output error over growing spans, weighted by sensor noise.
+
+    None where a run fails, and where a stage ends far from the measurement.
+    """
     problem = _about(problem, start)
     gear = _without_friction(problem, start).until([s.before[1] - CLEAR for s in shifts])
     found = minimise(gear, start, rough=True)
-    if found is None:
+    if found is None or _hopeless(found):
         return None
     slipping = problem.until([s.lockup_time - CLEAR for s in shifts])
     found = minimise(slipping, _levelled(slipping, found.point), rough=True)
-    if found is None:
+    if found is None or _hopeless(found):
         return None
     plain = replace(
         problem, parts=tuple(Part.unweighted(p.structure, p.record) for p in problem.parts)
     )
-    return minimise(plain, found.point, rough=True)
+    found = minimise(plain, found.point, rough=True)
+    return None if found is None or _hopeless(found) else found
+
+
+def _hopeless(found: Found) -> bool:
+    """Whether input noise, which the stages leave out, cannot be what is left by one."""
+    problem = found.problem.weighted_by(found.point)
+    return problem.cost(found.point) > HOPELESS * problem.size
 
 
 def _without_friction(problem: Problem, start: Point) -> Problem:

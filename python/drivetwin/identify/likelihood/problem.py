@@ -26,6 +26,7 @@ from drivetwin.identify.likelihood.covariance import Whiteness, sensor_noise, wi
 from drivetwin.identify.likelihood.record import Record
 from drivetwin.identify.likelihood.response import Response, observed, response_of
 from drivetwin.identify.likelihood.unknowns import TE_OFFSET, Point, Structure
+from drivetwin.identify.likelihood.work import EXPANSION, RUN, spend
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import FloatArray
 
@@ -252,6 +253,7 @@ class Problem:
 
     def cost(self, point: Point) -> float:
         """Q; infinite where a simulation fails, or where it is no number."""
+        spend(RUN)
         total = self.prior.cost(point.values)
         for part in self.parts:
             run = part.run(point)
@@ -264,6 +266,7 @@ class Problem:
 
     def normal(self, point: Point) -> Normal | None:
         """Expansion of Q at `point`; None where a simulation fails."""
+        spend(EXPANSION)
         size = len(point.names)
         cost, gradient = self.prior.cost(point.values), self.prior.pull(point.values)
         data = np.zeros((size, size))

@@ -9,23 +9,36 @@ kept where it is significant; outputs are samples or means, whichever leaves les
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fit import GOOD, RESTARTS, Hopeless, LikelihoodFit, fit
+from drivetwin.identify.likelihood.fit import (
+    GOOD,
+    RESTARTS,
+    Hopeless,
+    LikelihoodFit,
+    checked,
+    fit,
+)
 from drivetwin.identify.likelihood.kinds import averaged, in_words, likely_kinds, with_kinds
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
+from drivetwin.identify.likelihood.work import OutOfWork, at_most
 from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
 SIGNIFICANT = 3.0
 """Size of the growing part of the load, in its standard deviations, from which it is kept."""
-
+WORK = 750.0
+"""Passes over the log that the search may take: from far off and with its doubts cleared it takes
+400."""
+LESS_WORK = 300.0
+"""Passes that the search may take which starts from a minimum of a wider model."""
 SMALL = 1e-3
 """Growing part of the load [N m s^2/rad^2] to start from: one that is zero has no derivative."""
 
@@ -43,15 +56,16 @@ def choose(
     shifts = [s.shift for s in signals]
     problem, start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
     notes = []
-    with part(0.0, 0.6):
+    with part(0.0, 0.6), at_most(WORK):
         best = _fit_either(problem, start, shifts)
-    with part(0.6, 1.0):
+    with part(0.6, 1.0), at_most(LESS_WORK):
         if _grows(best):
             notes.append(_growth(best))
         else:
             problem, start = problem_of(signals, drivelines, loss_law, guess)
             problem = problem.of_kinds(best.problem.kinds)
-            best = fit(problem, _taken(start, best.point), shifts)
+            with suppress(OutOfWork):  # the wider model is right all the same
+                best = fit(problem, _taken(start, best.point), shifts, thorough=False)
     best, doubts = averaged(best)
     return best, (*notes, *in_words(best.problem.kinds), *doubts)
 
@@ -66,8 +80,8 @@ def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Like
     best = with_kinds(problem, best)
     if best.chi2 < GOOD:
         return best
-    again = fit(problem.of_kinds(best.problem.kinds), start, shifts)
-    return with_kinds(problem, min(best, again, key=lambda one: one.chi2))
+    second = checked(best, problem.of_kinds(best.problem.kinds), start, shifts)
+    return best if second is best else with_kinds(problem, second)
 
 
 def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit | None:

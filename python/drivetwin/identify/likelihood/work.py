@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""How much work a search may do before what it has found must do.
+
+Counted in passes over the log and never timed: a result is then the same on every machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+from drivetwin.errors import IdentificationError
+
+RUN = 1.0
+"""Passes that one evaluation of Q counts."""
+EXPANSION = 8.0
+"""Passes that one expansion of Q counts: as long as so many evaluations, whatever the log."""
+
+
+class OutOfWork(IdentificationError):
+    """A search has done all the work that it was given."""
+
+
+@dataclass
+class _Meter:
+    """Passes that are left."""
+
+    left: float
+
+
+_present: ContextVar[_Meter | None] = ContextVar("drivetwin_work", default=None)
+
+
+@contextmanager
+def at_most(passes: float) -> Iterator[None]:
+    """Give all searches of this thread inside the block so many passes over the log together."""
+    token = _present.set(_Meter(passes))
+    try:
+        yield
+    finally:
+        _present.reset(token)
+
+
+def spend(passes: float) -> None:
+    """Count work; outside a block of `at_most` it is free.
+
+    Raises OutOfWork where none is left.
+    """
+    meter = _present.get()
+    if meter is None:
+        return
+    meter.left -= passes
+    if meter.left < 0.0:
+        raise OutOfWork(
+            "the search was given up without a plausible minimum: the model hardly holds on "
+            "this log",
+            "check ratios, clutch gains and P0 on the card against the log, or use the integral "
+            "method",
+        )
