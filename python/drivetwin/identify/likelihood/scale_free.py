@@ -22,6 +22,8 @@ from drivetwin.vehicle.spec import VehicleCard
 
 STEP = 0.1
 """Time over which speeds are differenced [s]: about a period of the driveline's oscillation."""
+ROUNDS = 3
+"""How often the expected slopes follow what was found with them."""
 RING = (0.05, 0.8)
 """Stretch after lock-up in which the shaft's oscillation is looked for [s]."""
 
@@ -57,21 +59,30 @@ def guess_without_torque(
 def _inertias(
     signals: ShiftSignals, driveline: Driveline, card: VehicleCard
 ) -> tuple[float, float, float]:
-    """(Je/η, J_v/η, T_v/i_f/η) by least squares over both gears.
+    """(Je/η, J_v/η, T_v/i_f/η) over both gears.
 
-    The vehicle outweighs the engine side, so Je is taken from the middle of the card's range.
+    The vehicle outweighs the engine side, so Je is taken from the middle of the card's range. Noise
+    of the slopes would make the vehicle too light by least squares; the slopes that the torque lets
+    expect are their instruments.
     """
     J_e = float(np.sqrt(card.J_prime_range[0] * card.J_prime_range[1]))
-    rows, torques = [], []
     shift, age = signals.shift, MomentumSettings().delay_prior.value
-    for span, ratio in ((shift.before, driveline.i_before), (shift.after, driveline.i_after)):
+    spans = ((shift.before, driveline.i_before), (shift.after, driveline.i_after))
+    ratios, slopes, torques = [], [], []
+    for span, ratio in spans:
         time, slope = _slopes(signals, span)
-        mean = np.array([_mean(signals, t - 0.5 * STEP + age) for t in time])
-        rows.append(np.column_stack([slope / ratio**2, np.full(slope.size, 1.0 / ratio)]))
-        torques.append(mean - J_e * slope)
-    found = np.linalg.lstsq(np.vstack(rows), np.concatenate(torques), rcond=None)[0]
-    J_v = float(np.clip(found[0] * driveline.i_f**2, *card.J_vehicle_range))
-    return J_e, J_v, float(found[1])
+        slopes.append(slope)
+        ratios.append(np.full(slope.size, ratio))
+        torques.append(np.array([_mean(signals, t - 0.5 * STEP + age) for t in time]))
+    ratio, slope, torque = (np.concatenate(each) for each in (ratios, slopes, torques))
+    target, seen = torque - J_e * slope, np.column_stack([slope / ratio**2, 1.0 / ratio])
+    J5, load = np.linalg.lstsq(seen, target, rcond=None)[0]
+    for _ in range(ROUNDS):
+        expected = (torque - load / ratio) / (J_e * ratio**2 + J5)
+        instrument = np.column_stack([expected, 1.0 / ratio])
+        J5, load = np.linalg.lstsq(instrument.T @ seen, instrument.T @ target, rcond=None)[0]
+        J5 = float(np.clip(J5 * driveline.i_f**2, *card.J_vehicle_range)) / driveline.i_f**2
+    return J_e, J5 * driveline.i_f**2, float(load)
 
 
 def _slopes(signals: ShiftSignals, span: Span) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""Start values of a log without an output torque."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.estimation.bench import Knowledge, realise
+from drivetwin.dyno.files import card_text
+from drivetwin.dyno.scenarios import paper
+from drivetwin.identify.likelihood.scale_free import guess_without_torque
+from drivetwin.identify.signals import Sampled
+from drivetwin.vehicle.card import load_card
+
+NOISY = 4.0
+"""Noise of the speeds, a multiple of the scenario's."""
+
+
+def test_noise_of_the_speeds_does_not_make_the_vehicle_light(tmp_path: Path) -> None:
+    scenario = paper()
+    loud = tuple(
+        replace(one, noise=NOISY * one.noise) if one.role.endswith("speed") else one
+        for one in scenario.sensors
+    )
+    made = realise(replace(scenario, sensors=loud), 0, Knowledge())
+    file = tmp_path / "card.toml"
+    file.write_text(card_text(scenario), encoding="utf-8")
+    signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
+    guess = guess_without_torque(signals, made.driveline, load_card(file))
+    eta = scenario.model.eta
+    assert guess["J_vehicle"] == pytest.approx(made.truth["J_vehicle"] / eta, rel=0.1)
+    assert guess["Tv_over_if"] == pytest.approx(made.truth["Tv_over_if"] / eta, rel=0.1)
