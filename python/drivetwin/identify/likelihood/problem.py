@@ -26,7 +26,7 @@ from drivetwin.identify.likelihood.covariance import Whiteness, sensor_noise, wi
 from drivetwin.identify.likelihood.record import Record
 from drivetwin.identify.likelihood.response import Response, observed, response_of
 from drivetwin.identify.likelihood.unknowns import TE_OFFSET, Point, Structure
-from drivetwin.identify.likelihood.work import EXPANSION, RUN, spend
+from drivetwin.identify.likelihood.work import EXPANSION, RUN, WEIGHTING, spend
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import FloatArray
 
@@ -245,6 +245,7 @@ class Problem:
 
     def weighted_by(self, point: Point) -> Problem:
         """The problem with input noise in the covariance, at `point`."""
+        spend(WEIGHTING)
         return replace(self, parts=tuple(part.weighted_by(point) for part in self.parts))
 
     def with_expected_inputs(self, point: Point) -> Problem:

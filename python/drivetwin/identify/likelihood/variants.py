@@ -34,11 +34,10 @@ from drivetwin.shifts.shift import Shift
 
 SIGNIFICANT = 3.0
 """Size of the growing part of the load, in its standard deviations, from which it is kept."""
-WORK = 750.0
-"""Passes over the log that the search may take: from far off and with its doubts cleared it takes
-400."""
-LESS_WORK = 300.0
-"""Passes that the search may take which starts from a minimum of a wider model."""
+WORK = 700.0
+"""Passes over the log that the search may take: from a bad start and to the end it takes 450."""
+LESS_WORK = 200.0
+"""Passes that the search may take which starts from a minimum of the wider model: it takes 160."""
 SMALL = 1e-3
 """Growing part of the load [N m s^2/rad^2] to start from: one that is zero has no derivative."""
 

@@ -17,6 +17,8 @@ RUN = 1.0
 """Passes that one evaluation of Q counts."""
 EXPANSION = 8.0
 """Passes that one expansion of Q counts: as long as so many evaluations, whatever the log."""
+WEIGHTING = 4.0
+"""Passes that forming the covariance of Q anew counts."""
 
 
 class OutOfWork(IdentificationError):
