@@ -18,6 +18,7 @@ from drivetwin.identify.conclude import (
 from drivetwin.identify.likelihood.curves import METHOD, curves_of
 from drivetwin.identify.likelihood.derived import absolute_ids, of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.late import lateness_in_words
 from drivetwin.identify.likelihood.null_space import null_directions
 from drivetwin.identify.likelihood.priors import over_eta
 from drivetwin.identify.likelihood.residuals import residual_tests
@@ -165,4 +166,4 @@ def _warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str,
         label = f"log {s.log}, {label}" if s.log else label
         texts += list(s.shift.warnings)
         texts += [f"{label}: {text}" for test in tests for text in test.warnings]
-    return (*texts, *null_directions(fit))
+    return (*texts, *lateness_in_words(fit), *null_directions(fit))

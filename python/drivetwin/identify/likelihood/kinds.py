@@ -19,6 +19,7 @@ from drivetwin.identify.likelihood.fit import NEAR, LikelihoodFit, nearest
 from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.problem import Normal, Part, Problem
 from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
+from drivetwin.identify.likelihood.score import score_of
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import OutOfWork
 from drivetwin.identify.signals import FloatArray
@@ -137,30 +138,16 @@ class _Choices:
 
 
 def _choices(problem: Problem, point: Point, normal: Normal) -> _Choices:
-    """All choices by the expansion `normal` at `point`.
-
-    With the residual r - B·s, where s picks columns of B, Q changes by sᵀBᵀΣ⁻¹B·s - 2·sᵀBᵀΣ⁻¹r
-    before the parameters follow.
-    """
-    count = len(SIGNALS)
-    through, square = np.zeros(count), np.zeros((count, count))
-    pull = np.zeros((len(point.names), count))
-    for part, residual, regressors in zip(
-        problem.parts, normal.residuals, normal.regressors, strict=True
-    ):
-        change = _changes(part, point)
-        weighted = part.weighting.weighted(change)
-        through += weighted.T @ residual
-        square += change.T @ weighted
-        pull += regressors.T @ change
-    flips = np.array(list(product((0.0, 1.0), repeat=count)))
-    gradients = normal.gradient + flips @ pull.T
+    """All choices by the expansion `normal` at `point`."""
+    score = score_of(problem, normal, [_changes(part, point) for part in problem.parts])
+    flips = np.array(list(product((0.0, 1.0), repeat=len(SIGNALS))))
+    gradients = normal.gradient + flips @ score.cross.T
     steps = np.array([step_of(normal.information, gradient) for gradient in gradients])
     now = np.array([name in problem.kinds for name in SIGNALS])
     price = GAIN * np.sum(flips != now, axis=1)
     followed = np.sum(gradients * steps, axis=1)
-    left = np.sum((flips @ square) * flips, axis=1) - 2.0 * flips @ through + followed + price
-    return _Choices(flips, left, steps)
+    before = np.sum((flips @ score.own) * flips, axis=1) - 2.0 * flips @ score.pull
+    return _Choices(flips, before + followed + price, steps)
 
 
 def _changes(part: Part, point: Point) -> FloatArray:

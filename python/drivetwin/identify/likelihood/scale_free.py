@@ -69,20 +69,21 @@ def _inertias(
     shift, age = signals.shift, MomentumSettings().delay_prior.value
     spans = ((shift.before, driveline.i_before), (shift.after, driveline.i_after))
     ratios, slopes, torques = [], [], []
-    for span, ratio in spans:
-        time, slope = _slopes(signals, span)
-        slopes.append(slope)
-        ratios.append(np.full(slope.size, ratio))
+    for span, gear in spans:
+        time, in_gear = _slopes(signals, span)
+        slopes.append(in_gear)
+        ratios.append(np.full(in_gear.size, gear))
         torques.append(np.array([_mean(signals, t - 0.5 * STEP + age) for t in time]))
     ratio, slope, torque = (np.concatenate(each) for each in (ratios, slopes, torques))
     target, seen = torque - J_e * slope, np.column_stack([slope / ratio**2, 1.0 / ratio])
-    J5, load = np.linalg.lstsq(seen, target, rcond=None)[0]
+    limits = np.array(card.J_vehicle_range) / driveline.i_f**2
+    found = np.linalg.lstsq(seen, target, rcond=None)[0]
     for _ in range(ROUNDS):
-        expected = (torque - load / ratio) / (J_e * ratio**2 + J5)
+        expected = (torque - found[1] / ratio) / (J_e * ratio**2 + found[0])
         instrument = np.column_stack([expected, 1.0 / ratio])
-        J5, load = np.linalg.lstsq(instrument.T @ seen, instrument.T @ target, rcond=None)[0]
-        J5 = float(np.clip(J5 * driveline.i_f**2, *card.J_vehicle_range)) / driveline.i_f**2
-    return J_e, J5 * driveline.i_f**2, float(load)
+        found = np.linalg.lstsq(instrument.T @ seen, instrument.T @ target, rcond=None)[0]
+        found[0] = np.clip(found[0], *limits)
+    return J_e, float(found[0]) * driveline.i_f**2, float(found[1])
 
 
 def _slopes(signals: ShiftSignals, span: Span) -> tuple[FloatArray, FloatArray]:

@@ -26,6 +26,7 @@ from drivetwin.driveline import ShiftElement, Trajectory
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.newton import minimise
 from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.likelihood.score import score_of
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification
 from drivetwin.identify.signals import FloatArray, Sampled
@@ -124,19 +125,11 @@ def _step(
     """One step from the minimum; `known` (q,) has been put back already."""
     effects = [e for e in _effects(fit, largest, temperature) if e.plausible > 0.0]
     columns = [_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
-    size = len(effects)
-    own, cross = np.zeros((size, size)), np.zeros((len(fit.point.names), size))
     precision = np.array([e.plausible for e in effects]) ** -2.0
-    pull = np.zeros(size) if known is None else -precision * known
-    for part, z, r, regressors in zip(
-        fit.problem.parts, columns, fit.normal.residuals, fit.normal.regressors, strict=True
-    ):
-        weighted = part.weighting.weighted(z)
-        own += z.T @ weighted
-        cross += regressors.T @ z
-        pull += weighted.T @ r
-    schur = own - cross.T @ covariance_of(fit.normal.information) @ cross
+    score = score_of(fit.problem, fit.normal, columns)
+    schur = score.own - score.cross.T @ covariance_of(fit.normal.information) @ score.cross
     covariance = covariance_of(schur + np.diag(precision))
+    pull = score.pull if known is None else score.pull - precision * known
     return _Step(effects, columns, covariance @ pull, covariance)
 
 

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""What effects that a fit leaves out would do to Q: known columns beside those of its unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.identify.likelihood.problem import Normal, Problem
+from drivetwin.identify.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class Score:
+    """Sums over all parts for q columns Z of the outputs, with J and r those of the fit.
+
+    `own` (q, q) is ZᵀΣ⁻¹Z, `cross` (p, q) JᵀΣ⁻¹Z and `pull` (q,) ZᵀΣ⁻¹r. With an amount s (q,) of
+    the effects the residual is r - Z·s, and Q changes by sᵀ·own·s - 2·pull·s before the unknowns
+    follow.
+    """
+
+    own: FloatArray
+    cross: FloatArray
+    pull: FloatArray
+
+
+def score_of(problem: Problem, normal: Normal, columns: Sequence[FloatArray]) -> Score:
+    """Score of `columns` (n, q) of each part at the point of the expansion `normal`."""
+    size = columns[0].shape[1]
+    own, cross = np.zeros((size, size)), np.zeros((normal.gradient.size, size))
+    pull = np.zeros(size)
+    for part, z, residual, regressors in zip(
+        problem.parts, columns, normal.residuals, normal.regressors, strict=True
+    ):
+        weighted = part.weighting.weighted(z)
+        own += z.T @ weighted
+        cross += regressors.T @ z
+        pull += weighted.T @ residual
+    return Score(own, cross, pull)
