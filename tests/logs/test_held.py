@@ -105,3 +105,39 @@ def test_a_hole_brings_no_update_and_hides_none() -> None:
     expected = np.arange(150) * 0.01
     assert fresh.time == pytest.approx(expected[(expected < 0.4535) | (expected > 0.5365)])
     assert find_raster(whole) is not None
+
+
+def between(period: float, step: float, count: int, rounding: float) -> tuple[Channel, FloatArray]:
+    """A signal of `period` in a table of `step`, and the instants at which it was updated."""
+    at = np.asarray(1.3e-3 + period * np.arange(count), dtype=np.float64)
+    time = np.asarray(np.round(np.arange(0.0, at[-1], step), 6), dtype=np.float64)
+    values = wave(count, rounding)[np.clip(np.searchsorted(at, time, side="right") - 1, 0, None)]
+    return replace(channel(values), time=time), at
+
+
+@settings(deadline=None)
+@given(
+    rates=st.sampled_from([(5, 2), (10, 4), (10, 3), (20, 8), (20, 6), (50, 20), (100, 8)]),
+    rounding=st.sampled_from([0.01, 1.0, 11.0]),
+)
+def test_updates_between_the_samples_of_a_table_are_found(
+    rates: tuple[int, int], rounding: float
+) -> None:
+    period, step = 1e-3 * rates[0], 1e-3 * rates[1]
+    held, at = between(period, step, 300, rounding)
+    fresh = fresh_samples(held)
+    assert np.abs(np.diff(fresh.time) - period).max() < 0.01 * period
+    near = np.abs(fresh.time[:, None] - at).argmin(axis=1)
+    assert np.all(np.diff(near) == 1)
+    assert np.abs(fresh.time - at[near]).max() < 0.5 * step + 1e-6
+    assert fresh.values.tolist() == wave(300, rounding)[near].tolist()
+
+
+@settings(deadline=None)
+@given(st.integers(0, 1000), st.sampled_from([2e-3, 4e-3]))
+def test_changes_by_chance_are_on_no_raster_between_samples(seed: int, step: float) -> None:
+    gaps = np.random.default_rng(seed).integers(2, 6, 60)
+    values = np.repeat(wave(60, 0.01), gaps)
+    chance = channel(values)
+    chance = replace(chance, time=np.round(np.arange(values.size) * step, 6))
+    assert find_raster(chance) is None

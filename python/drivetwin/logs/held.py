@@ -3,7 +3,8 @@
 
 Only the instants of update carry information: a value is fresh there and stale until the next.
 Rounding can make an update repeat the old value, so the updates are not the changes; they lie on a
-regular raster of which the changes show a part.
+regular raster of which the changes show a part. A logger whose step does not divide the period, as
+2 ms for 5 ms, shows each update up to a step late; the raster tells when it came.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 MIN_CHANGES = 10
 """Fewer changes of value cannot prove a raster."""
 
+USUAL_PERIODS = (0.1, 0.05, 0.04, 0.025, 0.02, 0.0125, 0.01, 0.005)
+"""Periods of senders [s] that are looked for where they are no multiple of the logger's step."""
+
 MAX_PERIOD = 0.25
 """Longest update period looked for [s]; CAN messages of interest come every 5 to 100 ms."""
 
@@ -27,16 +31,38 @@ _JITTER = 0.2
 _JITTER_SAMPLES = 1.5
 """... and in samples of the logger."""
 
+_LEAST_STEPS = 2.1
+"""Steps of the logger in a period that it does not divide: in fewer the updates cannot be counted
+from change to change."""
+
+_BETWEEN_JITTER = 0.1
+"""How far such an update may lie from the raster, as part of the period, beside what the logger's
+step hides."""
+
+_UNEVEN = 0.02
+"""Part of a step that a period may have over a number of whole ones and count as divided by it: the
+clocks of sender and logger differ by less."""
+
+_IN_TIME = 0.05
+"""Share of updates that are taken to be shown as they come; the earliest of all may be jitter."""
+
+_CHANCE = 1e-6
+"""Probability from which on chance may have put all changes near such a raster."""
+
 _PAUSE = 1.5
 """After more than so many steps without a sample nobody knows when the value arrived."""
 
 
 @dataclass(frozen=True)
 class Raster:
-    """Instants of update `start` + k·`period` [s]."""
+    """Instants `start` + k·`period` [s] at which a logger shows the updates.
+
+    Where the logger's step does not divide the period they come `early` [s] before that.
+    """
 
     start: float
     period: float
+    early: float = 0.0
 
 
 def find_raster(channel: Channel) -> Raster | None:
@@ -50,9 +76,17 @@ def find_raster(channel: Channel) -> Raster | None:
     changes = channel.time[1:][_changed(channel)]
     if changes.size < MIN_CHANGES:
         return None
-    longest = min(float(np.diff(changes).min()) * (1.0 + _JITTER), MAX_PERIOD)
-    for samples in range(round(longest / channel.step), 1, -1):
-        raster = _fit(changes, samples * channel.step, channel.step)
+    step, shortest = channel.step, float(np.diff(changes).min())
+    longest = min(shortest * (1.0 + _JITTER), MAX_PERIOD)
+    whole = [(samples * step, _fit) for samples in range(round(longest / step), 1, -1)]
+    between = [
+        (period, _fit_between)
+        for period in USUAL_PERIODS
+        if _LEAST_STEPS * step < period < shortest + step + _BETWEEN_JITTER * period
+        and _uneven(period, step)
+    ]
+    for period, fit in sorted(whole + between, key=lambda one: -one[0]):
+        raster = fit(changes, period, step)
         if raster is not None:
             return raster
     return None
@@ -66,14 +100,54 @@ def _changed(channel: Channel) -> NDArray[np.bool_]:
 
 def _fit(changes: FloatArray, period: float, step: float) -> Raster | None:
     """Least-squares raster near `period` through the changes; None if they do not lie on one."""
+    found = _line(changes, period)
+    if found is None:
+        return None
+    start, slope, late = found
+    on_raster = np.abs(late).max() <= min(_JITTER * slope, _JITTER_SAMPLES * step)
+    if not on_raster or slope <= 1.5 * step:
+        return None
+    return Raster(start, slope, _early(slope, step, late))
+
+
+def _fit_between(changes: FloatArray, period: float, step: float) -> Raster | None:
+    """The same for a period that the step does not divide: a change shows up to a step late."""
+    found = _line(changes, period)
+    if found is None:
+        return None
+    start, slope, late = found
+    most = 0.5 * step + _BETWEEN_JITTER * period
+    by_chance = (2.0 * most / period) ** (changes.size - 2)
+    as_usual = abs(slope - period) < 0.01 * period
+    if np.abs(late).max() > most or by_chance > _CHANCE or not as_usual:
+        return None
+    return Raster(start, slope, _early(slope, step, late))
+
+
+def _early(period: float, step: float, late: FloatArray) -> float:
+    """How long before the raster updates come [s] that are shown `late` (n,) after it.
+
+    Where the step does not divide the period, some come just in time for a sample. Where it does,
+    all are as late as each other, and how late nobody knows: they count as in time.
+    """
+    return -float(np.quantile(late, _IN_TIME)) if _uneven(period, step) else 0.0
+
+
+def _uneven(period: float, step: float) -> bool:
+    """Whether the step does not divide the period."""
+    steps = period / step
+    return abs(steps - round(steps)) > _UNEVEN
+
+
+def _line(changes: FloatArray, period: float) -> tuple[float, float, FloatArray] | None:
+    """Start and period of the raster near `period` through the changes, and how much later each is
+    (n,); None where two changes lie closer."""
     steps = np.round(np.diff(changes) / period)
     if steps.min() < 1.0:
         return None
     count = np.concatenate(([0.0], np.cumsum(steps)))
     slope, start = np.polyfit(count, changes, 1)
-    residual = np.abs(changes - start - slope * count).max()
-    on_raster = residual <= min(_JITTER * slope, _JITTER_SAMPLES * step)
-    return Raster(float(start), float(slope)) if on_raster and slope > 1.5 * step else None
+    return float(start), float(slope), np.asarray(changes - start - slope * count)
 
 
 def _update_indices(channel: Channel, raster: Raster) -> NDArray[np.intp]:
@@ -99,10 +173,15 @@ def fresh_samples(channel: Channel) -> Channel:
     """Return the channel reduced to the instants at which its value was updated.
 
     A channel that is not `held` is returned as it is. The value at such an instant is the newest
-    the sender had, `te_delay` old; nothing is interpolated.
+    the sender had, `te_delay` old; nothing is interpolated. Where the updates fall between the
+    logger's samples, the instants are those of the raster.
     """
     raster = find_raster(channel) if channel.held else None
     if raster is None:
         return channel
     fresh = _update_indices(channel, raster)
-    return replace(channel, time=channel.time[fresh], values=channel.values[fresh], held=False)
+    time = channel.time[fresh]
+    if raster.early > 0.0:
+        count = np.round((time - raster.start) / raster.period)
+        time = raster.start - raster.early + raster.period * count
+    return replace(channel, time=time, values=channel.values[fresh], held=False)

@@ -253,7 +253,7 @@ class Problem:
         return replace(self, parts=tuple(part.with_expected_inputs(point) for part in self.parts))
 
     def cost(self, point: Point) -> float:
-        """Q; infinite where a simulation fails, or where it is no number."""
+        """Q; infinite where a simulation fails, or where it is no sum of squares."""
         spend(RUN)
         total = self.prior.cost(point.values)
         for part in self.parts:
@@ -262,8 +262,11 @@ class Problem:
                 return float("inf")
             residual = part.residual(run)
             with np.errstate(over="ignore", invalid="ignore"):
-                total += float(residual @ part.weighting.weighted(residual))
-        return total if np.isfinite(total) else float("inf")
+                square = float(residual @ part.weighting.weighted(residual))
+            if not _is_square(square):
+                return float("inf")
+            total += square
+        return total
 
     def normal(self, point: Point) -> Normal | None:
         """Expansion of Q at `point`; None where a simulation fails."""
@@ -279,13 +282,22 @@ class Problem:
             residual, slopes = found
             with np.errstate(over="ignore", invalid="ignore"):
                 weighted = part.weighting.weighted(np.column_stack([residual, slopes]))
-                cost += float(residual @ weighted[:, 0])
+                square = float(residual @ weighted[:, 0])
                 gradient = gradient - slopes.T @ weighted[:, 0]
                 data += slopes.T @ weighted[:, 1:]
+            if not _is_square(square):
+                return None
+            cost += square
             residuals.append(residual)
             regressors.append(weighted[:, 1:])
-        if not (np.isfinite(cost) and np.all(np.isfinite(data))):
+        if not np.all(np.isfinite(data)):
             return None
         data = 0.5 * (data + data.T)
         information = data + self.prior.precision
         return Normal(cost, gradient, information, data, tuple(residuals), tuple(regressors))
+
+
+def _is_square(value: float) -> bool:
+    """Whether a sum of squares could be told: not where numbers overflow, and not where the
+    weighting has lost its digits to inputs so coarse that their noise explains everything."""
+    return bool(np.isfinite(value)) and value >= 0.0
