@@ -164,5 +164,7 @@ def _changes(part: Part, point: Point) -> FloatArray:
         found[rows, SIGNALS.index(out.name)] = change
     bend = record.bend_over(part.structure.value(point, "te_delay"))
     sign = -1.0 if record.curved else 1.0
-    found[:, -1] = part.answer_to(point, run, {TORQUE: sign * bend})
+    answer = part.answer_to(point, run, {TORQUE: sign * bend})
+    if np.all(np.isfinite(answer)):  # an unstable run has no finite response
+        found[:, -1] = answer
     return found
