@@ -141,3 +141,27 @@ def test_changes_by_chance_are_on_no_raster_between_samples(seed: int, step: flo
     chance = channel(values)
     chance = replace(chance, time=np.round(np.arange(values.size) * step, 6))
     assert find_raster(chance) is None
+
+
+@settings(deadline=None)
+@given(st.integers(0, 1000), st.integers(2, 5), st.floats(0.1, 0.8))
+def test_messages_are_counted_where_their_stamps_jitter(
+    seed: int, repeats: int, jitter: float
+) -> None:
+    updates = wave(200, 0.01)
+    held = channel(hold(updates, repeats))
+    late = jitter * STEP * np.random.default_rng(seed).uniform(0.0, 1.0, held.time.size)
+    fresh = fresh_samples(replace(held, time=held.time + late))
+    assert fresh.values.tolist() == updates.tolist()
+    assert fresh.time == pytest.approx((held.time + late)[::repeats])
+
+
+@settings(deadline=None)
+@given(st.integers(0, 740), st.integers(1, 400))
+def test_a_gap_makes_no_two_updates_of_one(first: int, length: int) -> None:
+    held, _ = between(10e-3, 4e-3, 300, 1.0)
+    keep = np.ones(held.time.size, dtype=bool)
+    keep[first : first + length] = False
+    part = replace(held, time=held.time[keep], values=held.values[keep])
+    if part.time.size > 100:
+        assert np.all(np.diff(fresh_samples(part).time) > 0.5 * 10e-3)

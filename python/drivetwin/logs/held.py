@@ -4,7 +4,8 @@
 Only the instants of update carry information: a value is fresh there and stale until the next.
 Rounding can make an update repeat the old value, so the updates are not the changes; they lie on a
 regular raster of which the changes show a part. A logger whose step does not divide the period, as
-2 ms for 5 ms, shows each update up to a step late; the raster tells when it came.
+2 ms for 5 ms, shows each update up to a step late; the raster tells when it came. On a bus each
+message may repeat a value so many times; where its stamps jitter, messages are counted instead.
 """
 
 from __future__ import annotations
@@ -43,6 +44,9 @@ _UNEVEN = 0.02
 """Part of a step that a period may have over a number of whole ones and count as divided by it: the
 clocks of sender and logger differ by less."""
 
+_LOST = 2.5
+"""Pause in steps from which on a sample may have been lost."""
+
 _IN_TIME = 0.05
 """Share of updates that are taken to be shown as they come; the earliest of all may be jitter."""
 
@@ -69,14 +73,47 @@ def find_raster(channel: Channel) -> Raster | None:
     """Return the update raster of a held channel; None where each sample may be an update.
 
     The period is the longest one, up to the shortest distance of two changes, on which all changes
-    lie; start and period are fitted by least squares so that clock drift does not add up.
+    lie; start and period are fitted by least squares so that clock drift does not add up. Where
+    they lie on none by their stamps, they may by the number of samples.
     """
+    found = _found(channel)
+    return None if found is None else found[1]
+
+
+def _found(channel: Channel) -> tuple[Channel, Raster] | None:
+    """The channel with the stamps on which its raster lies, its own or counted ones, and that."""
+    raster = _raster_of(channel)
+    if raster is not None:
+        return channel, raster
+    if not _jitters(channel):
+        return None
+    counted = _counted(channel)
+    raster = _raster_of(counted)
+    return None if raster is None else (counted, raster)
+
+
+def _jitters(channel: Channel) -> bool:
+    """Whether the stamps lie so unevenly that samples are better counted, of which none is lost."""
+    if channel.time.size < MIN_CHANGES:
+        return False
+    steps = np.diff(channel.time) / channel.step
+    return bool(steps.max() < _LOST and np.abs(steps - 1.0).max() > _UNEVEN)
+
+
+def _counted(channel: Channel) -> Channel:
+    """The channel with its samples stamped evenly."""
+    time = np.linspace(channel.time[0], channel.time[-1], channel.time.size)
+    return replace(channel, time=time)
+
+
+def _raster_of(channel: Channel) -> Raster | None:
+    """The raster by the stamps of a channel; None where there is none."""
     if channel.quantity is Quantity.STATE:
         return None
     changes = channel.time[1:][_changed(channel)]
     if changes.size < MIN_CHANGES:
         return None
-    step, shortest = channel.step, float(np.diff(changes).min())
+    step, shortest = _step(channel), float(np.diff(changes).min())
     longest = min(shortest * (1.0 + _JITTER), MAX_PERIOD)
     whole = [(samples * step, _fit) for samples in range(round(longest / step), 1, -1)]
     between = [
@@ -90,6 +127,12 @@ def find_raster(channel: Channel) -> Raster | None:
         if raster is not None:
             return raster
     return None
+
+
+def _step(channel: Channel) -> float:
+    """Mean sample interval [s] less pauses: stamps that jitter move a median."""
+    steps = np.diff(channel.time)
+    return float(np.mean(steps[steps < _LOST * channel.step]))
 
 
 def _changed(channel: Channel) -> NDArray[np.bool_]:
@@ -150,15 +193,17 @@ def _line(changes: FloatArray, period: float) -> tuple[float, float, FloatArray]
     return float(start), float(slope), np.asarray(changes - start - slope * count)
 
 
-def _update_indices(channel: Channel, raster: Raster) -> NDArray[np.intp]:
-    """Samples at which an update arrives: the change near each raster instant, else the instant.
+def _updates(channel: Channel, raster: Raster) -> tuple[NDArray[np.intp], FloatArray]:
+    """Samples at which an update arrives, the change near each raster instant, else the instant,
+    and which instant it is, counted.
 
     An instant at which the channel has no sample brings none.
     """
     margin = 0.5 * channel.step
     first = np.ceil((channel.time[0] - margin - raster.start) / raster.period)
     last = np.floor((channel.time[-1] + margin - raster.start) / raster.period)
-    instants = raster.start + raster.period * np.arange(first, last + 1.0)
+    count = np.arange(first, last + 1.0)
+    instants = raster.start + raster.period * count
     nearest = np.minimum(np.searchsorted(channel.time, instants - margin), channel.time.size - 1)
     there = np.abs(channel.time[nearest] - instants) <= _PAUSE * channel.step
     changed = np.flatnonzero(_changed(channel)) + 1
@@ -166,7 +211,8 @@ def _update_indices(channel: Channel, raster: Raster) -> NDArray[np.intp]:
     inside = (slot >= 0) & (slot < instants.size)
     nearest[slot[inside]] = changed[inside]
     there[slot[inside]] = True
-    return np.unique(nearest[there])
+    samples, which = np.unique(nearest[there], return_index=True)
+    return samples, count[there][which]
 
 
 def fresh_samples(channel: Channel) -> Channel:
@@ -176,12 +222,12 @@ def fresh_samples(channel: Channel) -> Channel:
     the sender had, `te_delay` old; nothing is interpolated. Where the updates fall between the
     logger's samples, the instants are those of the raster.
     """
-    raster = find_raster(channel) if channel.held else None
-    if raster is None:
+    found = _found(channel) if channel.held else None
+    if found is None:
         return channel
-    fresh = _update_indices(channel, raster)
+    stamped, raster = found
+    fresh, count = _updates(stamped, raster)
     time = channel.time[fresh]
-    if raster.early > 0.0:
-        count = np.round((time - raster.start) / raster.period)
+    if raster.early > 0.0 and stamped is channel:
         time = raster.start - raster.early + raster.period * count
     return replace(channel, time=time, values=channel.values[fresh], held=False)
