@@ -26,8 +26,12 @@ from drivetwin.identify.signals import FloatArray
 
 SIGNALS = (*OUTPUTS, TORQUE)
 SPEEDS = tuple(name for name in OUTPUTS if name.endswith("speed"))
-GAIN = 4.0
-"""Promised fall of Q from which on signals change their kind: two standard deviations."""
+COMMON = 4.0
+"""Fall of Q from which on all speeds count as means, or the engine torque as a curve: encoders that
+send means are common, at odds of e² against them."""
+RARE = 8.0
+"""The same for means of the output torque alone, and for each speed of another kind than the rest:
+rare, at odds of e⁴. Half a millisecond of the torque is six standard deviations of its age."""
 MATTERS = 0.5
 """Spread of an unknown over the kinds of a signal, in its standard deviations, worth a word."""
 UNSURE = (
@@ -75,7 +79,7 @@ def with_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
         return one if other is None or left(other) >= left(one) else other
 
     def left(one: LikelihoodFit) -> float:
-        return one.chi2 * problem.size + GAIN * len(one.problem.kinds)
+        return one.chi2 * problem.size + _price(problem, one.problem.kinds)
 
     for _ in range(ROUNDS):
         known, best = best, better_of(best, _promising(best.problem, best.point, best.normal))
@@ -122,8 +126,21 @@ def in_words(kinds: frozenset[str]) -> list[str]:
 def _promising(problem: Problem, point: Point, normal: Normal) -> frozenset[str]:
     """Names of the signals that are better taken for something else than read."""
     choices = _choices(problem, point, normal)
-    best = choices.flips[int(np.argmin(choices.left))]
-    return problem.kinds ^ {name for name, flip in zip(SIGNALS, best, strict=True) if flip}
+    return _flipped(problem.kinds, choices.flips[int(np.argmin(choices.left))])
+
+
+def _flipped(kinds: frozenset[str], flips: FloatArray) -> frozenset[str]:
+    """The kinds with those of `SIGNALS` changed whose flip (m,) is 1."""
+    return kinds ^ {name for name, flip in zip(SIGNALS, flips, strict=True) if flip}
+
+
+def _price(problem: Problem, kinds: frozenset[str]) -> float:
+    """What kinds other than read cost Q: twice the logarithm of the odds against them."""
+    shown = {out.name for part in problem.parts for out in part.record.outputs}
+    means = len(kinds & shown.intersection(SPEEDS))
+    rest = len(shown.intersection(SPEEDS)) - means
+    common = int(means > 0) + int(TORQUE in kinds)
+    return COMMON * common + RARE * (min(means, rest) + len(kinds & shown.difference(SPEEDS)))
 
 
 @dataclass(frozen=True)
@@ -143,8 +160,7 @@ def _choices(problem: Problem, point: Point, normal: Normal) -> _Choices:
     flips = np.array(list(product((0.0, 1.0), repeat=len(SIGNALS))))
     gradients = normal.gradient + flips @ score.cross.T
     steps = np.array([step_of(normal.information, gradient) for gradient in gradients])
-    now = np.array([name in problem.kinds for name in SIGNALS])
-    price = GAIN * np.sum(flips != now, axis=1)
+    price = np.array([_price(problem, _flipped(problem.kinds, row)) for row in flips])
     followed = np.sum(gradients * steps, axis=1)
     before = np.sum((flips @ score.own) * flips, axis=1) - 2.0 * flips @ score.pull
     return _Choices(flips, before + followed + price, steps)
