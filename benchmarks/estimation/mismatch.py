@@ -7,7 +7,9 @@ The fit is told nothing of the fault. Its chi2 hardly moves; that is the point o
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -54,9 +56,10 @@ def late_torque() -> Scenario:
     return replace(base, sensors=tuple(sensors))
 
 
+DRUMLESS = partial(gearbox, 0.0)
 FAULTS = (
-    Fault("drums of 0.05 kg m²", lambda: gearbox(0.0), lambda: gearbox(0.05)),
-    Fault("drums of 0.2 kg m²", lambda: gearbox(0.0), lambda: gearbox(0.2)),
+    Fault("drums of 0.05 kg m²", DRUMLESS, partial(gearbox, 0.05)),
+    Fault("drums of 0.2 kg m²", DRUMLESS, partial(gearbox, 0.2)),
     Fault("pressure of B3 +20 kPa", throttle_steps, throttle_steps, ("pressure.B3", 0.0, 2e4)),
     Fault("engine torque 15 ms late", throttle_steps, late_torque),
     Fault("engine torque +3 %", throttle_steps, throttle_steps, ("engine_torque", 0.03, 0.0)),
@@ -66,20 +69,33 @@ FAULTS = (
 
 def shift_of(fault: Fault, count: int) -> Shift:
     """The shift over `count` noise realisations."""
-    sound, faulty = [], []
-    for seed in range(count):
-        sound.append(_told(_drumless(realise(fault.sound(), seed, KNOW))))
-        bench = _drumless(realise(fault.faulty(), seed, KNOW))
-        try:
-            faulty.append(_told(replace(bench, signals=disturbed(bench.signals, *fault.disturb))))
-        except IdentificationError:
-            return Shift(fault, None, 0.0, (sound[0]["chi2"], 0.0))
+    sound = _runs(fault.sound, count)
+    try:
+        faulty = _runs(fault.faulty, count, fault.disturb)
+    except IdentificationError:
+        return Shift(fault, None, 0.0, (sound[0]["chi2"], 0.0))
     means = [
         {n: float(np.mean([one[n] for one in runs])) for n in runs[0]} for runs in (sound, faulty)
     ]
     percent = {n: 100.0 * (means[1][n] / means[0][n] - 1.0) for n in SHOWN}
     delay = 1e3 * (means[1]["te_delay"] - means[0]["te_delay"])
     return Shift(fault, percent, delay, (means[0]["chi2"], means[1]["chi2"]))
+
+
+@cache
+def _runs(
+    made: Callable[[], Scenario], count: int, disturb: tuple[str, float, float] = ("", 0.0, 0.0)
+) -> list[dict[str, float]]:
+    """What is told of `count` realisations; several faults are compared with the same ones."""
+    with ProcessPoolExecutor() as pool:
+        return list(pool.map(partial(_one, made, disturb), range(count)))
+
+
+def _one(
+    made: Callable[[], Scenario], disturb: tuple[str, float, float], seed: int
+) -> dict[str, float]:
+    bench = _drumless(realise(made(), seed, KNOW))
+    return _told(replace(bench, signals=disturbed(bench.signals, *disturb)))
 
 
 def _drumless(bench: Bench) -> Bench:

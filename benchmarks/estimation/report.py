@@ -19,8 +19,10 @@ HEAD = """# Accuracy of the estimators
 Written by `make accuracy` from noise realisations of the virtual dynamometer, others in every case.
 The bound is that of Cramér and Rao: the Fisher information at the truth, with the noise of
 outputs and inputs and the priors of the card in it, computed by disturbing every input sample of
-the simulation; nothing of it is taken from the fits. Design values that the card knows only
-roughly are drawn about the truth. Coverage is that of the stated 95 % intervals from noise.
+the simulation; nothing of it is taken from the fits. It takes for known whether signals are
+samples or means, which the fits decide; that costs the age of the engine torque some of its bound.
+Design values that the card knows only roughly are drawn about the truth. Coverage is that of the
+stated 95 % intervals from noise.
 From n realisations RMSE/bound has a standard error of 1/√(2n), coverage one of √(475/n) %.
 Each section names the code that it is from; one that names none is older than the choice between
 samples and means, curves and lines, and than the off-going element's own drop of friction.
