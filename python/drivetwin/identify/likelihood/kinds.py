@@ -108,13 +108,18 @@ def averaged(best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
     between = (steps - step).T @ (weight[:, None] * (steps - step))
     values = np.clip(best.point.values + step, best.problem.lower, best.problem.upper)
     told = replace(best, mean=best.point.moved(values), covariance=best.covariance + between)
-    std = np.sqrt(np.diag(best.covariance))
-    one_by_one = np.sum(choices.flips, axis=1) == 1.0
-    moves = choices.flips[one_by_one].T @ np.abs(steps[one_by_one]) / std
+    return told, _doubts(choices, weight, np.sqrt(np.diag(best.covariance)))
+
+
+def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[str]:
+    """What is said of signals whose kind hardly shows and moves an unknown against its `std` (p,);
+    `weight` (q,) is that of each choice."""
+    single = np.sum(choices.flips, axis=1) == 1.0
+    moves = choices.flips[single].T @ np.abs(choices.steps[single] - choices.steps[0]) / std
     share = weight @ choices.flips
     spread = np.sqrt(share * (1.0 - share)) * np.max(moves, axis=1)
-    doubtful = [n for n, size in zip(SIGNALS, spread, strict=True) if size > MATTERS]
-    return told, [UNSURE.format(", ".join(n.replace("_", " ") for n in doubtful))] * bool(doubtful)
+    names = [n.replace("_", " ") for n, k in zip(SIGNALS, spread, strict=True) if k > MATTERS]
+    return [UNSURE.format(", ".join(names))] if names else []
 
 
 def in_words(kinds: frozenset[str]) -> list[str]:
