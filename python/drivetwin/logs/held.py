@@ -5,12 +5,14 @@ Only the instants of update carry information: a value is fresh there and stale 
 Rounding can make an update repeat the old value, so the updates are not the changes; they lie on a
 regular raster of which the changes show a part. A logger whose step does not divide the period, as
 2 ms for 5 ms, shows each update up to a step late; the raster tells when it came. On a bus each
-message may repeat a value so many times; where its stamps jitter, messages are counted instead.
+message may repeat a value so many times; where stamps jitter or messages are lost there is no
+raster, but most changes still come as many messages apart.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +47,18 @@ _UNEVEN = 0.02
 clocks of sender and logger differ by less."""
 
 _LOST = 2.5
-"""Pause in steps from which on a sample may have been lost."""
+"""Pause in steps from which on samples are missing."""
+
+_LEAST_LOOSE = 30
+"""Changes from which on their distances tell a period without a raster."""
+_NEAR = 0.6
+"""Steps within which a distance of changes is the usual one."""
+_USUAL = 0.5
+"""Least share of changes at the usual distance."""
+_CLOSE = 1.5
+"""Steps below which two changes are nearer than a held signal has them ..."""
+_SELDOM = 0.25
+"""... but for so many whose first message was lost."""
 
 _IN_TIME = 0.05
 """Share of updates that are taken to be shown as they come; the earliest of all may be jitter."""
@@ -74,36 +87,13 @@ def find_raster(channel: Channel) -> Raster | None:
 
     The period is the longest one, up to the shortest distance of two changes, on which all changes
     lie; start and period are fitted by least squares so that clock drift does not add up. Where
-    they lie on none by their stamps, they may by the number of samples.
+    stamps jitter or messages are lost, it is the distance that most changes have.
     """
-    found = _found(channel)
-    return None if found is None else found[1]
-
-
-def _found(channel: Channel) -> tuple[Channel, Raster] | None:
-    """The channel with the stamps on which its raster lies, its own or counted ones, and that."""
     raster = _raster_of(channel)
-    if raster is not None:
-        return channel, raster
-    if not _jitters(channel):
-        return None
-    counted = _counted(channel)
-    raster = _raster_of(counted)
-    return None if raster is None else (counted, raster)
-
-
-def _jitters(channel: Channel) -> bool:
-    """Whether the stamps lie so unevenly that samples are better counted, of which none is lost."""
-    if channel.time.size < MIN_CHANGES:
-        return False
-    steps = np.diff(channel.time) / channel.step
-    return bool(steps.max() < _LOST and np.abs(steps - 1.0).max() > _UNEVEN)
-
-
-def _counted(channel: Channel) -> Channel:
-    """The channel with its samples stamped evenly."""
-    time = np.linspace(channel.time[0], channel.time[-1], channel.time.size)
-    return replace(channel, time=time)
+    if raster is None:
+        period = _loose_period(channel)
+        raster = None if period is None else Raster(float(channel.time[0]), period)
+    return raster
 
 
 def _raster_of(channel: Channel) -> Raster | None:
@@ -222,12 +212,46 @@ def fresh_samples(channel: Channel) -> Channel:
     the sender had, `te_delay` old; nothing is interpolated. Where the updates fall between the
     logger's samples, the instants are those of the raster.
     """
-    found = _found(channel) if channel.held else None
-    if found is None:
+    if not channel.held:
         return channel
-    stamped, raster = found
-    fresh, count = _updates(stamped, raster)
-    time = channel.time[fresh]
-    if raster.early > 0.0 and stamped is channel:
-        time = raster.start - raster.early + raster.period * count
-    return replace(channel, time=time, values=channel.values[fresh], held=False)
+    raster = _raster_of(channel)
+    if raster is not None:
+        fresh, count = _updates(channel, raster)
+        time = channel.time[fresh]
+        if raster.early > 0.0:
+            time = raster.start - raster.early + raster.period * count
+        return replace(channel, time=time, values=channel.values[fresh], held=False)
+    period = _loose_period(channel)
+    if period is None:
+        return channel
+    fresh = _loose_updates(channel, period)
+    return replace(channel, time=channel.time[fresh], values=channel.values[fresh], held=False)
+
+
+def _loose_period(channel: Channel) -> float | None:
+    """Period [s] of a held channel whose stamps jitter or that lost messages.
+
+    None where each sample may be an update, and for even stamps, which would show a raster.
+    """
+    changed = np.flatnonzero(np.diff(channel.values) != 0.0) + 1
+    if channel.quantity is Quantity.STATE or changed.size < _LEAST_LOOSE:
+        return None
+    step = channel.step
+    if np.abs(np.diff(channel.time) / step - 1.0).max() < _UNEVEN:
+        return None
+    apart = np.maximum(np.diff(changed), np.diff(channel.time[changed]) / step)
+    usual = round(float(np.median(apart)))
+    most = np.mean(np.abs(apart - usual) < _NEAR) > _USUAL
+    return usual * step if usual > 1 and most and np.mean(apart < _CLOSE) < _SELDOM else None
+
+
+def _loose_updates(channel: Channel, period: float) -> NDArray[np.intp]:
+    """Samples at which an update arrives: the changes, and between them one for each period."""
+    changed = np.concatenate(([0], np.flatnonzero(np.diff(channel.values) != 0.0) + 1))
+    ends = np.append(channel.time[changed], channel.time[-1])
+    count = np.maximum(np.round(np.diff(ends) / period), 1.0).astype(int)
+    between = zip(pairwise(ends), count, strict=True)
+    instants = np.concatenate([np.linspace(*p, n, endpoint=False)[1:] for p, n in between])
+    nearest = np.searchsorted(channel.time, instants - 0.5 * channel.step)
+    there = np.abs(channel.time[nearest] - instants) <= _PAUSE * channel.step
+    return np.unique(np.concatenate((changed, nearest[there])))
