@@ -93,3 +93,25 @@ def test_one_sample_that_swings_after_lock_up_moves_it_little() -> None:
     assert found[1] is not None
     assert found[0].time == pytest.approx(1.2, abs=STEP)
     assert found[1].time == pytest.approx(1.2, abs=STEP)
+
+
+@settings(deadline=None)
+@given(
+    start=st.floats(1.0, 1.02),
+    flare=st.floats(3.0, 10.0),
+    duration=st.floats(0.2, 0.4),
+    pace=st.floats(60.0, 120.0),
+    seed=st.integers(0, 1000),
+)
+def test_a_slip_that_turns_after_a_flare_began_with_the_flare(
+    start: float, flare: float, duration: float, pace: float, seed: int
+) -> None:
+    time = np.arange(0.0, 3.0, STEP)
+    rise = flare * np.sin(0.5 * np.pi * np.clip((time - start) / duration, 0.0, 1.0))
+    slip = rise - pace * np.clip(time - start - duration, 0.0, None)
+    error = 0.2 * np.random.default_rng(seed).normal(size=time.size)
+    end = start + duration + (40.0 + flare) / pace
+    found = begun(time, (slip + error)[time < end], 0.2)
+    assert found is not None
+    assert found.time < start + duration
+    assert abs(found.time - start) < 3.0 * found.sigma

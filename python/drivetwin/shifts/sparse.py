@@ -23,6 +23,8 @@ _STEEP = 3.0
 """By this factor above what counts as begun the pace of a slip is told."""
 _LASTING = 3
 """So many samples at rest in a row are a gear held."""
+_CALM = 2.0
+"""Standard deviations of the noise within which these are."""
 
 
 @dataclass(frozen=True)
@@ -40,27 +42,40 @@ def begun(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
     """
     moved = np.abs(slip)
     limit = max(_SHARE * float(moved[-1]), _LIMIT * noise)
-    at, last = _crossing(time, moved, limit)
+    last = _last_at_rest(moved, limit, noise)
     if last is None:
         return None
+    at = _passes(time, moved, limit, last)
     calm = np.flatnonzero(moved[: last + 1] < _LIMIT * noise)
     rest = int(calm[-1]) if len(calm) else 0
     # A slip that creeps is seen before it is large.
     at = min(at, float(time[min(rest + _LASTING, len(time) - 1)]))
     # The capacity falls steadily, so a slip grows at least with the square of the time.
-    steep, _ = _crossing(time, moved, min(_STEEP * limit, 0.5 * float(moved[-1])))
+    steep = _passes(time, moved, min(_STEEP * limit, 0.5 * float(moved[last:].max())), last)
     hidden = (steep - at) / (np.sqrt(_STEEP) - 1.0)
     early = 0.5 * max(at - float(time[rest]), hidden)
     return Crossing(at, float(np.hypot(early, _step_error(time, last))))
 
 
-def _crossing(time: FloatArray, moved: FloatArray, limit: float) -> tuple[float, int | None]:
-    """When `moved` (n,) passes `limit` for good [s], and the sample before; None where never."""
-    below = np.flatnonzero(moved < limit)
-    if not len(below) or below[-1] + 1 >= len(moved):
-        return float(time[-1]), None
-    last = int(below[-1])
-    return float(np.interp(limit, moved[last : last + 2], time[last : last + 2])), last
+def _last_at_rest(moved: FloatArray, limit: float, noise: float) -> int | None:
+    """The last sample of those that lastingly are at rest; None without one, or if it is the last.
+
+    A slip that turns after a flare passes through zero and does not rest there.
+    """
+    below = moved < limit
+    calm = np.convolve(moved < min(_CALM * noise, limit), np.ones(_LASTING), "valid") >= _LASTING
+    ends = np.flatnonzero(calm) + _LASTING - 1 if calm.any() else np.flatnonzero(np.cumprod(below))
+    if not len(ends):
+        return None
+    # From there on it is at rest as long as it stays below.
+    last = int(ends[-1]) + int(np.cumprod(below[ends[-1] :]).sum()) - 1
+    return last if last + 1 < len(moved) else None
+
+
+def _passes(time: FloatArray, moved: FloatArray, limit: float, last: int) -> float:
+    """When `moved` (n,) passes `limit` first after the sample `last`, at which it is below [s]."""
+    above = last + int(np.argmax(moved[last:] >= limit))
+    return float(np.interp(limit, moved[above - 1 : above + 1], time[above - 1 : above + 1]))
 
 
 def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
