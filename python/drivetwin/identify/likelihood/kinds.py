@@ -32,6 +32,11 @@ send means are common, at odds of e² against them."""
 RARE = 8.0
 """The same for means of the output torque alone, and for each speed of another kind than the rest:
 rare, at odds of e⁴. Half a millisecond of the torque is six standard deviations of its age."""
+TIE = 6.0
+"""Rise of Q below which the 95 % interval reaches the minimum of the other kind, whatever its
+weight: odds of 20."""
+UNLIKELY = 0.01
+"""Weight of a kind below which it is not fitted."""
 MATTERS = 0.5
 """Spread of an unknown over the kinds of a signal, in its standard deviations, worth a word."""
 UNSURE = (
@@ -70,12 +75,7 @@ def with_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
         if kinds in tried:
             return one
         tried.add(kinds)
-        try:
-            other = nearest(
-                problem.of_kinds(kinds), one.point, WORSE * one.normal.cost / problem.size
-            )
-        except OutOfWork:
-            return one
+        other = _nearby(problem.of_kinds(kinds), one)
         return one if other is None or left(other) >= left(one) else other
 
     def left(one: LikelihoodFit) -> float:
@@ -90,32 +90,65 @@ def with_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
     return better_of(best, best.problem.kinds ^ frozenset(SPEEDS))
 
 
-def averaged(best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
+def averaged(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
     """The fit with mean and covariance over all kinds, weighted by their likelihood, and which
     kinds the log hardly tells, in words.
 
     The minima of two kinds may lie six standard deviations apart and one sample in twenty thousand
     decide between them; an interval about one of them would be wrong as often as that is the wrong
-    one (Burnham and Anderson 2002). None gets more weight than the kinds of the fit: those that
-    promise more were tried.
+    one (Burnham and Anderson 2002). `problem` has signals as read. By the expansion none gets more
+    weight than the kinds of the fit; those that would matter are fitted.
     """
-    choices = _choices(best.problem, best.point, best.normal)
-    rise = np.maximum(choices.left - choices.left[0], 0.0) / max(best.chi2, 1.0)
-    weight = np.exp(-0.5 * rise)
-    weight /= np.sum(weight)
-    steps = choices.steps - choices.steps[0]
-    step = weight @ steps
-    between = (steps - step).T @ (weight[:, None] * (steps - step))
+    choices = _fitted(problem, best, _choices(best.problem, best.point, best.normal))
+    weight = _weights(choices, best)
+    step = weight @ choices.steps
+    apart = choices.steps - step
+    reached = np.where(choices.left < np.min(choices.left) + TIE, 1.96**-2, 0.0)
     values = np.clip(best.point.values + step, best.problem.lower, best.problem.upper)
-    told = replace(best, mean=best.point.moved(values), covariance=best.covariance + between)
+    covariance = best.covariance + apart.T @ (np.maximum(weight, reached)[:, None] * apart)
+    told = replace(best, mean=best.point.moved(values), covariance=covariance)
     return told, _doubts(choices, weight, np.sqrt(np.diag(best.covariance)))
+
+
+def _weights(choices: _Choices, best: LikelihoodFit) -> FloatArray:
+    """Likelihood (q,) of each choice, all together 1."""
+    weight = np.exp(-0.5 * (choices.left - np.min(choices.left)) / max(best.chi2, 1.0))
+    return np.asarray(weight / np.sum(weight))
+
+
+def _fitted(problem: Problem, best: LikelihoodFit, choices: _Choices) -> _Choices:
+    """The choices as seen from the minimum of the first, those fitted that would matter: what an
+    expansion says of a minimum far away is too rough to weigh it by."""
+    left = np.maximum(choices.left - choices.left[0], 0.0)
+    steps = choices.steps - choices.steps[0]
+    seen = replace(choices, left=left, steps=steps)
+    far = np.max(np.abs(steps) / np.sqrt(np.diag(best.covariance)), axis=1) > MATTERS
+    for k in np.flatnonzero(far & (_weights(seen, best) > UNLIKELY)):
+        kinds = _flipped(best.problem.kinds, choices.flips[k])
+        other = _nearby(problem.of_kinds(kinds), best)
+        if other is None:
+            left[k] = np.inf
+            continue
+        prices = _price(problem, kinds) - _price(problem, best.problem.kinds)
+        left[k] = (other.chi2 - best.chi2) * problem.size + prices
+        steps[k] = other.point.values - best.point.values
+    return seen
+
+
+def _nearby(problem: Problem, best: LikelihoodFit) -> LikelihoodFit | None:
+    """The minimum of other kinds next to that of `best`; None where it is surely no better, or not
+    found with the work that is left."""
+    try:
+        return nearest(problem, best.point, WORSE * best.normal.cost / problem.size)
+    except OutOfWork:
+        return None
 
 
 def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[str]:
     """What is said of signals whose kind hardly shows and moves an unknown against its `std` (p,);
     `weight` (q,) is that of each choice."""
     single = np.sum(choices.flips, axis=1) == 1.0
-    moves = choices.flips[single].T @ np.abs(choices.steps[single] - choices.steps[0]) / std
+    moves = choices.flips[single].T @ np.abs(choices.steps[single]) / std
     share = weight @ choices.flips
     spread = np.sqrt(share * (1.0 - share)) * np.max(moves, axis=1)
     names = [n.replace("_", " ") for n, k in zip(SIGNALS, spread, strict=True) if k > MATTERS]
@@ -141,11 +174,16 @@ def _flipped(kinds: frozenset[str], flips: FloatArray) -> frozenset[str]:
 
 def _price(problem: Problem, kinds: frozenset[str]) -> float:
     """What kinds other than read cost Q: twice the logarithm of the odds against them."""
-    shown = {out.name for part in problem.parts for out in part.record.outputs}
-    means = len(kinds & shown.intersection(SPEEDS))
-    rest = len(shown.intersection(SPEEDS)) - means
+    speeds = _shown(problem).intersection(SPEEDS)
+    means = len(kinds & speeds)
     common = int(means > 0) + int(TORQUE in kinds)
-    return COMMON * common + RARE * (min(means, rest) + len(kinds & shown.difference(SPEEDS)))
+    rare = min(means, len(speeds) - means) + int("output_torque" in kinds)
+    return COMMON * common + RARE * rare
+
+
+def _shown(problem: Problem) -> frozenset[str]:
+    """Names of the outputs that the log holds."""
+    return frozenset(out.name for part in problem.parts for out in part.record.outputs)
 
 
 @dataclass(frozen=True)
@@ -162,7 +200,8 @@ class _Choices:
 def _choices(problem: Problem, point: Point, normal: Normal) -> _Choices:
     """All choices by the expansion `normal` at `point`."""
     score = score_of(problem, normal, [_changes(part, point) for part in problem.parts])
-    flips = np.array(list(product((0.0, 1.0), repeat=len(SIGNALS))))
+    shown = {*_shown(problem), TORQUE}
+    flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
     gradients = normal.gradient + flips @ score.cross.T
     steps = np.array([step_of(normal.information, gradient) for gradient in gradients])
     price = np.array([_price(problem, _flipped(problem.kinds, row)) for row in flips])

@@ -38,6 +38,8 @@ WORK = 700.0
 """Passes over the log that the search may take: from a bad start and to the end it takes 450."""
 LESS_WORK = 200.0
 """Passes that the search may take which starts from a minimum of the wider model: it takes 160."""
+DOUBT_WORK = 400.0
+"""Passes that may be spent on kinds of signals that the log hardly tells: each takes about 100."""
 SMALL = 1e-3
 """Growing part of the load [N m s^2/rad^2] to start from: one that is zero has no derivative."""
 
@@ -61,11 +63,13 @@ def choose(
         if _grows(best):
             notes.append(_growth(best))
         else:
-            problem, start = problem_of(signals, drivelines, loss_law, guess)
-            problem = problem.of_kinds(best.problem.kinds)
+            narrower, start = problem_of(signals, drivelines, loss_law, guess)
+            of_kinds = narrower.of_kinds(best.problem.kinds)
             with suppress(OutOfWork):  # the wider model is right all the same
-                best = fit(problem, _taken(start, best.point), shifts, thorough=False)
-    best, doubts = averaged(best)
+                best = fit(of_kinds, _taken(start, best.point), shifts, thorough=False)
+                problem = narrower
+    with at_most(DOUBT_WORK):
+        best, doubts = averaged(problem, best)
     return best, (*notes, *in_words(best.problem.kinds), *doubts)
 
 
