@@ -78,9 +78,9 @@ fuzz: $(venv)/.native ## 20,000 damaged files through each reader, for an hour o
 	$(bin)/python -m tests.fuzz.run --count 20000
 
 .PHONY: fuzz-identify
-fuzz-identify: $(venv)/.native ## 2,000 harmless and 2,000 damaged logs through `identify`, for an hour or two
+fuzz-identify: $(venv)/.native ## 2,000 harmless and 2,000 damaged logs through `identify` by two methods, for some hours
 	$(bin)/python -m tests.fuzz.identified --count 2000
-	$(bin)/python -m tests.fuzz.identified --count 100 --method likelihood
+	$(bin)/python -m tests.fuzz.identified --count 2000 --method likelihood
 
 fleet_logs ?= 10000
 .PHONY: fleet
