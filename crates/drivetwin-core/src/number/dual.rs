@@ -163,6 +163,8 @@ where
 }
 
 impl<const P: usize> Real for Dual<P> {
+    const PARAMETERS: usize = P;
+
     #[inline(always)]
     fn of(value: f64) -> Self {
         Self { re: value, eps: [0.0; P] }
@@ -174,6 +176,10 @@ impl<const P: usize> Real for Dual<P> {
     #[inline(always)]
     fn re(&self) -> f64 {
         self.re
+    }
+    #[inline(always)]
+    fn derivative(&self, parameter: usize) -> f64 {
+        self.eps[parameter]
     }
     fn is_constant(&self) -> bool {
         self.eps == [0.0; P]

@@ -37,6 +37,9 @@ pub trait Real:
     + MulAssign<f64>
     + DivAssign<f64>
 {
+    /// Number of parameters that derivatives are by.
+    const PARAMETERS: usize;
+
     /// A value without derivatives.
     fn of(value: f64) -> Self;
 
@@ -50,6 +53,9 @@ pub trait Real:
 
     /// The value.
     fn re(&self) -> f64;
+
+    /// Derivative by a parameter.
+    fn derivative(&self, parameter: usize) -> f64;
 
     /// Whether it has no derivatives other than zero.
     fn is_constant(&self) -> bool;
@@ -71,6 +77,8 @@ pub trait Real:
 }
 
 impl Real for f64 {
+    const PARAMETERS: usize = 0;
+
     #[inline(always)]
     fn of(value: f64) -> Self {
         value
@@ -82,6 +90,10 @@ impl Real for f64 {
     #[inline(always)]
     fn re(&self) -> f64 {
         *self
+    }
+    #[inline(always)]
+    fn derivative(&self, _: usize) -> f64 {
+        0.0
     }
     #[inline(always)]
     fn is_constant(&self) -> bool {

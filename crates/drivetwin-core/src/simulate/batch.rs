@@ -218,7 +218,7 @@ fn side_by_side<'p>(
         for ((place, outcome), (run, recorder)) in places.iter().zip(outcomes).zip(runs) {
             let status = outcome.err().unwrap_or(Status::Completed);
             if status == Status::Completed {
-                keep.reduce(&recorder.finish(), &mut values[place * per_run..][..per_run]);
+                keep.reduce(&recorder.finish().0, &mut values[place * per_run..][..per_run]);
             }
             ends[*place] = End::of(status, &run.events);
         }
@@ -236,7 +236,8 @@ impl Keep<'_> {
         }
     }
 
-    pub(super) fn reduce<T: Real>(self, columns: &[Vec<T>], out: &mut [T]) {
+    /// What is kept of the columns of a run.
+    pub(super) fn reduce(self, columns: &[Vec<f64>], out: &mut [f64]) {
         match self {
             Self::Columns => {
                 for (column, out) in columns.iter().zip(out.chunks_exact_mut(columns[0].len())) {
@@ -251,7 +252,33 @@ impl Keep<'_> {
             Self::Misfit(measured) => {
                 for ((column, measured), out) in columns.iter().zip(measured).zip(out) {
                     let known = column.iter().zip(measured).filter(|(_, m)| !m.is_nan());
-                    *out = known.fold(T::zero_(), |sum, (&c, &m)| sum + (c + -m) * (c + -m));
+                    *out = known.map(|(c, m)| (c - m) * (c - m)).sum();
+                }
+            }
+        }
+    }
+
+    /// The derivative of what is kept of the columns, by one parameter; `slopes` are those of the columns.
+    pub(super) fn reduce_slopes(self, columns: &[Vec<f64>], slopes: &[f64], out: &mut [f64]) {
+        let slopes = slopes.chunks_exact(columns[0].len());
+        match self {
+            Self::Columns => {
+                for (slope, out) in slopes.zip(out.chunks_exact_mut(columns[0].len())) {
+                    out.copy_from_slice(slope);
+                }
+            }
+            Self::Last => {
+                for (slope, out) in slopes.zip(out) {
+                    *out = slope[slope.len() - 1];
+                }
+            }
+            Self::Misfit(measured) => {
+                for (((column, slope), measured), out) in
+                    columns.iter().zip(slopes).zip(measured).zip(out)
+                {
+                    let all = column.iter().zip(measured).zip(slope);
+                    let known = all.filter(|((_, m), _)| !m.is_nan());
+                    *out = known.map(|((c, m), slope)| 2.0 * (c - m) * slope).sum();
                 }
             }
         }

@@ -8,7 +8,7 @@ use super::sensitivity::{LANES, Sampled, SensitivityError, delayed, variables};
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
-use crate::number::{Dual, Real};
+use crate::number::Dual;
 use crate::solve::{Settings, Status};
 use rayon::prelude::*;
 
@@ -85,7 +85,9 @@ fn plan(
 
 /// What is left of one pass of a run.
 struct Kept {
-    values: Vec<Derived>,
+    values: Vec<f64>,
+    /// Parameters of the pass × kept.
+    derivatives: Vec<f64>,
     last_lock: Derived,
     events: u32,
     status: Status,
@@ -95,13 +97,20 @@ struct Kept {
 impl Kept {
     fn of(run: Trajectory<Derived>, keep: Keep<'_>) -> Self {
         let failed = run.status != Status::Completed;
-        let nothing = Derived::new(f64::NAN, [f64::NAN; LANES]);
-        let mut values = vec![nothing; keep.size(run.columns.len(), run.time.len())];
-        if !failed {
+        let size = keep.size(run.columns.len(), run.time.len());
+        let mut values = vec![f64::NAN; size];
+        let mut derivatives = vec![f64::NAN; LANES * size];
+        if !failed && size > 0 {
             keep.reduce(&run.columns, &mut values);
+            let slopes = run.derivatives.chunks_exact(run.columns.len() * run.time.len());
+            for (slopes, out) in slopes.zip(derivatives.chunks_exact_mut(size)) {
+                keep.reduce_slopes(&run.columns, slopes, out);
+            }
         }
+        let nothing = Derived::new(f64::NAN, [f64::NAN; LANES]);
         Self {
             values,
+            derivatives,
             last_lock: last_lock(&run.events).unwrap_or(nothing),
             events: run.events.len() as u32,
             status: run.status,
@@ -136,15 +145,15 @@ fn gathered(
         for k in 0..parameters {
             let (pass, lane) = (&passes[k / LANES], k % LANES);
             let row = i * parameters + k;
-            let out = derivatives.kept[row * size..].iter_mut().zip(&pass.values);
-            out.for_each(|(out, value)| *out = value.eps[lane]);
+            let found = &pass.derivatives[lane * size..][..size];
+            derivatives.kept[row * size..][..size].copy_from_slice(found);
             derivatives.last_lock[row] = pass.last_lock.eps[lane];
         }
         let Some(first) = passes.into_iter().next() else { continue };
-        batch.values.extend(first.values.iter().map(Real::re));
+        batch.values.extend(first.values);
         batch.outcomes.push(Outcome::Ran(first.status));
         batch.events.push(first.events);
-        batch.last_lock.push(first.last_lock.re());
+        batch.last_lock.push(first.last_lock.re);
         derivatives.grazing.extend(first.grazing.map(|(time, element)| (i, time, element)));
     }
     (batch, derivatives)

@@ -6,6 +6,7 @@ mod batch;
 mod batch_sensitivity;
 mod dual_clutch;
 mod linear;
+mod recorded;
 mod run;
 mod sensitivity;
 mod start;

@@ -126,8 +126,9 @@ impl<T: Real> Plan<T> {
         let frictions = network.frictions.iter().map(|row| row.element.clone());
         let elements =
             frictions.chain(network.losses.iter().map(|gear| gear.element.clone())).collect();
-        let (time, columns) = (self.grid.clone(), recorder.finish());
-        Trajectory { time, columns, elements, events, status, grazing, audit: balance }
+        let (time, (columns, derivatives)) = (self.grid.clone(), recorder.finish());
+        let audit = balance;
+        Trajectory { time, columns, derivatives, elements, events, status, grazing, audit }
     }
 }
 

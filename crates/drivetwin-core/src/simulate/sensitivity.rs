@@ -80,50 +80,34 @@ fn pass<const P: usize>(
     let (model, start, delays) = variables::<P>(model, signals, start, parameters)?;
     let inputs = delayed(signals, &delays);
     let dual = simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?;
-    let found = found.get_or_insert_with(|| {
-        let (columns, events) = (Vec::new(), Vec::new());
-        Sensitivities { run: values_of(&dual), columns, events }
-    });
-    append_derivatives(&dual.columns, parameters.len(), &mut found.columns);
-    for lane in 0..parameters.len() {
-        found.events.push(dual.events.iter().map(|e| e.time.eps[lane]).collect());
+    let of_lane = |lane| dual.events.iter().map(|e| e.time.eps[lane]).collect();
+    let events: Vec<Vec<f64>> = (0..parameters.len()).map(of_lane).collect();
+    let (run, mut columns) = parted(dual);
+    columns.truncate(parameters.len() * run.columns.len() * grid.len());
+    match found {
+        None => *found = Some(Sensitivities { run, columns, events }),
+        Some(found) => {
+            found.columns.extend(columns);
+            found.events.extend(events);
+        }
     }
     Ok(())
 }
 
-/// The first derivatives of all columns, lane by lane.
-fn append_derivatives<const P: usize>(columns: &[Vec<Dual<P>>], lanes: usize, to: &mut Vec<f64>) {
-    let length = columns.first().map_or(0, Vec::len);
-    let from = to.len();
-    to.resize(from + lanes * columns.len() * length, 0.0);
-    for (place, column) in columns.iter().enumerate() {
-        // Few at a time, so that whole cache lines are written.
-        for (block, values) in column.chunks(STRETCH).enumerate() {
-            for lane in 0..lanes {
-                let at = from + (lane * columns.len() + place) * length + block * STRETCH;
-                let out = to[at..].iter_mut().zip(values);
-                out.for_each(|(out, value)| *out = value.eps[lane]);
-            }
-        }
-    }
-}
-
-/// Samples of which the derivatives are sorted together.
-const STRETCH: usize = 16;
-
-/// The run without its derivatives.
-fn values_of<const P: usize>(run: &DualClutchRun<Dual<P>>) -> DualClutchRun<f64> {
-    let column = |c: &Vec<Dual<P>>| c.iter().map(Real::re).collect();
+/// The run without derivatives, and those of its columns.
+fn parted<const P: usize>(run: DualClutchRun<Dual<P>>) -> (DualClutchRun<f64>, Vec<f64>) {
     let event = |e: &Event<Dual<P>>| Event { time: e.time.re, element: e.element, kind: e.kind };
-    Trajectory {
-        time: run.time.clone(),
-        columns: run.columns.iter().map(column).collect(),
-        elements: run.elements.clone(),
+    let values = Trajectory {
+        time: run.time,
+        columns: run.columns,
+        derivatives: Vec::new(),
+        elements: run.elements,
         events: run.events.iter().map(event).collect(),
-        status: run.status.clone(),
-        grazing: run.grazing.clone(),
+        status: run.status,
+        grazing: run.grazing,
         audit: run.audit,
-    }
+    };
+    (values, run.derivatives)
 }
 
 /// Model, start and delays [s].

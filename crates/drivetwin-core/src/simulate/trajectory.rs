@@ -2,13 +2,14 @@
 //! Chosen outputs on a time grid.
 
 use super::audit::EnergyAudit;
+use super::recorded::{Parts, Picked, Recorded};
 use super::start::{StartError, find};
 use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
 use crate::network::{Network, Row};
 use crate::number::Real;
 use crate::solve::{
-    BLOCK, Event, Integrator, Recording, RowState, Samples, Sink, Status, Step, Task, dispatch,
+    Event, Integrator, Recording, RowState, Samples, Sink, Status, Step, Task, dispatch,
 };
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -102,7 +103,9 @@ pub struct Trajectory<T> {
     /// Grid, s.
     pub time: Vec<f64>,
     /// One column per output.
-    pub columns: Vec<Vec<T>>,
+    pub columns: Vec<Vec<f64>>,
+    /// Derivatives of the columns: parameters × columns × time, the last the fastest.
+    pub derivatives: Vec<f64>,
     /// Names of the friction elements that events refer to.
     pub elements: Vec<String>,
     /// Events of friction elements.
@@ -119,17 +122,20 @@ pub struct Trajectory<T> {
 pub(super) struct Recorder<'g, T> {
     grid: &'g [f64],
     next: usize,
-    columns: Vec<(Column<T>, Vec<T>)>,
-    /// Working space.
+    columns: Vec<Column<T>>,
+    recorded: Recorded,
+    /// Working space: the basis, at an instant and over a block of samples.
     basis: Vec<T>,
+    parts: Vec<Parts>,
 }
 
 impl<'g, T: Real> Recorder<'g, T> {
     /// Columns of a network.
     pub fn new(network: &Network<T>, targets: &[Target], grid: &'g [f64]) -> Self {
-        let column =
-            |&target: &Target| (Column::of(network, target), Vec::with_capacity(grid.len()));
-        Self { grid, next: 0, columns: targets.iter().map(column).collect(), basis: Vec::new() }
+        let columns = targets.iter().map(|&target| Column::of(network, target)).collect();
+        let recorded = Recorded::new::<T>(targets.len(), grid.len());
+        let parts = vec![Parts::default(); network.basis()];
+        Self { grid, next: 0, columns, recorded, basis: Vec::new(), parts }
     }
 
     /// Record the grid points before the end of the step; `last` includes the end.
@@ -141,15 +147,16 @@ impl<'g, T: Real> Recorder<'g, T> {
             }
             let h = if t >= start { -step.start + t } else { T::zero_() };
             run.expansion.basis_at(run.network, h, &mut self.basis);
-            for (column, values) in &mut self.columns {
-                values.push(match column {
+            for (output, column) in self.columns.iter().enumerate() {
+                let value = match column {
                     Column::Angle(row, angle) => *angle + integral(run, row, h),
                     other => value(other, run, &self.basis),
-                });
+                };
+                self.recorded.push(output, value);
             }
             self.next += 1;
         }
-        for (column, _) in &mut self.columns {
+        for column in &mut self.columns {
             if let Column::Angle(row, angle) = column {
                 *angle += integral(run, row, step.length);
             }
@@ -174,14 +181,9 @@ impl<'g, T: Real> Recorder<'g, T> {
         Ok(())
     }
 
-    /// Columns at full length.
-    pub fn finish(self) -> Vec<Vec<T>> {
-        let length = self.grid.len();
-        let pad = |(_, mut values): (Column<T>, Vec<T>)| {
-            values.resize(length, T::of(f64::NAN));
-            values
-        };
-        self.columns.into_iter().map(pad).collect()
+    /// Columns at full length and their derivatives, as in [`Trajectory`].
+    pub fn finish(self) -> (Vec<Vec<f64>>, Vec<f64>) {
+        self.recorded.finish()
     }
 }
 
@@ -196,120 +198,69 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
         let knots = &run.knots()[first..first + count];
         let picked = if self.grid.len() == run.knots().len() && self.next == first {
             // The knots contain the grid: as many are the same.
-            Picked::All(count)
+            Picked::all(count)
         } else {
             Picked::of(&self.grid[self.next..], knots)
         };
         self.next += picked.count();
-        let columns = &mut self.columns;
-        dispatch(Passed { columns, run, active, samples, picked, range: (first, count) });
+        for parts in &mut self.parts {
+            parts.known = false;
+        }
+        let (columns, recorded, parts) =
+            (&self.columns[..], &mut self.recorded, &mut self.parts[..]);
+        dispatch(Passed { columns, recorded, parts, run, active, samples, picked, first });
     }
 }
 
 /// Samples to be added to the columns, with the widest instructions.
 struct Passed<'p, 'a, T, S> {
-    columns: &'p mut [(Column<T>, Vec<T>)],
+    columns: &'p [Column<T>],
+    recorded: &'p mut Recorded,
+    parts: &'p mut [Parts],
     run: &'p Integrator<'a, T>,
     active: &'p [usize],
     samples: &'p S,
     picked: Picked,
-    range: (usize, usize),
+    first: usize,
 }
 
 impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
     type Output = ();
 
     #[inline(always)]
-    fn run<const F: bool>(self) {
-        let Self { columns, run, active, samples, picked, range: (first, count) } = self;
-        let (states, inputs) = (run.x.len(), run.network.first_input());
-        for (column, values) in columns {
-            let from = values.len();
-            for &(position, c) in &*passing_terms(column, run) {
-                let out = (&mut *values, from);
-                if position < states {
-                    picked.add(out, samples.states(position), c);
-                } else if position < run.network.one() {
-                    let input = |k| run.input_at(first + k, position - inputs);
-                    picked.add(out, (0..count).map(input), c);
-                } else if position == run.network.one() {
-                    picked.add(out, std::iter::repeat_n(T::of(1.0), count), c);
-                } else {
-                    let channel = position - run.network.first_channel();
-                    if let Some(slot) = active.iter().position(|&j| j == channel) {
-                        picked.add(out, samples.torques(slot), c);
-                    }
+    fn run<const F: bool>(mut self) {
+        let count = self.picked.count();
+        for (output, column) in self.columns.iter().enumerate() {
+            self.recorded.open(output, count);
+            for &(position, factor) in &*passing_terms(column, self.run) {
+                if !self.parts[position].known {
+                    self.take_up(position);
                 }
-            }
-            values.resize(from + picked.count(), T::zero_());
-        }
-    }
-}
-
-/// The samples of a block that stand on the grid.
-enum Picked {
-    /// All: their number.
-    All(usize),
-    /// Those whose bits are set, of [`BLOCK`].
-    Some(u64),
-}
-
-impl Picked {
-    /// Of at most [`BLOCK`] samples at `knots`, those that the rest of the grid begins with.
-    fn of(grid: &[f64], knots: &[f64]) -> Self {
-        if grid.get(..knots.len()) == Some(knots) {
-            return Self::All(knots.len());
-        }
-        let mut bits = 0_u64;
-        for (k, knot) in knots.iter().enumerate() {
-            bits |= u64::from(grid.get(bits.count_ones() as usize) == Some(knot)) << k;
-        }
-        Self::Some(bits)
-    }
-
-    fn count(&self) -> usize {
-        match self {
-            Self::All(count) => *count,
-            Self::Some(bits) => bits.count_ones() as usize,
-        }
-    }
-
-    /// Add multiples of the picked samples to the values from `from` on, the first ones to nothing.
-    #[inline(always)]
-    fn add<T: Real>(
-        &self,
-        (values, from): (&mut Vec<T>, usize),
-        samples: impl Iterator<Item = T>,
-        factor: T,
-    ) {
-        // Most coefficients have no derivatives.
-        let constant = factor.is_constant();
-        let scaled = |value: T| if constant { value * factor.re() } else { factor * value };
-        match *self {
-            Self::All(count) => add(values, from, samples.take(count).map(scaled)),
-            Self::Some(bits) => {
-                let passed = samples.take(BLOCK).enumerate();
-                let picked = passed.filter(|(k, _)| bits >> k & 1 == 1);
-                add(values, from, picked.map(|(_, value)| scaled(value)));
+                self.recorded.add((output, count), &self.parts[position], factor);
             }
         }
     }
 }
 
-/// Add to the values from `from` on, or append where there are none.
-#[inline(always)]
-fn add<T: Real>(values: &mut Vec<T>, from: usize, terms: impl Iterator<Item = T>) {
-    if values.len() > from {
-        for (sum, term) in values[from..].iter_mut().zip(terms) {
-            *sum += term;
+impl<T: Real, S: Samples<T>> Passed<'_, '_, T, S> {
+    /// Take up an entry of the basis.
+    fn take_up(&mut self, position: usize) {
+        let (network, parts, picked) = (self.run.network, &mut self.parts[position], self.picked);
+        let constant = |value: f64| std::iter::repeat_n(T::of(value), picked.span());
+        if position < self.run.x.len() {
+            parts.set::<T>(self.samples.states(position), picked);
+        } else if position < network.one() {
+            let input = |k| self.run.input_at(self.first + k, position - network.first_input());
+            parts.set::<T>((0..picked.span()).map(input), picked);
+        } else if position == network.one() {
+            parts.set::<T>(constant(1.0), picked);
+        } else {
+            let channel = position - network.first_channel();
+            match self.active.iter().position(|&j| j == channel) {
+                Some(slot) => parts.set::<T>(self.samples.torques(slot), picked),
+                None => parts.set::<T>(constant(0.0), picked),
+            }
         }
-    } else if T::DERIVATIVES {
-        // In a loop of its own, which keeps its instructions.
-        for term in terms {
-            values.push(term);
-        }
-    } else {
-        values.extend(terms);
     }
 }
 

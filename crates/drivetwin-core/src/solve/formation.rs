@@ -15,6 +15,7 @@ use super::sprint::{Ready, Samples, Sink};
 use super::status::Status;
 use crate::network::smooth::Sample;
 use crate::number::{Lane, Pack};
+use std::borrow::Borrow;
 
 /// Runs in a formation: two vectors of the narrower sets, one of the widest.
 pub const WIDTH: usize = 8;
@@ -362,10 +363,10 @@ struct LaneView<'f, const N: usize> {
 }
 
 impl<const N: usize> Samples<f64> for LaneView<'_, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item = f64> {
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
         self.trail.states(i).iter().map(|x| x.0[self.lane])
     }
-    fn torques(&self, slot: usize) -> impl Iterator<Item = f64> {
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
         self.trail.torques(self.places[slot]).iter().map(|torque| torque.0[self.lane])
     }
 }
@@ -377,10 +378,10 @@ struct LastSample<'f, const N: usize> {
 }
 
 impl<const N: usize> Samples<f64> for LastSample<'_, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item = f64> {
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
         std::iter::once(self.x[i])
     }
-    fn torques(&self, slot: usize) -> impl Iterator<Item = f64> {
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
         std::iter::once(self.torques[slot])
     }
 }

@@ -244,6 +244,12 @@ impl<T: Real> Inputs<T> {
         &self.lines[i * self.sines.len()..(i + 1) * self.sines.len()]
     }
 
+    /// Whether derivatives jump at knots: a signal that comes later by a parameter is shifted along another
+    /// slope there.
+    pub fn jumps(&self) -> bool {
+        self.shifts.iter().any(|shift| !shift.is_constant())
+    }
+
     /// Bounds of an input over `count` segments from `first` on, without derivatives; zero where there
     /// are no inputs.
     pub fn bounds(&self, input: usize, (first, count): (usize, usize)) -> [f64; 2] {

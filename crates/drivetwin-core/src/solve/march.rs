@@ -20,6 +20,11 @@ pub trait Source<L> {
     /// The inputs of a segment, in `room` where they stand nowhere.
     fn read<'s>(&'s self, segment: usize, room: &'s mut Room<L>) -> &'s Sample<L>;
 
+    /// Whether the derivatives of inputs jump between segments, as with a delay that is a parameter.
+    fn jumps(&self) -> bool {
+        false
+    }
+
     /// The least and the largest value of an input over `count` segments from `first` on, or bounds of
     /// these.
     fn bounds(&self, input: usize, samples: (usize, usize)) -> [L::Values; 2]
@@ -125,7 +130,7 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize, const W: us
     (x, carry, guards): (&mut [L; N], &mut Carry<L, A>, &mut Guards<L::Values>),
     (trail, live): (&mut Trail<L, N>, u32),
 ) -> (usize, u32) {
-    let mut room = room();
+    let (mut room, jumps) = (room(), source.jumps());
     let mut ends: Ends<L::Values, W> = [[L::Values::all(0.0); W]; MAX_INPUTS];
     // A loop: the body of `all` would be compiled apart, for the least of all processors.
     let mut loaded = true;
@@ -138,7 +143,7 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize, const W: us
         let mut fallen = [L::Values::all(0.0); W];
         for (k, fallen) in fallen.iter_mut().enumerate().take(some) {
             let u = source.read(first + from + k, &mut room);
-            if L::DERIVATIVES {
+            if L::DERIVATIVES && jumps {
                 *carry = Carry::start::<F, N>(op, (u, h), x);
                 trail.put(op, from + k, (x, carry));
             }

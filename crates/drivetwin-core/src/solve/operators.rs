@@ -144,42 +144,53 @@ impl<T: Real, const N: usize> Operators<T, N> {
     }
 
     /// Add a channel; `argument` is its argument over the states.
-    fn carry(
+    #[inline(always)]
+    fn carry<const F: bool>(
         &mut self,
         slot: usize,
         (network, mode): (&Network<T>, &Mode<T>),
         (active, moments): (&[usize], &[[[T; N]; SHAPES]]),
         (argument, law): ([T; N], Law<T>),
     ) {
-        let now = over_basis(network, mode, &argument);
-        let rate: [T; N] =
-            std::array::from_fn(|i| if i < network.states() { now[i] } else { T::zero_() });
-        let second = over_basis(network, mode, &rate);
+        let now = over_basis::<T, F, N>(network, mode, &argument);
+        let mut rate = [T::zero_(); N];
+        rate[..network.states()].copy_from_slice(&now[..network.states()]);
+        let second = over_basis::<T, F, N>(network, mode, &rate);
         for drive in &mut self.drives {
             let [held, ramp] = &drive.step;
-            drive.argument[slot] = [dot(&argument, held), dot(&argument, ramp)];
-            drive.rate[slot] = [dot(&rate, held), dot(&rate, ramp)];
+            drive.argument[slot] =
+                [dot::<T, F, N>(&argument, held), dot::<T, F, N>(&argument, ramp)];
+            drive.rate[slot] = [dot::<T, F, N>(&rate, held), dot::<T, F, N>(&rate, ramp)];
             drive.now[slot] = now[network.first_input() + drive.input];
             drive.second[slot] = second[network.first_input() + drive.input];
         }
-        let step_form = |row: &[T; N]| {
-            let mut cubics = [[T::zero_(); SHAPES]; MAX_ACTIVE];
-            for (cubic, moments) in cubics.iter_mut().zip(moments) {
-                *cubic = std::array::from_fn(|k| dot(row, &moments[k]));
-            }
-            let state = std::array::from_fn(|j| dot(row, &self.transition[j]));
-            StepForm { state, constant: dot(row, &self.constant), cubics }
-        };
-        let carried = Carried {
+        let argument_end = self.at_end::<F>(&argument, moments);
+        let rate_end = self.at_end::<F>(&rate, moments);
+        self.channels.push(Carried {
             moments: moments[slot],
             argument,
-            argument_end: step_form(&argument),
-            rate_end: step_form(&rate),
+            argument_end,
+            rate_end,
             rate: Form::over(network, (active, &self.signs), &now),
             second: Form::over(network, (active, &self.signs), &second),
             law,
-        };
-        self.channels.push(carried);
+        });
+    }
+
+    /// A form over the states, at the end of a sample.
+    #[inline(always)]
+    fn at_end<const F: bool>(&self, row: &[T; N], moments: &[[[T; N]; SHAPES]]) -> StepForm<T, N> {
+        let mut form = StepForm::idle();
+        for j in 0..N {
+            form.state[j] = dot::<T, F, N>(row, &self.transition[j]);
+        }
+        form.constant = dot::<T, F, N>(row, &self.constant);
+        for (cubic, moments) in form.cubics.iter_mut().zip(moments) {
+            for k in 0..SHAPES {
+                cubic[k] = dot::<T, F, N>(row, &moments[k]);
+            }
+        }
+        form
     }
 
     /// Watch a form over the basis (x, u, 1, φ): see [`Watched`].
@@ -216,58 +227,84 @@ impl<T: Real, const N: usize> Task for Build<'_, T, N> {
     #[inline(always)]
     fn run<const F: bool>(self) -> Option<Operators<T, N>> {
         let Self { network, mode, active, laws, h } = self;
-        let n = network.states();
-        let derivative = |i: usize, column: usize| {
-            if i < n { mode.derivative[(i, column)] } else { T::zero_() }
-        };
-        let forcing = |column: usize| -> [T; N] { std::array::from_fn(|i| derivative(i, column)) };
-        let a: Square<T, N> = std::array::from_fn(|i| {
-            std::array::from_fn(|j| if j < n { derivative(i, j) } else { T::zero_() })
-        });
         let reach = mode.radius * h;
         if reach > if active.is_empty() { MAX_LINEAR } else { MAX_SLIPPING } {
             return None;
         }
+        // Plain loops: the body of a closure would be compiled apart, for the least of all processors.
+        let n = network.states();
+        let mut a = [[T::zero_(); N]; N];
+        for i in 0..n {
+            a[i][..n].copy_from_slice(&mode.derivative.row(i)[..n]);
+        }
         let s = integrals::<T, F, N>(&a, h, terms(reach));
-        let transition = std::array::from_fn(|j| std::array::from_fn(|i| s[0][i][j]));
-        let constant = apply(&s[1], &forcing(network.one()));
-        let drive = |input: usize| {
-            let force = forcing(network.first_input() + input);
-            Drive::new(input, [apply(&s[1], &force), apply(&s[2], &force)])
-        };
-        let inputs = 0..network.mechanism.inputs.len();
-        let drives = inputs.filter(|&input| network.is_driven_by(input)).map(drive).collect();
-        let mut signs = [T::zero_(); MAX_ACTIVE];
-        signs.iter_mut().zip(laws).for_each(|(sign, law)| *sign = law.sign);
-        let forces = active
-            .iter()
-            .zip(signs)
-            .map(|(&j, sign)| forcing(network.first_channel() + j).map(|f| f * sign));
-        let moments: Vec<[[T; N]; SHAPES]> = forces.map(|force| moments(&s, &force, h)).collect();
-        // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
-        let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
-        let mut operators = Operators {
-            states: n,
-            bow,
-            signs,
-            transition,
-            constant,
-            drives,
-            channels: vec![],
-            watched: vec![],
-            loads: vec![],
-        };
+        let mut operators = Operators::empty(n, reach);
+        for i in 0..N {
+            for j in 0..N {
+                operators.transition[j][i] = s[0][i][j];
+            }
+        }
+        operators.constant = apply::<T, F, N>(&s[1], &forcing(mode, network.one()));
+        for input in 0..network.mechanism.inputs.len() {
+            if network.is_driven_by(input) {
+                let force = forcing(mode, network.first_input() + input);
+                let step = [apply::<T, F, N>(&s[1], &force), apply::<T, F, N>(&s[2], &force)];
+                operators.drives.push(Drive::new(input, step));
+            }
+        }
+        let mut responses = [[[T::zero_(); N]; SHAPES]; MAX_ACTIVE];
         for (slot, &j) in active.iter().enumerate() {
-            let argument: [T; N] = std::array::from_fn(|i| {
-                network.channels[j].arguments[0].get(i).map_or(T::zero_(), |&c| c * signs[slot])
-            });
-            operators.carry(slot, (network, mode), (active, &moments), (argument, laws[slot]));
+            operators.signs[slot] = laws[slot].sign;
+            let mut force = forcing(mode, network.first_channel() + j);
+            for i in 0..N {
+                force[i] = force[i] * laws[slot].sign;
+            }
+            responses[slot] = moments::<T, F, N>(&s, &force, h);
+        }
+        for (slot, &j) in active.iter().enumerate() {
+            let mut argument = [T::zero_(); N];
+            for (to, &c) in argument.iter_mut().zip(&network.channels[j].arguments[0]) {
+                *to = c * laws[slot].sign;
+            }
+            let responses = &responses[..active.len()];
+            let carried = (argument, laws[slot]);
+            operators.carry::<F>(slot, (network, mode), (active, responses), carried);
         }
         // Inner loops exist for 0, 1, 2 and 4 channels.
         if operators.channels.len() == 3 {
             operators.channels.push(Carried::idle());
         }
         Some(operators)
+    }
+}
+
+/// Rates of the states by one entry of the basis.
+#[inline(always)]
+fn forcing<T: Real, const N: usize>(mode: &Mode<T>, column: usize) -> [T; N] {
+    let mut force = [T::zero_(); N];
+    for i in 0..mode.derivative.rows {
+        force[i] = mode.derivative[(i, column)];
+    }
+    force
+}
+
+impl<T: Real, const N: usize> Operators<T, N> {
+    /// Of `n` states that turn by `reach` within a step, without any effect.
+    fn empty(n: usize, reach: f64) -> Self {
+        // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
+        let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
+        let none = T::zero_();
+        Self {
+            states: n,
+            bow,
+            signs: [none; MAX_ACTIVE],
+            transition: [[none; N]; N],
+            constant: [none; N],
+            drives: Vec::new(),
+            channels: Vec::new(),
+            watched: Vec::new(),
+            loads: Vec::new(),
+        }
     }
 }
 
@@ -295,13 +332,11 @@ impl<L: Lane, const N: usize> Carried<L, N> {
     /// Without torque.
     pub fn idle() -> Self {
         let none = L::all(0.0);
-        let step_form =
-            StepForm { state: [none; N], constant: none, cubics: [[none; SHAPES]; MAX_ACTIVE] };
         Self {
             moments: [[none; N]; SHAPES],
             argument: [none; N],
-            argument_end: step_form,
-            rate_end: step_form,
+            argument_end: StepForm::idle(),
+            rate_end: StepForm::idle(),
             rate: Form::idle(),
             second: Form::idle(),
             law: Law::idle(),
@@ -313,6 +348,14 @@ impl<L: Lane, const N: usize> Watched<L, N> {
     /// Never falls.
     pub fn idle() -> Self {
         Self { form: Form::idle(), limit: Line::idle(), side: L::all(1.0), id: 0 }
+    }
+}
+
+impl<L: Lane, const N: usize> StepForm<L, N> {
+    /// Always zero.
+    fn idle() -> Self {
+        let none = L::all(0.0);
+        Self { state: [none; N], constant: none, cubics: [[none; SHAPES]; MAX_ACTIVE] }
     }
 }
 
@@ -350,23 +393,33 @@ impl<L: Copy, const N: usize> Operators<L, N> {
 }
 
 /// Response of the state at the end to a force `e` times each of the [`SHAPES`].
-fn moments<T: Real, const N: usize>(
+#[inline(always)]
+fn moments<T: Real, const F: bool, const N: usize>(
     s: &[Square<T, N>; CUBIC + 1],
     force: &[T; N],
     h: f64,
 ) -> [[T; N]; SHAPES] {
+    // Those to 1, t, t² and t³ first.
+    let mut all = [[T::zero_(); N]; SHAPES];
     let mut weight = 1.0;
-    let [m0, m1, m2, m3]: [[T; N]; CUBIC] = std::array::from_fn(|k| {
+    for k in 0..CUBIC {
         weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
-        apply(&s[k + 1], force).map(|v| v * weight)
-    });
-    let value = std::array::from_fn(|i| m2[i] * 3.0 - m3[i] * 2.0);
-    let slope = std::array::from_fn(|i| m3[i] - m2[i]);
-    [m0, m1, m2, value, slope]
+        let response = apply::<T, F, N>(&s[k + 1], force);
+        for i in 0..N {
+            all[k][i] = response[i] * weight;
+        }
+    }
+    for i in 0..N {
+        let (square, cube) = (all[2][i], all[3][i]);
+        all[3][i] = square * 3.0 - cube * 2.0;
+        all[4][i] = cube - square;
+    }
+    all
 }
 
 /// A form over the states, differentiated: over the basis.
-fn over_basis<T: Real, const N: usize>(
+#[inline(always)]
+fn over_basis<T: Real, const F: bool, const N: usize>(
     network: &Network<T>,
     mode: &Mode<T>,
     row: &[T; N],
@@ -374,7 +427,7 @@ fn over_basis<T: Real, const N: usize>(
     let mut out = vec![T::zero_(); network.basis()];
     for i in 0..network.states() {
         for (sum, &d) in out.iter_mut().zip(mode.derivative.row(i)) {
-            *sum += row[i] * d;
+            *sum = row[i].fma::<F>(d, *sum);
         }
     }
     out
@@ -400,51 +453,76 @@ fn integrals<T: Real, const F: bool, const N: usize>(
     h: f64,
     terms: usize,
 ) -> [Square<T, N>; CUBIC + 1] {
-    let ah = a.map(|row| row.map(|v| v * h));
-    let identity = |value: f64| -> Square<T, N> {
-        std::array::from_fn(|i| std::array::from_fn(|j| T::of(if i == j { value } else { 0.0 })))
-    };
-    let mut sum = identity(1.0);
+    let mut all = [[[T::zero_(); N]; N]; CUBIC + 1];
+    let mut sum = [[T::zero_(); N]; N];
+    add_to_diagonal(&mut sum, 1.0);
     for i in (1..terms).rev() {
-        let weight = 1.0 / (i + CUBIC) as f64;
-        sum = multiply::<T, F, N>(&ah, &sum).map(|row| row.map(|v| v * weight));
-        (0..N).for_each(|d| sum[d][d] += 1.0);
+        sum = multiply::<T, F, N>((a, h / (i + CUBIC) as f64), &sum);
+        add_to_diagonal(&mut sum, 1.0);
     }
     let mut weights = [1.0; CUBIC + 1];
     for k in 1..=CUBIC {
         weights[k] = weights[k - 1] * h / k as f64;
     }
-    let mut all = [identity(0.0); CUBIC + 1];
-    all[CUBIC] = sum.map(|row| row.map(|v| v * weights[CUBIC]));
+    for i in 0..N {
+        for j in 0..N {
+            all[CUBIC][i][j] = sum[i][j] * weights[CUBIC];
+        }
+    }
     for k in (0..CUBIC).rev() {
-        all[k] = multiply::<T, F, N>(a, &all[k + 1]);
-        (0..N).for_each(|d| all[k][d][d] += weights[k]);
+        all[k] = multiply::<T, F, N>((a, 1.0), &all[k + 1]);
+        add_to_diagonal(&mut all[k], weights[k]);
     }
     all
 }
 
 #[inline(always)]
+fn add_to_diagonal<T: Real, const N: usize>(a: &mut Square<T, N>, value: f64) {
+    for i in 0..N {
+        a[i][i] += value;
+    }
+}
+
+/// Product of a scaled matrix with another.
+#[inline(always)]
 fn multiply<T: Real, const F: bool, const N: usize>(
-    a: &Square<T, N>,
+    (a, scale): (&Square<T, N>, f64),
     b: &Square<T, N>,
 ) -> Square<T, N> {
     let mut out = [[T::zero_(); N]; N];
     for i in 0..N {
-        for k in 0..N {
-            for j in 0..N {
-                out[i][j] = a[i][k].fma::<F>(b[k][j], out[i][j]);
+        for j in 0..N {
+            let mut sum = T::zero_();
+            for k in 0..unrolled::<T, N>() {
+                sum = a[i][k].fma::<F>(b[k][j], sum);
             }
+            out[i][j] = sum * scale;
         }
     }
     out
 }
 
 #[inline(always)]
-fn apply<T: Real, const N: usize>(a: &Square<T, N>, v: &[T; N]) -> [T; N] {
-    std::array::from_fn(|i| dot(&a[i], v))
+fn apply<T: Real, const F: bool, const N: usize>(a: &Square<T, N>, v: &[T; N]) -> [T; N] {
+    let mut out = [T::zero_(); N];
+    for i in 0..N {
+        out[i] = dot::<T, F, N>(&a[i], v);
+    }
+    out
 }
 
 #[inline(always)]
-fn dot<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
-    (0..N).fold(T::zero_(), |sum, i| sum + a[i] * b[i])
+fn dot<T: Real, const F: bool, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
+    let mut sum = T::zero_();
+    for i in 0..unrolled::<T, N>() {
+        sum = a[i].fma::<F>(b[i], sum);
+    }
+    sum
+}
+
+/// `N`, but with derivatives hidden from the compiler: a sum that it unrolls it would also take for
+/// several entries at once, and gather what is a vector already.
+#[inline(always)]
+fn unrolled<T: Real, const N: usize>() -> usize {
+    if T::DERIVATIVES { std::hint::black_box(N) } else { N }
 }

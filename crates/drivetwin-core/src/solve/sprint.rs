@@ -12,6 +12,7 @@ use crate::network::channel::{self, Channel};
 use crate::network::smooth::{Law, Line, MAX_INPUTS, Sample, line_of};
 use crate::network::{Cell, GearState, ModeKey, Network, Row};
 use crate::number::Real;
+use std::borrow::Borrow;
 use std::sync::Arc;
 
 /// Operators for the number of states at hand.
@@ -94,18 +95,18 @@ pub trait Sink<T> {
 /// States and torques of the active channels at the start of samples, at least of those passed.
 pub trait Samples<T> {
     /// State `i`.
-    fn states(&self, i: usize) -> impl Iterator<Item = T>;
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>>;
 
     /// Torque of the active channel number `slot`.
-    fn torques(&self, slot: usize) -> impl Iterator<Item = T>;
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>>;
 }
 
 impl<T: Real, const N: usize> Samples<T> for Trail<T, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item = T> {
-        self.states(i).iter().copied()
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>> {
+        self.states(i).iter()
     }
-    fn torques(&self, slot: usize) -> impl Iterator<Item = T> {
-        self.torques(slot).iter().copied()
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>> {
+        self.torques(slot).iter()
     }
 }
 
@@ -369,6 +370,11 @@ impl<T: Real> Source<T> for Lines<'_, T> {
             *to = line;
         }
         &room[..lines.len()]
+    }
+
+    #[inline(always)]
+    fn jumps(&self) -> bool {
+        self.0.jumps()
     }
 
     #[inline(always)]

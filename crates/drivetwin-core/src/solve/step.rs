@@ -140,18 +140,15 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let half = 0.5 * h * h;
             let turned = turn * ds.times(half);
             self.cubics[a][2] = v.by_argument.times(half).fma::<F>(second, turned);
-            // With derivatives every sample starts anew.
-            if !L::DERIVATIVES {
-                // The second derivative comes late: all else is summed up before it.
-                let (straight, bend) = (ds.times(2.0 * h) + carry.argument[a], 2.0 * h * h);
-                let Law { rate, .. } = channels[a].law;
-                let decay = (near[a] - straight) * rate;
-                carry.near[a] = second.fma::<F>(L::all(bend), straight);
-                carry.stiction[a] = stiction[a]
-                    .grown::<F>(rate.times(-bend).fma::<F>(second, decay), || {
-                        channels[a].law.stiction::<F>(carry.near[a])
-                    });
-            }
+            // The second derivative comes late: all else is summed up before it.
+            let (straight, bend) = (ds.times(2.0 * h) + carry.argument[a], 2.0 * h * h);
+            let Law { rate, .. } = channels[a].law;
+            let decay = (near[a] - straight) * rate;
+            carry.near[a] = second.fma::<F>(L::all(bend), straight);
+            carry.stiction[a] = stiction[a]
+                .grown::<F>(rate.times(-bend).fma::<F>(second, decay), || {
+                    channels[a].law.stiction::<F>(carry.near[a])
+                });
         }
         add_moments::<L, F, N, A, 0, 3>(op, &self.cubics, &mut self.end);
         for a in 0..A {
