@@ -144,19 +144,6 @@ def test_changes_by_chance_are_on_no_raster_between_samples(seed: int, step: flo
 
 
 @settings(deadline=None)
-@given(st.integers(0, 1000), st.integers(2, 5), st.floats(0.1, 0.8))
-def test_messages_that_repeat_a_value_are_told_where_their_stamps_jitter(
-    seed: int, repeats: int, jitter: float
-) -> None:
-    updates = wave(200, 0.01)
-    held = channel(hold(updates, repeats))
-    late = jitter * STEP * np.random.default_rng(seed).uniform(0.0, 1.0, held.time.size)
-    fresh = fresh_samples(replace(held, time=held.time + late))
-    assert fresh.values.tolist() == updates.tolist()
-    assert fresh.time == pytest.approx((held.time + late)[::repeats])
-
-
-@settings(deadline=None)
 @given(st.integers(0, 740), st.integers(1, 400))
 def test_a_gap_makes_no_two_updates_of_one(first: int, length: int) -> None:
     held, _ = between(10e-3, 4e-3, 300, 1.0)
@@ -165,18 +152,3 @@ def test_a_gap_makes_no_two_updates_of_one(first: int, length: int) -> None:
     part = replace(held, time=held.time[keep], values=held.values[keep])
     if part.time.size > 100:
         assert np.all(np.diff(fresh_samples(part).time) > 0.5 * 10e-3)
-
-
-@settings(deadline=None)
-@given(st.integers(0, 1000), st.integers(2, 4), st.floats(0.02, 0.2))
-def test_messages_that_repeat_a_value_are_told_where_some_are_lost(
-    seed: int, repeats: int, share: float
-) -> None:
-    rng = np.random.default_rng(seed)
-    whole = channel(hold(wave(300, 0.01), repeats))
-    keep = rng.random(whole.time.size) > share
-    time = (whole.time + 0.05 * STEP * rng.uniform(size=whole.time.size))[keep]
-    fresh = fresh_samples(replace(whole, time=time, values=whole.values[keep]))
-    there = set(whole.values[keep].tolist())
-    assert len(there & set(fresh.values.tolist())) > 0.9 * len(there)
-    assert fresh.time.size < 1.1 * 300  # hardly a repeated value counts as an update

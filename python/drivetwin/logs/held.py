@@ -4,19 +4,17 @@
 Only the instants of update carry information: a value is fresh there and stale until the next.
 Rounding can make an update repeat the old value, so the updates are not the changes; they lie on a
 regular raster of which the changes show a part. A logger whose step does not divide the period, as
-2 ms for 5 ms, shows each update up to a step late; the raster tells when it came. On a bus each
-message may repeat a value so many times; where stamps jitter or messages are lost there is no
-raster, but most changes still come as many messages apart.
+2 ms for 5 ms, shows each update up to a step late; the raster tells when it came.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin.logs.repeated import repeat_period, updates_by_count
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 
 MIN_CHANGES = 10
@@ -49,17 +47,6 @@ clocks of sender and logger differ by less."""
 _LOST = 2.5
 """Pause in steps from which on samples are missing."""
 
-_LEAST_LOOSE = 30
-"""Changes from which on their distances tell a period without a raster."""
-_NEAR = 0.6
-"""Steps within which a distance of changes is the usual one."""
-_USUAL = 0.5
-"""Least share of changes at the usual distance."""
-_CLOSE = 1.5
-"""Steps below which two changes are nearer than a held signal has them ..."""
-_SELDOM = 0.25
-"""... but for so many whose first message was lost."""
-
 _IN_TIME = 0.05
 """Share of updates that are taken to be shown as they come; the earliest of all may be jitter."""
 
@@ -91,7 +78,7 @@ def find_raster(channel: Channel) -> Raster | None:
     """
     raster = _raster_of(channel)
     if raster is None:
-        period = _loose_period(channel)
+        period = repeat_period(channel)
         raster = None if period is None else Raster(float(channel.time[0]), period)
     return raster
 
@@ -192,15 +179,18 @@ def _updates(channel: Channel, raster: Raster) -> tuple[NDArray[np.intp], FloatA
     margin = 0.5 * channel.step
     first = np.ceil((channel.time[0] - margin - raster.start) / raster.period)
     last = np.floor((channel.time[-1] + margin - raster.start) / raster.period)
-    count = np.arange(first, last + 1.0)
+    own = np.round((channel.time - raster.start) / raster.period)
+    # Of a long pause no instant needs to be looked at.
+    count = np.unique(np.concatenate((own - 1.0, own, own + 1.0)))
+    count = count[(count >= first) & (count <= last)]
     instants = raster.start + raster.period * count
     nearest = np.minimum(np.searchsorted(channel.time, instants - margin), channel.time.size - 1)
     there = np.abs(channel.time[nearest] - instants) <= _PAUSE * channel.step
     changed = np.flatnonzero(_changed(channel)) + 1
-    slot = np.round((channel.time[changed] - instants[0]) / raster.period).astype(np.intp)
-    inside = (slot >= 0) & (slot < instants.size)
-    nearest[slot[inside]] = changed[inside]
-    there[slot[inside]] = True
+    changed = changed[(own[changed] >= first) & (own[changed] <= last)]
+    slot = np.searchsorted(count, own[changed])
+    nearest[slot] = changed
+    there[slot] = True
     samples, which = np.unique(nearest[there], return_index=True)
     return samples, count[there][which]
 
@@ -221,37 +211,8 @@ def fresh_samples(channel: Channel) -> Channel:
         if raster.early > 0.0:
             time = raster.start - raster.early + raster.period * count
         return replace(channel, time=time, values=channel.values[fresh], held=False)
-    period = _loose_period(channel)
+    period = repeat_period(channel)
     if period is None:
         return channel
-    fresh = _loose_updates(channel, period)
+    fresh = updates_by_count(channel, period)
     return replace(channel, time=channel.time[fresh], values=channel.values[fresh], held=False)
-
-
-def _loose_period(channel: Channel) -> float | None:
-    """Period [s] of a held channel whose stamps jitter or that lost messages.
-
-    None where each sample may be an update, and for even stamps, which would show a raster.
-    """
-    changed = np.flatnonzero(np.diff(channel.values) != 0.0) + 1
-    if channel.quantity is Quantity.STATE or changed.size < _LEAST_LOOSE:
-        return None
-    step = channel.step
-    if np.abs(np.diff(channel.time) / step - 1.0).max() < _UNEVEN:
-        return None
-    apart = np.maximum(np.diff(changed), np.diff(channel.time[changed]) / step)
-    usual = round(float(np.median(apart)))
-    most = np.mean(np.abs(apart - usual) < _NEAR) > _USUAL
-    return usual * step if usual > 1 and most and np.mean(apart < _CLOSE) < _SELDOM else None
-
-
-def _loose_updates(channel: Channel, period: float) -> NDArray[np.intp]:
-    """Samples at which an update arrives: the changes, and between them one for each period."""
-    changed = np.concatenate(([0], np.flatnonzero(np.diff(channel.values) != 0.0) + 1))
-    ends = np.append(channel.time[changed], channel.time[-1])
-    count = np.maximum(np.round(np.diff(ends) / period), 1.0).astype(int)
-    between = zip(pairwise(ends), count, strict=True)
-    instants = np.concatenate([np.linspace(*p, n, endpoint=False)[1:] for p, n in between])
-    nearest = np.searchsorted(channel.time, instants - 0.5 * channel.step)
-    there = np.abs(channel.time[nearest] - instants) <= _PAUSE * channel.step
-    return np.unique(np.concatenate((changed, nearest[there])))

@@ -257,7 +257,7 @@ impl<T: Real, const N: usize> Task for Build<'_, T, N> {
             operators.signs[slot] = laws[slot].sign;
             let mut force = forcing(mode, network.first_channel() + j);
             for i in 0..N {
-                force[i] = force[i] * laws[slot].sign;
+                force[i] *= laws[slot].sign;
             }
             responses[slot] = moments::<T, F, N>(&s, &force, h);
         }
