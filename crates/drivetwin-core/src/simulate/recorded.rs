@@ -33,27 +33,35 @@ impl Recorded {
         }
     }
 
-    /// Make room for the next values of an output, zero so far.
-    pub fn open(&mut self, output: usize, count: usize) {
-        let length = self.values[output].len();
-        self.values[output].resize(length + count, 0.0);
+    /// Number of values of an output.
+    pub fn length(&self, output: usize) -> usize {
+        self.values[output].len()
     }
 
-    /// Add a multiple of a quantity to the last `count` values of an output.
+    /// Add a multiple of a quantity to the values of an output from `from` on, where there are none to
+    /// nothing.
     #[inline(always)]
-    pub fn add<T: Real>(&mut self, (output, count): (usize, usize), source: &Parts, factor: T) {
-        let from = self.values[output].len() - count;
-        let values = source.part(0, count);
-        add(&mut self.values[output][from..], values, factor.re());
+    pub fn add<T: Real>(&mut self, (output, from): (usize, usize), source: &Parts, factor: T) {
+        let (values, sums) = (source.part(0), &mut self.values[output]);
+        if sums.len() > from {
+            add(&mut sums[from..], values, factor.re());
+        } else {
+            sums.extend(values.iter().map(|value| factor.re() * value));
+        }
         for parameter in 0..T::PARAMETERS {
-            let slopes = &mut self.slopes(parameter, output)[from..from + count];
+            let slopes = &mut self.slopes(parameter, output)[from..];
             if !source.constant {
-                add(slopes, source.part(1 + parameter, count), factor.re());
+                add(slopes, source.part(1 + parameter), factor.re());
             }
             if factor.derivative(parameter) != 0.0 {
                 add(slopes, values, factor.derivative(parameter));
             }
         }
+    }
+
+    /// Fill an output up to a length with zeros.
+    pub fn fill(&mut self, output: usize, length: usize) {
+        self.values[output].resize(length, 0.0);
     }
 
     /// Derivatives of an output by a parameter.
@@ -130,6 +138,8 @@ impl Picked {
 pub(super) struct Parts {
     /// Whether it has been taken up.
     pub known: bool,
+    /// Number of samples.
+    count: usize,
     /// Values, then derivatives by every parameter, unless constant.
     parts: Vec<f64>,
     /// Whether no value depends on a parameter.
@@ -137,29 +147,31 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Take up at most [`BLOCK`] numbers. Not inlined, so that it is not compiled for the widest
-    /// instructions: these would gather from strides, which takes longer than to move numbers one by one.
-    #[inline(never)]
+    /// Take up the picked samples.
+    #[inline(always)]
     pub fn set<T: Real>(&mut self, samples: impl Iterator<Item: Borrow<T>>, picked: Picked) {
         self.parts.resize((1 + T::PARAMETERS) * BLOCK, 0.0);
-        (self.known, self.constant) = (true, true);
-        if picked.are_all() {
-            for (k, number) in samples.take(picked.count()).enumerate() {
-                self.put(k, number.borrow());
+        (self.known, self.constant, self.count) = (true, true, picked.count());
+        if T::DERIVATIVES {
+            self.set_each(samples, picked);
+        } else if picked.are_all() {
+            for (to, number) in self.parts[..self.count].iter_mut().zip(samples) {
+                *to = number.borrow().re();
             }
         } else {
-            let samples = samples.take(picked.span()).enumerate();
-            let samples = samples.filter(|(k, _)| picked.contains(*k));
-            for (k, (_, number)) in samples.enumerate() {
-                self.put(k, number.borrow());
-            }
+            self.set_each(samples, picked);
         }
     }
 
-    #[inline(always)]
-    fn put<T: Real>(&mut self, k: usize, number: &T) {
-        self.parts[k] = number.re();
-        if T::DERIVATIVES {
+    /// The same, one by one. Not inlined, so that it is not compiled for the widest instructions: these
+    /// would gather from strides, which takes longer.
+    #[inline(never)]
+    fn set_each<T: Real>(&mut self, samples: impl Iterator<Item: Borrow<T>>, picked: Picked) {
+        let samples = samples.take(picked.span()).enumerate();
+        let samples = samples.filter(|(k, _)| picked.contains(*k));
+        for (k, (_, number)) in samples.enumerate() {
+            let number = number.borrow();
+            self.parts[k] = number.re();
             self.constant &= number.is_constant();
             for parameter in 0..T::PARAMETERS {
                 self.parts[(1 + parameter) * BLOCK + k] = number.derivative(parameter);
@@ -168,8 +180,8 @@ impl Parts {
     }
 
     #[inline(always)]
-    fn part(&self, part: usize, count: usize) -> &[f64] {
-        &self.parts[part * BLOCK..][..count]
+    fn part(&self, part: usize) -> &[f64] {
+        &self.parts[part * BLOCK..][..self.count]
     }
 }
 
@@ -187,9 +199,8 @@ mod tests {
         let mut recorded = Recorded::new::<Dual<2>>(2, 3);
         recorded.push(0, numbers[0]);
         recorded.push(0, numbers[1]);
-        recorded.open(1, 2);
-        recorded.add((1, 2), &varied, Dual::<2>::of(-2.0));
-        recorded.add((1, 2), &one, Dual::new(0.0, [0.0, 10.0]));
+        recorded.add((1, 0), &varied, Dual::<2>::of(-2.0));
+        recorded.add((1, 0), &one, Dual::new(0.0, [0.0, 10.0]));
         let (values, slopes) = recorded.finish();
         assert_eq!((&values[0][..2], &values[1][..2]), (&[5.0, 7.0][..], &[-10.0, -14.0][..]));
         assert!(values[0][2].is_nan() && slopes.iter().skip(2).step_by(3).all(|d| d.is_nan()));

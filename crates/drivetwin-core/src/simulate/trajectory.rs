@@ -231,19 +231,21 @@ impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
     fn run<const F: bool>(mut self) {
         let count = self.picked.count();
         for (output, column) in self.columns.iter().enumerate() {
-            self.recorded.open(output, count);
+            let from = self.recorded.length(output);
             for &(position, factor) in &*passing_terms(column, self.run) {
                 if !self.parts[position].known {
                     self.take_up(position);
                 }
-                self.recorded.add((output, count), &self.parts[position], factor);
+                self.recorded.add((output, from), &self.parts[position], factor);
             }
+            self.recorded.fill(output, from + count);
         }
     }
 }
 
 impl<T: Real, S: Samples<T>> Passed<'_, '_, T, S> {
     /// Take up an entry of the basis.
+    #[inline(always)]
     fn take_up(&mut self, position: usize) {
         let (network, parts, picked) = (self.run.network, &mut self.parts[position], self.picked);
         let constant = |value: f64| std::iter::repeat_n(T::of(value), picked.span());
