@@ -11,6 +11,7 @@ mod first_fall;
 mod formation;
 mod guard;
 mod inputs;
+mod integrals;
 mod integrator;
 mod known;
 mod lanes;

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+//! Integrals of the motion of one mode over a step, by the series of its matrix: what the exact step
+//! operators are made of.
+//!
+//! Plain loops throughout: the body of a closure would be compiled apart, for the least of all processors.
+
+use super::operators::SHAPES;
+use crate::number::Real;
+
+/// A square matrix by rows.
+type Square<T, const N: usize> = [[T; N]; N];
+
+/// Powers of time that a force is integrated with.
+const CUBIC: usize = 4;
+/// What may be left of the series, relative to its first term; generous, as A is badly scaled.
+const REMAINDER: f64 = 1e-24;
+/// Most terms of the series.
+const MAX_SERIES: usize = 40;
+
+/// Terms that the series of the operators needs.
+fn terms(reach: f64) -> usize {
+    let mut left = 1.0;
+    (1..MAX_SERIES)
+        .find(|&k| {
+            left *= reach / k as f64;
+            left < REMAINDER
+        })
+        .unwrap_or(MAX_SERIES)
+}
+
+/// `S_k = Σ_i A^i h^(i+k) / (i+k)!` for k = 0 .. CUBIC: S_0 is the transition matrix, and
+/// `k! S_(k+1) e` the response to a force `e t^k`. The highest by its series, the lower ones by
+/// `S_(k-1) = I h^(k-1)/(k-1)! + A S_k`.
+#[inline(always)]
+pub fn integrals<T: Real, const F: bool, const N: usize>(
+    a: &Square<T, N>,
+    (h, reach): (f64, f64),
+) -> [Square<T, N>; CUBIC + 1] {
+    let mut all = [[[T::zero_(); N]; N]; CUBIC + 1];
+    let mut sum = [[T::zero_(); N]; N];
+    add_to_diagonal(&mut sum, 1.0);
+    for i in (1..terms(reach)).rev() {
+        sum = multiply::<T, F, N>((a, h / (i + CUBIC) as f64), &sum);
+        add_to_diagonal(&mut sum, 1.0);
+    }
+    let mut weights = [1.0; CUBIC + 1];
+    for k in 1..=CUBIC {
+        weights[k] = weights[k - 1] * h / k as f64;
+    }
+    for i in 0..N {
+        for j in 0..N {
+            all[CUBIC][i][j] = sum[i][j] * weights[CUBIC];
+        }
+    }
+    for k in (0..CUBIC).rev() {
+        all[k] = multiply::<T, F, N>((a, 1.0), &all[k + 1]);
+        add_to_diagonal(&mut all[k], weights[k]);
+    }
+    all
+}
+
+#[inline(always)]
+fn add_to_diagonal<T: Real, const N: usize>(a: &mut Square<T, N>, value: f64) {
+    for i in 0..N {
+        a[i][i] += value;
+    }
+}
+
+/// Product of a scaled matrix with another.
+#[inline(always)]
+fn multiply<T: Real, const F: bool, const N: usize>(
+    (a, scale): (&Square<T, N>, f64),
+    b: &Square<T, N>,
+) -> Square<T, N> {
+    let mut out = [[T::zero_(); N]; N];
+    for i in 0..N {
+        for j in 0..N {
+            let mut sum = T::zero_();
+            for k in 0..unrolled::<T, N>() {
+                sum = a[i][k].fma::<F>(b[k][j], sum);
+            }
+            out[i][j] = sum * scale;
+        }
+    }
+    out
+}
+
+/// A matrix times a vector.
+#[inline(always)]
+pub fn apply<T: Real, const F: bool, const N: usize>(a: &Square<T, N>, v: &[T; N]) -> [T; N] {
+    let mut out = [T::zero_(); N];
+    for i in 0..N {
+        out[i] = dot::<T, F, N>(&a[i], v);
+    }
+    out
+}
+
+/// Scalar product.
+#[inline(always)]
+pub fn dot<T: Real, const F: bool, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
+    let mut sum = T::zero_();
+    for i in 0..unrolled::<T, N>() {
+        sum = a[i].fma::<F>(b[i], sum);
+    }
+    sum
+}
+
+/// `N`, but with derivatives hidden from the compiler: a sum that it unrolls it would also take for
+/// several entries at once, and gather what is a vector already.
+#[inline(always)]
+fn unrolled<T: Real, const N: usize>() -> usize {
+    if T::DERIVATIVES { std::hint::black_box(N) } else { N }
+}
+
+/// Response of the state at the end to a force `e` times each of the [`SHAPES`].
+#[inline(always)]
+pub fn moments<T: Real, const F: bool, const N: usize>(
+    s: &[Square<T, N>; CUBIC + 1],
+    force: &[T; N],
+    h: f64,
+) -> [[T; N]; SHAPES] {
+    // Those to 1, t, t² and t³ first.
+    let mut all = [[T::zero_(); N]; SHAPES];
+    let mut weight = 1.0;
+    for k in 0..CUBIC {
+        weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
+        let response = apply::<T, F, N>(&s[k + 1], force);
+        for i in 0..N {
+            all[k][i] = response[i] * weight;
+        }
+    }
+    for i in 0..N {
+        let (square, cube) = (all[2][i], all[3][i]);
+        all[3][i] = square * 3.0 - cube * 2.0;
+        all[4][i] = cube - square;
+    }
+    all
+}
