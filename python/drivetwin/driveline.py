@@ -302,7 +302,7 @@ def _trajectory(
     outcome: tuple[list[tuple[float, str, str]], str, EnergyAudit | None],
 ) -> Trajectory:
     events, status, audit = outcome
-    engine, output, wheel, twist, shaft = columns[:5]
+    engine, output, wheel, twist, shaft, *friction = columns
     names = [element.name for element in model.elements]
     return Trajectory(
         time,
@@ -311,8 +311,8 @@ def _trajectory(
         wheel,
         twist,
         shaft,
-        clutch_torque=dict(zip(names, columns[5::2], strict=True)),
-        slip=dict(zip(names, columns[6::2], strict=True)),
+        clutch_torque=dict(zip(names, friction[::2], strict=True)),
+        slip=dict(zip(names, friction[1::2], strict=True)),
         events=tuple(Event(*event) for event in events),
         status=status,
         audit=audit,
