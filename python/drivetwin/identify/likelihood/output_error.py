@@ -27,7 +27,7 @@ SOUGHT = ("J_e", "J_out", "J_vehicle", "k_o", "c_o")
 far off the driveline is so stiff that one run takes as long as a whole fit."""
 ABOUT = 10.0
 """Factor on either side of the start within which they are sought."""
-HOPELESS = 30.0
+HOPELESS = 20.0
 """Q per sample with input noise after a stage above which no other follows."""
 LEVEL = "mu_c"
 LEVELS = np.geomspace(0.5, 2.0, 13)
