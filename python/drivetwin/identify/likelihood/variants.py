@@ -39,7 +39,8 @@ WORK = 700.0
 LESS_WORK = 200.0
 """Passes that the search may take which starts from a minimum of the wider model: it takes 160."""
 DOUBT_WORK = 400.0
-"""Passes that may be spent on kinds of signals that the log hardly tells: each takes about 100."""
+"""Passes that may be spent on kinds of signals that the log hardly tells, of what the search has
+left: each takes about 100."""
 SMALL = 1e-3
 """Growing part of the load [N m s^2/rad^2] to start from: one that is zero has no derivative."""
 
@@ -57,7 +58,7 @@ def choose(
     shifts = [s.shift for s in signals]
     problem, start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
     notes = []
-    with part(0.0, 0.6), at_most(WORK):
+    with part(0.0, 0.6), at_most(WORK) as search:
         best = _fit_either(problem, start, shifts)
     with part(0.6, 1.0), at_most(LESS_WORK):
         if _grows(best):
@@ -68,7 +69,7 @@ def choose(
             with suppress(OutOfWork):  # the wider model is right all the same
                 best = fit(of_kinds, _taken(start, best.point), shifts, thorough=False)
                 problem = narrower
-    with at_most(DOUBT_WORK):
+    with at_most(min(DOUBT_WORK, search.left)):
         best, doubts = averaged(problem, best)
     return best, (*notes, *in_words(best.problem.kinds), *doubts)
 

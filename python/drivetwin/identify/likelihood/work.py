@@ -26,21 +26,22 @@ class OutOfWork(IdentificationError):
 
 
 @dataclass
-class _Meter:
+class Meter:
     """Passes that are left."""
 
     left: float
 
 
-_present: ContextVar[_Meter | None] = ContextVar("drivetwin_work", default=None)
+_present: ContextVar[Meter | None] = ContextVar("drivetwin_work", default=None)
 
 
 @contextmanager
-def at_most(passes: float) -> Iterator[None]:
+def at_most(passes: float) -> Iterator[Meter]:
     """Give all searches of this thread inside the block so many passes over the log together."""
-    token = _present.set(_Meter(passes))
+    meter = Meter(passes)
+    token = _present.set(meter)
     try:
-        yield
+        yield meter
     finally:
         _present.reset(token)
 
