@@ -32,6 +32,8 @@ from drivetwin.identify.signals import FloatArray
 
 LARGEST = 1e9
 """Residual in standard deviations from which a run counts as failed."""
+ROUND_OFF = 1e-6
+"""What a sum of squares may be negative by, relative to the squares in it."""
 
 
 @dataclass(frozen=True)
@@ -290,9 +292,9 @@ class Problem:
             cost += square
             residuals.append(residual)
             regressors.append(weighted[:, 1:])
-        if not np.all(np.isfinite(data)):
-            return None
         data = 0.5 * (data + data.T)
+        if not (np.all(np.isfinite(data)) and _are_products(data)):
+            return None
         information = data + self.prior.precision
         return Normal(cost, gradient, information, data, tuple(residuals), tuple(regressors))
 
@@ -301,3 +303,13 @@ def _is_square(value: float) -> bool:
     """Whether a sum of squares could be told: not where numbers overflow, and not where the
     weighting has lost its digits to inputs so coarse that their noise explains everything."""
     return bool(np.isfinite(value)) and value >= 0.0
+
+
+def _are_products(data: FloatArray) -> bool:
+    """Whether a matrix can be that of the weighted scalar products of slopes: a weighting that has
+    lost its digits gives some directions a negative length."""
+    squares = np.diag(data)
+    if np.any(squares < 0.0):
+        return False
+    length = np.sqrt(np.where(squares > 0.0, squares, 1.0))
+    return bool(np.linalg.eigvalsh(data / np.outer(length, length))[0] > -ROUND_OFF)
