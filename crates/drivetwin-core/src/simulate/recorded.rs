@@ -140,9 +140,9 @@ pub(super) struct Parts {
     pub known: bool,
     /// Number of samples.
     count: usize,
-    /// Values, then derivatives by every parameter, unless constant.
+    /// Values, then derivatives by every parameter, [`BLOCK`] of each.
     parts: Vec<f64>,
-    /// Whether no value depends on a parameter.
+    /// Whether no value depends on a parameter: all derivatives are zero.
     constant: bool,
 }
 
@@ -152,9 +152,7 @@ impl Parts {
     pub fn set<T: Real>(&mut self, samples: impl Iterator<Item: Borrow<T>>, picked: Picked) {
         self.parts.resize((1 + T::PARAMETERS) * BLOCK, 0.0);
         (self.known, self.constant, self.count) = (true, true, picked.count());
-        if T::DERIVATIVES {
-            self.set_each(samples, picked);
-        } else if picked.are_all() {
+        if !T::DERIVATIVES && picked.are_all() {
             for (to, number) in self.parts[..self.count].iter_mut().zip(samples) {
                 *to = number.borrow().re();
             }
