@@ -5,8 +5,9 @@ use super::lane::{Lane, SMALL, Values, growth};
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// `K` values, one of each run. The loops over the runs compile to vector instructions of the set that
-/// is active where they are inlined.
+/// is active where they are inlined. Aligned to the cache's lines, so that no vector straddles two.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
 pub struct Pack<const K: usize>(pub [f64; K]);
 
 impl<const K: usize> Pack<K> {
