@@ -46,7 +46,7 @@ def sensitivities(
     start: tuple[float, float, float, float, Sequence[str]],
     grid: _Array,
     options: tuple[float, Sequence[str]],
-) -> tuple[_Array, list[tuple[float, str, str]], str, NDArray[np.float64], _Array]: ...
+) -> tuple[_Array, list[tuple[float, str, str]], str, list[list[_Array]], _Array]: ...
 def linearise(
     driveline: str,
     locked: Sequence[str],

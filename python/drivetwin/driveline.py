@@ -7,7 +7,7 @@ The physics itself stands in the Rust core; these classes only describe and carr
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -280,14 +280,37 @@ def sensitivities(
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
     run = _trajectory(model, time, columns, (events, status, None))
+    passes = ((i, columns[0].shape[1]) for i, columns in enumerate(derivatives))
+    rooms = ((i, place) for i, width in passes for place in range(width))
+    places = dict(zip(parameters, rooms, strict=False))
     return Sensitivities(
         run,
-        {
-            name: _trajectory(model, time, derivatives[i], ([], status, None))
-            for i, name in enumerate(parameters)
-        },
-        {name: event_derivatives[i] for i, name in enumerate(parameters)},
+        _Derivatives(model, run, derivatives, places),
+        dict(zip(parameters, event_derivatives, strict=True)),
     )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Derivatives(Mapping[str, Trajectory]):
+    """Trajectories of derivatives by parameter, made of the core's arrays when asked for."""
+
+    model: DualClutch
+    run: Trajectory
+    passes: Sequence[Sequence[FloatArray]]
+    """Of every pass of the core its columns (n, n_parameters of the pass)."""
+    places: Mapping[str, tuple[int, int]]
+    """Pass and place in it."""
+
+    def __getitem__(self, name: str) -> Trajectory:
+        number, place = self.places[name]
+        columns = [column[:, place] for column in self.passes[number]]
+        return _trajectory(self.model, self.run.time, columns, ([], self.run.status, None))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.places)
+
+    def __len__(self) -> int:
+        return len(self.places)
 
 
 def _start(start: State) -> tuple[float, float, float, float, list[str]]:
@@ -298,7 +321,7 @@ def _start(start: State) -> tuple[float, float, float, float, list[str]]:
 def _trajectory(
     model: DualClutch,
     time: FloatArray,
-    columns: FloatArray,
+    columns: Iterable[FloatArray],
     outcome: tuple[list[tuple[float, str, str]], str, EnergyAudit | None],
 ) -> Trajectory:
     events, status, audit = outcome

@@ -7,7 +7,7 @@ use drivetwin_core::simulate::{
     DualClutchStart, Trajectory, dual_clutch_sensitivities, simulate_dual_clutch,
 };
 use drivetwin_core::solve::{Settings, Signal};
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -50,13 +50,13 @@ pub fn simulate<'py>(
     Ok((columns, events, run.status.to_string(), run.audit.map(as_tuple)))
 }
 
-/// Columns (n_columns, n_time), events, status, derivatives (n_parameters, n_columns, n_time), and
-/// of event times (n_parameters, n_events).
+/// Columns (n_columns, n_time), events, status, derivatives of every column, pass by pass (n_time,
+/// n_parameters of the pass), and of event times (n_parameters, n_events).
 type Sensitive<'py> = (
     Bound<'py, PyArray2<f64>>,
     Vec<Event>,
     String,
-    Bound<'py, PyArray3<f64>>,
+    Vec<Vec<Bound<'py, PyArray2<f64>>>>,
     Bound<'py, PyArray2<f64>>,
 );
 /// Name, times [s], values and delay [s] of an input.
@@ -87,13 +87,20 @@ pub fn sensitivities<'py>(
     let found = py
         .detach(|| dual_clutch_sensitivities(&model, &signals, &start, grid, (settings, &names)))
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
-    let derivatives = found.columns;
-    let shape = [names.len(), found.run.columns.len(), grid.len()];
+    // Handed over as they are, the memory of the core.
+    let handed = |slopes: Vec<f64>| {
+        let parameters = slopes.len() / grid.len();
+        slopes.into_pyarray(py).reshape([grid.len(), parameters])
+    };
+    let passes = found.columns.into_iter();
+    let derivatives = passes
+        .map(|columns| columns.into_iter().map(handed).collect::<PyResult<_>>())
+        .collect::<PyResult<_>>()?;
     Ok((
         PyArray2::from_vec2(py, &found.run.columns)?,
         events_of(&found.run),
         status_of(&found.run),
-        derivatives.into_pyarray(py).reshape(shape)?,
+        derivatives,
         PyArray2::from_vec2(py, &found.events)?,
     ))
 }

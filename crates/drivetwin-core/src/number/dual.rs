@@ -163,7 +163,9 @@ where
 }
 
 impl<const P: usize> Real for Dual<P> {
-    const PARAMETERS: usize = P;
+    type Slopes = [f64; P];
+
+    const NO_SLOPES: [f64; P] = [f64::NAN; P];
 
     #[inline(always)]
     fn of(value: f64) -> Self {
@@ -174,8 +176,12 @@ impl<const P: usize> Real for Dual<P> {
         self.re
     }
     #[inline(always)]
-    fn derivative(&self, parameter: usize) -> f64 {
-        self.eps[parameter]
+    fn sloped(slopes: [f64; P]) -> Self {
+        Self { re: 0.0, eps: slopes }
+    }
+    #[inline(always)]
+    fn slopes(self) -> [f64; P] {
+        self.eps
     }
     fn is_constant(&self) -> bool {
         self.eps == [0.0; P]

@@ -37,8 +37,11 @@ pub trait Real:
     + MulAssign<f64>
     + DivAssign<f64>
 {
-    /// Number of parameters that derivatives are by.
-    const PARAMETERS: usize;
+    /// Derivatives by the parameters: an array.
+    type Slopes: Copy + Debug + Send + Sync;
+
+    /// Derivatives that are no numbers.
+    const NO_SLOPES: Self::Slopes;
 
     /// A value without derivatives.
     fn of(value: f64) -> Self;
@@ -51,8 +54,11 @@ pub trait Real:
     /// The value.
     fn re(&self) -> f64;
 
-    /// Derivative by a parameter.
-    fn derivative(&self, parameter: usize) -> f64;
+    /// Number zero with derivatives by the parameters.
+    fn sloped(slopes: Self::Slopes) -> Self;
+
+    /// Derivatives by the parameters.
+    fn slopes(self) -> Self::Slopes;
 
     /// Whether it has no derivatives other than zero.
     fn is_constant(&self) -> bool;
@@ -74,7 +80,9 @@ pub trait Real:
 }
 
 impl Real for f64 {
-    const PARAMETERS: usize = 0;
+    type Slopes = [f64; 0];
+
+    const NO_SLOPES: Self::Slopes = [];
 
     #[inline(always)]
     fn of(value: f64) -> Self {
@@ -85,8 +93,12 @@ impl Real for f64 {
         *self
     }
     #[inline(always)]
-    fn derivative(&self, _: usize) -> f64 {
+    fn sloped(_: Self::Slopes) -> Self {
         0.0
+    }
+    #[inline(always)]
+    fn slopes(self) -> Self::Slopes {
+        []
     }
     #[inline(always)]
     fn is_constant(&self) -> bool {

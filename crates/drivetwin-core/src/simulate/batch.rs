@@ -258,27 +258,32 @@ impl Keep<'_> {
         }
     }
 
-    /// The derivative of what is kept of the columns, by one parameter; `slopes` are those of the columns.
-    pub(super) fn reduce_slopes(self, columns: &[Vec<f64>], slopes: &[f64], out: &mut [f64]) {
-        let slopes = slopes.chunks_exact(columns[0].len());
-        match self {
-            Self::Columns => {
-                for (slope, out) in slopes.zip(out.chunks_exact_mut(columns[0].len())) {
-                    out.copy_from_slice(slope);
-                }
-            }
-            Self::Last => {
-                for (slope, out) in slopes.zip(out) {
-                    *out = slope[slope.len() - 1];
-                }
-            }
-            Self::Misfit(measured) => {
-                for (((column, slope), measured), out) in
-                    columns.iter().zip(slopes).zip(measured).zip(out)
-                {
-                    let all = column.iter().zip(measured).zip(slope);
-                    let known = all.filter(|((_, m), _)| !m.is_nan());
-                    *out = known.map(|((c, m), slope)| 2.0 * (c - m) * slope).sum();
+    /// The derivatives of what is kept of the columns, parameters × kept, by those of the columns.
+    pub(super) fn reduce_slopes<const P: usize>(
+        self,
+        columns: &[Vec<f64>],
+        slopes: &[Vec<[f64; P]>],
+        out: &mut [f64],
+    ) {
+        let points = columns[0].len();
+        let size = self.size(columns.len(), points);
+        for (parameter, out) in out.chunks_exact_mut(size).enumerate() {
+            for (output, (column, slopes)) in columns.iter().zip(slopes).enumerate() {
+                let slope = |point: usize| slopes[point][parameter];
+                match self {
+                    Self::Columns => {
+                        for (point, out) in out[output * points..][..points].iter_mut().enumerate()
+                        {
+                            *out = slope(point);
+                        }
+                    }
+                    Self::Last => out[output] = slope(points - 1),
+                    Self::Misfit(measured) => {
+                        let measured = &measured[output];
+                        let known = (0..points).filter(|&k| !measured[k].is_nan());
+                        let terms = known.map(|k| 2.0 * (column[k] - measured[k]) * slope(k));
+                        out[output] = terms.sum();
+                    }
                 }
             }
         }

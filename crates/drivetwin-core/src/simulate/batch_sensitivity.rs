@@ -102,10 +102,7 @@ impl Kept {
         let mut derivatives = vec![f64::NAN; LANES * size];
         if !failed && size > 0 {
             keep.reduce(&run.columns, &mut values);
-            let slopes = run.derivatives.chunks_exact(run.columns.len() * run.time.len());
-            for (slopes, out) in slopes.zip(derivatives.chunks_exact_mut(size)) {
-                keep.reduce_slopes(&run.columns, slopes, out);
-            }
+            keep.reduce_slopes(&run.columns, &run.derivatives, &mut derivatives);
         }
         let nothing = Derived::new(f64::NAN, [f64::NAN; LANES]);
         Self {

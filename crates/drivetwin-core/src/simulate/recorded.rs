@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Numbers on a grid by their parts: the value, and the derivative by every parameter.
+//! Numbers on a grid by their parts: values, and derivatives by the parameters.
 
 use crate::number::Real;
 use crate::solve::BLOCK;
@@ -7,30 +7,29 @@ use std::borrow::Borrow;
 
 /// Values of outputs on a grid with their derivatives, filled as a run comes along.
 #[derive(Clone, Debug)]
-pub(super) struct Recorded {
+pub(super) struct Recorded<T: Real> {
     /// Points of the grid.
     points: usize,
     /// A column per output, as long as the run has come.
     values: Vec<Vec<f64>>,
-    /// Parameters × outputs × points, filled as far as the columns.
-    derivatives: Vec<f64>,
+    /// The same of derivatives.
+    slopes: Vec<Vec<T::Slopes>>,
 }
 
-impl Recorded {
-    /// Nothing yet, for numbers of type `T`.
-    pub fn new<T: Real>(outputs: usize, points: usize) -> Self {
+impl<T: Real> Recorded<T> {
+    /// Nothing yet.
+    pub fn new(outputs: usize, points: usize) -> Self {
         let column = || Vec::with_capacity(points);
         let values = std::iter::repeat_with(column).take(outputs).collect();
-        Self { points, values, derivatives: vec![0.0; T::PARAMETERS * outputs * points] }
+        let column = || Vec::with_capacity(points);
+        let slopes = std::iter::repeat_with(column).take(outputs).collect();
+        Self { points, values, slopes }
     }
 
     /// The next value of an output.
-    pub fn push<T: Real>(&mut self, output: usize, value: T) {
-        let at = self.values[output].len();
+    pub fn push(&mut self, output: usize, value: T) {
         self.values[output].push(value.re());
-        for parameter in 0..T::PARAMETERS {
-            self.slopes(parameter, output)[at] = value.derivative(parameter);
-        }
+        self.slopes[output].push(value.slopes());
     }
 
     /// Number of values of an output.
@@ -41,46 +40,63 @@ impl Recorded {
     /// Add a multiple of a quantity to the values of an output from `from` on, where there are none to
     /// nothing.
     #[inline(always)]
-    pub fn add<T: Real>(&mut self, (output, from): (usize, usize), source: &Parts, factor: T) {
-        let (values, sums) = (source.part(0), &mut self.values[output]);
+    pub fn add(&mut self, (output, from): (usize, usize), source: &Values, factor: f64) {
+        let (values, sums) = (source.values(), &mut self.values[output]);
         if sums.len() > from {
-            add(&mut sums[from..], values, factor.re());
+            add(&mut sums[from..], values, factor);
         } else {
-            sums.extend(values.iter().map(|value| factor.re() * value));
+            sums.extend(values.iter().map(|value| factor * value));
         }
-        for parameter in 0..T::PARAMETERS {
-            let slopes = &mut self.slopes(parameter, output)[from..];
-            if !source.constant {
-                add(slopes, source.part(1 + parameter), factor.re());
+    }
+
+    /// Add the derivatives of the same.
+    #[inline(always)]
+    pub fn add_slopes<const F: bool>(
+        &mut self,
+        (output, from): (usize, usize),
+        (mut samples, mut picked): (impl Iterator<Item: Borrow<T>>, Picked),
+        factor: T,
+    ) {
+        let (sums, mut at) = (&mut self.slopes[output], from);
+        // Its length not known beforehand, the compiler does not take several samples at once, and
+        // gather what is a vector already.
+        while let Some(number) = picked.gap().and_then(|gap| samples.nth(gap)) {
+            let number = *number.borrow();
+            match sums.get_mut(at) {
+                Some(sum) => *sum = number.fma::<F>(factor, T::sloped(*sum)).slopes(),
+                None => sums.push(number.fma::<F>(factor, T::zero_()).slopes()),
             }
-            if factor.derivative(parameter) != 0.0 {
-                add(slopes, values, factor.derivative(parameter));
-            }
+            at += 1;
+        }
+    }
+
+    /// Add the derivatives of the same where the quantity has none.
+    #[inline(always)]
+    pub fn add_slopes_of_factor<const F: bool>(
+        &mut self,
+        to: (usize, usize),
+        source: &Values,
+        factor: T,
+    ) {
+        if !factor.is_constant() {
+            let plain = source.values().iter().map(|&value| T::of(value));
+            self.add_slopes::<F>(to, (plain, Picked::all(source.count)), factor);
         }
     }
 
     /// Fill an output up to a length with zeros.
     pub fn fill(&mut self, output: usize, length: usize) {
         self.values[output].resize(length, 0.0);
-    }
-
-    /// Derivatives of an output by a parameter.
-    #[inline(always)]
-    fn slopes(&mut self, parameter: usize, output: usize) -> &mut [f64] {
-        let row = parameter * self.values.len() + output;
-        &mut self.derivatives[row * self.points..(row + 1) * self.points]
+        self.slopes[output].resize(length, T::zero_().slopes());
     }
 
     /// Values by output, and derivatives, NaN where the run did not come.
-    pub fn finish(mut self) -> (Vec<Vec<f64>>, Vec<f64>) {
-        let outputs = self.values.len();
-        for (row, slopes) in self.derivatives.chunks_exact_mut(self.points).enumerate() {
-            slopes[self.values[row % outputs].len()..].fill(f64::NAN);
+    pub fn finish(mut self) -> (Vec<Vec<f64>>, Vec<Vec<T::Slopes>>) {
+        for (values, slopes) in self.values.iter_mut().zip(&mut self.slopes) {
+            values.resize(self.points, f64::NAN);
+            slopes.resize(self.points, T::NO_SLOPES);
         }
-        for column in &mut self.values {
-            column.resize(self.points, f64::NAN);
-        }
-        (self.values, self.derivatives)
+        (self.values, self.slopes)
     }
 }
 
@@ -113,6 +129,14 @@ impl Picked {
         Self(bits)
     }
 
+    /// Take the next out: how many samples are left out before it.
+    #[inline(always)]
+    fn gap(&mut self) -> Option<usize> {
+        let gap = self.0.trailing_zeros();
+        self.0 = self.0.checked_shr(gap + 1).unwrap_or(0);
+        (gap < u64::BITS).then_some(gap as usize)
+    }
+
     /// Their number.
     pub fn count(self) -> usize {
         self.0.count_ones() as usize
@@ -133,27 +157,25 @@ impl Picked {
     }
 }
 
-/// One quantity over the samples of a block.
+/// Values of one quantity over the samples of a block.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Parts {
+pub(super) struct Values {
     /// Whether it has been taken up.
     pub known: bool,
     /// Number of samples.
     count: usize,
-    /// Values, then derivatives by every parameter, [`BLOCK`] of each.
-    parts: Vec<f64>,
-    /// Whether no value depends on a parameter: all derivatives are zero.
-    constant: bool,
+    /// Room for [`BLOCK`] of them.
+    values: Vec<f64>,
 }
 
-impl Parts {
+impl Values {
     /// Take up the picked samples.
     #[inline(always)]
     pub fn set<T: Real>(&mut self, samples: impl Iterator<Item: Borrow<T>>, picked: Picked) {
-        self.parts.resize((1 + T::PARAMETERS) * BLOCK, 0.0);
-        (self.known, self.constant, self.count) = (true, true, picked.count());
+        self.values.resize(BLOCK, 0.0);
+        (self.known, self.count) = (true, picked.count());
         if !T::DERIVATIVES && picked.are_all() {
-            for (to, number) in self.parts[..self.count].iter_mut().zip(samples) {
+            for (to, number) in self.values[..self.count].iter_mut().zip(samples) {
                 *to = number.borrow().re();
             }
         } else {
@@ -167,19 +189,14 @@ impl Parts {
     fn set_each<T: Real>(&mut self, samples: impl Iterator<Item: Borrow<T>>, picked: Picked) {
         let samples = samples.take(picked.span()).enumerate();
         let samples = samples.filter(|(k, _)| picked.contains(*k));
-        for (k, (_, number)) in samples.enumerate() {
-            let number = number.borrow();
-            self.parts[k] = number.re();
-            self.constant &= number.is_constant();
-            for parameter in 0..T::PARAMETERS {
-                self.parts[(1 + parameter) * BLOCK + k] = number.derivative(parameter);
-            }
+        for (to, (_, number)) in self.values.iter_mut().zip(samples) {
+            *to = number.borrow().re();
         }
     }
 
     #[inline(always)]
-    fn part(&self, part: usize) -> &[f64] {
-        &self.parts[part * BLOCK..][..self.count]
+    fn values(&self) -> &[f64] {
+        &self.values[..self.count]
     }
 }
 
@@ -191,18 +208,22 @@ mod tests {
     #[test]
     fn values_and_derivatives_stand_apart_and_what_was_not_reached_is_no_number() {
         let numbers = [Dual::new(5.0, [50.0, 0.0]), Dual::new(7.0, [70.0, 1.0])];
-        let (mut varied, mut one) = (Parts::default(), Parts::default());
-        varied.set::<Dual<2>>(numbers.iter(), Picked::all(2));
-        one.set::<Dual<2>>([Dual::of(1.0); 2].iter(), Picked::all(2));
-        let mut recorded = Recorded::new::<Dual<2>>(2, 3);
+        let (mut varied, mut one) = (Values::default(), Values::default());
+        let picked = Picked::all(2);
+        varied.set::<Dual<2>>(numbers.iter(), picked);
+        one.set::<Dual<2>>([Dual::of(1.0); 2].iter(), picked);
+        let mut recorded = Recorded::new(2, 3);
         recorded.push(0, numbers[0]);
         recorded.push(0, numbers[1]);
-        recorded.add((1, 0), &varied, Dual::<2>::of(-2.0));
-        recorded.add((1, 0), &one, Dual::new(0.0, [0.0, 10.0]));
+        recorded.add((1, 0), &varied, -2.0);
+        recorded.add_slopes::<false>((1, 0), (numbers.iter(), picked), Dual::of(-2.0));
+        let factor = Dual::new(0.0, [0.0, 10.0]);
+        recorded.add((1, 0), &one, factor.re);
+        recorded.add_slopes_of_factor::<false>((1, 0), &one, factor);
         let (values, slopes) = recorded.finish();
         assert_eq!((&values[0][..2], &values[1][..2]), (&[5.0, 7.0][..], &[-10.0, -14.0][..]));
-        assert!(values[0][2].is_nan() && slopes.iter().skip(2).step_by(3).all(|d| d.is_nan()));
-        let reached = slopes.iter().filter(|d| !d.is_nan()).copied().collect::<Vec<f64>>();
-        assert_eq!(reached, [50.0, 70.0, -100.0, -140.0, 0.0, 1.0, 10.0, 8.0]);
+        assert!(values[0][2].is_nan() && slopes.iter().flat_map(|s| s[2]).all(f64::is_nan));
+        assert_eq!(slopes[0][..2], [[50.0, 0.0], [70.0, 1.0]]);
+        assert_eq!(slopes[1][..2], [[-100.0, 10.0], [-140.0, 8.0]]);
     }
 }

@@ -10,7 +10,7 @@ use crate::solve::{Event, Settings, Signal};
 use thiserror::Error;
 
 /// Most parameters that one pass differentiates for.
-pub(super) const LANES: usize = 16;
+pub const LANES: usize = 16;
 /// The same of a pass for few.
 const FEW: usize = 8;
 
@@ -40,9 +40,10 @@ pub type Sampled<'a> = (&'a str, &'a [f64], &'a [f64], f64);
 pub struct Sensitivities {
     /// Values.
     pub run: DualClutchRun<f64>,
-    /// Derivative of every column by every parameter: parameters × columns × time, the last the
-    /// fastest.
-    pub columns: Vec<f64>,
+    /// Derivatives of every column, pass by pass: time × parameters of the pass, the last the fastest.
+    /// All passes but the last are for [`LANES`] parameters; in that there may be room for more than
+    /// were asked for, with zeros.
+    pub columns: Vec<Vec<Vec<f64>>>,
     /// Derivative of every event time by every parameter: parameters × events.
     pub events: Vec<Vec<f64>>,
 }
@@ -82,20 +83,19 @@ fn pass<const P: usize>(
     let dual = simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?;
     let of_lane = |lane| dual.events.iter().map(|e| e.time.eps[lane]).collect();
     let events: Vec<Vec<f64>> = (0..parameters.len()).map(of_lane).collect();
-    let (run, mut columns) = parted(dual);
-    columns.truncate(parameters.len() * run.columns.len() * grid.len());
+    let (run, columns) = parted(dual);
     match found {
-        None => *found = Some(Sensitivities { run, columns, events }),
+        None => *found = Some(Sensitivities { run, columns: vec![columns], events }),
         Some(found) => {
-            found.columns.extend(columns);
+            found.columns.push(columns);
             found.events.extend(events);
         }
     }
     Ok(())
 }
 
-/// The run without derivatives, and those of its columns.
-fn parted<const P: usize>(run: DualClutchRun<Dual<P>>) -> (DualClutchRun<f64>, Vec<f64>) {
+/// The run without derivatives, and those of its columns: time × parameters.
+fn parted<const P: usize>(run: DualClutchRun<Dual<P>>) -> (DualClutchRun<f64>, Vec<Vec<f64>>) {
     let event = |e: &Event<Dual<P>>| Event { time: e.time.re, element: e.element, kind: e.kind };
     let values = Trajectory {
         time: run.time,
@@ -107,7 +107,7 @@ fn parted<const P: usize>(run: DualClutchRun<Dual<P>>) -> (DualClutchRun<f64>, V
         grazing: run.grazing,
         audit: run.audit,
     };
-    (values, run.derivatives)
+    (values, run.derivatives.into_iter().map(Vec::into_flattened).collect())
 }
 
 /// Model, start and delays [s].

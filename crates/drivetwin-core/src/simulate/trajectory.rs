@@ -2,7 +2,7 @@
 //! Chosen outputs on a time grid.
 
 use super::audit::EnergyAudit;
-use super::recorded::{Parts, Picked, Recorded};
+use super::recorded::{Picked, Recorded, Values};
 use super::start::{StartError, find};
 use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
@@ -99,13 +99,13 @@ enum Column<T> {
 /// Result of a run. Columns in the order of the outputs asked for, each as long as `time`; NaN
 /// after a failure.
 #[derive(Clone, Debug)]
-pub struct Trajectory<T> {
+pub struct Trajectory<T: Real> {
     /// Grid, s.
     pub time: Vec<f64>,
     /// One column per output.
     pub columns: Vec<Vec<f64>>,
-    /// Derivatives of the columns: parameters × columns × time, the last the fastest.
-    pub derivatives: Vec<f64>,
+    /// Derivatives of every column by the parameters, where numbers carry any.
+    pub derivatives: Vec<Vec<T::Slopes>>,
     /// Names of the friction elements that events refer to.
     pub elements: Vec<String>,
     /// Events of friction elements.
@@ -119,23 +119,23 @@ pub struct Trajectory<T> {
 }
 
 /// Fills columns while a run advances.
-pub(super) struct Recorder<'g, T> {
+pub(super) struct Recorder<'g, T: Real> {
     grid: &'g [f64],
     next: usize,
     columns: Vec<Column<T>>,
-    recorded: Recorded,
+    recorded: Recorded<T>,
     /// Working space: the basis, at an instant and over a block of samples.
     basis: Vec<T>,
-    parts: Vec<Parts>,
+    values: Vec<Values>,
 }
 
 impl<'g, T: Real> Recorder<'g, T> {
     /// Columns of a network.
     pub fn new(network: &Network<T>, targets: &[Target], grid: &'g [f64]) -> Self {
         let columns = targets.iter().map(|&target| Column::of(network, target)).collect();
-        let recorded = Recorded::new::<T>(targets.len(), grid.len());
-        let parts = vec![Parts::default(); network.basis()];
-        Self { grid, next: 0, columns, recorded, basis: Vec::new(), parts }
+        let recorded = Recorded::new(targets.len(), grid.len());
+        let values = vec![Values::default(); network.basis()];
+        Self { grid, next: 0, columns, recorded, basis: Vec::new(), values }
     }
 
     /// Record the grid points before the end of the step; `last` includes the end.
@@ -182,7 +182,7 @@ impl<'g, T: Real> Recorder<'g, T> {
     }
 
     /// Columns at full length and their derivatives, as in [`Trajectory`].
-    pub fn finish(self) -> (Vec<Vec<f64>>, Vec<f64>) {
+    pub fn finish(self) -> (Vec<Vec<f64>>, Vec<Vec<T::Slopes>>) {
         self.recorded.finish()
     }
 }
@@ -203,20 +203,20 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
             Picked::of(&self.grid[self.next..], knots)
         };
         self.next += picked.count();
-        for parts in &mut self.parts {
-            parts.known = false;
+        for values in &mut self.values {
+            values.known = false;
         }
-        let (columns, recorded, parts) =
-            (&self.columns[..], &mut self.recorded, &mut self.parts[..]);
-        dispatch(Passed { columns, recorded, parts, run, active, samples, picked, first });
+        let (columns, recorded, values) =
+            (&self.columns[..], &mut self.recorded, &mut self.values[..]);
+        dispatch(Passed { columns, recorded, values, run, active, samples, picked, first });
     }
 }
 
 /// Samples to be added to the columns, with the widest instructions.
-struct Passed<'p, 'a, T, S> {
+struct Passed<'p, 'a, T: Real, S> {
     columns: &'p [Column<T>],
-    recorded: &'p mut Recorded,
-    parts: &'p mut [Parts],
+    recorded: &'p mut Recorded<T>,
+    values: &'p mut [Values],
     run: &'p Integrator<'a, T>,
     active: &'p [usize],
     samples: &'p S,
@@ -233,10 +233,13 @@ impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
         for (output, column) in self.columns.iter().enumerate() {
             let from = self.recorded.length(output);
             for &(position, factor) in &*passing_terms(column, self.run) {
-                if !self.parts[position].known {
+                if !self.values[position].known {
                     self.take_up(position);
                 }
-                self.recorded.add((output, from), &self.parts[position], factor);
+                self.recorded.add((output, from), &self.values[position], factor.re());
+                if T::DERIVATIVES {
+                    self.add_slopes::<F>((output, from), position, factor);
+                }
             }
             self.recorded.fill(output, from + count);
         }
@@ -247,21 +250,41 @@ impl<T: Real, S: Samples<T>> Passed<'_, '_, T, S> {
     /// Take up an entry of the basis.
     #[inline(always)]
     fn take_up(&mut self, position: usize) {
-        let (network, parts, picked) = (self.run.network, &mut self.parts[position], self.picked);
+        let (network, values, picked) = (self.run.network, &mut self.values[position], self.picked);
         let constant = |value: f64| std::iter::repeat_n(T::of(value), picked.span());
         if position < self.run.x.len() {
-            parts.set::<T>(self.samples.states(position), picked);
+            values.set::<T>(self.samples.states(position), picked);
         } else if position < network.one() {
             let input = |k| self.run.input_at(self.first + k, position - network.first_input());
-            parts.set::<T>((0..picked.span()).map(input), picked);
+            values.set::<T>((0..picked.span()).map(input), picked);
         } else if position == network.one() {
-            parts.set::<T>(constant(1.0), picked);
+            values.set::<T>(constant(1.0), picked);
         } else {
             let channel = position - network.first_channel();
             match self.active.iter().position(|&j| j == channel) {
-                Some(slot) => parts.set::<T>(self.samples.torques(slot), picked),
-                None => parts.set::<T>(constant(0.0), picked),
+                Some(slot) => values.set::<T>(self.samples.torques(slot), picked),
+                None => values.set::<T>(constant(0.0), picked),
             }
+        }
+    }
+
+    /// Add the derivatives of a multiple of an entry of the basis that has been taken up.
+    #[inline(always)]
+    fn add_slopes<const F: bool>(&mut self, to: (usize, usize), position: usize, factor: T) {
+        let (network, picked) = (self.run.network, self.picked);
+        let channel = |j: &usize| network.first_channel() + j == position;
+        if position < self.run.x.len() {
+            let samples = (self.samples.states(position), picked);
+            self.recorded.add_slopes::<F>(to, samples, factor);
+        } else if position < network.one() && self.run.inputs_shift() {
+            let input = |k| self.run.input_at(self.first + k, position - network.first_input());
+            let samples = ((0..picked.span()).map(input), picked);
+            self.recorded.add_slopes::<F>(to, samples, factor);
+        } else if let Some(slot) = self.active.iter().position(channel) {
+            let samples = (self.samples.torques(slot), picked);
+            self.recorded.add_slopes::<F>(to, samples, factor);
+        } else {
+            self.recorded.add_slopes_of_factor::<F>(to, &self.values[position], factor);
         }
     }
 }

@@ -284,6 +284,11 @@ impl<'a, T: Real> Integrator<'a, T> {
         start + rate * (self.inputs.knot(i) - self.inputs.knot(i - 1))
     }
 
+    /// Whether inputs carry derivatives.
+    pub fn inputs_shift(&self) -> bool {
+        self.inputs.jumps()
+    }
+
     /// Whether the inputs end here.
     pub fn is_at_end(&self) -> bool {
         self.t.re() >= self.inputs.knot(self.inputs.segments())

@@ -90,8 +90,10 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                 s.end[i] = u.onto::<F>(drive.step[0][i], du.onto::<F>(drive.step[1][i], s.end[i]));
             }
             for a in 0..A {
-                s.argument[a] = pair::<L, U, F>(&drive.argument[a], (u, du), s.argument[a]);
-                s.rate[a] = pair::<L, U, F>(&drive.rate[a], (u, du), s.rate[a]);
+                if !L::DERIVATIVES {
+                    s.argument[a] = pair::<L, U, F>(&drive.argument[a], (u, du), s.argument[a]);
+                    s.rate[a] = pair::<L, U, F>(&drive.rate[a], (u, du), s.rate[a]);
+                }
                 s.direct[a] = u_end.onto::<F>(drive.now[a], s.direct[a]);
                 s.second[a] = u.onto::<F>(drive.second[a], du.onto::<F>(drive.now[a], s.second[a]));
             }
@@ -102,8 +104,10 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             }
             for a in 0..A {
                 let c = &channels[a];
-                s.argument[a] = c.argument_end.state[j].fma::<F>(x[j], s.argument[a]);
-                s.rate[a] = c.rate_end.state[j].fma::<F>(x[j], s.rate[a]);
+                if !L::DERIVATIVES {
+                    s.argument[a] = c.argument_end.state[j].fma::<F>(x[j], s.argument[a]);
+                    s.rate[a] = c.rate_end.state[j].fma::<F>(x[j], s.rate[a]);
+                }
                 s.second[a] = c.second.state[j].fma::<F>(x[j], s.second[a]);
             }
         }
@@ -162,11 +166,19 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         }
         add_moments::<L, F, N, A, 0, 3>(op, &self.cubics, &mut self.end);
         for a in 0..A {
-            let Carried { argument_end, rate_end, law, .. } = &channels[a];
-            let (cubics, from_near) = (&self.cubics, self.argument[a] - near[a]);
-            let distance = over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, from_near);
-            self.argument[a] = near[a] + distance;
-            self.rate[a] = over_cubics::<L, F, N, A, 0, 3>(rate_end, cubics, self.rate[a]);
+            let Carried { argument, argument_end, rate, rate_end, law, .. } = &channels[a];
+            let distance = if L::DERIVATIVES {
+                // Few products by way of the state, where they count for more than their order.
+                self.argument[a] = over_state::<L, F, N>(op, argument, &self.end);
+                self.rate[a] = over_state::<L, F, N>(op, &rate.state, &self.end);
+                self.argument[a] - near[a]
+            } else {
+                let (cubics, from_near) = (&self.cubics, self.argument[a] - near[a]);
+                self.rate[a] = over_cubics::<L, F, N, A, 0, 3>(rate_end, cubics, self.rate[a]);
+                let distance = over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, from_near);
+                self.argument[a] = near[a] + distance;
+                distance
+            };
             let normal = self.normal[a][1].times(h) + self.normal[a][0];
             let friction = law.about::<F>(near[a], stiction[a]);
             self.value[a] = friction.at::<F>(distance, normal);
@@ -293,6 +305,20 @@ fn add_moments<
             }
         }
     }
+}
+
+/// Value of a form over the state.
+#[inline(always)]
+fn over_state<L: Lane, const F: bool, const N: usize>(
+    op: &Operators<L, N>,
+    form: &[L; N],
+    x: &[L; N],
+) -> L {
+    let mut sum = L::all(0.0);
+    for i in 0..op.columns() {
+        sum = form[i].fma::<F>(x[i], sum);
+    }
+    sum
 }
 
 #[inline(always)]
