@@ -120,7 +120,7 @@ impl<const N: usize> Formation<N> {
             x: [zero; N],
             carry: [Carry::idle(); MAX_ACTIVE],
             guards: idle_guards(),
-            trail: Trail::with_channels(MAX_ACTIVE),
+            trail: Trail::in_columns(Vec::new(), MAX_ACTIVE),
             stretch: (0, 0),
         }
     }

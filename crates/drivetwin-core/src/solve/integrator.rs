@@ -5,6 +5,7 @@ use super::expansion::{Accuracy, Expansion};
 use super::guard::{Cause, Watch, earliest};
 use super::inputs::Inputs;
 use super::known::Known;
+use super::march::Column;
 use super::sprint::{Sink, can_march};
 use super::status::Status;
 use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
@@ -142,6 +143,8 @@ pub struct Integrator<'a, T> {
     pub(super) settings: Settings,
     /// Whether samples are passed by operators.
     marches: bool,
+    /// Working space of a march.
+    pub(super) trail: Vec<Column<T>>,
     /// Modes and operators, also those of this run.
     pub known: Known<'a, T>,
     pub(super) segment: usize,
@@ -185,6 +188,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             marches: settings.sprint && inputs.is_sampled() && can_march(network),
             settings,
             mode,
+            trail: Vec::new(),
             known,
             segment: 0,
             pending: None,

@@ -66,24 +66,24 @@ pub fn idle_guards<V: Values>() -> Guards<V> {
 }
 
 /// States and torques of the carried channels at the start of passed samples, and at the end of the last,
-/// each as a column over the samples.
-pub struct Trail<L, const N: usize> {
-    /// States.
-    states: Box<[Column<L>; N]>,
-    /// Torques.
-    torques: Vec<Column<L>>,
-}
+/// each as a column over the samples: first the states.
+pub struct Trail<L, const N: usize>(Vec<Column<L>>);
 
 /// One value at every sample.
 pub type Column<L> = [L; BLOCK + 1];
 
 impl<L: Lane, const N: usize> Trail<L, N> {
-    /// Empty columns, for so many carried channels.
-    pub fn with_channels(channels: usize) -> Self {
-        let empty = [L::all(0.0); BLOCK + 1];
-        let states = vec![empty; N].into_boxed_slice();
-        let states = states.try_into().unwrap_or_else(|_| unreachable!("as many as asked for"));
-        Self { states, torques: vec![empty; channels] }
+    /// For so many carried channels, in columns of old.
+    pub fn in_columns(mut columns: Vec<Column<L>>, channels: usize) -> Self {
+        if columns.len() < N + channels {
+            columns.resize(N + channels, [L::all(0.0); BLOCK + 1]);
+        }
+        Self(columns)
+    }
+
+    /// The columns, for another trail.
+    pub fn into_columns(self) -> Vec<Column<L>> {
+        self.0
     }
 
     /// Set sample `k`.
@@ -94,24 +94,25 @@ impl<L: Lane, const N: usize> Trail<L, N> {
         k: usize,
         (x, carry): (&[L; N], &[Carry<L>; A]),
     ) {
+        let (states, torques) = self.0.split_at_mut(N);
         for i in 0..op.columns() {
-            self.states[i][k] = x[i];
+            states[i][k] = x[i];
         }
         for a in 0..A {
-            self.torques[a][k] = op.channels[a].torque(&carry[a]);
+            torques[a][k] = op.channels[a].torque(&carry[a]);
         }
     }
 
     /// State `i`.
     #[inline(always)]
     pub fn states(&self, i: usize) -> &Column<L> {
-        &self.states[i]
+        &self.0[i]
     }
 
     /// Torque of the carried channel number `slot`.
     #[inline(always)]
     pub fn torques(&self, slot: usize) -> &Column<L> {
-        &self.torques[slot]
+        &self.0[N + slot]
     }
 }
 
@@ -149,6 +150,7 @@ pub fn march<
     for load in &op.loads {
         loaded &= load.stays_positive::<F>(source.bounds(load.input, (first, count)));
     }
+    let looks = !loaded || !op.watched.is_empty();
     trail.put(op, at, (&x, carry));
     'samples: for from in (0..count).step_by(W) {
         let some = W.min(count - from);
@@ -161,8 +163,10 @@ pub fn march<
             }
             *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, carry));
             trail.put(op, at + from + k + 1, (&x, carry));
-            for (ends, [start, rate]) in ends.iter_mut().zip(u) {
-                ends[k] = rate.values().times(h) + start.values();
+            if looks {
+                for (ends, [start, rate]) in ends.iter_mut().zip(u) {
+                    ends[k] = rate.values().times(h) + start.values();
+                }
             }
         }
         // Apart from those of the step: sums over a loop that start from nothing stay in vectors.
@@ -251,13 +255,13 @@ impl<L: Lane, const N: usize> Operators<L, N> {
             add::<L, V, F, W>(&mut torque, drive.watched[place], of_input(drive.input));
         }
         for i in 0..self.columns() {
-            let column: &[L; W] = after(&trail.states[i], from);
+            let column: &[L; W] = after(trail.states(i), from);
             for k in 0..W {
                 torque[k] = form.state[i].values().fma::<F>(column[k].values(), torque[k]);
             }
         }
         for a in 0..A {
-            let column: &[L; W] = after(&trail.torques[a], from);
+            let column: &[L; W] = after(trail.torques(a), from);
             for k in 0..W {
                 torque[k] = form.channels[a].values().fma::<F>(column[k].values(), torque[k]);
             }

@@ -336,7 +336,7 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Sprint<'_, '_, T, S, N
         x[..n].copy_from_slice(&run.x);
         let mut carry: [Carry<T>; A] = Carry::start::<F, N, A, _>(operators, (first, h), &x);
         let mut guards = operators.guards::<_, F, A>(first, (&x, &carry));
-        let mut trail = Trail::with_channels(A);
+        let mut trail = Trail::in_columns(std::mem::take(&mut run.trail), A);
         let mut whole = true;
         while count > 0 && whole {
             let samples = (run.segment, count.min(BLOCK));
@@ -363,6 +363,7 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Sprint<'_, '_, T, S, N
             sink.passed(run, active, &trail, (run.segment, 1));
             run.segment -= 1;
         }
+        run.trail = trail.into_columns();
         whole
     }
 }

@@ -27,8 +27,9 @@ struct Sampling<L: Lane, const N: usize, const A: usize> {
     rate: [L; A],
     /// The part of these rates that comes from the inputs.
     direct: [L; A],
-    /// Second derivatives of the arguments at the start.
+    /// Second derivatives of the arguments at the start, without channels and state, and by the state.
     second: [L; A],
+    turning: [L; A],
     /// Normal loads at the start and their rates.
     normal: [[L; 2]; A],
     /// Cubics of the torques.
@@ -70,6 +71,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             rate: [none; A],
             direct: [none; A],
             second: [none; A],
+            turning: [none; A],
             normal: [[none; 2]; A],
             cubics: [[none; SHAPES]; A],
             value: [Value::zero(); A],
@@ -108,8 +110,10 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                     s.argument[a] = c.argument_end.state[j].fma::<F>(x[j], s.argument[a]);
                     s.rate[a] = c.rate_end.state[j].fma::<F>(x[j], s.rate[a]);
                 }
-                s.second[a] = c.second.state[j].fma::<F>(x[j], s.second[a]);
             }
+        }
+        for a in 0..A {
+            s.turning[a] = over_state::<L, F, N>(op, &channels[a].second.state, x);
         }
         s
     }
@@ -123,14 +127,14 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         carry: &mut [Carry<L>; A],
         h: f64,
     ) {
+        let mut near = [L::all(0.0); A];
+        let (mut stiction, mut faded, mut rise) = (near, near, near);
         for a in 0..A {
             let v = &carry[a].value;
-            let drift = (v.by_normal * self.normal[a][1]).times(h);
+            rise[a] = v.by_argument.fma::<F>(carry[a].rate, v.by_normal * self.normal[a][1]);
             self.cubics[a][0] = v.value;
-            self.cubics[a][1] = v.by_argument.times(h).fma::<F>(carry[a].rate, drift);
+            self.cubics[a][1] = rise[a].times(h);
         }
-        let mut near = [L::all(0.0); A];
-        let (mut stiction, mut faded) = (near, near);
         let mut farthest = L::Values::all(0.0);
         for a in 0..A {
             let mut second = self.second[a];
@@ -138,9 +142,9 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                 second = channels[a].second.channels[b].fma::<F>(self.cubics[b][0], second);
             }
             for b in 0..A {
-                let rate = channels[a].rate.channels[b].times(1.0 / h);
-                second = rate.fma::<F>(self.cubics[b][1], second);
+                second = channels[a].rate.channels[b].fma::<F>(rise[b], second);
             }
+            let second = second + self.turning[a];
             let (v, ds) = (&carry[a].value, carry[a].rate);
             let mixed = v.mixed * self.normal[a][1];
             let turn = v.bend.fma::<F>(ds, mixed + mixed);
@@ -198,13 +202,14 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         h: f64,
     ) {
         let mut missing = [[L::all(0.0); SHAPES]; A];
+        let mut rate = [L::all(0.0); A];
         for a in 0..A {
             let (v, [a0, a1, a2, ..]) = (&self.value[a], self.cubics[a]);
             let known = self.rate[a] + self.direct[a];
-            let ds = over_channels::<L, F, N, A>(&channels[a].rate, &self.value, known);
+            rate[a] = over_channels::<L, F, N, A>(&channels[a].rate, &self.value, known);
             let drift = (v.by_normal * self.normal[a][1]).times(h);
             missing[a][VALUE] = v.value - (a0 + a1 + a2);
-            missing[a][SLOPE] = v.by_argument.times(h).fma::<F>(ds, drift - (a1 + a2 + a2));
+            missing[a][SLOPE] = v.by_argument.times(h).fma::<F>(rate[a], drift - (a1 + a2 + a2));
         }
         add_moments::<L, F, N, A, VALUE, SHAPES>(op, &missing, &mut self.end);
         let mut size = L::Values::all(0.0);
@@ -212,13 +217,10 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             size = size.larger(carry[a].value.value.values().magnitude());
         }
         size = size + L::Values::all(1.0);
-        let mut early = [L::Values::all(0.0); A];
         for a in 0..A {
-            let Carried { argument_end, rate_end, .. } = &channels[a];
+            let Carried { argument_end, rate_end, law, .. } = &channels[a];
             let none = L::all(0.0);
             let ds = over_cubics::<L, F, N, A, VALUE, SHAPES>(argument_end, &missing, none);
-            let rate = self.rate[a];
-            self.rate[a] = over_cubics::<L, F, N, A, VALUE, SHAPES>(rate_end, &missing, rate);
             let corrected = self.value[a].moved::<F>(ds);
             let correction = (corrected.value - self.value[a].value).values().magnitude();
             let [.., value, slope] = missing[a];
@@ -226,18 +228,14 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let close = size.times(MAX_CORRECTION) - correction;
             let guard = size.times(MAX_CUBIC) - cubic;
             self.guard = self.guard.negative_with(guard).negative_with(close);
-            self.value[a] = corrected;
             let (start, step) = (carry[a].argument.values(), carry[a].rate.values().times(h / 3.0));
-            early[a] = step + start;
+            let early = step + start;
             carry[a].argument = self.argument[a] + ds;
-        }
-        for a in 0..A {
-            let Carried { rate, law, .. } = &channels[a];
-            let known = self.rate[a] + self.direct[a];
-            carry[a].rate = over_channels::<L, F, N, A>(rate, &self.value, known);
-            carry[a].value = self.value[a];
+            carry[a].value = corrected;
+            // What the corrected torques change of the rate is of higher order.
+            carry[a].rate = over_cubics::<L, F, N, A, VALUE, SHAPES>(rate_end, &missing, rate[a]);
             // Between its ends the argument stays within these (Bernstein's form of the cubic).
-            let (early, end) = (early[a], carry[a].argument.values());
+            let end = carry[a].argument.values();
             let late = end - carry[a].rate.values().times(h / 3.0);
             let above = early.smaller(late).smaller(end) - law.from.values();
             let below = law.to.values() - early.larger(late).larger(end);
@@ -314,11 +312,12 @@ fn over_state<L: Lane, const F: bool, const N: usize>(
     form: &[L; N],
     x: &[L; N],
 ) -> L {
-    let mut sum = L::all(0.0);
-    for i in 0..op.columns() {
-        sum = form[i].fma::<F>(x[i], sum);
+    // Two chains of products, half as long.
+    let mut sums = [form[0] * x[0], form[1] * x[1]];
+    for i in 2..op.columns() {
+        sums[i % 2] = form[i].fma::<F>(x[i], sums[i % 2]);
     }
-    sum
+    sums[0] + sums[1]
 }
 
 #[inline(always)]
