@@ -59,6 +59,8 @@ pub struct ChannelSeries<T> {
     pub arguments: [Series<T>; 2],
     /// |slip| of a friction law.
     slip: Series<T>,
+    /// Normal load of a friction law, and the number of the last coefficient that is not zero.
+    normal: (Series<T>, usize),
     /// exp(-|s|/v_s) of a Stribeck law.
     exponential: Series<T>,
     /// μ of a friction law.
@@ -70,7 +72,14 @@ pub struct ChannelSeries<T> {
 impl<T: Real> Default for ChannelSeries<T> {
     fn default() -> Self {
         let zero = [T::zero_(); TERMS];
-        Self { arguments: [zero, zero], slip: zero, exponential: zero, mu: zero, torque: zero }
+        Self {
+            arguments: [zero, zero],
+            slip: zero,
+            normal: (zero, 0),
+            exponential: zero,
+            mu: zero,
+            torque: zero,
+        }
     }
 }
 
@@ -121,11 +130,11 @@ impl<T: Real> Channel<T> {
             (Law::Friction { mu, normal, .. }, Cell::Moving { sign, piece }) => {
                 c.slip[k] = s[k] * sign;
                 c.mu[k] = mu.series_term(&c.slip, piece, &mut c.exponential, k);
-                let product = (0..=k).fold(T::zero_(), |sum, i| {
-                    let normal = normal.term(inputs, i);
-                    if normal.re() == 0.0 && i > 1 { sum } else { sum + normal * c.mu[k - i] }
-                });
-                product * sign
+                let (load, last) = &mut c.normal;
+                load[k] = normal.term(inputs, k);
+                *last = if k <= 1 || load[k].re() != 0.0 { k } else { *last };
+                let products = load[..=*last].iter().zip(c.mu[..=k].iter().rev());
+                products.fold(T::zero_(), |sum, (&load, &mu)| sum + load * mu) * sign
             }
             (Law::Quadratic(coefficient), Cell::Moving { sign, .. }) => {
                 *coefficient * product_term(s, s, k) * sign

@@ -6,13 +6,13 @@ use super::cell::Cell;
 use super::channel::{self, Channel};
 use crate::model::FrictionLaw;
 use crate::model::mechanism::Normal;
-use crate::number::{Lane, Real};
+use crate::number::{Factor, Lane, Real};
 
 /// Most inputs of a network that is marched.
 pub const MAX_INPUTS: usize = 16;
 
 /// Value at the start of a sample and rate within it, of every input.
-pub type Sample<L> = [[L; 2]];
+pub type Sample<U> = [[U; 2]];
 
 /// `gain · u + offset`.
 #[derive(Clone, Copy, Debug)]
@@ -207,9 +207,9 @@ impl<L: Lane> Line<L> {
 
     /// Value at the start of a sample and rate within it.
     #[inline(always)]
-    pub fn line<const F: bool>(&self, sample: &Sample<L>) -> [L; 2] {
+    pub fn line<const F: bool, U: Factor<L>>(&self, sample: &Sample<U>) -> [L; 2] {
         let [start, rate] = sample[self.input];
-        [self.gain.fma::<F>(start, self.offset), self.gain * rate]
+        [start.onto::<F>(self.gain, self.offset), rate.product(self.gain)]
     }
 }
 

@@ -172,10 +172,6 @@ impl<const P: usize> Real for Dual<P> {
         Self { re: value, eps: [0.0; P] }
     }
     #[inline(always)]
-    fn plain(_: &[[f64; 2]]) -> Option<&[[Self; 2]]> {
-        None
-    }
-    #[inline(always)]
     fn re(&self) -> f64 {
         self.re
     }

@@ -24,18 +24,55 @@ pub trait Lane:
     /// `self · a + b`.
     fn fma<const F: bool>(self, a: Self, b: Self) -> Self;
 
+    /// `self · factor + b`.
+    fn fma_times<const F: bool>(self, factor: f64, b: Self) -> Self;
+
     /// Product with a number.
     fn times(self, factor: f64) -> Self;
 
     /// `e^x` to a few units in the last place for |x| < 700, beyond that of the bound.
     fn exponential<const F: bool>(self) -> Self;
 
-    /// `self · e^x` by the series where |x| is small, else by `full`, which gives the same by another
-    /// way.
-    fn grown<const F: bool>(self, x: Self, full: impl FnOnce() -> Self) -> Self;
+    /// `self · e^x` for |x| up to [`SMALL`].
+    fn grown<const F: bool>(self, x: Self) -> Self;
+
+    /// The values of another in the runs named by bits.
+    fn with(self, runs: u32, other: Self) -> Self;
 
     /// The values without derivatives.
     fn values(self) -> Self::Values;
+}
+
+/// A factor of numbers of type `L`: one of them, or a plain number, which is the same in all runs and has no
+/// derivatives.
+pub trait Factor<L: Lane>: Lane {
+    /// `self · a`.
+    fn product(self, a: L) -> L;
+
+    /// `self · a + b`.
+    fn onto<const F: bool>(self, a: L, b: L) -> L;
+}
+
+impl<L: Lane> Factor<L> for f64 {
+    #[inline(always)]
+    fn product(self, a: L) -> L {
+        a.times(self)
+    }
+    #[inline(always)]
+    fn onto<const F: bool>(self, a: L, b: L) -> L {
+        a.fma_times::<F>(self, b)
+    }
+}
+
+impl<const P: usize> Factor<Self> for Dual<P> {
+    #[inline(always)]
+    fn product(self, a: Self) -> Self {
+        self * a
+    }
+    #[inline(always)]
+    fn onto<const F: bool>(self, a: Self, b: Self) -> Self {
+        self.fma::<F>(a, b)
+    }
 }
 
 /// Values of one or several runs, as guards look at them: a guard falls where its sign bit is set.
@@ -46,11 +83,17 @@ pub trait Values: Lane<Values = Self> {
     /// The larger of two numbers, run by run.
     fn larger(self, other: Self) -> Self;
 
+    /// The smaller of two numbers, run by run.
+    fn smaller(self, other: Self) -> Self;
+
     /// Something that is negative where either is; its magnitude means nothing.
     fn negative_with(self, other: Self) -> Self;
 
     /// Runs whose value is negative, as bits.
     fn negative(self) -> u32;
+
+    /// Whether there is one.
+    fn any_negative(self) -> bool;
 
     /// Runs whose value is infinite or no number, as bits.
     fn unbounded(self) -> u32;
@@ -102,8 +145,8 @@ pub(super) fn exponential<const F: bool>(x: f64) -> f64 {
     fused::<F>(odd, r, even) * power
 }
 
-/// Largest |x| for which [`growth`] is exact to 3e-14.
-pub(super) const SMALL: f64 = 0.125;
+/// Largest |x| for which [`Lane::grown`] is exact to 3e-14.
+pub const SMALL: f64 = 0.125;
 
 /// `e^x` for |x| up to [`SMALL`], by its series; powers of x² apart, for a short chain of products.
 #[inline(always)]
@@ -129,6 +172,10 @@ impl Lane for f64 {
         fused::<F>(self, a, b)
     }
     #[inline(always)]
+    fn fma_times<const F: bool>(self, factor: f64, b: Self) -> Self {
+        fused::<F>(self, factor, b)
+    }
+    #[inline(always)]
     fn times(self, factor: f64) -> Self {
         self * factor
     }
@@ -137,8 +184,12 @@ impl Lane for f64 {
         exponential::<F>(self)
     }
     #[inline(always)]
-    fn grown<const F: bool>(self, x: Self, full: impl FnOnce() -> Self) -> Self {
-        if x.abs() <= SMALL { self * growth::<F>(x) } else { full() }
+    fn grown<const F: bool>(self, x: Self) -> Self {
+        self * growth::<F>(x)
+    }
+    #[inline(always)]
+    fn with(self, runs: u32, other: Self) -> Self {
+        if runs & 1 == 1 { other } else { self }
     }
     #[inline(always)]
     fn values(self) -> Self {
@@ -156,12 +207,20 @@ impl Values for f64 {
         if self > other { self } else { other }
     }
     #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+    #[inline(always)]
     fn negative_with(self, other: Self) -> Self {
         f64::from_bits(self.to_bits() | other.to_bits())
     }
     #[inline(always)]
     fn negative(self) -> u32 {
         (self.to_bits() >> 63) as u32
+    }
+    #[inline(always)]
+    fn any_negative(self) -> bool {
+        self.is_sign_negative()
     }
     #[inline(always)]
     fn unbounded(self) -> u32 {
@@ -188,6 +247,14 @@ impl<const P: usize> Lane for Dual<P> {
         Self::new(fused::<F>(self.re, a.re, b.re), eps)
     }
     #[inline(always)]
+    fn fma_times<const F: bool>(self, factor: f64, b: Self) -> Self {
+        let mut eps = b.eps;
+        for i in 0..P {
+            eps[i] = fused::<F>(self.eps[i], factor, eps[i]);
+        }
+        Self::new(fused::<F>(self.re, factor, b.re), eps)
+    }
+    #[inline(always)]
     fn times(self, factor: f64) -> Self {
         self * factor
     }
@@ -197,12 +264,13 @@ impl<const P: usize> Lane for Dual<P> {
         self.chain(value, value)
     }
     #[inline(always)]
-    fn grown<const F: bool>(self, x: Self, full: impl FnOnce() -> Self) -> Self {
-        if x.re.abs() > SMALL {
-            return full();
-        }
+    fn grown<const F: bool>(self, x: Self) -> Self {
         let factor = growth::<F>(x.re);
         self * x.chain(factor, factor)
+    }
+    #[inline(always)]
+    fn with(self, runs: u32, other: Self) -> Self {
+        if runs & 1 == 1 { other } else { self }
     }
     #[inline(always)]
     fn values(self) -> f64 {

@@ -8,16 +8,16 @@ mod pack;
 mod series;
 
 pub use dual::Dual;
-pub use lane::{Lane, Values};
+pub use lane::{Factor, Lane, SMALL, Values};
 pub use pack::Pack;
-pub use series::{Series, TERMS, evaluate, product_term, slope};
+pub use series::{INVERSE, Series, TERMS, evaluate, product_term, slope};
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Sub, SubAssign};
 
 /// A real number, with or without derivatives. Decisions are taken on [`Real::re`].
 pub trait Real:
-    Lane<Values = f64>
+    Factor<Self, Values = f64>
     + Debug
     + PartialEq
     + Send
@@ -50,9 +50,6 @@ pub trait Real:
     fn zero_() -> Self {
         Self::of(0.0)
     }
-
-    /// The same numbers where they need no derivatives.
-    fn plain(values: &[[f64; 2]]) -> Option<&[[Self; 2]]>;
 
     /// The value.
     fn re(&self) -> f64;
@@ -90,10 +87,6 @@ impl Real for f64 {
     #[inline(always)]
     fn of(value: f64) -> Self {
         value
-    }
-    #[inline(always)]
-    fn plain(values: &[[f64; 2]]) -> Option<&[[Self; 2]]> {
-        Some(values)
     }
     #[inline(always)]
     fn re(&self) -> f64 {

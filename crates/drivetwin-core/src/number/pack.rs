@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Values of several runs side by side.
 
-use super::lane::{Lane, SMALL, Values, growth};
+use super::lane::{Factor, Lane, Values, growth};
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// `K` values, one of each run. The loops over the runs compile to vector instructions of the set that
@@ -27,13 +27,6 @@ impl<const K: usize> Pack<K> {
             bits |= f(self.0[i]) << i;
         }
         bits
-    }
-
-    /// The values of another in the runs named by bits.
-    #[inline(always)]
-    fn with(self, runs: u32, other: Self) -> Self {
-        let own = |i: usize| runs >> i & 1 == 0;
-        Self(std::array::from_fn(|i| if own(i) { self.0[i] } else { other.0[i] }))
     }
 
     #[inline(always)]
@@ -96,6 +89,10 @@ impl<const K: usize> Lane for Pack<K> {
         Self(out)
     }
     #[inline(always)]
+    fn fma_times<const F: bool>(self, factor: f64, b: Self) -> Self {
+        self.fma::<F>(Self::all(factor), b)
+    }
+    #[inline(always)]
     fn times(self, factor: f64) -> Self {
         self.each(|a| a * factor)
     }
@@ -104,14 +101,28 @@ impl<const K: usize> Lane for Pack<K> {
         self.each(|a| a.exponential::<F>())
     }
     #[inline(always)]
-    fn grown<const F: bool>(self, x: Self, full: impl FnOnce() -> Self) -> Self {
-        let far = x.bits(|x| u32::from(x.abs() > SMALL));
-        let grown = self.zip(x, |value, x| value * growth::<F>(x));
-        if far == 0 { grown } else { grown.with(far, full()) }
+    fn grown<const F: bool>(self, x: Self) -> Self {
+        self.zip(x, |value, x| value * growth::<F>(x))
+    }
+    #[inline(always)]
+    fn with(self, runs: u32, other: Self) -> Self {
+        let own = |i: usize| runs >> i & 1 == 0;
+        Self(std::array::from_fn(|i| if own(i) { self.0[i] } else { other.0[i] }))
     }
     #[inline(always)]
     fn values(self) -> Self {
         self
+    }
+}
+
+impl<const K: usize> Factor<Self> for Pack<K> {
+    #[inline(always)]
+    fn product(self, a: Self) -> Self {
+        self * a
+    }
+    #[inline(always)]
+    fn onto<const F: bool>(self, a: Self, b: Self) -> Self {
+        self.fma::<F>(a, b)
     }
 }
 
@@ -125,12 +136,24 @@ impl<const K: usize> Values for Pack<K> {
         self.zip(other, |a, b| a.larger(b))
     }
     #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        self.zip(other, |a, b| a.smaller(b))
+    }
+    #[inline(always)]
     fn negative_with(self, other: Self) -> Self {
         self.zip(other, |a, b| a.negative_with(b))
     }
     #[inline(always)]
     fn negative(self) -> u32 {
         self.bits(|a| a.negative())
+    }
+    #[inline(always)]
+    fn any_negative(self) -> bool {
+        let mut any = 0;
+        for i in 0..K {
+            any |= self.0[i].to_bits();
+        }
+        any >> 63 == 1
     }
     #[inline(always)]
     fn unbounded(self) -> u32 {

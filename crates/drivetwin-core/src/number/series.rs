@@ -9,6 +9,16 @@ pub const TERMS: usize = 15;
 /// Taylor coefficients of a scalar in time, `value(t0 + h) = Σ c_k h^k`.
 pub type Series<T> = [T; TERMS];
 
+/// 1/k; at k = 0 zero.
+pub const INVERSE: Series<f64> = {
+    let (mut inverse, mut k) = ([0.0; TERMS], 1);
+    while k < TERMS {
+        inverse[k] = 1.0 / k as f64;
+        k += 1;
+    }
+    inverse
+};
+
 /// Value of a series at `h` [s], by Horner's rule over its first `order + 1` coefficients.
 pub fn evaluate<T: Real>(series: &Series<T>, order: usize, h: T) -> T {
     let mut value = series[order];

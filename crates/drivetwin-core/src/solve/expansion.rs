@@ -3,7 +3,7 @@
 
 use crate::network::channel::{ChannelSeries, form};
 use crate::network::{Cell, Channel, Mode, Network};
-use crate::number::{Real, Series, TERMS, evaluate, slope};
+use crate::number::{INVERSE, Real, Series, TERMS, evaluate, slope};
 
 /// Coefficients of states and channels over one step, and the working space to compute them.
 #[derive(Clone, Debug)]
@@ -70,6 +70,9 @@ impl<T: Real> Expansion<T> {
             series[0] = value;
         }
         self.set_scales(network);
+        self.basis.clear();
+        self.basis.resize(network.basis(), T::zero_());
+        let curved = self.inputs.iter().any(|u| u[2].re() != 0.0 || u[3].re() != 0.0);
         let last = accuracy.order.unwrap_or(TERMS - 1);
         let products = network.channels.iter().any(Channel::is_product);
         // Successive terms that must be small: every other one of an even or odd motion is zero, and
@@ -79,9 +82,13 @@ impl<T: Real> Expansion<T> {
         let mut power = 1.0;
         for k in 0..last {
             self.channel_terms(network, cells, k);
-            self.next_term(network, mode, k);
+            // Of lines only two coefficients are left to enter, and the zeros after them.
+            if k <= 2 || curved {
+                self.input_terms(network, k);
+            }
             power *= h;
-            sizes[k + 1] = self.relative_size(k + 1).max(self.input_size(k + 1)) * power;
+            let size = self.next_term(mode, k);
+            sizes[k + 1] = power * if curved { size.max(self.input_size(k + 1)) } else { size };
             let recent = largest(&sizes[(k + 2).saturating_sub(window)..k + 2]);
             if accuracy.order.is_none() && recent <= accuracy.tolerance {
                 self.finish(network, cells, k + 1);
@@ -139,30 +146,47 @@ impl<T: Real> Expansion<T> {
         self.order = order;
     }
 
-    /// Coefficient `k` of the channels from that of the states.
+    /// Coefficient `k` of the channels from that of the states, both into the basis.
     fn channel_terms(&mut self, network: &Network<T>, cells: &[Cell], k: usize) {
-        self.basis.clear();
-        self.basis.extend(self.states.iter().map(|state| state[k]));
-        for ((channel, &cell), series) in network.channels.iter().zip(cells).zip(&mut self.channels)
-        {
+        let (states, others) = self.basis.split_at_mut(self.states.len());
+        for (to, state) in states.iter_mut().zip(&self.states) {
+            *to = state[k];
+        }
+        let torques = &mut others[network.first_channel() - self.states.len()..];
+        let channels = network.channels.iter().zip(cells).zip(&mut self.channels);
+        for (((channel, &cell), series), torque) in channels.zip(torques) {
             for (row, argument) in channel.arguments.iter().zip(&mut series.arguments) {
-                argument[k] = form(row, &self.basis);
+                argument[k] = form(row, states);
             }
             channel.term(cell, &self.inputs, series, k);
+            *torque = series.torque[k];
         }
     }
 
-    /// Coefficient `k + 1` of the states; the basis holds coefficient `k` of them.
-    fn next_term(&mut self, network: &Network<T>, mode: &Mode<T>, k: usize) {
-        let basis = &mut self.basis;
-        basis.extend(self.inputs.iter().map(|input| input[k]));
-        let rate = |&(_, input): &(Vec<T>, usize)| self.inputs[input][k + 1] * (k + 1) as f64;
-        basis.extend(network.prescribed.iter().map(rate));
-        basis.push(T::of(if k == 0 { 1.0 } else { 0.0 }));
-        basis.extend(self.channels.iter().map(|channel| channel.torque[k]));
-        for (state, rate) in self.states.iter_mut().zip(mode.rates.times(basis)) {
-            state[k + 1] = rate / (k + 1) as f64;
+    /// Coefficient `k` of what the inputs and the constant give to the basis.
+    fn input_terms(&mut self, network: &Network<T>, k: usize) {
+        let given = &mut self.basis[network.first_input()..];
+        for (to, input) in given.iter_mut().zip(&self.inputs) {
+            *to = input[k];
         }
+        let given = &mut self.basis[network.first_rate()..];
+        for (to, &(_, input)) in given.iter_mut().zip(&network.prescribed) {
+            *to = self.inputs[input][k + 1] * (k + 1) as f64;
+        }
+        self.basis[network.one()] = T::of(if k == 0 { 1.0 } else { 0.0 });
+    }
+
+    /// Coefficient `k + 1` of the states, by coefficient `k` of the basis. Returns the largest, relative
+    /// to the scale of its state.
+    fn next_term(&mut self, mode: &Mode<T>, k: usize) -> f64 {
+        let mut largest = 0.0;
+        let states = self.states.iter_mut().zip(&self.scales);
+        for ((state, scale), rate) in states.zip(mode.rates.times(&self.basis)) {
+            state[k + 1] = rate * INVERSE[k + 1];
+            let size = state[k + 1].re().abs() * scale;
+            largest = if size > largest { size } else { largest };
+        }
+        largest
     }
 
     /// Largest coefficient `k` of an input that is not linear, relative to its size now: guards depend
@@ -182,14 +206,8 @@ impl<T: Real> Expansion<T> {
             *scale = 1.0 / state[0].re().abs().max(floor);
         }
     }
-
-    /// Largest coefficient `k` relative to the scale of its state.
-    fn relative_size(&self, k: usize) -> f64 {
-        let sizes = self.states.iter().zip(&self.scales).map(|(s, scale)| s[k].re().abs() * scale);
-        sizes.fold(0.0, |largest, size| if size > largest { size } else { largest })
-    }
 }
 
 fn largest(sizes: &[f64]) -> f64 {
-    sizes.iter().copied().fold(0.0, f64::max)
+    sizes.iter().fold(0.0, |largest, &size| if size > largest { size } else { largest })
 }

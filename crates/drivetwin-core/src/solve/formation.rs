@@ -11,7 +11,7 @@ use super::integrator::{Integrator, Step};
 use super::lanes::{Task, dispatch};
 use super::march::{BLOCK, Carry, Guards, Room, Source, Trail, idle_guards, march, room};
 use super::operators::{MAX_ACTIVE, Operators};
-use super::sprint::{Ready, Samples, Sink};
+use super::sprint::{Lines, Ready, Samples, Sink};
 use super::status::Status;
 use crate::network::smooth::Sample;
 use crate::number::{Lane, Pack};
@@ -36,6 +36,8 @@ struct Member<'r, 'a, S> {
     ready: Option<Ready<f64>>,
     /// Segment at which its operators end.
     until: usize,
+    /// First sample that its sink has not got.
+    from: usize,
     joined: bool,
     outcome: Result<(), Status>,
 }
@@ -48,7 +50,7 @@ pub fn run_together<'a, S: Recording>(
         .iter_mut()
         .map(|(run, sink)| {
             let (ready, outcome) = (None, Ok(()));
-            let mut member = Member { run, sink, ready, until: 0, joined: false, outcome };
+            let mut member = Member { run, sink, ready, until: 0, from: 0, joined: false, outcome };
             member.go_on(false);
             member
         })
@@ -101,9 +103,11 @@ struct Formation<const N: usize> {
     /// Watched guards by number, likewise.
     watched: Vec<usize>,
     x: [Lanes; N],
-    carry: Carry<Lanes, MAX_ACTIVE>,
+    carry: [Carry<Lanes>; MAX_ACTIVE],
     guards: Guards<Lanes>,
     trail: Trail<Lanes, N>,
+    /// Segment of the first sample in the trail, and number of samples.
+    stretch: (usize, usize),
 }
 
 impl<const N: usize> Formation<N> {
@@ -114,9 +118,10 @@ impl<const N: usize> Formation<N> {
             slots: Vec::new(),
             watched: Vec::new(),
             x: [zero; N],
-            carry: Carry::zero(),
+            carry: [Carry::idle(); MAX_ACTIVE],
             guards: idle_guards(),
             trail: Trail::with_channels(MAX_ACTIVE),
+            stretch: (0, 0),
         }
     }
 
@@ -124,32 +129,34 @@ impl<const N: usize> Formation<N> {
     fn march<S: Recording>(mut self, members: &mut [Member<'_, '_, S>]) {
         let live = |member: &Member<'_, '_, S>| member.ready.is_some();
         while let Some(segment) = members.iter().filter(|m| live(m)).map(|m| m.run.segment).min() {
+            if segment != self.stretch.0 + self.stretch.1 || self.stretch.1 == BLOCK {
+                self.hand_over(members, segment);
+            }
             let joining = self.join(members, segment);
             let ahead = |m: &Member<'_, '_, S>| if m.joined { m.until } else { m.run.segment };
             let until = members.iter().filter(|m| live(m)).map(ahead).min().unwrap_or(segment);
-            let samples = (segment, (until - segment).min(BLOCK));
+            let samples = (segment, (until - segment).min(BLOCK - self.stretch.1));
             let marching = members.iter().find(|m| m.joined).and_then(|m| m.ready.as_ref());
             let Some(h) = marching.map(|ready| ready.h) else { break };
             let inputs: [&Inputs<f64>; WIDTH] = std::array::from_fn(|lane| {
                 members[if lane < members.len() { lane } else { 0 }].run.inputs
             });
-            let source =
-                Together { inputs, shared: inputs.iter().all(|i| std::ptr::eq(*i, inputs[0])) };
             let live = members.iter().enumerate().filter(|(_, m)| m.joined);
             let live = live.fold(0, |bits, (lane, _)| bits | 1 << lane);
-            let (passed, fallen) = self.pass((&source, h), samples, (joining, live));
+            let (passed, fallen) = self.pass((&inputs, h), samples, (joining, live));
             for (lane, member) in members.iter_mut().enumerate().filter(|(_, m)| m.joined) {
                 let fell = fallen >> lane & 1 == 1;
                 // Those that did not fall have passed the sample in which others did.
-                let count = passed + usize::from(fallen != 0 && !fell);
-                self.deliver(lane, member, (segment, count));
-                member.run.segment = segment + count;
+                member.run.segment = segment + passed + usize::from(fallen != 0 && !fell);
                 if fell || member.run.segment == member.until {
-                    let x = |i| if fell { self.trail.states(i)[passed] } else { self.x[i] };
+                    let start = self.stretch.1 + passed;
+                    let x = |i| if fell { self.trail.states(i)[start] } else { self.x[i] };
                     let x: [f64; N] = std::array::from_fn(|i| x(i).0[lane]);
+                    self.deliver(lane, member);
                     self.leave(lane, member, (&x, fell));
                 }
             }
+            self.stretch.1 += passed + usize::from(fallen != 0);
         }
     }
 
@@ -158,29 +165,14 @@ impl<const N: usize> Formation<N> {
         let mut joining = 0;
         for (lane, member) in members.iter_mut().enumerate() {
             if member.ready.is_some() && !member.joined && member.run.segment == segment {
-                member.joined = true;
+                (member.joined, member.from) = (true, segment);
                 joining |= 1 << lane;
             }
         }
         if joining == 0 {
             return 0;
         }
-        let (mut slots, mut watched) = (Vec::new(), Vec::new());
-        for ready in members.iter().filter(|m| m.joined).filter_map(|m| m.ready.as_ref()) {
-            slots.extend(&ready.active);
-            watched.extend(operators_of::<N>(ready).watched.iter().map(|w| w.id));
-        }
-        let before = (self.slots.clone(), self.watched.clone());
-        for (union, all) in [(&mut self.slots, slots), (&mut self.watched, watched)] {
-            *union = all;
-            union.sort_unstable();
-            union.dedup();
-        }
-        let anew = before != (self.slots.clone(), self.watched.clone());
-        if anew {
-            self.operators = Operators::idle();
-            self.rearrange(&before.0, &before.1);
-        }
+        let anew = self.arrange(members, segment);
         for (lane, member) in members.iter().enumerate().filter(|(_, m)| m.joined) {
             if anew || joining >> lane & 1 == 1 {
                 let ready = member.ready.as_ref().expect("a member that has joined");
@@ -196,18 +188,36 @@ impl<const N: usize> Formation<N> {
         joining
     }
 
+    /// Find places for the channels and guards of all that march; whether they are others than before.
+    fn arrange<S: Recording>(&mut self, members: &mut [Member<'_, '_, S>], segment: usize) -> bool {
+        let (mut slots, mut watched) = (Vec::new(), Vec::new());
+        for ready in members.iter().filter(|m| m.joined).filter_map(|m| m.ready.as_ref()) {
+            slots.extend(&ready.active);
+            watched.extend(operators_of::<N>(ready).watched.iter().map(|w| w.id));
+        }
+        for union in [&mut slots, &mut watched] {
+            union.sort_unstable();
+            union.dedup();
+        }
+        if (&slots, &watched) == (&self.slots, &self.watched) {
+            return false;
+        }
+        self.hand_over(members, segment);
+        self.operators = Operators::idle();
+        let slots = std::mem::replace(&mut self.slots, slots);
+        let watched = std::mem::replace(&mut self.watched, watched);
+        self.rearrange(&slots, &watched);
+        true
+    }
+
     /// Carry and guards from the old places to the new ones.
     fn rearrange(&mut self, slots: &[usize], watched: &[usize]) {
         let (carry, guards) = (self.carry, self.guards);
-        self.carry = Carry::zero();
+        self.carry = [Carry::idle(); MAX_ACTIVE];
         self.guards = idle_guards();
         for (to, id) in self.slots.iter().enumerate() {
             if let Some(from) = slots.iter().position(|old| old == id) {
-                self.carry.argument[to] = carry.argument[from];
-                self.carry.rate[to] = carry.rate[from];
-                self.carry.value[to] = carry.value[from];
-                self.carry.near[to] = carry.near[from];
-                self.carry.stiction[to] = carry.stiction[from];
+                self.carry[to] = carry[from];
             }
         }
         for (to, id) in self.watched.iter().enumerate() {
@@ -232,15 +242,25 @@ impl<const N: usize> Formation<N> {
         }
     }
 
-    fn deliver<S: Recording>(
-        &self,
-        lane: usize,
-        member: &mut Member<'_, '_, S>,
-        samples: (usize, usize),
-    ) {
+    /// Hand the samples of all that march on, and begin the trail anew at `segment`.
+    fn hand_over<S: Recording>(&mut self, members: &mut [Member<'_, '_, S>], segment: usize) {
+        for (lane, member) in members.iter_mut().enumerate().filter(|(_, m)| m.joined) {
+            self.deliver(lane, member);
+        }
+        self.stretch = (segment, 0);
+    }
+
+    /// Hand the samples up to the segment of a member on.
+    fn deliver<S: Recording>(&self, lane: usize, member: &mut Member<'_, '_, S>) {
+        let (from, to) = (member.from, member.run.segment);
+        if from == to {
+            return;
+        }
         let active = &member.ready.as_ref().expect("a member that has joined").active;
-        let view = LaneView { trail: &self.trail, lane, places: self.places(active) };
-        member.sink.passed(member.run, active, &view, samples);
+        let (first, places) = (from - self.stretch.0, self.places(active));
+        let view = LaneView { trail: &self.trail, first, lane, places };
+        member.sink.passed(member.run, active, &view, (from, to - from));
+        member.from = to;
     }
 
     /// Slots of the channels of one lane.
@@ -267,7 +287,8 @@ impl<const N: usize> Formation<N> {
         if ended {
             let active = member.ready.take().map_or_else(Vec::new, |ready| ready.active);
             let places = self.places(&active);
-            let torque = |&slot: &usize| self.carry.torque(&self.operators, slot).0[lane];
+            let torque =
+                |&slot: &usize| self.operators.channels[slot].torque(&self.carry[slot]).0[lane];
             let torques = places[..active.len()].iter().map(torque).collect();
             let end = LastSample { x, torques };
             member.sink.passed(member.run, &active, &end, (member.run.segment, 1));
@@ -298,56 +319,63 @@ impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
 
     #[inline(always)]
     fn run<const F: bool>(self) -> (usize, u32) {
-        let Self { formation, source: (source, h), samples, lanes: (joining, live) } = self;
-        let Formation { operators, x, carry: kept, guards, trail, .. } = formation;
-        let mut carry = kept.first::<A>();
+        let first = self.source.0[0];
+        if self.source.0.iter().all(|inputs| std::ptr::eq(*inputs, first)) {
+            self.pass::<F, _>(&Lines(first))
+        } else {
+            let source = self.source.0;
+            self.pass::<F, _>(source)
+        }
+    }
+}
+
+impl<const N: usize, const A: usize> Pass<'_, '_, N, A> {
+    #[inline(always)]
+    fn pass<const F: bool, U: Source<Lanes>>(self, source: &U) -> (usize, u32) {
+        let Self { formation, source: (_, h), samples, lanes: (joining, live) } = self;
+        let Formation { operators, x, carry, guards, trail, stretch: (_, at), .. } = formation;
+        let carry = carry.first_chunk_mut::<A>().expect("at most as many");
         if joining != 0 {
             let mut room = room();
             let sample = source.read(samples.0, &mut room);
-            let fresh = Carry::<Lanes, A>::start::<F, N>(operators, (sample, h), x);
-            let first = operators.guards::<F, A>(sample, (x, &fresh));
+            let fresh: [_; A] = Carry::start::<F, N, A, _>(operators, (sample, h), x);
+            let first = operators.guards::<_, F, A>(sample, (x, &fresh));
             for lane in (0..WIDTH).filter(|lane| joining >> lane & 1 == 1) {
-                carry.take_lane(lane, &fresh);
+                for (carry, fresh) in carry.iter_mut().zip(&fresh) {
+                    carry.set_lane(lane, fresh);
+                }
                 for (guard, first) in guards.as_flattened_mut().iter_mut().zip(first.as_flattened())
                 {
                     guard.0[lane] = first.0[lane];
                 }
             }
         }
-        let at = (&mut *x, &mut carry, &mut *guards);
-        let outcome =
-            march::<Lanes, F, N, A, 1>(operators, (source, h), samples, at, (trail, live));
-        kept.set_first(&carry);
-        outcome
+        let state = (&mut *x, carry, &mut *guards);
+        let to = (trail, *at, live);
+        march::<U, Lanes, F, N, A, 1>(operators, (source, h), samples, state, to)
     }
 }
 
-/// The inputs of all lanes.
-struct Together<'a> {
-    inputs: [&'a Inputs<f64>; WIDTH],
-    /// Whether these are the same.
-    shared: bool,
-}
+/// The inputs of every lane.
+type Together<'a> = [&'a Inputs<f64>; WIDTH];
 
 impl Source<Lanes> for Together<'_> {
+    type Input = Lanes;
+
     #[inline(always)]
     fn read<'s>(&'s self, segment: usize, room: &'s mut Room<Lanes>) -> &'s Sample<Lanes> {
-        let first = self.inputs[0].lines(segment);
-        for (to, &[start, rate]) in room.iter_mut().zip(first) {
-            *to = [Pack::all(start), Pack::all(rate)];
-        }
-        for (lane, inputs) in self.inputs.iter().enumerate().filter(|_| !self.shared) {
+        for (lane, inputs) in self.iter().enumerate() {
             for (to, &[start, rate]) in room.iter_mut().zip(inputs.lines(segment)) {
                 (to[0].0[lane], to[1].0[lane]) = (start, rate);
             }
         }
-        &room[..first.len()]
+        &room[..self[0].lines(segment).len()]
     }
 
     #[inline(always)]
     fn bounds(&self, input: usize, samples: (usize, usize)) -> [Lanes; 2] {
-        let mut bounds = self.inputs[0].bounds(input, samples).map(Pack::all);
-        for (lane, inputs) in self.inputs.iter().enumerate().filter(|_| !self.shared) {
+        let mut bounds = [Pack::all(0.0); 2];
+        for (lane, inputs) in self.iter().enumerate() {
             let [low, high] = inputs.bounds(input, samples);
             (bounds[0].0[lane], bounds[1].0[lane]) = (low, high);
         }
@@ -355,19 +383,37 @@ impl Source<Lanes> for Together<'_> {
     }
 }
 
+/// The inputs that all lanes share.
+impl Source<Lanes> for Lines<'_, f64> {
+    type Input = f64;
+
+    #[inline(always)]
+    fn read<'s>(&'s self, segment: usize, _: &'s mut Room<f64>) -> &'s Sample<f64> {
+        self.0.lines(segment)
+    }
+
+    #[inline(always)]
+    fn bounds(&self, input: usize, samples: (usize, usize)) -> [Lanes; 2] {
+        self.0.bounds(input, samples).map(Pack::all)
+    }
+}
+
 /// The samples of one lane.
 struct LaneView<'f, const N: usize> {
     trail: &'f Trail<Lanes, N>,
+    /// Place of the first.
+    first: usize,
     lane: usize,
     places: [usize; MAX_ACTIVE],
 }
 
 impl<const N: usize> Samples<f64> for LaneView<'_, N> {
     fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
-        self.trail.states(i).iter().map(|x| x.0[self.lane])
+        self.trail.states(i)[self.first..].iter().map(|x| x.0[self.lane])
     }
     fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
-        self.trail.torques(self.places[slot]).iter().map(|torque| torque.0[self.lane])
+        let torques = &self.trail.torques(self.places[slot])[self.first..];
+        torques.iter().map(|torque| torque.0[self.lane])
     }
 }
 

@@ -7,52 +7,54 @@
 //! moved to the corrected argument by its own derivatives. One exponential a sample and channel, grown
 //! from the last a sample ahead, at about the argument that it is needed at, so that nothing waits for it.
 
-use super::operators::{Carried, MAX_ACTIVE, MAX_WATCHED, Operators, Watched};
-use super::step::{over_channels, step};
+use super::operators::{Carried, MAX_WATCHED, Operators, Watched};
+use super::step::step;
 use crate::network::smooth::{Line, MAX_INPUTS, Sample, Value};
-use crate::number::{Lane, Pack, Values};
+use crate::number::{Factor, Lane, Pack, Values};
 
 /// Samples that are passed before they are handed on.
 pub const BLOCK: usize = 64;
 
 /// Inputs of one run or several.
-pub trait Source<L> {
-    /// The inputs of a segment, in `room` where they stand nowhere.
-    fn read<'s>(&'s self, segment: usize, room: &'s mut Room<L>) -> &'s Sample<L>;
+pub trait Source<L: Lane> {
+    /// Plain numbers, or where runs have inputs of their own or a delay is a parameter, numbers like the
+    /// state. With derivatives these jump between segments.
+    type Input: Factor<L, Values: Factor<L::Values>>;
 
-    /// Whether the derivatives of inputs jump between segments, as with a delay that is a parameter.
-    fn jumps(&self) -> bool {
-        false
-    }
+    /// The inputs of a segment, in `room` where they stand nowhere.
+    fn read<'s>(
+        &'s self,
+        segment: usize,
+        room: &'s mut Room<Self::Input>,
+    ) -> &'s Sample<Self::Input>;
 
     /// The least and the largest value of an input over `count` segments from `first` on, or bounds of
     /// these.
-    fn bounds(&self, input: usize, samples: (usize, usize)) -> [L::Values; 2]
-    where
-        L: Lane;
+    fn bounds(&self, input: usize, samples: (usize, usize)) -> [L::Values; 2];
 }
 
 /// Room for the inputs of a segment.
-pub type Room<L> = [[L; 2]; MAX_INPUTS];
+pub type Room<U> = [[U; 2]; MAX_INPUTS];
 
 /// [`Room`] without inputs.
-pub fn room<L: Lane>() -> Room<L> {
-    [[L::all(0.0); 2]; MAX_INPUTS]
+#[inline(always)]
+pub fn room<U: Lane>() -> Room<U> {
+    [[U::all(0.0); 2]; MAX_INPUTS]
 }
 
-/// Carried channels at the start of a sample.
+/// A carried channel at the start of a sample.
 #[derive(Clone, Copy, Debug)]
-pub struct Carry<L, const A: usize> {
-    /// Arguments.
-    pub argument: [L; A],
-    /// Their rates.
-    pub rate: [L; A],
-    /// Torques with their slopes.
-    pub value: [Value<L>; A],
-    /// Arguments expected at the end of the sample.
-    pub near: [L; A],
+pub struct Carry<L> {
+    /// Argument.
+    pub argument: L,
+    /// Its rate.
+    pub rate: L,
+    /// Torque with its slopes.
+    pub value: Value<L>,
+    /// Argument expected at the end of the sample.
+    pub near: L,
     /// Stiction there.
-    pub stiction: [L; A],
+    pub stiction: L,
 }
 
 /// Limits and values of the watched forms at the start of a sample.
@@ -90,13 +92,13 @@ impl<L: Lane, const N: usize> Trail<L, N> {
         &mut self,
         op: &Operators<L, N>,
         k: usize,
-        (x, carry): (&[L; N], &Carry<L, A>),
+        (x, carry): (&[L; N], &[Carry<L>; A]),
     ) {
         for i in 0..op.columns() {
             self.states[i][k] = x[i];
         }
         for a in 0..A {
-            self.torques[a][k] = carry.torque(op, a);
+            self.torques[a][k] = op.channels[a].torque(&carry[a]);
         }
     }
 
@@ -116,64 +118,81 @@ impl<L: Lane, const N: usize> Trail<L, N> {
 /// Inputs at the ends of `W` samples.
 type Ends<V, const W: usize> = [[V; W]; MAX_INPUTS];
 
-/// Pass up to `count` (at most [`BLOCK`]) samples from segment `first`. Returns how many were passed
-/// and, as bits, the runs of which a guard could have fallen within the next one. Only the runs `live`,
-/// as bits, count.
+/// Pass up to `count` samples from segment `first`, which stand in the trail from place `at` on. Returns how
+/// many were passed and, as bits, the runs of which a guard could have fallen within the next one. Only the
+/// runs `live`, as bits, count.
 ///
 /// Guards are looked at over `W` samples together, which run ahead of them: with `W = 1` state and carry
 /// are those after the sample that was not passed, else the trail alone knows where that began.
 #[inline(always)]
-pub fn march<L: Lane, const F: bool, const N: usize, const A: usize, const W: usize>(
+pub fn march<
+    S: Source<L>,
+    L: Lane,
+    const F: bool,
+    const N: usize,
+    const A: usize,
+    const W: usize,
+>(
     op: &Operators<L, N>,
-    (source, h): (&impl Source<L>, f64),
+    (source, h): (&S, f64),
     (first, count): (usize, usize),
-    (x, carry, guards): (&mut [L; N], &mut Carry<L, A>, &mut Guards<L::Values>),
-    (trail, live): (&mut Trail<L, N>, u32),
+    (state, carry, guards): (&mut [L; N], &mut [Carry<L>; A], &mut Guards<L::Values>),
+    (trail, at, live): (&mut Trail<L, N>, usize, u32),
 ) -> (usize, u32) {
-    let (mut room, jumps) = (room(), source.jumps());
-    let mut ends: Ends<L::Values, W> = [[L::Values::all(0.0); W]; MAX_INPUTS];
+    let mut room = room();
+    let mut ends = [[<S::Input as Lane>::Values::all(0.0); W]; MAX_INPUTS];
+    // Of its own, for the processor's registers.
+    let mut x = *state;
+    let mut outcome = (count, 0);
     // A loop: the body of `all` would be compiled apart, for the least of all processors.
     let mut loaded = true;
     for load in &op.loads {
         loaded &= load.stays_positive::<F>(source.bounds(load.input, (first, count)));
     }
-    trail.put(op, 0, (x, carry));
-    for from in (0..count).step_by(W) {
+    trail.put(op, at, (&x, carry));
+    'samples: for from in (0..count).step_by(W) {
         let some = W.min(count - from);
         let mut fallen = [L::Values::all(0.0); W];
         for (k, fallen) in fallen.iter_mut().enumerate().take(some) {
             let u = source.read(first + from + k, &mut room);
-            if L::DERIVATIVES && jumps {
-                *carry = Carry::start::<F, N>(op, (u, h), x);
-                trail.put(op, from + k, (x, carry));
+            if S::Input::DERIVATIVES {
+                *carry = Carry::start::<F, N, A, _>(op, (u, h), &x);
+                trail.put(op, at + from + k, (&x, carry));
             }
-            *fallen = step::<L, F, N, A>(op, (u, h), (x, carry));
-            trail.put(op, from + k + 1, (x, carry));
+            *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, carry));
+            trail.put(op, at + from + k + 1, (&x, carry));
             for (ends, [start, rate]) in ends.iter_mut().zip(u) {
                 ends[k] = rate.values().times(h) + start.values();
             }
         }
+        // Apart from those of the step: sums over a loop that start from nothing stay in vectors.
+        let mut left = [L::Values::all(0.0); W];
         for (place, before) in guards.iter_mut().enumerate().take(op.watched.len()) {
-            let after = op.guards_after::<F, A, W>(place, &ends, (trail, from));
-            op.falls(place, (before, &after), &mut fallen);
+            let after = op.guards_after::<_, F, A, W>(place, &ends, (trail, at + from));
+            op.falls(place, (before, &after), &mut left);
             *before = after.map(|values| values[some - 1]);
         }
         if !loaded {
             for load in &op.loads {
-                load.falls::<F, W>(&ends[load.input % MAX_INPUTS], &mut fallen);
+                load.falls::<_, F, W>(&ends[load.input % MAX_INPUTS], &mut left);
             }
         }
-        for (k, fallen) in fallen.iter().enumerate().take(some) {
-            let fallen = fallen.negative() & live;
-            if fallen != 0 {
-                return (from + k, fallen);
+        for k in 0..some {
+            let fallen = fallen[k].negative_with(left[k]);
+            if fallen.any_negative() && fallen.negative() & live != 0 {
+                outcome = (from + k, fallen.negative() & live);
+                break 'samples;
             }
         }
+    }
+    *state = x;
+    if outcome.1 != 0 {
+        return outcome;
     }
     // What has grown beyond all bounds is left to the expansion, which says so.
     let sum = x.iter().fold(L::Values::all(0.0), |sum, x| x.values().magnitude() + sum);
     match sum.unbounded() & live {
-        0 => (count, 0),
+        0 => outcome,
         unbounded => (count.saturating_sub(1), unbounded),
     }
 }
@@ -181,66 +200,70 @@ pub fn march<L: Lane, const F: bool, const N: usize, const A: usize, const W: us
 impl<L: Lane, const N: usize> Operators<L, N> {
     /// All guards at the start of a segment.
     #[inline(always)]
-    pub fn guards<const F: bool, const A: usize>(
+    pub fn guards<U: Factor<L, Values: Factor<L::Values>>, const F: bool, const A: usize>(
         &self,
-        sample: &Sample<L>,
-        at: (&[L; N], &Carry<L, A>),
+        sample: &Sample<U>,
+        at: (&[L; N], &[Carry<L>; A]),
     ) -> Guards<L::Values> {
         let mut guards = idle_guards();
         for (place, guard) in guards.iter_mut().enumerate().take(self.watched.len()) {
-            *guard = self.guard::<F, A>(place, sample, at);
+            *guard = self.guard::<U, F, A>(place, sample, at);
         }
         guards
     }
 
     /// Limit and value of a watched form at the start of a segment.
     #[inline(always)]
-    fn guard<const F: bool, const A: usize>(
+    fn guard<U: Factor<L, Values: Factor<L::Values>>, const F: bool, const A: usize>(
         &self,
         place: usize,
-        sample: &Sample<L>,
-        (x, carry): (&[L; N], &Carry<L, A>),
+        sample: &Sample<U>,
+        (x, carry): (&[L; N], &[Carry<L>; A]),
     ) -> [L::Values; 2] {
         let Watched { form, limit, .. } = &self.watched[place];
         let mut torque = form.constant.values();
         for drive in &self.drives {
             let u = sample[drive.input][0].values();
-            torque = drive.watched[place].values().fma::<F>(u, torque);
+            torque = u.onto::<F>(drive.watched[place].values(), torque);
         }
         for i in 0..self.columns() {
             torque = form.state[i].values().fma::<F>(x[i].values(), torque);
         }
         for a in 0..A {
-            let carried = carry.torque(self, a).values();
+            let carried = self.channels[a].torque(&carry[a]).values();
             torque = form.channels[a].values().fma::<F>(carried, torque);
         }
-        [limit.line::<F>(sample)[0].values(), torque]
+        [limit.line::<F, U>(sample)[0].values(), torque]
     }
 
     /// The same at the end of `W` samples from `from` on.
     #[inline(always)]
-    fn guards_after<const F: bool, const A: usize, const W: usize>(
+    fn guards_after<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
         &self,
         place: usize,
-        ends: &Ends<L::Values, W>,
+        ends: &Ends<V, W>,
         (trail, from): (&Trail<L, N>, usize),
     ) -> [[L::Values; W]; 2] {
         let Watched { form, limit, .. } = &self.watched[place];
         let of_input = |input: usize| &ends[input % MAX_INPUTS];
         let mut torque = [form.constant.values(); W];
         for drive in &self.drives {
-            add::<L, F, W>(&mut torque, drive.watched[place], |k| of_input(drive.input)[k]);
+            add::<L, V, F, W>(&mut torque, drive.watched[place], of_input(drive.input));
         }
         for i in 0..self.columns() {
             let column: &[L; W] = after(&trail.states[i], from);
-            add::<L, F, W>(&mut torque, form.state[i], |k| column[k].values());
+            for k in 0..W {
+                torque[k] = form.state[i].values().fma::<F>(column[k].values(), torque[k]);
+            }
         }
         for a in 0..A {
             let column: &[L; W] = after(&trail.torques[a], from);
-            add::<L, F, W>(&mut torque, form.channels[a], |k| column[k].values());
+            for k in 0..W {
+                torque[k] = form.channels[a].values().fma::<F>(column[k].values(), torque[k]);
+            }
         }
         let mut limits = [limit.offset.values(); W];
-        add::<L, F, W>(&mut limits, limit.gain, |k| of_input(limit.input)[k]);
+        add::<L, V, F, W>(&mut limits, limit.gain, of_input(limit.input));
         [limits, torque]
     }
 
@@ -277,15 +300,15 @@ fn after<L, const W: usize>(column: &Column<L>, from: usize) -> &[L; W] {
     column[from + 1..].first_chunk().expect("stretches that divide a block")
 }
 
-/// Add a multiple to every value.
+/// Add multiples of inputs.
 #[inline(always)]
-fn add<L: Lane, const F: bool, const W: usize>(
+fn add<L: Lane, V: Factor<L::Values>, const F: bool, const W: usize>(
     sums: &mut [L::Values; W],
     factor: L,
-    value: impl Fn(usize) -> L::Values,
+    inputs: &[V; W],
 ) {
     for k in 0..W {
-        sums[k] = factor.values().fma::<F>(value(k), sums[k]);
+        sums[k] = inputs[k].onto::<F>(factor.values(), sums[k]);
     }
 }
 
@@ -301,115 +324,86 @@ impl<L: Lane> Line<L> {
 
     /// Make negative where the line falls below zero at the end of a sample.
     #[inline(always)]
-    fn falls<const F: bool, const W: usize>(
+    fn falls<V: Factor<L::Values>, const F: bool, const W: usize>(
         &self,
-        ends: &[L::Values; W],
+        ends: &[V; W],
         fallen: &mut [L::Values; W],
     ) {
         // A load of -0 is none that has fallen.
         let none = L::Values::all(0.0);
         for k in 0..W {
-            let load = self.gain.values().fma::<F>(ends[k], self.offset.values()) + none;
+            let load = ends[k].onto::<F>(self.gain.values(), self.offset.values()) + none;
             fallen[k] = fallen[k].negative_with(load);
         }
     }
 }
 
-impl<L: Lane, const A: usize> Carry<L, A> {
+impl<L: Lane> Carry<L> {
     /// Nothing carried.
-    pub fn zero() -> Self {
+    pub fn idle() -> Self {
         let none = L::all(0.0);
-        Self {
-            argument: [none; A],
-            rate: [none; A],
-            value: [Value::zero(); A],
-            near: [none; A],
-            stiction: [none; A],
-        }
+        Self { argument: none, rate: none, value: Value::zero(), near: none, stiction: none }
     }
 
-    /// Torque of channel `a`.
+    /// All channels at the start of a segment of length `h`.
     #[inline(always)]
-    pub fn torque<const N: usize>(&self, op: &Operators<L, N>, a: usize) -> L {
-        op.channels[a].law.sign * self.value[a].value
-    }
-
-    /// Everything at the start of a segment of length `h`.
-    #[inline(always)]
-    pub fn start<const F: bool, const N: usize>(
+    pub fn start<const F: bool, const N: usize, const A: usize, U: Factor<L>>(
         op: &Operators<L, N>,
-        (sample, h): (&Sample<L>, f64),
+        (sample, h): (&Sample<U>, f64),
         x: &[L; N],
-    ) -> Self {
+    ) -> [Self; A] {
         let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
-        let mut out = Self::zero();
+        let mut out = [Self::idle(); A];
         for a in 0..A {
             let Carried { argument, law, .. } = &channels[a];
             for i in 0..op.columns() {
-                out.argument[a] = argument[i].fma::<F>(x[i], out.argument[a]);
+                out[a].argument = argument[i].fma::<F>(x[i], out[a].argument);
             }
-            let m = out.argument[a];
-            let normal = law.normal.line::<F>(sample)[0];
-            out.value[a] = law.about::<F>(m, law.stiction::<F>(m)).here(normal);
+            let m = out[a].argument;
+            let normal = law.normal.line::<F, U>(sample)[0];
+            out[a].value = law.about::<F>(m, law.stiction::<F>(m)).here(normal);
         }
         for a in 0..A {
             let form = &channels[a].rate;
-            let mut rate = over_channels::<L, F, N, A>(form, &out.value, form.constant);
+            let mut rate = form.constant;
+            for b in 0..A {
+                rate = form.channels[b].fma::<F>(out[b].value.value, rate);
+            }
             for i in 0..op.columns() {
                 rate = form.state[i].fma::<F>(x[i], rate);
             }
             for drive in &op.drives {
-                rate = drive.now[a].fma::<F>(sample[drive.input][0], rate);
+                rate = sample[drive.input][0].onto::<F>(drive.now[a], rate);
             }
-            out.rate[a] = rate;
-            out.near[a] = rate.times(h) + out.argument[a];
-            out.stiction[a] = channels[a].law.stiction::<F>(out.near[a]);
+            out[a].rate = rate;
+            out[a].near = rate.times(h) + out[a].argument;
+            out[a].stiction = channels[a].law.stiction::<F>(out[a].near);
         }
         out
     }
 }
 
-impl<const K: usize> Carry<Pack<K>, MAX_ACTIVE> {
-    /// The first `A` channels.
+impl<L: Lane, const N: usize> Carried<L, N> {
+    /// Its torque φ.
     #[inline(always)]
-    pub fn first<const A: usize>(&self) -> Carry<Pack<K>, A> {
-        let mut first = Carry::zero();
-        for a in 0..A {
-            first.argument[a] = self.argument[a];
-            first.rate[a] = self.rate[a];
-            first.value[a] = self.value[a];
-            first.near[a] = self.near[a];
-            first.stiction[a] = self.stiction[a];
-        }
-        first
-    }
-
-    /// Replace the first `A` channels.
-    #[inline(always)]
-    pub fn set_first<const A: usize>(&mut self, first: &Carry<Pack<K>, A>) {
-        self.argument[..A].copy_from_slice(&first.argument);
-        self.rate[..A].copy_from_slice(&first.rate);
-        self.value[..A].copy_from_slice(&first.value);
-        self.near[..A].copy_from_slice(&first.near);
-        self.stiction[..A].copy_from_slice(&first.stiction);
+    pub fn torque(&self, carry: &Carry<L>) -> L {
+        self.law.sign * carry.value.value
     }
 }
 
-impl<const K: usize, const A: usize> Carry<Pack<K>, A> {
+impl<const K: usize> Carry<Pack<K>> {
     /// Replace one run.
     #[inline(always)]
-    pub fn take_lane(&mut self, lane: usize, from: &Self) {
-        for a in 0..A {
-            self.argument[a].0[lane] = from.argument[a].0[lane];
-            self.rate[a].0[lane] = from.rate[a].0[lane];
-            self.near[a].0[lane] = from.near[a].0[lane];
-            self.stiction[a].0[lane] = from.stiction[a].0[lane];
-            let (to, from) = (&mut self.value[a], &from.value[a]);
-            to.value.0[lane] = from.value.0[lane];
-            to.by_argument.0[lane] = from.by_argument.0[lane];
-            to.bend.0[lane] = from.bend.0[lane];
-            to.by_normal.0[lane] = from.by_normal.0[lane];
-            to.mixed.0[lane] = from.mixed.0[lane];
-        }
+    pub fn set_lane(&mut self, lane: usize, from: &Self) {
+        self.argument.0[lane] = from.argument.0[lane];
+        self.rate.0[lane] = from.rate.0[lane];
+        self.near.0[lane] = from.near.0[lane];
+        self.stiction.0[lane] = from.stiction.0[lane];
+        let (to, from) = (&mut self.value, &from.value);
+        to.value.0[lane] = from.value.0[lane];
+        to.by_argument.0[lane] = from.by_argument.0[lane];
+        to.bend.0[lane] = from.bend.0[lane];
+        to.by_normal.0[lane] = from.by_normal.0[lane];
+        to.mixed.0[lane] = from.mixed.0[lane];
     }
 }

@@ -316,26 +316,37 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
 
     #[inline(always)]
     fn run<const F: bool>(self) -> bool {
+        let inputs = self.run.inputs;
+        if T::DERIVATIVES && inputs.jumps() {
+            self.pass::<F, _>(&Shifted(inputs))
+        } else {
+            self.pass::<F, _>(&Lines(inputs))
+        }
+    }
+}
+
+impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Sprint<'_, '_, T, S, N, A> {
+    #[inline(always)]
+    fn pass<const F: bool, U: Source<T>>(self, source: &U) -> bool {
         let Self { run, operators, active, steps: (h, mut count), sink } = self;
-        let source = Lines(run.inputs);
         let mut room = room();
         let first = source.read(run.segment, &mut room);
         let n = run.x.len();
         let mut x = [T::zero_(); N];
         x[..n].copy_from_slice(&run.x);
-        let mut carry = Carry::<T, A>::start::<F, N>(operators, (first, h), &x);
-        let mut guards = operators.guards::<F, A>(first, (&x, &carry));
+        let mut carry: [Carry<T>; A] = Carry::start::<F, N, A, _>(operators, (first, h), &x);
+        let mut guards = operators.guards::<_, F, A>(first, (&x, &carry));
         let mut trail = Trail::with_channels(A);
         let mut whole = true;
         while count > 0 && whole {
             let samples = (run.segment, count.min(BLOCK));
             let at = (&mut x, &mut carry, &mut guards);
-            let source = (&source, h);
             // Samples with derivatives are dear.
+            let to = (&mut trail, 0, 1);
             let (passed, fallen) = if T::DERIVATIVES {
-                march::<T, F, N, A, 1>(operators, source, samples, at, (&mut trail, 1))
+                march::<U, T, F, N, A, 1>(operators, (source, h), samples, at, to)
             } else {
-                march::<T, F, N, A, AHEAD>(operators, source, samples, at, (&mut trail, 1))
+                march::<U, T, F, N, A, AHEAD>(operators, (source, h), samples, at, to)
             };
             sink.passed(run, active, &trail, (run.segment, passed));
             run.segment += passed;
@@ -357,24 +368,34 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Task for Sprint<'_, '_
 }
 
 /// The inputs of one run.
-struct Lines<'a, T>(&'a Inputs<T>);
+pub(super) struct Lines<'a, T>(pub &'a Inputs<T>);
 
 impl<T: Real> Source<T> for Lines<'_, T> {
+    type Input = f64;
+
     #[inline(always)]
-    fn read<'s>(&'s self, segment: usize, room: &'s mut Room<T>) -> &'s Sample<T> {
-        let lines = self.0.lines(segment);
-        if let Some(plain) = T::plain(lines) {
-            return plain;
-        }
-        for (to, line) in room.iter_mut().zip(self.0.lines_at(segment)) {
-            *to = line;
-        }
-        &room[..lines.len()]
+    fn read<'s>(&'s self, segment: usize, _: &'s mut Room<f64>) -> &'s Sample<f64> {
+        self.0.lines(segment)
     }
 
     #[inline(always)]
-    fn jumps(&self) -> bool {
-        self.0.jumps()
+    fn bounds(&self, input: usize, samples: (usize, usize)) -> [f64; 2] {
+        self.0.bounds(input, samples)
+    }
+}
+
+/// The inputs of one run where a delay is a parameter.
+struct Shifted<'a, T>(&'a Inputs<T>);
+
+impl<T: Real> Source<T> for Shifted<'_, T> {
+    type Input = T;
+
+    #[inline(always)]
+    fn read<'s>(&'s self, segment: usize, room: &'s mut Room<T>) -> &'s Sample<T> {
+        for (to, line) in room.iter_mut().zip(self.0.lines_at(segment)) {
+            *to = line;
+        }
+        &room[..self.0.lines(segment).len()]
     }
 
     #[inline(always)]

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 //! One sample: the torques of slipping elements as cubics, predicted and corrected.
 
+use super::lanes::{Task, dispatch};
 use super::march::Carry;
 use super::operators::{Carried, Form, Operators, SHAPES, StepForm};
 use crate::network::smooth::{Law, Sample, Value};
-use crate::number::{Lane, Values};
+use crate::number::{Factor, Lane, SMALL, Values};
 
 /// Largest cubic part of a channel over a sample, relative to the largest of all.
 const MAX_CUBIC: f64 = 2e-4;
@@ -40,13 +41,13 @@ struct Sampling<L: Lane, const N: usize, const A: usize> {
 
 /// Pass one sample; returns something negative where a guard of the carried channels has fallen.
 #[inline(always)]
-pub fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
+pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize>(
     op: &Operators<L, N>,
-    (sample, h): (&Sample<L>, f64),
-    (x, carry): (&mut [L; N], &mut Carry<L, A>),
+    (sample, h): (&Sample<U>, f64),
+    (x, carry): (&mut [L; N], &mut [Carry<L>; A]),
 ) -> L::Values {
     let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
-    let mut sampling = Sampling::known::<F>(op, channels, (sample, h), x);
+    let mut sampling = Sampling::known::<F, U>(op, channels, (sample, h), x);
     sampling.predict::<F>(op, channels, carry, h);
     sampling.correct::<F>(op, channels, carry, h);
     *x = sampling.end;
@@ -56,10 +57,10 @@ pub fn step<L: Lane, const F: bool, const N: usize, const A: usize>(
 impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
     /// What state and inputs alone lead to.
     #[inline(always)]
-    fn known<const F: bool>(
+    fn known<const F: bool, U: Factor<L>>(
         op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
-        (sample, h): (&Sample<L>, f64),
+        (sample, h): (&Sample<U>, f64),
         x: &[L; N],
     ) -> Self {
         let none = L::all(0.0);
@@ -80,21 +81,21 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             s.rate[a] = c.rate_end.constant;
             s.direct[a] = c.rate.constant;
             s.second[a] = c.second.constant;
-            s.normal[a] = c.law.normal.line::<F>(sample);
+            s.normal[a] = c.law.normal.line::<F, U>(sample);
         }
         for drive in &op.drives {
             let [u, du] = sample[drive.input];
             let u_end = du.times(h) + u;
             for i in 0..N {
-                s.end[i] = drive.step[0][i].fma::<F>(u, drive.step[1][i].fma::<F>(du, s.end[i]));
+                s.end[i] = u.onto::<F>(drive.step[0][i], du.onto::<F>(drive.step[1][i], s.end[i]));
             }
             for a in 0..A {
                 if !L::DERIVATIVES {
-                    s.argument[a] = pair::<L, F>(&drive.argument[a], (u, du), s.argument[a]);
-                    s.rate[a] = pair::<L, F>(&drive.rate[a], (u, du), s.rate[a]);
+                    s.argument[a] = pair::<L, U, F>(&drive.argument[a], (u, du), s.argument[a]);
+                    s.rate[a] = pair::<L, U, F>(&drive.rate[a], (u, du), s.rate[a]);
                 }
-                s.direct[a] = drive.now[a].fma::<F>(u_end, s.direct[a]);
-                s.second[a] = drive.second[a].fma::<F>(u, drive.now[a].fma::<F>(du, s.second[a]));
+                s.direct[a] = u_end.onto::<F>(drive.now[a], s.direct[a]);
+                s.second[a] = u.onto::<F>(drive.second[a], du.onto::<F>(drive.now[a], s.second[a]));
             }
         }
         for j in 0..op.columns() {
@@ -119,16 +120,18 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         &mut self,
         op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
-        carry: &mut Carry<L, A>,
+        carry: &mut [Carry<L>; A],
         h: f64,
     ) {
         for a in 0..A {
-            let v = &carry.value[a];
+            let v = &carry[a].value;
             let drift = (v.by_normal * self.normal[a][1]).times(h);
             self.cubics[a][0] = v.value;
-            self.cubics[a][1] = v.by_argument.times(h).fma::<F>(carry.rate[a], drift);
+            self.cubics[a][1] = v.by_argument.times(h).fma::<F>(carry[a].rate, drift);
         }
-        let (near, stiction) = (carry.near, carry.stiction);
+        let mut near = [L::all(0.0); A];
+        let (mut stiction, mut faded) = (near, near);
+        let mut farthest = L::Values::all(0.0);
         for a in 0..A {
             let mut second = self.second[a];
             for b in 0..A {
@@ -138,21 +141,28 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                 let rate = channels[a].rate.channels[b].times(1.0 / h);
                 second = rate.fma::<F>(self.cubics[b][1], second);
             }
-            let (v, ds) = (&carry.value[a], carry.rate[a]);
+            let (v, ds) = (&carry[a].value, carry[a].rate);
             let mixed = v.mixed * self.normal[a][1];
             let turn = v.bend.fma::<F>(ds, mixed + mixed);
             let half = 0.5 * h * h;
             let turned = turn * ds.times(half);
             self.cubics[a][2] = v.by_argument.times(half).fma::<F>(second, turned);
             // The second derivative comes late: all else is summed up before it.
-            let (straight, bend) = (ds.times(2.0 * h) + carry.argument[a], 2.0 * h * h);
+            let (straight, bend) = (ds.times(2.0 * h) + carry[a].argument, 2.0 * h * h);
             let Law { rate, .. } = channels[a].law;
-            let decay = (near[a] - straight) * rate;
-            carry.near[a] = second.fma::<F>(L::all(bend), straight);
-            carry.stiction[a] = stiction[a]
-                .grown::<F>(rate.times(-bend).fma::<F>(second, decay), || {
-                    channels[a].law.stiction::<F>(carry.near[a])
-                });
+            let decay = (carry[a].near - straight) * rate;
+            (near[a], stiction[a]) = (carry[a].near, carry[a].stiction);
+            carry[a].near = second.fma::<F>(L::all(bend), straight);
+            let decay = rate.times(-bend).fma::<F>(second, decay);
+            farthest = farthest.larger(decay.values().magnitude());
+            faded[a] = stiction[a].grown::<F>(decay);
+        }
+        let far = (L::Values::all(SMALL) - farthest).negative();
+        if far != 0 {
+            faded = anew(channels, std::array::from_fn(|a| carry[a].near), faded, far);
+        }
+        for a in 0..A {
+            carry[a].stiction = faded[a];
         }
         add_moments::<L, F, N, A, 0, 3>(op, &self.cubics, &mut self.end);
         for a in 0..A {
@@ -184,7 +194,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         &mut self,
         op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
-        carry: &mut Carry<L, A>,
+        carry: &mut [Carry<L>; A],
         h: f64,
     ) {
         let mut missing = [[L::all(0.0); SHAPES]; A];
@@ -199,10 +209,10 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         add_moments::<L, F, N, A, VALUE, SHAPES>(op, &missing, &mut self.end);
         let mut size = L::Values::all(0.0);
         for a in 0..A {
-            size = size.larger(carry.value[a].value.values().magnitude());
+            size = size.larger(carry[a].value.value.values().magnitude());
         }
         size = size + L::Values::all(1.0);
-        let before = (carry.argument, carry.rate);
+        let mut early = [L::Values::all(0.0); A];
         for a in 0..A {
             let Carried { argument_end, rate_end, .. } = &channels[a];
             let none = L::all(0.0);
@@ -217,28 +227,62 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let guard = size.times(MAX_CUBIC) - cubic;
             self.guard = self.guard.negative_with(guard).negative_with(close);
             self.value[a] = corrected;
-            carry.argument[a] = self.argument[a] + ds;
+            let (start, step) = (carry[a].argument.values(), carry[a].rate.values().times(h / 3.0));
+            early[a] = step + start;
+            carry[a].argument = self.argument[a] + ds;
         }
-        carry.value = self.value;
         for a in 0..A {
             let Carried { rate, law, .. } = &channels[a];
             let known = self.rate[a] + self.direct[a];
-            carry.rate[a] = over_channels::<L, F, N, A>(rate, &carry.value, known);
+            carry[a].rate = over_channels::<L, F, N, A>(rate, &self.value, known);
+            carry[a].value = self.value[a];
             // Between its ends the argument stays within these (Bernstein's form of the cubic).
-            let end = carry.argument[a].values();
-            let early = before.1[a].values().times(h / 3.0) + before.0[a].values();
-            let late = end - carry.rate[a].values().times(h / 3.0);
-            for m in [early, late, end] {
-                let (above, below) = (m - law.from.values(), law.to.values() - m);
-                self.guard = self.guard.negative_with(above).negative_with(below);
-            }
+            let (early, end) = (early[a], carry[a].argument.values());
+            let late = end - carry[a].rate.values().times(h / 3.0);
+            let above = early.smaller(late).smaller(end) - law.from.values();
+            let below = law.to.values() - early.larger(late).larger(end);
+            self.guard = self.guard.negative_with(above).negative_with(below);
         }
     }
 }
 
+/// Stiction of the runs `far`, as bits, by the law. Apart, so that the samples without it stay one run of
+/// instructions, which the compiler keeps in vectors.
+#[cold]
+#[inline(never)]
+fn anew<L: Lane, const N: usize, const A: usize>(
+    channels: &[Carried<L, N>; A],
+    near: [L; A],
+    faded: [L; A],
+    far: u32,
+) -> [L; A] {
+    dispatch(Anew { channels, near, faded, far })
+}
+
+/// [`anew`], to be dispatched.
+struct Anew<'c, L, const N: usize, const A: usize> {
+    channels: &'c [Carried<L, N>; A],
+    near: [L; A],
+    faded: [L; A],
+    far: u32,
+}
+
+impl<L: Lane, const N: usize, const A: usize> Task for Anew<'_, L, N, A> {
+    type Output = [L; A];
+
+    #[inline(always)]
+    fn run<const F: bool>(mut self) -> [L; A] {
+        for a in 0..A {
+            let stiction = self.channels[a].law.stiction::<F>(self.near[a]);
+            self.faded[a] = self.faded[a].with(self.far, stiction);
+        }
+        self.faded
+    }
+}
+
 #[inline(always)]
-fn pair<L: Lane, const F: bool>(coefficients: &[L; 2], (u, du): (L, L), sum: L) -> L {
-    coefficients[0].fma::<F>(u, coefficients[1].fma::<F>(du, sum))
+fn pair<L: Lane, U: Factor<L>, const F: bool>(coefficients: &[L; 2], (u, du): (U, U), sum: L) -> L {
+    u.onto::<F>(coefficients[0], du.onto::<F>(coefficients[1], sum))
 }
 
 #[inline(always)]
