@@ -284,6 +284,26 @@ def test_the_derivative_by_a_delay_agrees_with_differences() -> None:
         assert np.abs(exact - difference).max() < 1e-3 * np.abs(difference).max()
 
 
+def test_derivatives_by_more_parameters_than_one_pass_takes_stand_under_their_names() -> None:
+    torque, pressures, start, time = upshift()
+    fields = ("J1", "J2e", "eta", "i_in", "J_out", "i_f", "J_v", "k_o", "c_o", "load.constant")
+    names = [
+        *fields,
+        *(f"B{i}.{field}" for i in (2, 3) for field in ("P0", "gain", "mu_c", "mu_s")),
+    ]
+    assert len(names) > 16
+    found = sensitivities(paper_model(), torque, pressures, start, time, names)
+    assert list(found.derivatives) == names == list(found.event_times)
+    for name in (names[0], names[15], names[16], names[-1]):
+        alone = sensitivities(paper_model(), torque, pressures, start, time, [name])
+        assert len(alone.derivatives) == 1
+        one, same = alone.derivatives[name], found.derivatives[name]
+        np.testing.assert_allclose(same.shaft_torque, one.shaft_torque, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(same.slip["B3"], one.slip["B3"], rtol=1e-9, atol=1e-9)
+    with pytest.raises(KeyError):
+        found.derivatives["k"]
+
+
 def test_an_unknown_parameter_of_a_derivative_is_refused() -> None:
     torque, pressures, start, time = upshift()
     with pytest.raises(InputError, match=r"parameter \"B3\.nu\" is unknown"):

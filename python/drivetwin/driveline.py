@@ -213,7 +213,8 @@ class Sensitivities:
     """A run with its derivatives.
 
     `derivatives[parameter]` holds the derivative of every trajectory column per unit of the
-    parameter; `event_times[parameter]` (n_events,) those of the times of `run.events` [s].
+    parameter, in arrays that are not contiguous; `event_times[parameter]` (n_events,) those of the
+    times of `run.events` [s].
     """
 
     run: Trajectory
@@ -280,14 +281,8 @@ def sensitivities(
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
     run = _trajectory(model, time, columns, (events, status, None))
-    passes = ((i, columns[0].shape[1]) for i, columns in enumerate(derivatives))
-    rooms = ((i, place) for i, width in passes for place in range(width))
-    places = dict(zip(parameters, rooms, strict=False))
-    return Sensitivities(
-        run,
-        _Derivatives(model, run, derivatives, places),
-        dict(zip(parameters, event_derivatives, strict=True)),
-    )
+    by_name = dict(zip(parameters, event_derivatives, strict=True))
+    return Sensitivities(run, _Derivatives(model, run, derivatives, tuple(parameters)), by_name)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -297,20 +292,22 @@ class _Derivatives(Mapping[str, Trajectory]):
     model: DualClutch
     run: Trajectory
     passes: Sequence[Sequence[FloatArray]]
-    """Of every pass of the core its columns (n, n_parameters of the pass)."""
-    places: Mapping[str, tuple[int, int]]
-    """Pass and place in it."""
+    """Of every pass of the core its columns (n, parameters of the pass)."""
+    parameters: tuple[str, ...]
 
     def __getitem__(self, name: str) -> Trajectory:
-        number, place = self.places[name]
+        if name not in self.parameters:
+            raise KeyError(name)
+        # All passes but the last are for as many parameters.
+        number, place = divmod(self.parameters.index(name), self.passes[0][0].shape[1])
         columns = [column[:, place] for column in self.passes[number]]
         return _trajectory(self.model, self.run.time, columns, ([], self.run.status, None))
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.places)
+        return iter(dict.fromkeys(self.parameters))
 
     def __len__(self) -> int:
-        return len(self.places)
+        return len(set(self.parameters))
 
 
 def _start(start: State) -> tuple[float, float, float, float, list[str]]:

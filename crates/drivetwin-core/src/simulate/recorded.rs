@@ -49,39 +49,12 @@ impl<T: Real> Recorded<T> {
         }
     }
 
-    /// Add the derivatives of the same.
+    /// The values that a block has summed up, out of it.
     #[inline(always)]
-    pub fn add_slopes<const F: bool>(
-        &mut self,
-        (output, from): (usize, usize),
-        (mut samples, mut picked): (impl Iterator<Item: Borrow<T>>, Picked),
-        factor: T,
-    ) {
-        let (sums, mut at) = (&mut self.slopes[output], from);
-        // Its length not known beforehand, the compiler does not take several samples at once, and
-        // gather what is a vector already.
-        while let Some(number) = picked.gap().and_then(|gap| samples.nth(gap)) {
-            let number = *number.borrow();
-            match sums.get_mut(at) {
-                Some(sum) => *sum = number.fma::<F>(factor, T::sloped(*sum)).slopes(),
-                None => sums.push(number.fma::<F>(factor, T::zero_()).slopes()),
-            }
-            at += 1;
-        }
-    }
-
-    /// Add the derivatives of the same where the quantity has none.
-    #[inline(always)]
-    pub fn add_slopes_of_factor<const F: bool>(
-        &mut self,
-        to: (usize, usize),
-        source: &Values,
-        factor: T,
-    ) {
-        if !factor.is_constant() {
-            let plain = source.values().iter().map(|&value| T::of(value));
-            self.add_slopes::<F>(to, (plain, Picked::all(source.count)), factor);
-        }
+    pub fn take(&mut self, output: usize, block: &mut Block<T>) {
+        let count = std::mem::take(&mut block.count);
+        self.values[output].extend_from_slice(&block.values[..count]);
+        self.slopes[output].extend_from_slice(&block.slopes[..count]);
     }
 
     /// Fill an output up to a length with zeros.
@@ -157,7 +130,57 @@ impl Picked {
     }
 }
 
-/// Values of one quantity over the samples of a block.
+/// Values with derivatives of one output over the samples of a block, while its terms are summed up.
+#[derive(Clone, Debug)]
+pub(super) struct Block<T: Real> {
+    /// Number of samples; none before the first term.
+    count: usize,
+    values: [f64; BLOCK],
+    slopes: Vec<T::Slopes>,
+}
+
+impl<T: Real> Block<T> {
+    /// Without terms.
+    pub fn new() -> Self {
+        Self { count: 0, values: [0.0; BLOCK], slopes: vec![T::zero_().slopes(); BLOCK] }
+    }
+
+    /// Add a multiple of the picked ones of samples.
+    #[inline(always)]
+    pub fn add<const F: bool>(
+        &mut self,
+        (samples, picked): (impl Iterator<Item: Borrow<T>>, Picked),
+        factor: T,
+    ) {
+        if self.count == 0 {
+            self.sum::<F, true>((samples, picked), factor);
+        } else {
+            self.sum::<F, false>((samples, picked), factor);
+        }
+        self.count = picked.count();
+    }
+
+    /// The same; `FIRST` where there is nothing yet.
+    #[inline(always)]
+    fn sum<const F: bool, const FIRST: bool>(
+        &mut self,
+        (mut samples, mut picked): (impl Iterator<Item: Borrow<T>>, Picked),
+        factor: T,
+    ) {
+        let mut at = 0;
+        // Its length not known beforehand, the compiler does not take several samples at once, and
+        // gather what is a vector already.
+        while let Some(sample) = picked.gap().and_then(|gap| samples.nth(gap)) {
+            let (sample, slopes) = (sample.borrow(), &mut self.slopes[at]);
+            let (value, sum) = (&mut self.values[at], T::sloped(*slopes));
+            *value = sample.re() * factor.re() + if FIRST { 0.0 } else { *value };
+            *slopes = sample.fma::<F>(factor, if FIRST { T::zero_() } else { sum }).slopes();
+            at += 1;
+        }
+    }
+}
+
+/// One quantity over the samples of a block, without derivatives.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Values {
     /// Whether it has been taken up.
@@ -174,7 +197,7 @@ impl Values {
     pub fn set<T: Real>(&mut self, samples: impl Iterator<Item: Borrow<T>>, picked: Picked) {
         self.values.resize(BLOCK, 0.0);
         (self.known, self.count) = (true, picked.count());
-        if !T::DERIVATIVES && picked.are_all() {
+        if picked.are_all() {
             for (to, number) in self.values[..self.count].iter_mut().zip(samples) {
                 *to = number.borrow().re();
             }
@@ -208,22 +231,28 @@ mod tests {
     #[test]
     fn values_and_derivatives_stand_apart_and_what_was_not_reached_is_no_number() {
         let numbers = [Dual::new(5.0, [50.0, 0.0]), Dual::new(7.0, [70.0, 1.0])];
-        let (mut varied, mut one) = (Values::default(), Values::default());
-        let picked = Picked::all(2);
-        varied.set::<Dual<2>>(numbers.iter(), picked);
-        one.set::<Dual<2>>([Dual::of(1.0); 2].iter(), picked);
+        let (ones, picked) = ([Dual::of(1.0); 2], Picked::all(2));
         let mut recorded = Recorded::new(2, 3);
         recorded.push(0, numbers[0]);
         recorded.push(0, numbers[1]);
-        recorded.add((1, 0), &varied, -2.0);
-        recorded.add_slopes::<false>((1, 0), (numbers.iter(), picked), Dual::of(-2.0));
-        let factor = Dual::new(0.0, [0.0, 10.0]);
-        recorded.add((1, 0), &one, factor.re);
-        recorded.add_slopes_of_factor::<false>((1, 0), &one, factor);
+        let mut block = Block::new();
+        block.add::<false>((numbers.iter(), picked), Dual::of(-2.0));
+        block.add::<false>((ones.iter(), picked), Dual::new(0.0, [0.0, 10.0]));
+        recorded.take(1, &mut block);
         let (values, slopes) = recorded.finish();
         assert_eq!((&values[0][..2], &values[1][..2]), (&[5.0, 7.0][..], &[-10.0, -14.0][..]));
         assert!(values[0][2].is_nan() && slopes.iter().flat_map(|s| s[2]).all(f64::is_nan));
         assert_eq!(slopes[0][..2], [[50.0, 0.0], [70.0, 1.0]]);
         assert_eq!(slopes[1][..2], [[-100.0, 10.0], [-140.0, 8.0]]);
+    }
+
+    #[test]
+    fn only_the_samples_on_the_grid_are_recorded() {
+        let numbers = [1.0, 2.0, 3.0, 4.0].map(|re| Dual::new(re, [10.0 * re]));
+        let picked = Picked::of(&[0.1, 0.3, 0.9], &[0.0, 0.1, 0.2, 0.3]);
+        let (mut recorded, mut block) = (Recorded::new(1, 2), Block::new());
+        block.add::<false>((numbers.iter(), picked), Dual::of(1.0));
+        recorded.take(0, &mut block);
+        assert_eq!(recorded.finish(), (vec![vec![2.0, 4.0]], vec![vec![[20.0], [40.0]]]));
     }
 }

@@ -2,7 +2,7 @@
 //! Chosen outputs on a time grid.
 
 use super::audit::EnergyAudit;
-use super::recorded::{Picked, Recorded, Values};
+use super::recorded::{Block, Picked, Recorded, Values};
 use super::start::{StartError, find};
 use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
@@ -127,6 +127,7 @@ pub(super) struct Recorder<'g, T: Real> {
     /// Working space: the basis, at an instant and over a block of samples.
     basis: Vec<T>,
     values: Vec<Values>,
+    block: Block<T>,
 }
 
 impl<'g, T: Real> Recorder<'g, T> {
@@ -135,7 +136,8 @@ impl<'g, T: Real> Recorder<'g, T> {
         let columns = targets.iter().map(|&target| Column::of(network, target)).collect();
         let recorded = Recorded::new(targets.len(), grid.len());
         let values = vec![Values::default(); network.basis()];
-        Self { grid, next: 0, columns, recorded, basis: Vec::new(), values }
+        let (basis, block) = (Vec::new(), Block::new());
+        Self { grid, next: 0, columns, recorded, basis, values, block }
     }
 
     /// Record the grid points before the end of the step; `last` includes the end.
@@ -206,9 +208,9 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
         for values in &mut self.values {
             values.known = false;
         }
-        let (columns, recorded, values) =
-            (&self.columns[..], &mut self.recorded, &mut self.values[..]);
-        dispatch(Passed { columns, recorded, values, run, active, samples, picked, first });
+        let (columns, recorded) = (&self.columns[..], &mut self.recorded);
+        let (values, block) = (&mut self.values[..], &mut self.block);
+        dispatch(Passed { columns, recorded, values, block, run, active, samples, picked, first });
     }
 }
 
@@ -217,6 +219,7 @@ struct Passed<'p, 'a, T: Real, S> {
     columns: &'p [Column<T>],
     recorded: &'p mut Recorded<T>,
     values: &'p mut [Values],
+    block: &'p mut Block<T>,
     run: &'p Integrator<'a, T>,
     active: &'p [usize],
     samples: &'p S,
@@ -233,13 +236,17 @@ impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
         for (output, column) in self.columns.iter().enumerate() {
             let from = self.recorded.length(output);
             for &(position, factor) in &*passing_terms(column, self.run) {
-                if !self.values[position].known {
-                    self.take_up(position);
-                }
-                self.recorded.add((output, from), &self.values[position], factor.re());
                 if T::DERIVATIVES {
-                    self.add_slopes::<F>((output, from), position, factor);
+                    self.add_to_block::<F>(position, factor);
+                } else {
+                    if !self.values[position].known {
+                        self.take_up(position);
+                    }
+                    self.recorded.add((output, from), &self.values[position], factor.re());
                 }
+            }
+            if T::DERIVATIVES {
+                self.recorded.take(output, self.block);
             }
             self.recorded.fill(output, from + count);
         }
@@ -268,23 +275,22 @@ impl<T: Real, S: Samples<T>> Passed<'_, '_, T, S> {
         }
     }
 
-    /// Add the derivatives of a multiple of an entry of the basis that has been taken up.
+    /// Add a multiple of an entry of the basis with its derivatives to the block.
     #[inline(always)]
-    fn add_slopes<const F: bool>(&mut self, to: (usize, usize), position: usize, factor: T) {
-        let (network, picked) = (self.run.network, self.picked);
+    fn add_to_block<const F: bool>(&mut self, position: usize, factor: T) {
+        let (network, block, picked) = (self.run.network, &mut *self.block, self.picked);
         let channel = |j: &usize| network.first_channel() + j == position;
         if position < self.run.x.len() {
-            let samples = (self.samples.states(position), picked);
-            self.recorded.add_slopes::<F>(to, samples, factor);
-        } else if position < network.one() && self.run.inputs_shift() {
+            block.add::<F>((self.samples.states(position), picked), factor);
+        } else if position < network.one() {
             let input = |k| self.run.input_at(self.first + k, position - network.first_input());
-            let samples = ((0..picked.span()).map(input), picked);
-            self.recorded.add_slopes::<F>(to, samples, factor);
+            block.add::<F>(((0..picked.span()).map(input), picked), factor);
+        } else if position == network.one() {
+            block.add::<F>((std::iter::repeat(T::of(1.0)), picked), factor);
         } else if let Some(slot) = self.active.iter().position(channel) {
-            let samples = (self.samples.torques(slot), picked);
-            self.recorded.add_slopes::<F>(to, samples, factor);
+            block.add::<F>((self.samples.torques(slot), picked), factor);
         } else {
-            self.recorded.add_slopes_of_factor::<F>(to, &self.values[position], factor);
+            block.add::<F>((std::iter::repeat(T::zero_()), picked), factor);
         }
     }
 }

@@ -264,6 +264,7 @@ impl<T: Real> Inputs<T> {
     }
 
     /// Value of an input at the start of segment `i` and its rate.
+    #[inline(always)]
     pub fn line(&self, i: usize, input: usize) -> [T; 2] {
         shifted(&self.lines(i)[input], self.shifts[input])
     }

@@ -280,17 +280,13 @@ impl<'a, T: Real> Integrator<'a, T> {
     }
 
     /// Value of an input at a knot.
+    #[inline(always)]
     pub fn input_at(&self, i: usize, input: usize) -> T {
         if i < self.inputs.segments() {
             return self.inputs.line(i, input)[0];
         }
         let [start, rate] = self.inputs.line(i - 1, input);
         start + rate * (self.inputs.knot(i) - self.inputs.knot(i - 1))
-    }
-
-    /// Whether inputs carry derivatives.
-    pub fn inputs_shift(&self) -> bool {
-        self.inputs.jumps()
     }
 
     /// Whether the inputs end here.
