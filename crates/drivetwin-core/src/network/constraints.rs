@@ -2,7 +2,7 @@
 //! Minimal coordinates: some node speeds are independent, the rest follow from the constraints.
 
 use super::error::CompileError;
-use super::linalg::{Matrix, independent_rows, solve};
+use super::linalg::{Matrix, independent_columns, independent_rows, solve};
 use crate::model::mechanism::{Constraint, Mechanism};
 use crate::number::Real;
 
@@ -20,11 +20,10 @@ pub struct Coordinates<T> {
 /// Choose coordinates for `C ω = 0`; faults name the elements.
 pub fn coordinates<T: Real>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileError> {
     let c = constraint_matrix(m, |_, _| None);
-    let rows = independent_rows(&c);
-    if rows.len() < c.rows {
+    let dependent = dependent_nodes(m, &c);
+    if dependent.len() < c.rows {
         return Err(CompileError::DependentConstraints { elements: dependent_elements(m, &c) });
     }
-    let dependent = dependent_nodes(m, &c);
     let independent: Vec<usize> = (0..m.nodes.len()).filter(|i| !dependent.contains(i)).collect();
     if independent.is_empty() {
         return Err(CompileError::Immobile);
@@ -69,7 +68,7 @@ fn complete<T: Real>(
     independent: &[usize],
     dependent: &[usize],
 ) -> Option<Matrix<T>> {
-    let tied = solve(&c.select_columns(dependent), &c.select_columns(independent)).ok()?;
+    let tied = solve(c.select_columns(dependent), c.select_columns(independent)).ok()?;
     let mut map = Matrix::zeros(c.cols, independent.len());
     for (j, &node) in independent.iter().enumerate() {
         map[(node, j)] = T::of(1.0);
@@ -82,17 +81,15 @@ fn complete<T: Real>(
     Some(map)
 }
 
-/// One dependent node per constraint, massless nodes first: coordinates are then mostly the speeds
-/// of real masses.
+/// One dependent node per independent constraint, massless nodes first: coordinates are then mostly the
+/// speeds of real masses.
 fn dependent_nodes<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<usize> {
     let massless = |node: usize| {
         !m.inertias.iter().any(|i| i.inertia.re() > 0.0 && i.row.len() == 1 && i.row[0].0 == node)
     };
-    let (mut order, heavy): (Vec<usize>, Vec<usize>) =
-        (0..m.nodes.len()).partition(|&i| massless(i));
-    order.extend(heavy);
-    let by_node = c.transposed().select_rows(&order);
-    independent_rows(&by_node).into_iter().map(|i| order[i]).collect()
+    let mut order: Vec<usize> = (0..m.nodes.len()).collect();
+    order.sort_by_key(|&i| !massless(i));
+    independent_columns(c, &order)
 }
 
 /// Elements of a smallest set of dependent rows.

@@ -163,10 +163,9 @@ fn row_matrix<T: Real>(rows: &[RigidRow<T>], nodes: usize) -> Matrix<T> {
 /// Solve the rows for the connected nodes that are not free; `None` where these do not determine
 /// them.
 fn over_free<T: Real>(c: &Matrix<T>, connected: &[usize], free: &[usize]) -> Option<Matrix<T>> {
-    let columns = |index: &[usize]| c.transposed().select_rows(index).transposed();
     let dependent: Vec<usize> =
         connected.iter().copied().filter(|node| !free.contains(node)).collect();
-    let tied = solve(&columns(&dependent), &columns(free)).ok()?;
+    let tied = solve(c.select_columns(&dependent), c.select_columns(free)).ok()?;
     let mut speeds = Matrix::zeros(c.cols, free.len());
     for (j, &node) in free.iter().enumerate() {
         speeds[(node, j)] = T::of(1.0);

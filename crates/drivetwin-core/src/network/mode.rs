@@ -5,6 +5,7 @@
 use super::compile::Network;
 use super::constraints::force_map;
 use super::linalg::{Matrix, SparseRows, independent_rows, least_norm, solve};
+use super::radius::radius;
 use crate::model::mechanism::{Loss, LossLaw};
 use crate::number::Real;
 use std::borrow::Cow;
@@ -61,7 +62,6 @@ impl ModeKey {
 
     /// Rows that keep a speed at zero: friction elements, then gears.
     pub fn rows(self) -> Vec<Row> {
-        let bits = |set: u32| (0..u32::BITS as usize).filter(move |j| set >> j & 1 == 1);
         bits(self.stuck).map(Row::Friction).chain(bits(self.held).map(Row::Gear)).collect()
     }
 }
@@ -171,65 +171,32 @@ impl<T: Real> Network<T> {
     pub fn mode(&self, key: ModeKey, capacity: &[T]) -> Option<Mode<T>> {
         let motion = self.motion_of(key)?;
         let stuck = key.rows();
-        if stuck.is_empty() && self.prescribed.is_empty() {
-            let derivative = self.with_other_states(&motion.free);
-            return Some(Mode {
-                key,
-                rates: SparseRows::of(&derivative),
-                radius: self.radius(&derivative),
-                derivative,
-                stuck,
-                stuck_torque: Matrix::zeros(0, self.basis()),
-                gear_torque: OnceLock::new(),
-                redundant: false,
-            });
-        }
-        let (speeds, nodes) = self.held_speeds(&stuck);
-        let response = motion.mobility.times(&nodes);
-        let mut needed = speeds.times(&motion.free);
-        for i in 0..self.prescribed.len() {
-            needed[(stuck.len() + i, self.first_rate() + i)] -= 1.0;
-        }
-        let (stuck_torque, redundant) = holding_torque(
-            &speeds.times(&response),
-            &needed,
-            &self.weights(&stuck, capacity),
-            stuck.len(),
-        );
-        let acceleration = difference(&motion.free, &response.times(&stuck_torque));
-        let derivative = self.with_other_states(&acceleration);
+        let mut derivative = self.with_other_states(&motion.free);
+        let (stuck_torque, redundant) = if stuck.is_empty() && self.prescribed.is_empty() {
+            (Matrix::zeros(0, self.basis()), false)
+        } else {
+            let (speeds, nodes) = self.held_speeds(&stuck);
+            let response = motion.mobility.times(&nodes);
+            let mut needed = speeds.times(&motion.free);
+            for i in 0..self.prescribed.len() {
+                needed[(stuck.len() + i, self.first_rate() + i)] -= 1.0;
+            }
+            let weights = || self.weights(&stuck, capacity);
+            let (torque, redundant) =
+                holding_torque(speeds.times(&response), needed, weights, stuck.len());
+            derivative.subtract(&response.times(&torque));
+            (torque, redundant)
+        };
         Some(Mode {
             key,
             rates: SparseRows::of(&derivative),
-            radius: self.radius(&derivative),
+            radius: radius(&derivative),
             derivative,
             gear_torque: OnceLock::new(),
             stuck_torque,
             stuck,
             redundant,
         })
-    }
-
-    /// Estimate of the spectral radius [1/s] of the motion from `A^16`, of which a bad scaling of the
-    /// states counts only by its sixteenth root.
-    fn radius(&self, derivative: &Matrix<T>) -> f64 {
-        let n = self.states();
-        let mut power = Matrix::<f64>::zeros(n, n);
-        for i in 0..n {
-            let row = power.row_mut(i).iter_mut().zip(derivative.row(i));
-            row.for_each(|(to, from)| *to = from.re());
-        }
-        let mut scale = 0.0;
-        for _ in 0..4 {
-            let size = power.max_abs();
-            if size == 0.0 {
-                return 0.0;
-            }
-            scale = 2.0 * (scale + size.ln());
-            power.scale(1.0 / size);
-            power = power.times(&power);
-        }
-        ((scale + power.max_abs().max(f64::MIN_POSITIVE).ln()) / 16.0).exp()
     }
 
     /// The motion that the modes of a key share; compiled with the network where it has no gear whose
@@ -248,7 +215,7 @@ impl<T: Real> Network<T> {
         let node_torques = self.with_drag(key);
         let kt = map.transposed();
         let mass = kt.times(&self.inertia).times(&self.coordinates.speeds);
-        let mobility = solve(&mass, &kt).ok()?;
+        let mobility = solve(mass, kt).ok()?;
         let free = mobility.times(&node_torques);
         Some(Motion { force_rows, node_torques, mobility, free })
     }
@@ -343,16 +310,17 @@ impl<T: Real> Mode<T> {
         self.gear_torque.get_or_init(|| {
             let motion = network.motion_of(self.key).expect("compiled with the mode");
             let (_, nodes) = network.held_speeds(&self.stuck);
-            let torques = difference(&motion.node_torques, &nodes.times(&self.stuck_torque));
             let mut acceleration = Matrix::zeros(network.speeds(), network.basis());
             for i in 0..network.speeds() {
                 acceleration.row_mut(i).copy_from_slice(self.derivative.row(i));
             }
             let inertia = network.inertia.times(&network.coordinates.speeds);
-            let residual = difference(&torques, &inertia.times(&acceleration));
+            let mut residual = motion.node_torques.clone();
+            residual.subtract(&nodes.times(&self.stuck_torque));
+            residual.subtract(&inertia.times(&acceleration));
             let dependent = &network.coordinates.dependent;
-            let balance = motion.force_rows.transposed().select_rows(dependent);
-            let multipliers = solve(&balance, &residual.select_rows(dependent));
+            let balance = motion.force_rows.select_columns(dependent).transposed();
+            let multipliers = solve(balance, residual.select_rows(dependent));
             let multipliers = multipliers.expect("the forces determine the accelerations");
             let lossy: Vec<usize> = network.losses.iter().map(|loss| loss.constraint).collect();
             let mut entering = multipliers.select_rows(&lossy);
@@ -371,14 +339,15 @@ impl<T: Real> Mode<T> {
 /// least `Σ (τ_j / weight_j)²`. Prescribed speeds, from row `stuck` on, win where the rows contradict
 /// each other.
 fn holding_torque<T: Real>(
-    w: &Matrix<T>,
-    b: &Matrix<T>,
-    weights: &[T],
+    w: Matrix<T>,
+    b: Matrix<T>,
+    weights: impl FnOnce() -> Vec<T>,
     stuck: usize,
 ) -> (Matrix<T>, bool) {
-    if independent_rows(w).len() == w.rows {
+    if independent_rows(&w).len() == w.rows {
         return (solve(w, b).expect("independent rows"), false);
     }
+    let weights = weights();
     let order: Vec<usize> = (stuck..w.rows).chain(0..stuck).collect();
     let (mut scaled, b) = (w.select_rows(&order), b.select_rows(&order));
     for r in 0..w.rows {
@@ -393,12 +362,11 @@ fn holding_torque<T: Real>(
     (torque, true)
 }
 
-fn difference<T: Real>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
-    let mut out = a.clone();
-    for i in 0..a.rows {
-        for (o, &s) in out.row_mut(i).iter_mut().zip(b.row(i)) {
-            *o -= s;
-        }
-    }
-    out
+/// Numbers of the bits that are set.
+fn bits(mut set: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lowest = set.trailing_zeros();
+        set &= set.checked_sub(1)?;
+        Some(lowest as usize)
+    })
 }
