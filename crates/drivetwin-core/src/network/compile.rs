@@ -7,8 +7,9 @@ use super::error::CompileError;
 use super::linalg::{Matrix, independent_rows, solve};
 use super::mode::{ModeKey, Motion};
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
-use crate::model::{Driveline, FrictionLaw};
+use crate::model::{Driveline, FrictionLaw, Name};
 use crate::number::Real;
+use smallvec::smallvec;
 
 /// Most friction elements and lossy gears together: the bits of a mode key.
 pub const MAX_ROWS: usize = 32;
@@ -21,7 +22,7 @@ const MASSLESS: f64 = 1e-12;
 #[derive(Clone, Debug)]
 pub struct FrictionRow<T> {
     /// Name for messages and events.
-    pub element: String,
+    pub element: Name,
     /// Slip over the independent speeds.
     pub slip: Vec<T>,
     /// Slip over the nodes; its negative is the direction of the torque.
@@ -40,7 +41,7 @@ pub struct FrictionRow<T> {
 #[derive(Clone, Debug)]
 pub struct LossyGear<T> {
     /// Name for messages and events.
-    pub element: String,
+    pub element: Name,
     /// Index of its constraint.
     pub constraint: usize,
     /// Its loss.
@@ -248,7 +249,7 @@ impl<T: Real> Network<T> {
         let Some(column) = self.massless_speed() else { return Ok(()) };
         let n = &self.coordinates.speeds;
         let moved = |&node: &usize| n[(node, column)].re() != 0.0;
-        let members = (0..n.rows).filter(moved).map(|i| self.mechanism.nodes[i].clone()).collect();
+        let members = (0..n.rows).filter(moved).map(|i| self.mechanism.nodes[i].to_string()).collect();
         Err(CompileError::Massless { members })
     }
 
@@ -260,7 +261,7 @@ impl<T: Real> Network<T> {
         if independent_rows(&rows).len() == rows.rows {
             return Ok(());
         }
-        let elements = self.mechanism.prescribed.iter().map(|p| p.element.clone()).collect();
+        let elements = self.mechanism.prescribed.iter().map(|p| p.element.to_string()).collect();
         Err(CompileError::PrescribedTwice { elements })
     }
 
@@ -335,7 +336,7 @@ impl<T: Real> Network<T> {
             if let ForceLaw::Constant(_) = force.law {
                 continue;
             }
-            let nodes = vec![(force.node, T::of(1.0))];
+            let nodes = smallvec![(force.node, T::of(1.0))];
             self.drives.push(Drive { basis, nodes, account: Some(force.account) });
         }
     }

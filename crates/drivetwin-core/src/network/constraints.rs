@@ -87,8 +87,9 @@ fn dependent_nodes<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<usize> {
     let massless = |node: usize| {
         !m.inertias.iter().any(|i| i.inertia.re() > 0.0 && i.row.len() == 1 && i.row[0].0 == node)
     };
-    let mut order: Vec<usize> = (0..m.nodes.len()).collect();
-    order.sort_by_key(|&i| !massless(i));
+    let (mut order, heavy): (Vec<usize>, Vec<usize>) =
+        (0..m.nodes.len()).partition(|&i| massless(i));
+    order.extend(heavy);
     independent_columns(c, &order)
 }
 
@@ -102,5 +103,5 @@ fn dependent_elements<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<String> {
         without.remove(i);
         if deficient(&without) { rows = without } else { i += 1 }
     }
-    rows.into_iter().map(|i| m.constraints[i].element.clone()).collect()
+    rows.into_iter().map(|i| m.constraints[i].element.to_string()).collect()
 }
