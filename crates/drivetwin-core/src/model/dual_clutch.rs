@@ -6,6 +6,7 @@ use super::mechanism::LossLaw;
 use super::{Driveline, FrictionLaw, Name};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
+use smol_str::SmolStrBuilder;
 use std::marker::PhantomData;
 
 /// A shift element: `slip = ω_in / i_c - i_out ω_out` (eq. 15).
@@ -133,7 +134,6 @@ impl<T: Real> DualClutch<T> {
 impl<T: Real> ShiftElement<T> {
     /// Gear i_c, clutch, gear i_out between the input gear and the output (paper Figure 2).
     fn path(&self, input: &Name, output: &Name) -> [Element<T>; 3] {
-        let joined = |first: &str, second: &str| Name::from([first, second].concat());
         let (a, b) = (joined(&self.name, " input side"), joined(&self.name, " output side"));
         [
             Element::Gear(gear(joined("i_c ", &self.name), input, &a, self.i_c)),
@@ -151,6 +151,13 @@ impl<T: Real> ShiftElement<T> {
             Element::Gear(gear(joined("i_out ", &self.name), &b, output, self.i_out)),
         ]
     }
+}
+
+fn joined(first: &str, second: &str) -> Name {
+    let mut name = SmolStrBuilder::new();
+    name.push_str(first);
+    name.push_str(second);
+    name.finish()
 }
 
 fn inertia<T: Real>(name: Name, node: &Name, inertia: T) -> Element<T> {

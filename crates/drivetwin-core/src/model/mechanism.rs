@@ -2,10 +2,10 @@
 //! The vocabulary in which elements state their laws: a mechanism that is linear in the node
 //! speeds, with scalar force laws and set-valued friction (THEORY section 1).
 
-use super::{GROUND, Name};
 use super::converter_map::ConverterMap;
 use super::friction::FrictionLaw;
 use super::torque_map::TorqueMap;
+use super::{GROUND, Name};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;

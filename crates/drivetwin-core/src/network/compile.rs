@@ -249,7 +249,8 @@ impl<T: Real> Network<T> {
         let Some(column) = self.massless_speed() else { return Ok(()) };
         let n = &self.coordinates.speeds;
         let moved = |&node: &usize| n[(node, column)].re() != 0.0;
-        let members = (0..n.rows).filter(moved).map(|i| self.mechanism.nodes[i].to_string()).collect();
+        let members =
+            (0..n.rows).filter(moved).map(|i| self.mechanism.nodes[i].to_string()).collect();
         Err(CompileError::Massless { members })
     }
 

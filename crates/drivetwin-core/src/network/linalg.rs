@@ -46,6 +46,24 @@ impl<T: Real> Matrix<T> {
         out
     }
 
+    /// Product with a matrix that is given by the entries of its columns: row and value.
+    pub fn times_columns(&self, columns: &[impl AsRef<[(usize, T)]>]) -> Self {
+        let mut out = Self::zeros(self.rows, columns.len());
+        for i in 0..self.rows {
+            for (sum, column) in out.row_mut(i).iter_mut().zip(columns) {
+                for &(k, value) in column.as_ref() {
+                    *sum += self[(i, k)] * value;
+                }
+            }
+        }
+        out
+    }
+
+    /// Subtract a multiple of `other` from row `i`.
+    pub fn subtract_row(&mut self, i: usize, (other, factor): (&[T], T)) {
+        self.row_mut(i).iter_mut().zip(other).for_each(|(v, &o)| *v -= o * factor);
+    }
+
     /// Subtract another matrix, which may have fewer rows.
     pub fn subtract(&mut self, other: &Self) {
         self.data.iter_mut().zip(&other.data).for_each(|(v, &o)| *v -= o);

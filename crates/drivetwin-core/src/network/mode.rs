@@ -6,7 +6,7 @@ use super::compile::Network;
 use super::constraints::force_map;
 use super::linalg::{Matrix, SparseRows, independent_rows, least_norm, solve};
 use super::radius::radius;
-use crate::model::mechanism::{Loss, LossLaw};
+use crate::model::mechanism::{self, Loss, LossLaw};
 use crate::number::Real;
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -176,7 +176,7 @@ impl<T: Real> Network<T> {
             (Matrix::zeros(0, self.basis()), false)
         } else {
             let (speeds, nodes) = self.held_speeds(&stuck);
-            let response = motion.mobility.times(&nodes);
+            let response = motion.mobility.times_columns(&nodes);
             let mut needed = speeds.times(&motion.free);
             for i in 0..self.prescribed.len() {
                 needed[(stuck.len() + i, self.first_rate() + i)] -= 1.0;
@@ -245,24 +245,21 @@ impl<T: Real> Network<T> {
     }
 
     /// Speeds kept at zero or prescribed, over the independent speeds and over the nodes.
-    fn held_speeds(&self, stuck: &[Row]) -> (Matrix<T>, Matrix<T>) {
+    fn held_speeds(&self, stuck: &[Row]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
         let count = stuck.len() + self.prescribed.len();
         let mut speeds = Matrix::zeros(count, self.speeds());
-        let mut nodes = Matrix::zeros(self.mechanism.nodes.len(), count);
+        let mut nodes = Vec::with_capacity(count);
+        let one = |node| mechanism::Row::from_elem((node, T::of(1.0)), 1);
         for (i, &row) in stuck.iter().enumerate() {
             speeds.row_mut(i).copy_from_slice(self.slip_of(row));
-            match row {
-                Row::Friction(j) => {
-                    for &(node, direction) in &self.frictions[j].nodes {
-                        nodes[(node, i)] += direction;
-                    }
-                }
-                Row::Gear(g) => nodes[(self.losses[g].loss.driving, i)] += 1.0,
-            }
+            nodes.push(match row {
+                Row::Friction(j) => self.frictions[j].nodes.clone(),
+                Row::Gear(g) => one(self.losses[g].loss.driving),
+            });
         }
         for (i, (speed, _)) in self.prescribed.iter().enumerate() {
             speeds.row_mut(stuck.len() + i).copy_from_slice(speed);
-            nodes[(self.mechanism.prescribed[i].node, stuck.len() + i)] += 1.0;
+            nodes.push(one(self.mechanism.prescribed[i].node));
         }
         (speeds, nodes)
     }
@@ -316,7 +313,11 @@ impl<T: Real> Mode<T> {
             }
             let inertia = network.inertia.times(&network.coordinates.speeds);
             let mut residual = motion.node_torques.clone();
-            residual.subtract(&nodes.times(&self.stuck_torque));
+            for (i, held) in nodes.iter().enumerate() {
+                for &(node, direction) in held {
+                    residual.subtract_row(node, (self.stuck_torque.row(i), direction));
+                }
+            }
             residual.subtract(&inertia.times(&acceleration));
             let dependent = &network.coordinates.dependent;
             let balance = motion.force_rows.select_columns(dependent).transposed();

@@ -58,7 +58,8 @@ impl Chunked {
         {
             for (c, product) in products.iter_mut().enumerate() {
                 let mut sum = [0.0; CHUNK];
-                for (&a, b) in row.as_flattened().iter().zip(self.chunks[c..].iter().step_by(width)) {
+                for (&a, b) in row.as_flattened().iter().zip(self.chunks[c..].iter().step_by(width))
+                {
                     for i in 0..CHUNK {
                         sum[i] += a * b[i];
                     }

@@ -135,7 +135,8 @@ fn piece_of(network: &Network<f64>, j: usize, slip: f64) -> usize {
 }
 
 fn state_names(network: &Network<f64>) -> Vec<String> {
-    let nodes = network.coordinates.independent.iter().map(|&i| network.mechanism.nodes[i].to_string());
+    let nodes =
+        network.coordinates.independent.iter().map(|&i| network.mechanism.nodes[i].to_string());
     let shafts = network.mechanism.springs.iter().map(|spring| spring.element.to_string());
     let lags = (0..network.lags.len()).map(|i| format!("lag {}", i + 1));
     nodes.chain(shafts).chain(lags).collect()
