@@ -2,7 +2,7 @@
 //! Minimal coordinates: some node speeds are independent, the rest follow from the constraints.
 
 use super::error::CompileError;
-use super::linalg::{Matrix, independent_columns, independent_rows, solve};
+use super::linalg::{Matrix, eliminate, independent_rows};
 use crate::model::mechanism::{Constraint, Mechanism};
 use crate::number::Real;
 
@@ -19,17 +19,16 @@ pub struct Coordinates<T> {
 
 /// Choose coordinates for `C ω = 0`; faults name the elements.
 pub fn coordinates<T: Real>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileError> {
-    let c = constraint_matrix(m, |_, _| None);
-    let dependent = dependent_nodes(m, &c);
+    let mut c = constraint_matrix(m, |_, _| None);
+    let dependent = eliminate(&mut c, &massless_first(m));
     if dependent.len() < c.rows {
-        return Err(CompileError::DependentConstraints { elements: dependent_elements(m, &c) });
+        return Err(CompileError::DependentConstraints { elements: dependent_elements(m) });
     }
     let independent: Vec<usize> = (0..m.nodes.len()).filter(|i| !dependent.contains(i)).collect();
     if independent.is_empty() {
         return Err(CompileError::Immobile);
     }
-    let speeds = complete(&c, &independent, &dependent)
-        .expect("the dependent nodes were chosen to make their block regular");
+    let speeds = over_independent(&c, &independent, &dependent);
     Ok(Coordinates { independent, dependent, speeds })
 }
 
@@ -42,8 +41,9 @@ pub fn force_map<T: Real>(
     efficiency: impl Fn(&Constraint<T>, usize) -> Option<T>,
 ) -> Option<(Matrix<T>, Matrix<T>)> {
     let forces = constraint_matrix(m, efficiency);
-    let map = complete(&forces, &c.independent, &c.dependent)?;
-    Some((map, forces))
+    let mut reduced = forces.clone();
+    let determined = eliminate(&mut reduced, &c.dependent).len() == c.dependent.len();
+    determined.then(|| (over_independent(&reduced, &c.independent, &c.dependent), forces))
 }
 
 /// Rows of all constraints over the nodes; `efficiency(constraint, index)` scales the entries
@@ -62,39 +62,36 @@ fn constraint_matrix<T: Real>(
     c
 }
 
-/// `[I; -C_dep⁻¹ C_ind]` in node order, or `None` if the dependent block is singular.
-fn complete<T: Real>(
+/// `[I; -C_dep⁻¹ C_ind]` in node order, where `C_dep` has been brought to unity.
+fn over_independent<T: Real>(
     c: &Matrix<T>,
     independent: &[usize],
     dependent: &[usize],
-) -> Option<Matrix<T>> {
-    let tied = solve(c.select_columns(dependent), c.select_columns(independent)).ok()?;
+) -> Matrix<T> {
     let mut map = Matrix::zeros(c.cols, independent.len());
     for (j, &node) in independent.iter().enumerate() {
         map[(node, j)] = T::of(1.0);
-    }
-    for (i, &node) in dependent.iter().enumerate() {
-        for j in 0..independent.len() {
-            map[(node, j)] = -tied[(i, j)];
+        for (i, &tied) in dependent.iter().enumerate() {
+            map[(tied, j)] = -c[(i, node)];
         }
     }
-    Some(map)
+    map
 }
 
-/// One dependent node per independent constraint, massless nodes first: coordinates are then mostly the
-/// speeds of real masses.
-fn dependent_nodes<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<usize> {
+/// The order in which nodes are made dependent: coordinates are then mostly the speeds of real masses.
+fn massless_first<T: Real>(m: &Mechanism<T>) -> Vec<usize> {
     let massless = |node: usize| {
         !m.inertias.iter().any(|i| i.inertia.re() > 0.0 && i.row.len() == 1 && i.row[0].0 == node)
     };
     let (mut order, heavy): (Vec<usize>, Vec<usize>) =
         (0..m.nodes.len()).partition(|&i| massless(i));
     order.extend(heavy);
-    independent_columns(c, &order)
+    order
 }
 
 /// Elements of a smallest set of dependent rows.
-fn dependent_elements<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<String> {
+fn dependent_elements<T: Real>(m: &Mechanism<T>) -> Vec<String> {
+    let c = constraint_matrix(m, |_, _| None);
     let deficient = |rows: &[usize]| independent_rows(&c.select_rows(rows)).len() < rows.len();
     let mut rows: Vec<usize> = (0..c.rows).collect();
     let mut i = 0;

@@ -5,6 +5,7 @@
 //! through the solve.
 
 use crate::number::Real;
+use smallvec::SmallVec;
 
 /// A dense row-major matrix.
 #[derive(Clone, Debug, PartialEq)]
@@ -190,49 +191,65 @@ pub fn solve<T: Real>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usize
     Ok(x)
 }
 
+/// Bring `a` to a form in which those of the columns `order` that are linearly independent of the ones
+/// before them, to `1e-9` of the largest entry, are unit vectors: number i of those that are returned has
+/// its 1 in row i. Sparse matrices take fewer operations.
+pub fn eliminate<T: Real>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
+    let least = 1e-9 * a.max_abs();
+    let mut units = Vec::with_capacity(a.rows);
+    for &column in order {
+        let row = units.len();
+        if row == a.rows {
+            break;
+        }
+        let pivot = largest_in_column(a, column, row);
+        if a[(pivot, column)].re().abs() <= least {
+            continue;
+        }
+        a.swap_rows(row, pivot);
+        let inverse = a[(row, column)].recip();
+        for r in 0..a.rows {
+            let entry = a[(r, column)];
+            if r != row && !is_zero(entry) {
+                subtract_row(a, (r, row), 0, entry * inverse);
+            }
+        }
+        a.row_mut(row).iter_mut().for_each(|v| *v *= inverse);
+        units.push(column);
+    }
+    units
+}
+
 /// Rows of `a` that are linearly independent of those before them, to `1e-9` of their size.
 pub fn independent_rows<T: Real>(a: &Matrix<T>) -> Vec<usize> {
-    independent((a.rows, a.cols), |i, j| a[(i, j)].re())
-}
-
-/// Those of the columns `index` of `a` that are linearly independent of the ones before them there.
-pub fn independent_columns<T: Real>(a: &Matrix<T>, index: &[usize]) -> Vec<usize> {
-    let mut kept = independent((index.len(), a.rows), |i, j| a[(j, index[i])].re());
-    kept.iter_mut().for_each(|i| *i = index[*i]);
-    kept
-}
-
-/// Which of `count` vectors of the length `size` are linearly independent of those before them, by
-/// elimination; `entry(i, j)` is entry j of vector i.
-fn independent((count, size): (usize, usize), entry: impl Fn(usize, usize) -> f64) -> Vec<usize> {
-    let most = count.min(size);
+    let most = a.rows.min(a.cols);
     let mut kept = Vec::with_capacity(most);
-    // What is left of each kept vector, with 1 as its largest entry, and where that stands.
-    let mut left = Matrix::<f64>::zeros(most, size);
-    let mut pivots: Vec<usize> = Vec::with_capacity(most);
-    for i in 0..count {
+    // What is left of each kept row, with 1 as its largest entry, and where that stands.
+    let mut left = Matrix::<f64>::zeros(most, a.cols);
+    let mut pivots = SmallVec::<[usize; 8]>::new();
+    for i in 0..a.rows {
         let k = kept.len();
         if k == most {
             break;
         }
-        let (before, rest) = left.data.split_at_mut(k * size);
-        let vector = &mut rest[..size];
+        let (before, rest) = left.data.split_at_mut(k * a.cols);
+        let row = &mut rest[..a.cols];
         let mut scale = 0.0_f64;
-        for (j, to) in vector.iter_mut().enumerate() {
-            *to = entry(i, j);
+        for (to, from) in row.iter_mut().zip(a.row(i)) {
+            *to = from.re();
             scale = scale.max(to.abs());
         }
-        for (basis, &pivot) in before.chunks_exact(size).zip(&pivots) {
-            let factor = vector[pivot];
+        for (basis, &pivot) in before.chunks_exact(a.cols).zip(&pivots) {
+            let factor = row[pivot];
             if factor != 0.0 {
-                vector.iter_mut().zip(basis).for_each(|(v, &b)| *v -= factor * b);
+                row.iter_mut().zip(basis).for_each(|(v, &b)| *v -= factor * b);
             }
         }
-        let largest = |a: usize, b: usize| if vector[b].abs() > vector[a].abs() { b } else { a };
-        let pivot = (1..size).fold(0, largest);
-        if vector[pivot].abs() > 1e-9 * scale {
-            let inverse = vector[pivot].recip();
-            vector.iter_mut().for_each(|v| *v *= inverse);
+        let larger = |j: usize, k: usize| if row[k].abs() > row[j].abs() { k } else { j };
+        let pivot = (1..a.cols).fold(0, larger);
+        if row[pivot].abs() > 1e-9 * scale {
+            let inverse = row[pivot].recip();
+            row.iter_mut().for_each(|v| *v *= inverse);
             pivots.push(pivot);
             kept.push(i);
         }
