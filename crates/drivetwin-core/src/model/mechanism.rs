@@ -278,6 +278,17 @@ impl<T> Default for Mechanism<T> {
 }
 
 impl<T: Real> Mechanism<T> {
+    /// Nothing yet, with room for what so many elements state: about half of them are couplings, half
+    /// masses.
+    pub fn with_room(elements: usize) -> Self {
+        Self {
+            nodes: Vec::with_capacity(elements),
+            inertias: Vec::with_capacity(elements / 2),
+            constraints: Vec::with_capacity(elements / 2),
+            ..Self::default()
+        }
+    }
+
     /// Index of a node, added on first use.
     pub fn node(&mut self, name: &Name) -> usize {
         index_of(&mut self.nodes, name)

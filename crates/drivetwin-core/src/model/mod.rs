@@ -40,7 +40,7 @@ impl<T: Real> Driveline<T> {
     /// State every element's law; all faults of the description are reported together.
     pub fn mechanism(&self) -> Result<Mechanism<T>, ModelFaults> {
         let mut faults = Vec::new();
-        let mut mechanism = Mechanism::default();
+        let mut mechanism = Mechanism::with_room(self.elements.len());
         let mut seen: Vec<&Name> = Vec::with_capacity(self.elements.len());
         for element in &self.elements {
             if seen.contains(&element.name()) {

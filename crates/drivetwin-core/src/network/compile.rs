@@ -75,6 +75,8 @@ pub struct Lag<T> {
 pub struct Network<T> {
     /// What it was compiled from.
     pub mechanism: Mechanism<T>,
+    /// See [`Network::states`].
+    states: usize,
     /// Independent speeds and their map to all nodes.
     pub coordinates: Coordinates<T>,
     /// Kinetic energy over the nodes, `½ ωᵀ I ω`.
@@ -116,8 +118,10 @@ impl<T: Real> Network<T> {
             return Err(CompileError::TooManyRows { count, limit: MAX_ROWS });
         }
         let coordinates = coordinates(&mechanism)?;
+        let lags = mechanism.forces.iter().filter(|force| force.lag.is_some()).count();
         let empty = Matrix::zeros(0, 0);
         let mut network = Self {
+            states: coordinates.independent.len() + mechanism.springs.len() + lags,
             inertia: node_inertia(&mechanism),
             mass: empty.clone(),
             twist_rates: empty.clone(),
@@ -159,7 +163,7 @@ impl<T: Real> Network<T> {
 
     /// Number of states: speeds, twists, lagging torques.
     pub fn states(&self) -> usize {
-        self.first_lag() + self.mechanism.forces.iter().filter(|f| f.lag.is_some()).count()
+        self.states
     }
 
     /// Position of the first input in the basis (x, u, prescribed accelerations, 1, φ).
@@ -229,15 +233,14 @@ impl<T: Real> Network<T> {
     fn give_mass_between_frictions(&mut self) -> bool {
         let floor = self.inertia.max_abs() * MASSLESS;
         let mut given = false;
-        for j in 0..self.speeds() {
+        for j in (0..self.speeds()).filter(|&j| self.mass[(j, j)].re() == 0.0) {
             let node = self.coordinates.independent[j];
             let touches = |row: &Row<T>| {
                 row.iter().any(|&(n, _)| self.coordinates.speeds[(n, j)].re() != 0.0)
             };
-            let massless = self.mass[(j, j)].re() == 0.0;
             let rubbed = self.mechanism.frictions.iter().any(|f| touches(&f.row));
             let sprung = self.mechanism.springs.iter().any(|s| touches(&s.row));
-            if massless && rubbed && !sprung {
+            if rubbed && !sprung {
                 self.inertia[(node, node)] += floor;
                 given = true;
             }

@@ -23,10 +23,11 @@ pub fn radius<T: Real>(rows: &Matrix<T>) -> f64 {
         }
     }
     let size = power.max_abs();
-    if size == 0.0 {
+    if size < f64::MIN_POSITIVE {
         return 0.0;
     }
-    power.chunks.as_flattened_mut().iter_mut().for_each(|v| *v /= size);
+    let inverse = size.recip();
+    power.chunks.as_flattened_mut().iter_mut().for_each(|v| *v *= inverse);
     let mut square = Chunked::zeros(rows.rows);
     for _ in 0..4 {
         power.square(&mut square);
