@@ -3,7 +3,7 @@
 
 use super::error::CompileError;
 use super::linalg::{Matrix, eliminate, independent_rows};
-use crate::model::mechanism::{Constraint, Mechanism};
+use crate::model::mechanism::Mechanism;
 use crate::number::Real;
 
 /// Split of the nodes and the map `ω = N v`.
@@ -19,7 +19,7 @@ pub struct Coordinates<T> {
 
 /// Choose coordinates for `C ω = 0`; faults name the elements.
 pub fn coordinates<T: Real>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileError> {
-    let mut c = constraint_matrix(m, |_, _| None);
+    let mut c = constraint_matrix(m, |_| None);
     let dependent = eliminate(&mut c, &massless_first(m));
     if dependent.len() < c.rows {
         return Err(CompileError::DependentConstraints { elements: dependent_elements(m) });
@@ -32,29 +32,26 @@ pub fn coordinates<T: Real>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileE
     Ok(Coordinates { independent, dependent, speeds })
 }
 
-/// The map from node torques to generalised forces, `Kᵀ f`, for one direction of power through each
-/// lossy gear: like N, but built from the force rows, whose driven entries carry the efficiency.
-/// `None` where the efficiencies make the force balance singular (self-locking).
+/// The map from node torques to generalised forces, `Kᵀ f`, like N, but built from the force rows: the
+/// constraints as their forces act on the nodes, see [`constraint_matrix`]. `None` where the efficiencies
+/// make the force balance singular (self-locking).
 pub fn force_map<T: Real>(
-    m: &Mechanism<T>,
-    c: &Coordinates<T>,
-    efficiency: impl Fn(&Constraint<T>, usize) -> Option<T>,
-) -> Option<(Matrix<T>, Matrix<T>)> {
-    let forces = constraint_matrix(m, efficiency);
-    let mut reduced = forces.clone();
-    let determined = eliminate(&mut reduced, &c.dependent).len() == c.dependent.len();
-    determined.then(|| (over_independent(&reduced, &c.independent, &c.dependent), forces))
+    mut force_rows: Matrix<T>,
+    Coordinates { independent, dependent, .. }: &Coordinates<T>,
+) -> Option<Matrix<T>> {
+    let determined = eliminate(&mut force_rows, dependent).len() == dependent.len();
+    determined.then(|| over_independent(&force_rows, independent, dependent))
 }
 
-/// Rows of all constraints over the nodes; `efficiency(constraint, index)` scales the entries
-/// other than the first of lossy ones.
-fn constraint_matrix<T: Real>(
+/// Rows of all constraints over the nodes; `efficiency` of a constraint by its index, where it has one,
+/// scales the entries other than the first.
+pub fn constraint_matrix<T: Real>(
     m: &Mechanism<T>,
-    efficiency: impl Fn(&Constraint<T>, usize) -> Option<T>,
+    efficiency: impl Fn(usize) -> Option<T>,
 ) -> Matrix<T> {
     let mut c = Matrix::zeros(m.constraints.len(), m.nodes.len());
     for (i, constraint) in m.constraints.iter().enumerate() {
-        let eta = efficiency(constraint, i).unwrap_or(T::of(1.0));
+        let eta = efficiency(i).unwrap_or(T::of(1.0));
         for (position, &(node, coefficient)) in constraint.row.iter().enumerate() {
             c[(i, node)] += if position == 0 { coefficient } else { coefficient * eta };
         }
@@ -91,7 +88,7 @@ fn massless_first<T: Real>(m: &Mechanism<T>) -> Vec<usize> {
 
 /// Elements of a smallest set of dependent rows.
 fn dependent_elements<T: Real>(m: &Mechanism<T>) -> Vec<String> {
-    let c = constraint_matrix(m, |_, _| None);
+    let c = constraint_matrix(m, |_| None);
     let deficient = |rows: &[usize]| independent_rows(&c.select_rows(rows)).len() < rows.len();
     let mut rows: Vec<usize> = (0..c.rows).collect();
     let mut i = 0;

@@ -337,6 +337,6 @@ fn subtract_row<T: Real>(
 }
 
 /// Whether a number is zero with all its derivatives.
-fn is_zero<T: Real>(value: T) -> bool {
+pub fn is_zero<T: Real>(value: T) -> bool {
     value.re() == 0.0 && value.is_constant()
 }

@@ -3,8 +3,8 @@
 //! stuck, their torques, and the torques through lossy gears.
 
 use super::compile::Network;
-use super::constraints::force_map;
-use super::linalg::{Matrix, SparseRows, independent_rows, least_norm, solve};
+use super::constraints::{constraint_matrix, force_map};
+use super::linalg::{Matrix, SparseRows, independent_rows, is_zero, least_norm, solve};
 use super::radius::radius;
 use crate::model::mechanism::{self, Loss, LossLaw};
 use crate::number::Real;
@@ -92,10 +92,6 @@ pub struct Mode<T> {
 /// What all modes with the same states of the lossy gears share.
 #[derive(Clone, Debug)]
 pub struct Motion<T> {
-    /// Rows of the constraints as their forces act on the nodes.
-    force_rows: Matrix<T>,
-    /// Node torques over the basis, with the drag of the gears.
-    node_torques: Matrix<T>,
     /// Accelerations of the independent speeds per node torque, speeds × nodes.
     mobility: Matrix<T>,
     /// Accelerations with nothing at rest, speeds × basis.
@@ -210,35 +206,38 @@ impl<T: Real> Network<T> {
 
     /// `None` if the efficiencies leave the accelerations undetermined.
     pub(super) fn motion(&self, key: ModeKey) -> Option<Motion<T>> {
-        let efficiency = |_: &_, constraint: usize| self.efficiency(key, constraint);
-        let (map, force_rows) = force_map(&self.mechanism, &self.coordinates, efficiency)?;
-        let node_torques = self.with_drag(key);
-        let kt = map.transposed();
+        let kt = force_map(self.force_rows(key), &self.coordinates)?.transposed();
         let mass = kt.times(&self.inertia).times(&self.coordinates.speeds);
         let mobility = solve(mass, kt).ok()?;
-        let free = mobility.times(&node_torques);
-        Some(Motion { force_rows, node_torques, mobility, free })
+        let free = mobility.times(&self.with_drag(key));
+        Some(Motion { mobility, free })
     }
 
-    fn efficiency(&self, key: ModeKey, constraint: usize) -> Option<T> {
-        let i = self.losses.iter().position(|loss| loss.constraint == constraint)?;
-        if key.held >> i & 1 == 1 {
-            return None;
-        }
-        Some(self.losses[i].loss.factor(1.0, key.backward >> i & 1 == 1).0)
+    /// The constraints as their forces act on the nodes: the driven side of a rolling gear gets what its
+    /// efficiency leaves.
+    fn force_rows(&self, key: ModeKey) -> Matrix<T> {
+        constraint_matrix(&self.mechanism, |constraint| {
+            let i = self.losses.iter().position(|loss| loss.constraint == constraint)?;
+            let held = key.held >> i & 1 == 1;
+            let backward = key.backward >> i & 1 == 1;
+            (!held).then(|| self.losses[i].loss.factor(1.0, backward).0)
+        })
     }
 
-    /// Node torques with the drag of rolling gears, which acts on their driven side.
-    fn with_drag(&self, key: ModeKey) -> Matrix<T> {
-        let mut torques = self.node_torques.clone();
+    /// Node torques over the basis with the drag of rolling gears, which acts on their driven side.
+    fn with_drag(&self, key: ModeKey) -> Cow<'_, Matrix<T>> {
+        let mut torques = Cow::Borrowed(&self.node_torques);
         for (i, gear) in self.losses.iter().enumerate() {
             if key.held >> i & 1 == 1 {
                 continue;
             }
             let sign = if key.reverse >> i & 1 == 1 { -1.0 } else { 1.0 };
             let (_, drag) = gear.loss.factor(sign, key.backward >> i & 1 == 1);
+            if is_zero(drag) {
+                continue;
+            }
             for &(node, coefficient) in &self.mechanism.constraints[gear.constraint].row[1..] {
-                torques[(node, self.one())] += coefficient * drag;
+                torques.to_mut()[(node, self.one())] += coefficient * drag;
             }
         }
         torques
@@ -305,14 +304,13 @@ impl<T: Real> Mode<T> {
     /// the loss torque on top. Computed when first asked for.
     pub fn gear_torque(&self, network: &Network<T>) -> &Matrix<T> {
         self.gear_torque.get_or_init(|| {
-            let motion = network.motion_of(self.key).expect("compiled with the mode");
             let (_, nodes) = network.held_speeds(&self.stuck);
             let mut acceleration = Matrix::zeros(network.speeds(), network.basis());
             for i in 0..network.speeds() {
                 acceleration.row_mut(i).copy_from_slice(self.derivative.row(i));
             }
             let inertia = network.inertia.times(&network.coordinates.speeds);
-            let mut residual = motion.node_torques.clone();
+            let mut residual = network.with_drag(self.key).into_owned();
             for (i, held) in nodes.iter().enumerate() {
                 for &(node, direction) in held {
                     residual.subtract_row(node, (self.stuck_torque.row(i), direction));
@@ -320,7 +318,7 @@ impl<T: Real> Mode<T> {
             }
             residual.subtract(&inertia.times(&acceleration));
             let dependent = &network.coordinates.dependent;
-            let balance = motion.force_rows.select_columns(dependent).transposed();
+            let balance = network.force_rows(self.key).select_columns(dependent).transposed();
             let multipliers = solve(balance, residual.select_rows(dependent));
             let multipliers = multipliers.expect("the forces determine the accelerations");
             let lossy: Vec<usize> = network.losses.iter().map(|loss| loss.constraint).collect();

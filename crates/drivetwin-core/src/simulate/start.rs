@@ -75,6 +75,9 @@ impl<T: Real> Start<T> {
     }
 }
 
+/// Values by the names of what has them.
+type Stated<'n, T> = [(&'n str, T)];
+
 fn by_name<T: Copy>(values: &[(String, T)]) -> Vec<(&str, T)> {
     values.iter().map(|(name, value)| (name.as_str(), *value)).collect()
 }
@@ -82,7 +85,7 @@ fn by_name<T: Copy>(values: &[(String, T)]) -> Vec<(&str, T)> {
 /// The state of a network from speeds of nodes, twists of shafts and elements without slip, see [`Start`].
 pub(super) fn state_of<T: Real>(
     network: &Network<T>,
-    (speeds, twists): (&[(&str, T)], &[(&str, T)]),
+    (speeds, twists): (&Stated<'_, T>, &Stated<'_, T>),
     locked: &[String],
 ) -> Result<State<T>, StartError> {
     let elements = network.frictions.iter().map(|f| &f.element);
@@ -104,7 +107,7 @@ pub(super) fn state_of<T: Real>(
 }
 
 /// The independent speeds, from speeds of nodes.
-fn speeds_of<T: Real>(network: &Network<T>, speeds: &[(&str, T)]) -> Result<Vec<T>, StartError> {
+fn speeds_of<T: Real>(network: &Network<T>, speeds: &Stated<'_, T>) -> Result<Vec<T>, StartError> {
     let nodes = &network.mechanism.nodes;
     let n = &network.coordinates.speeds;
     let rows = speeds.iter().map(|(name, _)| find("node", name, nodes.iter()));
