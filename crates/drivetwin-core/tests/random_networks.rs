@@ -12,7 +12,7 @@ use drivetwin_core::model::elements::{
     Bearing, Clutch, Element, Gear, GearLoss, OneWayClutch, Planetary,
 };
 use drivetwin_core::model::mechanism::LossLaw;
-use drivetwin_core::model::{FrictionLaw, Stribeck};
+use drivetwin_core::model::{FrictionLaw, Name, Stribeck};
 use drivetwin_core::simulate::{Output, Start, Trajectory, run};
 use drivetwin_core::solve::{EventKind, Settings, Signal, Status};
 use proptest::prelude::*;
@@ -124,12 +124,12 @@ fn elements(case: &Case) -> Vec<Element<f64>> {
         }));
     }
     for (i, other) in case.others.iter().enumerate() {
-        let name = format!("element {i}");
+        let name: Name = format!("element {i}").into();
         let element = match *other {
             RandomElement::Shaft(a, b, k, c) => renamed(shaft(NODES[a], NODES[b], k, c), name),
             RandomElement::Gear(a, ratio, loss) => {
                 let far = format!("far {i}");
-                all.push(renamed(inertia(&far, 0.3), format!("J {i}")));
+                all.push(renamed(inertia(&far, 0.3), format!("J {i}").into()));
                 let loss = loss.map(|(eta, eta_backward)| GearLoss {
                     eta_backward: Some(eta_backward),
                     ..GearLoss::by_efficiency(LossLaw::Dissipative, eta)
@@ -140,7 +140,7 @@ fn elements(case: &Case) -> Vec<Element<f64>> {
             RandomElement::Planetary(z) => Element::Planetary(Planetary {
                 name,
                 sun: "a".into(),
-                ring: format!("ring {i}"),
+                ring: format!("ring {i}").into(),
                 carrier: "b".into(),
                 z,
                 planet_inertia: None,
@@ -168,7 +168,7 @@ fn elements(case: &Case) -> Vec<Element<f64>> {
     all
 }
 
-fn renamed(mut element: Element<f64>, name: String) -> Element<f64> {
+fn renamed(mut element: Element<f64>, name: Name) -> Element<f64> {
     match &mut element {
         Element::SpringDamper(e) => e.name = name,
         Element::RoadLoad(e) => e.name = name,

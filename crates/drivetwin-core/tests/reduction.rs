@@ -40,7 +40,7 @@ fn set<T: Real>(name: &str, [sun, ring, carrier]: [&str; 3], z: T) -> Element<T>
 }
 
 fn inertia<T: Real>(node: &str, inertia: f64) -> Element<T> {
-    let name = format!("J {node}");
+    let name = format!("J {node}").into();
     Element::Inertia(Inertia { name, node: node.into(), inertia: T::of(inertia) })
 }
 

@@ -3,9 +3,10 @@
 
 use super::elements::{Clutch, Element, Gear, GearLoss, Inertia, RoadLoad, SpringDamper, Torque};
 use super::mechanism::LossLaw;
-use super::{Driveline, FrictionLaw};
+use super::{Driveline, FrictionLaw, Name};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
+use smol_str::SmolStrBuilder;
 use std::marker::PhantomData;
 
 /// A shift element: `slip = ω_in / i_c - i_out ω_out` (eq. 15).
@@ -13,7 +14,7 @@ use std::marker::PhantomData;
 #[serde(deny_unknown_fields)]
 pub struct ShiftElement<T> {
     /// Name, such as B2.
-    pub name: String,
+    pub name: Name,
     /// Ratio between input gear and clutch.
     pub i_c: T,
     /// Ratio between clutch and output.
@@ -88,41 +89,43 @@ pub const ENGINE_TORQUE: &str = "engine torque";
 impl<T: Real> DualClutch<T> {
     /// The same driveline as elements of the network.
     pub fn driveline(&self) -> Driveline<T> {
-        let input = "input gear";
-        let axle = "axle";
-        let mut elements = vec![
-            inertia("J1", ENGINE, self.J1),
+        let [engine, output, wheel] =
+            const { [Name::new_inline(ENGINE), Name::new_inline(OUTPUT), Name::new_inline(WHEEL)] };
+        let [input, axle] = const { [Name::new_inline("input gear"), Name::new_inline("axle")] };
+        let mut elements = Vec::with_capacity(9 + 3 * self.elements.len());
+        elements.extend([
+            inertia(const { Name::new_inline("J1") }, &engine, self.J1),
             Element::Torque(Torque {
-                name: "engine".into(),
-                node: ENGINE.into(),
-                input: ENGINE_TORQUE.into(),
+                name: const { Name::new_inline("engine") },
+                node: engine.clone(),
+                input: const { Name::new_inline(ENGINE_TORQUE) },
                 number: PhantomData,
             }),
             Element::Gear(Gear {
                 loss: Some(GearLoss::by_efficiency(self.loss_law, self.eta)),
-                ..gear("i_in", ENGINE, input, self.i_in)
+                ..gear(const { Name::new_inline("i_in") }, &engine, &input, self.i_in)
             }),
-            inertia("J2e", input, self.J2e * self.i_in * self.i_in),
-            inertia("J_out", OUTPUT, self.J_out),
+            inertia(const { Name::new_inline("J2e") }, &input, self.J2e * self.i_in * self.i_in),
+            inertia(const { Name::new_inline("J_out") }, &output, self.J_out),
             Element::SpringDamper(SpringDamper {
-                name: SHAFT.into(),
-                a: OUTPUT.into(),
-                b: axle.into(),
+                name: const { Name::new_inline(SHAFT) },
+                a: output.clone(),
+                b: axle.clone(),
                 stiffness: self.k_o,
                 damping: self.c_o,
             }),
-            Element::Gear(gear("i_f", axle, WHEEL, self.i_f)),
-            inertia("J_v", WHEEL, self.J_v),
+            Element::Gear(gear(const { Name::new_inline("i_f") }, &axle, &wheel, self.i_f)),
+            inertia(const { Name::new_inline("J_v") }, &wheel, self.J_v),
             Element::RoadLoad(RoadLoad {
-                name: "load".into(),
-                node: WHEEL.into(),
+                name: const { Name::new_inline("load") },
+                node: wheel.clone(),
                 constant: self.load.constant,
                 rolling: self.load.rolling,
                 aero: self.load.aero,
             }),
-        ];
+        ]);
         for element in &self.elements {
-            elements.extend(element.path(input));
+            elements.extend(element.path(&input, &output));
         }
         Driveline { elements }
     }
@@ -130,10 +133,10 @@ impl<T: Real> DualClutch<T> {
 
 impl<T: Real> ShiftElement<T> {
     /// Gear i_c, clutch, gear i_out between the input gear and the output (paper Figure 2).
-    fn path(&self, input: &str) -> [Element<T>; 3] {
-        let (a, b) = (format!("{} input side", self.name), format!("{} output side", self.name));
+    fn path(&self, input: &Name, output: &Name) -> [Element<T>; 3] {
+        let (a, b) = (joined(&self.name, " input side"), joined(&self.name, " output side"));
         [
-            Element::Gear(gear(&format!("i_c {}", self.name), input, &a, self.i_c)),
+            Element::Gear(gear(joined("i_c ", &self.name), input, &a, self.i_c)),
             Element::Clutch(Clutch {
                 name: self.name.clone(),
                 a,
@@ -145,17 +148,24 @@ impl<T: Real> ShiftElement<T> {
                 pressure: self.name.clone(),
                 drum_inertia: self.drum_inertia,
             }),
-            Element::Gear(gear(&format!("i_out {}", self.name), &b, OUTPUT, self.i_out)),
+            Element::Gear(gear(joined("i_out ", &self.name), &b, output, self.i_out)),
         ]
     }
 }
 
-fn inertia<T: Real>(name: &str, node: &str, inertia: T) -> Element<T> {
-    Element::Inertia(Inertia { name: name.into(), node: node.into(), inertia })
+fn joined(first: &str, second: &str) -> Name {
+    let mut name = SmolStrBuilder::new();
+    name.push_str(first);
+    name.push_str(second);
+    name.finish()
 }
 
-fn gear<T: Real>(name: &str, a: &str, b: &str, ratio: T) -> Gear<T> {
-    Gear { name: name.into(), a: a.into(), b: b.into(), ratio, loss: None }
+fn inertia<T: Real>(name: Name, node: &Name, inertia: T) -> Element<T> {
+    Element::Inertia(Inertia { name, node: node.clone(), inertia })
+}
+
+fn gear<T: Real>(name: Name, a: &Name, b: &Name, ratio: T) -> Gear<T> {
+    Gear { name, a: a.clone(), b: b.clone(), ratio, loss: None }
 }
 
 impl<T> DualClutch<T> {

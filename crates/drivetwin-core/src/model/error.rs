@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Faults of a description, each naming its element.
 
+use super::Name;
 use std::fmt;
 use thiserror::Error;
 
@@ -78,9 +79,9 @@ pub(crate) fn require(
 }
 
 /// Require two flanges on different nodes.
-pub(crate) fn require_apart(element: &str, a: &str, b: &str) -> Result<(), ModelError> {
+pub(crate) fn require_apart(element: &str, a: &Name, b: &Name) -> Result<(), ModelError> {
     if a == b {
-        Err(ModelError::ShortCircuit { element: element.to_owned(), node: a.to_owned() })
+        Err(ModelError::ShortCircuit { element: element.to_owned(), node: a.to_string() })
     } else {
         Ok(())
     }

@@ -2,15 +2,17 @@
 //! The vocabulary in which elements state their laws: a mechanism that is linear in the node
 //! speeds, with scalar force laws and set-valued friction (THEORY section 1).
 
-use super::GROUND;
 use super::converter_map::ConverterMap;
 use super::friction::FrictionLaw;
 use super::torque_map::TorqueMap;
+use super::{GROUND, Name};
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 
-/// A linear form over node speeds: `Σ coefficient · ω_node`; the ground has no entry.
-pub type Row<T> = Vec<(usize, T)>;
+/// A linear form over node speeds: `Σ coefficient · ω_node`; the ground has no entry. Most have one or two
+/// entries, which stand in place.
+pub type Row<T> = SmallVec<[(usize, T); 2]>;
 
 /// How gear losses depend on the direction of power (THEORY section 3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,7 +45,7 @@ pub struct Loss<T> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constraint<T> {
     /// Element that states it.
-    pub element: String,
+    pub element: Name,
     /// Kinematic row.
     pub row: Row<T>,
     /// Loss, if the element has one.
@@ -113,7 +115,7 @@ pub struct Region<T> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spring<T> {
     /// Element that states it.
-    pub element: String,
+    pub element: Name,
     /// Rate of twist.
     pub row: Row<T>,
     /// Torque law.
@@ -140,7 +142,7 @@ pub enum Normal<T> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Friction<T> {
     /// Element that states it.
-    pub element: String,
+    pub element: Name,
     /// Slip.
     pub row: Row<T>,
     /// μ over |slip|.
@@ -204,7 +206,7 @@ pub enum ForceLaw<T> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Force<T> {
     /// Element that states it.
-    pub element: String,
+    pub element: Name,
     /// Node it acts on.
     pub node: usize,
     /// Its value.
@@ -219,7 +221,7 @@ pub struct Force<T> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Prescribed {
     /// Element that states it.
-    pub element: String,
+    pub element: Name,
     /// The node.
     pub node: usize,
     /// Index of the speed input, rad/s.
@@ -230,9 +232,9 @@ pub struct Prescribed {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mechanism<T> {
     /// Node names, in order of appearance.
-    pub nodes: Vec<String>,
+    pub nodes: Vec<Name>,
     /// Input names, in order of appearance.
-    pub inputs: Vec<String>,
+    pub inputs: Vec<Name>,
     /// Kinetic energy.
     pub inertias: Vec<Inertia<T>>,
     /// Rigid couplings.
@@ -276,26 +278,38 @@ impl<T> Default for Mechanism<T> {
 }
 
 impl<T: Real> Mechanism<T> {
+    /// Nothing yet, with room for what so many elements state: about half of them are couplings, half
+    /// masses.
+    pub fn with_room(elements: usize) -> Self {
+        Self {
+            nodes: Vec::with_capacity(elements),
+            inertias: Vec::with_capacity(elements / 2),
+            constraints: Vec::with_capacity(elements / 2),
+            ..Self::default()
+        }
+    }
+
     /// Index of a node, added on first use.
-    pub fn node(&mut self, name: &str) -> usize {
+    pub fn node(&mut self, name: &Name) -> usize {
         index_of(&mut self.nodes, name)
     }
 
     /// Index of an input, added on first use.
-    pub fn input(&mut self, name: &str) -> usize {
+    pub fn input(&mut self, name: &Name) -> usize {
         index_of(&mut self.inputs, name)
     }
 
     /// Linear form over named nodes; entries at the ground drop out.
-    pub fn row(&mut self, terms: &[(&str, T)]) -> Row<T> {
-        let moving = terms.iter().filter(|(name, _)| *name != GROUND);
+    pub fn row(&mut self, terms: &[(&Name, T)]) -> Row<T> {
+        let ground = const { Name::new_inline(GROUND) };
+        let moving = terms.iter().filter(|(name, _)| **name != ground);
         moving.map(|&(name, coefficient)| (self.node(name), coefficient)).collect()
     }
 }
 
-fn index_of(names: &mut Vec<String>, name: &str) -> usize {
+fn index_of(names: &mut Vec<Name>, name: &Name) -> usize {
     names.iter().position(|n| n == name).unwrap_or_else(|| {
-        names.push(name.to_owned());
+        names.push(name.clone());
         names.len() - 1
     })
 }

@@ -21,6 +21,10 @@ pub use mechanism::Mechanism;
 use crate::number::Real;
 use serde::{Deserialize, Serialize};
 
+/// Name of an element, a node or an input. Short ones stand in place: to compile a driveline, which is
+/// done anew for every run of a batch, takes few blocks of memory.
+pub type Name = smol_str::SmolStr;
+
 /// Name of the node that does not turn.
 pub const GROUND: &str = "ground";
 
@@ -36,11 +40,11 @@ impl<T: Real> Driveline<T> {
     /// State every element's law; all faults of the description are reported together.
     pub fn mechanism(&self) -> Result<Mechanism<T>, ModelFaults> {
         let mut faults = Vec::new();
-        let mut mechanism = Mechanism::default();
-        let mut seen: Vec<&str> = Vec::new();
+        let mut mechanism = Mechanism::with_room(self.elements.len());
+        let mut seen: Vec<&Name> = Vec::with_capacity(self.elements.len());
         for element in &self.elements {
             if seen.contains(&element.name()) {
-                faults.push(ModelError::DuplicateName { element: element.name().to_owned() });
+                faults.push(ModelError::DuplicateName { element: element.name().to_string() });
             }
             seen.push(element.name());
             match element.check() {

@@ -7,8 +7,9 @@ use super::error::CompileError;
 use super::linalg::{Matrix, independent_rows, solve};
 use super::mode::{ModeKey, Motion};
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
-use crate::model::{Driveline, FrictionLaw};
+use crate::model::{Driveline, FrictionLaw, Name};
 use crate::number::Real;
+use smallvec::smallvec;
 
 /// Most friction elements and lossy gears together: the bits of a mode key.
 pub const MAX_ROWS: usize = 32;
@@ -21,7 +22,7 @@ const MASSLESS: f64 = 1e-12;
 #[derive(Clone, Debug)]
 pub struct FrictionRow<T> {
     /// Name for messages and events.
-    pub element: String,
+    pub element: Name,
     /// Slip over the independent speeds.
     pub slip: Vec<T>,
     /// Slip over the nodes; its negative is the direction of the torque.
@@ -40,7 +41,7 @@ pub struct FrictionRow<T> {
 #[derive(Clone, Debug)]
 pub struct LossyGear<T> {
     /// Name for messages and events.
-    pub element: String,
+    pub element: Name,
     /// Index of its constraint.
     pub constraint: usize,
     /// Its loss.
@@ -74,6 +75,8 @@ pub struct Lag<T> {
 pub struct Network<T> {
     /// What it was compiled from.
     pub mechanism: Mechanism<T>,
+    /// See [`Network::states`].
+    states: usize,
     /// Independent speeds and their map to all nodes.
     pub coordinates: Coordinates<T>,
     /// Kinetic energy over the nodes, `½ ωᵀ I ω`.
@@ -115,8 +118,10 @@ impl<T: Real> Network<T> {
             return Err(CompileError::TooManyRows { count, limit: MAX_ROWS });
         }
         let coordinates = coordinates(&mechanism)?;
+        let lags = mechanism.forces.iter().filter(|force| force.lag.is_some()).count();
         let empty = Matrix::zeros(0, 0);
         let mut network = Self {
+            states: coordinates.independent.len() + mechanism.springs.len() + lags,
             inertia: node_inertia(&mechanism),
             mass: empty.clone(),
             twist_rates: empty.clone(),
@@ -132,7 +137,9 @@ impl<T: Real> Network<T> {
             motion: None,
         };
         network.set_mass();
-        network.give_mass_between_frictions();
+        if network.give_mass_between_frictions() {
+            network.set_mass();
+        }
         network.refuse_massless()?;
         network.add_rows();
         network.refuse_prescribed_twice()?;
@@ -156,7 +163,7 @@ impl<T: Real> Network<T> {
 
     /// Number of states: speeds, twists, lagging torques.
     pub fn states(&self) -> usize {
-        self.first_lag() + self.mechanism.forces.iter().filter(|f| f.lag.is_some()).count()
+        self.states
     }
 
     /// Position of the first input in the basis (x, u, prescribed accelerations, 1, φ).
@@ -192,7 +199,7 @@ impl<T: Real> Network<T> {
     }
 
     /// A linear form over nodes, expressed over the independent speeds.
-    pub fn over_speeds(&self, row: &Row<T>) -> Vec<T> {
+    pub fn over_speeds(&self, row: &[(usize, T)]) -> Vec<T> {
         let n = &self.coordinates.speeds;
         (0..n.cols)
             .map(|j| row.iter().fold(T::zero_(), |sum, &(node, c)| sum + c * n[(node, j)]))
@@ -208,7 +215,7 @@ impl<T: Real> Network<T> {
     }
 
     fn node_speed(&self, node: usize) -> Vec<T> {
-        self.over_speeds(&vec![(node, T::of(1.0))])
+        self.over_speeds(&[(node, T::of(1.0))])
     }
 
     fn set_mass(&mut self) {
@@ -218,32 +225,35 @@ impl<T: Real> Network<T> {
 
     /// Independent speed of a direction without mass, if there is one.
     fn massless_speed(&self) -> Option<usize> {
-        solve(&self.mass, &Matrix::zeros(self.mass.rows, 1)).err()
+        solve(self.mass.clone(), Matrix::zeros(self.mass.rows, 0)).err()
     }
 
-    /// Members without mass that only friction elements act on get a negligible one.
-    fn give_mass_between_frictions(&mut self) {
+    /// Members without mass that only friction elements act on get a negligible one; whether there are
+    /// any.
+    fn give_mass_between_frictions(&mut self) -> bool {
         let floor = self.inertia.max_abs() * MASSLESS;
-        for j in 0..self.speeds() {
+        let mut given = false;
+        for j in (0..self.speeds()).filter(|&j| self.mass[(j, j)].re() == 0.0) {
             let node = self.coordinates.independent[j];
             let touches = |row: &Row<T>| {
                 row.iter().any(|&(n, _)| self.coordinates.speeds[(n, j)].re() != 0.0)
             };
-            let massless = self.mass[(j, j)].re() == 0.0;
             let rubbed = self.mechanism.frictions.iter().any(|f| touches(&f.row));
             let sprung = self.mechanism.springs.iter().any(|s| touches(&s.row));
-            if massless && rubbed && !sprung {
+            if rubbed && !sprung {
                 self.inertia[(node, node)] += floor;
+                given = true;
             }
         }
-        self.set_mass();
+        given
     }
 
     fn refuse_massless(&self) -> Result<(), CompileError> {
         let Some(column) = self.massless_speed() else { return Ok(()) };
         let n = &self.coordinates.speeds;
         let moved = |&node: &usize| n[(node, column)].re() != 0.0;
-        let members = (0..n.rows).filter(moved).map(|i| self.mechanism.nodes[i].clone()).collect();
+        let members =
+            (0..n.rows).filter(moved).map(|i| self.mechanism.nodes[i].to_string()).collect();
         Err(CompileError::Massless { members })
     }
 
@@ -255,7 +265,7 @@ impl<T: Real> Network<T> {
         if independent_rows(&rows).len() == rows.rows {
             return Ok(());
         }
-        let elements = self.mechanism.prescribed.iter().map(|p| p.element.clone()).collect();
+        let elements = self.mechanism.prescribed.iter().map(|p| p.element.to_string()).collect();
         Err(CompileError::PrescribedTwice { elements })
     }
 
@@ -266,7 +276,7 @@ impl<T: Real> Network<T> {
             let rate = self.over_speeds(&self.mechanism.springs[i].row);
             self.twist_rates.row_mut(i).copy_from_slice(&rate);
         }
-        for f in self.mechanism.frictions.clone() {
+        for f in &self.mechanism.frictions {
             let slip = self.over_speeds(&f.row);
             let (mu, normal) = (f.law.clone(), f.normal.clone());
             self.channels.push(Channel {
@@ -274,28 +284,29 @@ impl<T: Real> Network<T> {
                 arguments: vec![self.over_states(&slip)],
             });
             self.frictions.push(FrictionRow {
-                element: f.element,
+                element: f.element.clone(),
                 slip,
-                nodes: f.row,
-                law: f.law,
-                normal: f.normal,
+                nodes: f.row.clone(),
+                law: f.law.clone(),
+                normal: f.normal.clone(),
                 peak: f.peak,
                 one_way: f.one_way,
             });
         }
-        for (constraint, c) in self.mechanism.constraints.clone().into_iter().enumerate() {
-            if let Some(loss) = c.loss {
-                let speed = self.node_speed(loss.driving);
-                self.losses.push(LossyGear { element: c.element, constraint, loss, speed });
+        for (constraint, c) in self.mechanism.constraints.iter().enumerate() {
+            if let Some(loss) = c.loss.clone() {
+                let (element, speed) = (c.element.clone(), self.node_speed(loss.driving));
+                self.losses.push(LossyGear { element, constraint, loss, speed });
             }
         }
-        for p in self.mechanism.prescribed.clone() {
+        for p in &self.mechanism.prescribed {
             self.prescribed.push((self.node_speed(p.node), p.input));
         }
     }
 
     fn over_states(&self, speeds: &[T]) -> Vec<T> {
-        let mut row = speeds.to_vec();
+        let mut row = Vec::with_capacity(self.states());
+        row.extend_from_slice(speeds);
         row.resize(self.states(), T::zero_());
         row
     }
@@ -303,20 +314,25 @@ impl<T: Real> Network<T> {
     /// Torques that are no linear function of the state and inputs become channels; lags become
     /// states.
     fn add_drives(&mut self) {
-        for i in 0..self.mechanism.springs.len() {
-            let spring = self.mechanism.springs[i].clone();
-            if let SpringLaw::Regions { regions, .. } = spring.law {
+        for (i, spring) in self.mechanism.springs.iter().enumerate() {
+            if let SpringLaw::Regions { regions, .. } = &spring.law {
                 let mut twist = vec![T::zero_(); self.states()];
                 twist[self.speeds() + i] = T::of(1.0);
                 let arguments = vec![twist, self.over_states(self.twist_rates.row(i))];
-                let law = Law::Regions(regions);
-                let basis = self.add_channel(Channel { law, arguments });
-                let nodes = spring.row.into_iter().map(|(node, c)| (node, -c)).collect();
+                let basis = self.basis();
+                self.channels.push(Channel { law: Law::Regions(regions.clone()), arguments });
+                let nodes = spring.row.iter().map(|&(node, c)| (node, -c)).collect();
                 self.drives.push(Drive { basis, nodes, account: None });
             }
         }
-        for force in self.mechanism.forces.clone() {
-            let mut basis = self.value_of(&force.law);
+        for force in &self.mechanism.forces {
+            let mut basis = match force.law {
+                ForceLaw::Input(input) => self.first_input() + input,
+                ForceLaw::Constant(_) => self.one(),
+                // That of the channel to come.
+                _ => self.basis(),
+            };
+            self.channels.extend(self.channel_of(&force.law));
             if let Some(time) = force.lag {
                 self.lags.push(Lag { target: basis, time });
                 basis = self.first_lag() + self.lags.len() - 1;
@@ -324,35 +340,28 @@ impl<T: Real> Network<T> {
             if let ForceLaw::Constant(_) = force.law {
                 continue;
             }
-            let nodes = vec![(force.node, T::of(1.0))];
+            let nodes = smallvec![(force.node, T::of(1.0))];
             self.drives.push(Drive { basis, nodes, account: Some(force.account) });
         }
     }
 
-    /// Position in the basis of the value of a force law; a new channel where it needs one.
-    fn value_of(&mut self, law: &ForceLaw<T>) -> usize {
-        let over = |network: &Self, node| network.over_states(&network.node_speed(node));
-        let channel = match law {
-            ForceLaw::Input(input) => return self.first_input() + input,
-            ForceLaw::Constant(_) => return self.one(),
+    /// The channel of a force law, where it needs one.
+    fn channel_of(&self, law: &ForceLaw<T>) -> Option<Channel<T>> {
+        let over = |node| self.over_states(&self.node_speed(node));
+        Some(match law {
+            ForceLaw::Input(_) | ForceLaw::Constant(_) => return None,
             ForceLaw::Quadratic { coefficient, node } => {
-                Channel { law: Law::Quadratic(*coefficient), arguments: vec![over(self, *node)] }
+                Channel { law: Law::Quadratic(*coefficient), arguments: vec![over(*node)] }
             }
             ForceLaw::Map { input, node, map } => Channel {
                 law: Law::Map { input: *input, map: map.clone() },
-                arguments: vec![over(self, *node)],
+                arguments: vec![over(*node)],
             },
             ForceLaw::Converter { pump, turbine, map, at_turbine } => Channel {
                 law: Law::Converter { map: map.clone(), at_turbine: *at_turbine },
-                arguments: vec![over(self, *pump), over(self, *turbine)],
+                arguments: vec![over(*pump), over(*turbine)],
             },
-        };
-        self.add_channel(channel)
-    }
-
-    fn add_channel(&mut self, channel: Channel<T>) -> usize {
-        self.channels.push(channel);
-        self.first_channel() + self.channels.len() - 1
+        })
     }
 
     fn assemble_node_torques(&self) -> Matrix<T> {

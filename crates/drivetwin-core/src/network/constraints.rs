@@ -2,8 +2,8 @@
 //! Minimal coordinates: some node speeds are independent, the rest follow from the constraints.
 
 use super::error::CompileError;
-use super::linalg::{Matrix, independent_rows, solve};
-use crate::model::mechanism::{Constraint, Mechanism};
+use super::linalg::{Matrix, eliminate, independent_rows};
+use crate::model::mechanism::Mechanism;
 use crate::number::Real;
 
 /// Split of the nodes and the map `ω = N v`.
@@ -19,43 +19,39 @@ pub struct Coordinates<T> {
 
 /// Choose coordinates for `C ω = 0`; faults name the elements.
 pub fn coordinates<T: Real>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileError> {
-    let c = constraint_matrix(m, |_, _| None);
-    let rows = independent_rows(&c);
-    if rows.len() < c.rows {
-        return Err(CompileError::DependentConstraints { elements: dependent_elements(m, &c) });
+    let mut c = constraint_matrix(m, |_| None);
+    let dependent = eliminate(&mut c, &massless_first(m));
+    if dependent.len() < c.rows {
+        return Err(CompileError::DependentConstraints { elements: dependent_elements(m) });
     }
-    let dependent = dependent_nodes(m, &c);
     let independent: Vec<usize> = (0..m.nodes.len()).filter(|i| !dependent.contains(i)).collect();
     if independent.is_empty() {
         return Err(CompileError::Immobile);
     }
-    let speeds = complete(&c, &independent, &dependent)
-        .expect("the dependent nodes were chosen to make their block regular");
+    let speeds = over_independent(&c, &independent, &dependent);
     Ok(Coordinates { independent, dependent, speeds })
 }
 
-/// The map from node torques to generalised forces, `Kᵀ f`, for one direction of power through each
-/// lossy gear: like N, but built from the force rows, whose driven entries carry the efficiency.
-/// `None` where the efficiencies make the force balance singular (self-locking).
+/// The map from node torques to generalised forces, `Kᵀ f`, like N, but built from the force rows: the
+/// constraints as their forces act on the nodes, see [`constraint_matrix`]. `None` where the efficiencies
+/// make the force balance singular (self-locking).
 pub fn force_map<T: Real>(
-    m: &Mechanism<T>,
-    c: &Coordinates<T>,
-    efficiency: impl Fn(&Constraint<T>, usize) -> Option<T>,
-) -> Option<(Matrix<T>, Matrix<T>)> {
-    let forces = constraint_matrix(m, efficiency);
-    let map = complete(&forces, &c.independent, &c.dependent)?;
-    Some((map, forces))
+    mut force_rows: Matrix<T>,
+    Coordinates { independent, dependent, .. }: &Coordinates<T>,
+) -> Option<Matrix<T>> {
+    let determined = eliminate(&mut force_rows, dependent).len() == dependent.len();
+    determined.then(|| over_independent(&force_rows, independent, dependent))
 }
 
-/// Rows of all constraints over the nodes; `efficiency(constraint, index)` scales the entries
-/// other than the first of lossy ones.
-fn constraint_matrix<T: Real>(
+/// Rows of all constraints over the nodes; `efficiency` of a constraint by its index, where it has one,
+/// scales the entries other than the first.
+pub fn constraint_matrix<T: Real>(
     m: &Mechanism<T>,
-    efficiency: impl Fn(&Constraint<T>, usize) -> Option<T>,
+    efficiency: impl Fn(usize) -> Option<T>,
 ) -> Matrix<T> {
     let mut c = Matrix::zeros(m.constraints.len(), m.nodes.len());
     for (i, constraint) in m.constraints.iter().enumerate() {
-        let eta = efficiency(constraint, i).unwrap_or(T::of(1.0));
+        let eta = efficiency(i).unwrap_or(T::of(1.0));
         for (position, &(node, coefficient)) in constraint.row.iter().enumerate() {
             c[(i, node)] += if position == 0 { coefficient } else { coefficient * eta };
         }
@@ -63,40 +59,36 @@ fn constraint_matrix<T: Real>(
     c
 }
 
-/// `[I; -C_dep⁻¹ C_ind]` in node order, or `None` if the dependent block is singular.
-fn complete<T: Real>(
+/// `[I; -C_dep⁻¹ C_ind]` in node order, where `C_dep` has been brought to unity.
+fn over_independent<T: Real>(
     c: &Matrix<T>,
     independent: &[usize],
     dependent: &[usize],
-) -> Option<Matrix<T>> {
-    let tied = solve(&c.select_columns(dependent), &c.select_columns(independent)).ok()?;
+) -> Matrix<T> {
     let mut map = Matrix::zeros(c.cols, independent.len());
     for (j, &node) in independent.iter().enumerate() {
         map[(node, j)] = T::of(1.0);
-    }
-    for (i, &node) in dependent.iter().enumerate() {
-        for j in 0..independent.len() {
-            map[(node, j)] = -tied[(i, j)];
+        for (i, &tied) in dependent.iter().enumerate() {
+            map[(tied, j)] = -c[(i, node)];
         }
     }
-    Some(map)
+    map
 }
 
-/// One dependent node per constraint, massless nodes first: coordinates are then mostly the speeds
-/// of real masses.
-fn dependent_nodes<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<usize> {
+/// The order in which nodes are made dependent: coordinates are then mostly the speeds of real masses.
+fn massless_first<T: Real>(m: &Mechanism<T>) -> Vec<usize> {
     let massless = |node: usize| {
         !m.inertias.iter().any(|i| i.inertia.re() > 0.0 && i.row.len() == 1 && i.row[0].0 == node)
     };
     let (mut order, heavy): (Vec<usize>, Vec<usize>) =
         (0..m.nodes.len()).partition(|&i| massless(i));
     order.extend(heavy);
-    let by_node = c.transposed().select_rows(&order);
-    independent_rows(&by_node).into_iter().map(|i| order[i]).collect()
+    order
 }
 
 /// Elements of a smallest set of dependent rows.
-fn dependent_elements<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<String> {
+fn dependent_elements<T: Real>(m: &Mechanism<T>) -> Vec<String> {
+    let c = constraint_matrix(m, |_| None);
     let deficient = |rows: &[usize]| independent_rows(&c.select_rows(rows)).len() < rows.len();
     let mut rows: Vec<usize> = (0..c.rows).collect();
     let mut i = 0;
@@ -105,5 +97,5 @@ fn dependent_elements<T: Real>(m: &Mechanism<T>, c: &Matrix<T>) -> Vec<String> {
         without.remove(i);
         if deficient(&without) { rows = without } else { i += 1 }
     }
-    rows.into_iter().map(|i| m.constraints[i].element.clone()).collect()
+    rows.into_iter().map(|i| m.constraints[i].element.to_string()).collect()
 }

@@ -3,6 +3,7 @@
 //! speeds are left, and the speed of every member over those of a few named ones.
 
 use super::linalg::{Matrix, independent_rows, solve};
+use crate::model::Name;
 use crate::model::mechanism::{Mechanism, Row};
 use crate::number::Real;
 use thiserror::Error;
@@ -79,7 +80,7 @@ pub struct Engaged<T> {
 pub fn friction_index<T>(m: &Mechanism<T>, name: &str) -> Result<usize, EngagedError> {
     m.frictions.iter().position(|f| f.element == name).ok_or_else(|| EngagedError::UnknownElement {
         name: name.to_owned(),
-        known: m.frictions.iter().map(|f| f.element.clone()).collect(),
+        known: m.frictions.iter().map(|f| f.element.to_string()).collect(),
     })
 }
 
@@ -87,7 +88,7 @@ pub fn friction_index<T>(m: &Mechanism<T>, name: &str) -> Result<usize, EngagedE
 pub fn member_index<T>(m: &Mechanism<T>, name: &str) -> Result<usize, EngagedError> {
     m.nodes.iter().position(|n| n == name).ok_or_else(|| EngagedError::UnknownMember {
         name: name.to_owned(),
-        known: m.nodes.clone(),
+        known: m.nodes.iter().map(Name::to_string).collect(),
     })
 }
 
@@ -97,7 +98,7 @@ impl<T: Real> Engaged<T> {
         let mut rows: Vec<RigidRow<T>> = m
             .constraints
             .iter()
-            .map(|c| RigidRow { element: c.element.clone(), row: c.row.clone() })
+            .map(|c| RigidRow { element: c.element.to_string(), row: c.row.clone() })
             .collect();
         for name in engaged {
             let friction = &m.frictions[friction_index(m, name)?];
@@ -116,7 +117,7 @@ impl<T: Real> Engaged<T> {
             return Err(EngagedError::FreeSpeeds { found, wanted, engaged });
         }
         let Some(speeds) = over_free(&matrix, &connected, free) else {
-            let members = free.iter().map(|&i| m.nodes[i].clone()).collect();
+            let members = free.iter().map(|&i| m.nodes[i].to_string()).collect();
             return Err(EngagedError::Held { members, engaged: engaged.to_vec() });
         };
         Ok(Self { rows, connected, speeds })
@@ -163,10 +164,9 @@ fn row_matrix<T: Real>(rows: &[RigidRow<T>], nodes: usize) -> Matrix<T> {
 /// Solve the rows for the connected nodes that are not free; `None` where these do not determine
 /// them.
 fn over_free<T: Real>(c: &Matrix<T>, connected: &[usize], free: &[usize]) -> Option<Matrix<T>> {
-    let columns = |index: &[usize]| c.transposed().select_rows(index).transposed();
     let dependent: Vec<usize> =
         connected.iter().copied().filter(|node| !free.contains(node)).collect();
-    let tied = solve(&columns(&dependent), &columns(free)).ok()?;
+    let tied = solve(c.select_columns(&dependent), c.select_columns(free)).ok()?;
     let mut speeds = Matrix::zeros(c.cols, free.len());
     for (j, &node) in free.iter().enumerate() {
         speeds[(node, j)] = T::of(1.0);

@@ -5,6 +5,7 @@
 //! through the solve.
 
 use crate::number::Real;
+use smallvec::SmallVec;
 
 /// A dense row-major matrix.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,20 +33,41 @@ impl<T: Real> Matrix<T> {
         &mut self.data[i * self.cols..(i + 1) * self.cols]
     }
 
-    /// Matrix product.
+    /// Matrix product; the left factor may be sparse.
     pub fn times(&self, other: &Self) -> Self {
         let mut out = Self::zeros(self.rows, other.cols);
         for i in 0..self.rows {
+            let sums = out.row_mut(i);
             for (k, &a) in self.row(i).iter().enumerate() {
-                out.row_mut(i).iter_mut().zip(other.row(k)).for_each(|(sum, &b)| *sum += a * b);
+                if !is_zero(a) {
+                    sums.iter_mut().zip(other.row(k)).for_each(|(sum, &b)| *sum += a * b);
+                }
             }
         }
         out
     }
 
-    /// Multiply all entries.
-    pub fn scale(&mut self, factor: f64) {
-        self.data.iter_mut().for_each(|v| *v *= factor);
+    /// Product with a matrix that is given by the entries of its columns: row and value.
+    pub fn times_columns(&self, columns: &[impl AsRef<[(usize, T)]>]) -> Self {
+        let mut out = Self::zeros(self.rows, columns.len());
+        for i in 0..self.rows {
+            for (sum, column) in out.row_mut(i).iter_mut().zip(columns) {
+                for &(k, value) in column.as_ref() {
+                    *sum += self[(i, k)] * value;
+                }
+            }
+        }
+        out
+    }
+
+    /// Subtract a multiple of `other` from row `i`.
+    pub fn subtract_row(&mut self, i: usize, (other, factor): (&[T], T)) {
+        self.row_mut(i).iter_mut().zip(other).for_each(|(v, &o)| *v -= o * factor);
+    }
+
+    /// Subtract another matrix, which may have fewer rows.
+    pub fn subtract(&mut self, other: &Self) {
+        self.data.iter_mut().zip(&other.data).for_each(|(v, &o)| *v -= o);
     }
 
     /// Transpose.
@@ -105,10 +127,14 @@ pub struct SparseRows<T> {
 impl<T: Real> SparseRows<T> {
     /// Of a dense matrix.
     pub fn of(dense: &Matrix<T>) -> Self {
-        let (mut terms, mut ends) = (Vec::with_capacity(4 * dense.rows), Vec::new());
+        let mut terms = Vec::with_capacity(8 * dense.rows);
+        let mut ends = Vec::with_capacity(dense.rows);
         for i in 0..dense.rows {
-            let row = dense.row(i).iter().copied().enumerate();
-            terms.extend(row.filter(|(_, v)| v.re() != 0.0 || !v.is_constant()));
+            for (j, &value) in dense.row(i).iter().enumerate() {
+                if !is_zero(value) {
+                    terms.push((j, value));
+                }
+            }
             ends.push(terms.len());
         }
         Self { terms, ends }
@@ -138,12 +164,11 @@ impl<T> std::ops::IndexMut<(usize, usize)> for Matrix<T> {
 }
 
 /// Solve `a x = b` for a square matrix; `Err(column)` where the matrix is singular to `1e-12`
-/// of its row scale.
-pub fn solve<T: Real>(a: &Matrix<T>, b: &Matrix<T>) -> Result<Matrix<T>, usize> {
-    let n = a.rows;
-    let (mut a, mut x) = (a.clone(), b.clone());
+/// of its row scale. Sparse matrices are solved in fewer operations.
+pub fn solve<T: Real>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usize> {
+    let mut x = b;
     let scale = a.max_abs().max(f64::MIN_POSITIVE);
-    for c in 0..n {
+    for c in 0..a.rows {
         let pivot = largest_in_column(&a, c, c);
         if a[(pivot, c)].re().abs() <= 1e-12 * scale {
             return Err(c);
@@ -151,22 +176,85 @@ pub fn solve<T: Real>(a: &Matrix<T>, b: &Matrix<T>) -> Result<Matrix<T>, usize> 
         a.swap_rows(c, pivot);
         x.swap_rows(c, pivot);
         let inverse = a[(c, c)].recip();
-        for r in 0..n {
-            if r != c {
-                let factor = a[(r, c)] * inverse;
-                subtract_row(&mut a, r, c, factor);
-                subtract_row(&mut x, r, c, factor);
+        for r in 0..a.rows {
+            let entry = a[(r, c)];
+            if r != c && !is_zero(entry) {
+                let factor = entry * inverse;
+                // What stands before column c is not read again.
+                subtract_row(&mut a, (r, c), c, factor);
+                subtract_row(&mut x, (r, c), 0, factor);
             }
         }
-        a.row_mut(c).iter_mut().for_each(|v| *v *= inverse);
+        a.row_mut(c)[c..].iter_mut().for_each(|v| *v *= inverse);
         x.row_mut(c).iter_mut().for_each(|v| *v *= inverse);
     }
     Ok(x)
 }
 
-/// Rows of `a` that are linearly independent of those before them, to `1e-9` of their length.
+/// Bring `a` to a form in which those of the columns `order` that are linearly independent of the ones
+/// before them, to `1e-9` of the largest entry, are unit vectors: number i of those that are returned has
+/// its 1 in row i. Sparse matrices take fewer operations.
+pub fn eliminate<T: Real>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
+    let least = 1e-9 * a.max_abs();
+    let mut units = Vec::with_capacity(a.rows);
+    for &column in order {
+        let row = units.len();
+        if row == a.rows {
+            break;
+        }
+        let pivot = largest_in_column(a, column, row);
+        if a[(pivot, column)].re().abs() <= least {
+            continue;
+        }
+        a.swap_rows(row, pivot);
+        let inverse = a[(row, column)].recip();
+        for r in 0..a.rows {
+            let entry = a[(r, column)];
+            if r != row && !is_zero(entry) {
+                subtract_row(a, (r, row), 0, entry * inverse);
+            }
+        }
+        a.row_mut(row).iter_mut().for_each(|v| *v *= inverse);
+        units.push(column);
+    }
+    units
+}
+
+/// Rows of `a` that are linearly independent of those before them, to `1e-9` of their size.
 pub fn independent_rows<T: Real>(a: &Matrix<T>) -> Vec<usize> {
-    orthogonalised(a).kept
+    let most = a.rows.min(a.cols);
+    let mut kept = Vec::with_capacity(most);
+    // What is left of each kept row, with 1 as its largest entry, and where that stands.
+    let mut left = Matrix::<f64>::zeros(most, a.cols);
+    let mut pivots = SmallVec::<[usize; 8]>::new();
+    for i in 0..a.rows {
+        let k = kept.len();
+        if k == most {
+            break;
+        }
+        let (before, rest) = left.data.split_at_mut(k * a.cols);
+        let row = &mut rest[..a.cols];
+        let mut scale = 0.0_f64;
+        for (to, from) in row.iter_mut().zip(a.row(i)) {
+            *to = from.re();
+            scale = scale.max(to.abs());
+        }
+        for (basis, &pivot) in before.chunks_exact(a.cols).zip(&pivots) {
+            let factor = row[pivot];
+            if factor != 0.0 {
+                row.iter_mut().zip(basis).for_each(|(v, &b)| *v -= factor * b);
+            }
+        }
+        let larger = |j: usize, k: usize| if row[k].abs() > row[j].abs() { k } else { j };
+        let pivot = (1..a.cols).fold(0, larger);
+        if row[pivot].abs() > 1e-9 * scale {
+            let inverse = row[pivot].recip();
+            row.iter_mut().for_each(|v| *v *= inverse);
+            pivots.push(pivot);
+            kept.push(i);
+        }
+    }
+    kept
 }
 
 /// Least-norm solution of the consistent system `a x = b`, which may be rank deficient: with
@@ -235,9 +323,20 @@ fn largest_in_column<T: Real>(a: &Matrix<T>, c: usize, from: usize) -> usize {
         .unwrap_or(from)
 }
 
-fn subtract_row<T: Real>(a: &mut Matrix<T>, target: usize, source: usize, factor: T) {
+/// Subtract a multiple of row `source` from row `target`, from column `from` on.
+fn subtract_row<T: Real>(
+    a: &mut Matrix<T>,
+    (target, source): (usize, usize),
+    from: usize,
+    factor: T,
+) {
     let (low, high) = a.data.split_at_mut(target.max(source) * a.cols);
     let (first, second) = (&mut low[target.min(source) * a.cols..][..a.cols], &mut high[..a.cols]);
     let (target, source) = if target < source { (first, second) } else { (second, first) };
-    target.iter_mut().zip(&*source).for_each(|(t, &s)| *t -= s * factor);
+    target[from..].iter_mut().zip(&source[from..]).for_each(|(t, &s)| *t -= s * factor);
+}
+
+/// Whether a number is zero with all its derivatives.
+pub fn is_zero<T: Real>(value: T) -> bool {
+    value.re() == 0.0 && value.is_constant()
 }

@@ -19,6 +19,7 @@ pub mod engaged;
 mod error;
 pub mod linalg;
 mod mode;
+mod radius;
 pub mod reduction;
 pub mod smooth;
 pub mod statics;

@@ -3,9 +3,10 @@
 //! stuck, their torques, and the torques through lossy gears.
 
 use super::compile::Network;
-use super::constraints::force_map;
-use super::linalg::{Matrix, SparseRows, independent_rows, least_norm, solve};
-use crate::model::mechanism::{Loss, LossLaw};
+use super::constraints::{constraint_matrix, force_map};
+use super::linalg::{Matrix, SparseRows, independent_rows, is_zero, least_norm, solve};
+use super::radius::radius;
+use crate::model::mechanism::{self, Loss, LossLaw};
 use crate::number::Real;
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -61,7 +62,6 @@ impl ModeKey {
 
     /// Rows that keep a speed at zero: friction elements, then gears.
     pub fn rows(self) -> Vec<Row> {
-        let bits = |set: u32| (0..u32::BITS as usize).filter(move |j| set >> j & 1 == 1);
         bits(self.stuck).map(Row::Friction).chain(bits(self.held).map(Row::Gear)).collect()
     }
 }
@@ -92,10 +92,6 @@ pub struct Mode<T> {
 /// What all modes with the same states of the lossy gears share.
 #[derive(Clone, Debug)]
 pub struct Motion<T> {
-    /// Rows of the constraints as their forces act on the nodes.
-    force_rows: Matrix<T>,
-    /// Node torques over the basis, with the drag of the gears.
-    node_torques: Matrix<T>,
     /// Accelerations of the independent speeds per node torque, speeds × nodes.
     mobility: Matrix<T>,
     /// Accelerations with nothing at rest, speeds × basis.
@@ -171,65 +167,32 @@ impl<T: Real> Network<T> {
     pub fn mode(&self, key: ModeKey, capacity: &[T]) -> Option<Mode<T>> {
         let motion = self.motion_of(key)?;
         let stuck = key.rows();
-        if stuck.is_empty() && self.prescribed.is_empty() {
-            let derivative = self.with_other_states(&motion.free);
-            return Some(Mode {
-                key,
-                rates: SparseRows::of(&derivative),
-                radius: self.radius(&derivative),
-                derivative,
-                stuck,
-                stuck_torque: Matrix::zeros(0, self.basis()),
-                gear_torque: OnceLock::new(),
-                redundant: false,
-            });
-        }
-        let (speeds, nodes) = self.held_speeds(&stuck);
-        let response = motion.mobility.times(&nodes);
-        let mut needed = speeds.times(&motion.free);
-        for i in 0..self.prescribed.len() {
-            needed[(stuck.len() + i, self.first_rate() + i)] -= 1.0;
-        }
-        let (stuck_torque, redundant) = holding_torque(
-            &speeds.times(&response),
-            &needed,
-            &self.weights(&stuck, capacity),
-            stuck.len(),
-        );
-        let acceleration = difference(&motion.free, &response.times(&stuck_torque));
-        let derivative = self.with_other_states(&acceleration);
+        let mut derivative = self.with_other_states(&motion.free);
+        let (stuck_torque, redundant) = if stuck.is_empty() && self.prescribed.is_empty() {
+            (Matrix::zeros(0, self.basis()), false)
+        } else {
+            let (speeds, nodes) = self.held_speeds(&stuck);
+            let response = motion.mobility.times_columns(&nodes);
+            let mut needed = speeds.times(&motion.free);
+            for i in 0..self.prescribed.len() {
+                needed[(stuck.len() + i, self.first_rate() + i)] -= 1.0;
+            }
+            let weights = || self.weights(&stuck, capacity);
+            let (torque, redundant) =
+                holding_torque(speeds.times(&response), needed, weights, stuck.len());
+            derivative.subtract(&response.times(&torque));
+            (torque, redundant)
+        };
         Some(Mode {
             key,
             rates: SparseRows::of(&derivative),
-            radius: self.radius(&derivative),
+            radius: radius(&derivative),
             derivative,
             gear_torque: OnceLock::new(),
             stuck_torque,
             stuck,
             redundant,
         })
-    }
-
-    /// Estimate of the spectral radius [1/s] of the motion from `A^16`, of which a bad scaling of the
-    /// states counts only by its sixteenth root.
-    fn radius(&self, derivative: &Matrix<T>) -> f64 {
-        let n = self.states();
-        let mut power = Matrix::<f64>::zeros(n, n);
-        for i in 0..n {
-            let row = power.row_mut(i).iter_mut().zip(derivative.row(i));
-            row.for_each(|(to, from)| *to = from.re());
-        }
-        let mut scale = 0.0;
-        for _ in 0..4 {
-            let size = power.max_abs();
-            if size == 0.0 {
-                return 0.0;
-            }
-            scale = 2.0 * (scale + size.ln());
-            power.scale(1.0 / size);
-            power = power.times(&power);
-        }
-        ((scale + power.max_abs().max(f64::MIN_POSITIVE).ln()) / 16.0).exp()
     }
 
     /// The motion that the modes of a key share; compiled with the network where it has no gear whose
@@ -243,59 +206,59 @@ impl<T: Real> Network<T> {
 
     /// `None` if the efficiencies leave the accelerations undetermined.
     pub(super) fn motion(&self, key: ModeKey) -> Option<Motion<T>> {
-        let efficiency = |_: &_, constraint: usize| self.efficiency(key, constraint);
-        let (map, force_rows) = force_map(&self.mechanism, &self.coordinates, efficiency)?;
-        let node_torques = self.with_drag(key);
-        let kt = map.transposed();
+        let kt = force_map(self.force_rows(key), &self.coordinates)?.transposed();
         let mass = kt.times(&self.inertia).times(&self.coordinates.speeds);
-        let mobility = solve(&mass, &kt).ok()?;
-        let free = mobility.times(&node_torques);
-        Some(Motion { force_rows, node_torques, mobility, free })
+        let mobility = solve(mass, kt).ok()?;
+        let free = mobility.times(&self.with_drag(key));
+        Some(Motion { mobility, free })
     }
 
-    fn efficiency(&self, key: ModeKey, constraint: usize) -> Option<T> {
-        let i = self.losses.iter().position(|loss| loss.constraint == constraint)?;
-        if key.held >> i & 1 == 1 {
-            return None;
-        }
-        Some(self.losses[i].loss.factor(1.0, key.backward >> i & 1 == 1).0)
+    /// The constraints as their forces act on the nodes: the driven side of a rolling gear gets what its
+    /// efficiency leaves.
+    fn force_rows(&self, key: ModeKey) -> Matrix<T> {
+        constraint_matrix(&self.mechanism, |constraint| {
+            let i = self.losses.iter().position(|loss| loss.constraint == constraint)?;
+            let held = key.held >> i & 1 == 1;
+            let backward = key.backward >> i & 1 == 1;
+            (!held).then(|| self.losses[i].loss.factor(1.0, backward).0)
+        })
     }
 
-    /// Node torques with the drag of rolling gears, which acts on their driven side.
-    fn with_drag(&self, key: ModeKey) -> Matrix<T> {
-        let mut torques = self.node_torques.clone();
+    /// Node torques over the basis with the drag of rolling gears, which acts on their driven side.
+    fn with_drag(&self, key: ModeKey) -> Cow<'_, Matrix<T>> {
+        let mut torques = Cow::Borrowed(&self.node_torques);
         for (i, gear) in self.losses.iter().enumerate() {
             if key.held >> i & 1 == 1 {
                 continue;
             }
             let sign = if key.reverse >> i & 1 == 1 { -1.0 } else { 1.0 };
             let (_, drag) = gear.loss.factor(sign, key.backward >> i & 1 == 1);
+            if is_zero(drag) {
+                continue;
+            }
             for &(node, coefficient) in &self.mechanism.constraints[gear.constraint].row[1..] {
-                torques[(node, self.one())] += coefficient * drag;
+                torques.to_mut()[(node, self.one())] += coefficient * drag;
             }
         }
         torques
     }
 
     /// Speeds kept at zero or prescribed, over the independent speeds and over the nodes.
-    fn held_speeds(&self, stuck: &[Row]) -> (Matrix<T>, Matrix<T>) {
+    fn held_speeds(&self, stuck: &[Row]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
         let count = stuck.len() + self.prescribed.len();
         let mut speeds = Matrix::zeros(count, self.speeds());
-        let mut nodes = Matrix::zeros(self.mechanism.nodes.len(), count);
+        let mut nodes = Vec::with_capacity(count);
+        let one = |node| mechanism::Row::from_elem((node, T::of(1.0)), 1);
         for (i, &row) in stuck.iter().enumerate() {
             speeds.row_mut(i).copy_from_slice(self.slip_of(row));
-            match row {
-                Row::Friction(j) => {
-                    for &(node, direction) in &self.frictions[j].nodes {
-                        nodes[(node, i)] += direction;
-                    }
-                }
-                Row::Gear(g) => nodes[(self.losses[g].loss.driving, i)] += 1.0,
-            }
+            nodes.push(match row {
+                Row::Friction(j) => self.frictions[j].nodes.clone(),
+                Row::Gear(g) => one(self.losses[g].loss.driving),
+            });
         }
         for (i, (speed, _)) in self.prescribed.iter().enumerate() {
             speeds.row_mut(stuck.len() + i).copy_from_slice(speed);
-            nodes[(self.mechanism.prescribed[i].node, stuck.len() + i)] += 1.0;
+            nodes.push(one(self.mechanism.prescribed[i].node));
         }
         (speeds, nodes)
     }
@@ -341,18 +304,22 @@ impl<T: Real> Mode<T> {
     /// the loss torque on top. Computed when first asked for.
     pub fn gear_torque(&self, network: &Network<T>) -> &Matrix<T> {
         self.gear_torque.get_or_init(|| {
-            let motion = network.motion_of(self.key).expect("compiled with the mode");
             let (_, nodes) = network.held_speeds(&self.stuck);
-            let torques = difference(&motion.node_torques, &nodes.times(&self.stuck_torque));
             let mut acceleration = Matrix::zeros(network.speeds(), network.basis());
             for i in 0..network.speeds() {
                 acceleration.row_mut(i).copy_from_slice(self.derivative.row(i));
             }
             let inertia = network.inertia.times(&network.coordinates.speeds);
-            let residual = difference(&torques, &inertia.times(&acceleration));
+            let mut residual = network.with_drag(self.key).into_owned();
+            for (i, held) in nodes.iter().enumerate() {
+                for &(node, direction) in held {
+                    residual.subtract_row(node, (self.stuck_torque.row(i), direction));
+                }
+            }
+            residual.subtract(&inertia.times(&acceleration));
             let dependent = &network.coordinates.dependent;
-            let balance = motion.force_rows.transposed().select_rows(dependent);
-            let multipliers = solve(&balance, &residual.select_rows(dependent));
+            let balance = network.force_rows(self.key).select_columns(dependent).transposed();
+            let multipliers = solve(balance, residual.select_rows(dependent));
             let multipliers = multipliers.expect("the forces determine the accelerations");
             let lossy: Vec<usize> = network.losses.iter().map(|loss| loss.constraint).collect();
             let mut entering = multipliers.select_rows(&lossy);
@@ -371,14 +338,15 @@ impl<T: Real> Mode<T> {
 /// least `Σ (τ_j / weight_j)²`. Prescribed speeds, from row `stuck` on, win where the rows contradict
 /// each other.
 fn holding_torque<T: Real>(
-    w: &Matrix<T>,
-    b: &Matrix<T>,
-    weights: &[T],
+    w: Matrix<T>,
+    b: Matrix<T>,
+    weights: impl FnOnce() -> Vec<T>,
     stuck: usize,
 ) -> (Matrix<T>, bool) {
-    if independent_rows(w).len() == w.rows {
+    if independent_rows(&w).len() == w.rows {
         return (solve(w, b).expect("independent rows"), false);
     }
+    let weights = weights();
     let order: Vec<usize> = (stuck..w.rows).chain(0..stuck).collect();
     let (mut scaled, b) = (w.select_rows(&order), b.select_rows(&order));
     for r in 0..w.rows {
@@ -393,12 +361,11 @@ fn holding_torque<T: Real>(
     (torque, true)
 }
 
-fn difference<T: Real>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
-    let mut out = a.clone();
-    for i in 0..a.rows {
-        for (o, &s) in out.row_mut(i).iter_mut().zip(b.row(i)) {
-            *o -= s;
-        }
-    }
-    out
+/// Numbers of the bits that are set.
+fn bits(mut set: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lowest = set.trailing_zeros();
+        set &= set.checked_sub(1)?;
+        Some(lowest as usize)
+    })
 }

@@ -41,7 +41,7 @@ impl<T: Real> Statics<T> {
         let held = Engaged::new(m, engaged, &[input])?;
         let output_speed = held.speeds[(output, 0)];
         if !held.connected.contains(&output) || output_speed.re().abs() < STANDSTILL {
-            let members = vec![m.nodes[output].clone()];
+            let members = vec![m.nodes[output].to_string()];
             return Err(EngagedError::Held { members, engaged: engaged.to_vec() });
         }
         let load_torque = -output_speed.recip();
@@ -51,7 +51,7 @@ impl<T: Real> Statics<T> {
         let speeds = (0..m.nodes.len())
             .map(|i| {
                 let speed = held.connected.contains(&i).then(|| held.speeds[(i, 0)]);
-                (m.nodes[i].clone(), speed)
+                (m.nodes[i].to_string(), speed)
             })
             .collect();
         Ok(Self { speeds, flanges: flanges(m, &held, &external), load_torque })
@@ -98,7 +98,7 @@ fn flanges<T: Real>(m: &Mechanism<T>, held: &Engaged<T>, external: &Matrix<T>) -
         for &(node, coefficient) in &rigid.row {
             flanges.push(Flange {
                 element: rigid.element.clone(),
-                member: m.nodes[node].clone(),
+                member: m.nodes[node].to_string(),
                 torque: multipliers[(i, 0)] * coefficient,
             });
         }

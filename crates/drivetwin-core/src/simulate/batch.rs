@@ -100,7 +100,7 @@ pub fn dual_clutch_batch(
     let make = |i: usize| {
         let (model, start) = placed(model, &scenario(i).1, (parameters, sets), i);
         let network = Network::compile(&model.driveline())?;
-        let state = start.named().state(&network)?;
+        let state = start.state(&network)?;
         Ok((network, state))
     };
     Ok(batch(count, |i| &scenario(i).0, make, options))

@@ -56,7 +56,7 @@ pub fn dual_clutch_batch_sensitivities(
             let (model, start, _) =
                 variables(&model, signals, &start, names).expect("names that were checked");
             let network = Network::compile(&model.driveline())?;
-            let state = start.named().state(&network)?;
+            let state = start.state(&network)?;
             Ok(Kept::of(plan.run(&network, &state), keep))
         });
         passes.collect()

@@ -2,7 +2,7 @@
 //! A run of the dual-clutch driveline with its usual outputs.
 
 use super::run::{SimulateError, run};
-use super::start::Start;
+use super::start::{Start, StartError, State, state_of};
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};
 use crate::network::Network;
@@ -50,13 +50,20 @@ pub fn dual_clutch_outputs<T>(model: &DualClutch<T>) -> Vec<Output> {
         Output::ShaftTorque(SHAFT.into()),
     ];
     for element in &model.elements {
-        outputs.push(Output::FrictionTorque(element.name.clone()));
-        outputs.push(Output::Slip(element.name.clone()));
+        outputs.push(Output::FrictionTorque(element.name.to_string()));
+        outputs.push(Output::Slip(element.name.to_string()));
     }
     outputs
 }
 
 impl<T: Real> DualClutchStart<T> {
+    /// The state of a network of the dual clutch.
+    pub fn state(&self, network: &Network<T>) -> Result<State<T>, StartError> {
+        let speeds =
+            [(ENGINE, self.engine_speed), (OUTPUT, self.output_speed), (WHEEL, self.wheel_speed)];
+        state_of(network, (&speeds, &[(SHAFT, self.twist)]), &self.locked)
+    }
+
     /// The start by the names of the network.
     pub fn named(&self) -> Start<T> {
         Start {

@@ -4,6 +4,7 @@
 use super::run::SimulateError;
 use super::start::{StartError, find};
 use super::trajectory::Output;
+use crate::model::Name;
 use crate::model::mechanism::Normal;
 use crate::network::linalg::Matrix;
 use crate::network::smooth::Law;
@@ -69,7 +70,7 @@ pub fn linearise(
         c: Matrix::zeros(outputs.len(), n),
         d: Matrix::zeros(outputs.len(), inputs),
         states: state_names(network),
-        inputs: network.mechanism.inputs.clone(),
+        inputs: network.mechanism.inputs.iter().map(Name::to_string).collect(),
     };
     for i in 0..n {
         let row = over(mode.derivative.row(i));
@@ -134,8 +135,9 @@ fn piece_of(network: &Network<f64>, j: usize, slip: f64) -> usize {
 }
 
 fn state_names(network: &Network<f64>) -> Vec<String> {
-    let nodes = network.coordinates.independent.iter().map(|&i| network.mechanism.nodes[i].clone());
-    let shafts = network.mechanism.springs.iter().map(|spring| spring.element.clone());
+    let nodes =
+        network.coordinates.independent.iter().map(|&i| network.mechanism.nodes[i].to_string());
+    let shafts = network.mechanism.springs.iter().map(|spring| spring.element.to_string());
     let lags = (0..network.lags.len()).map(|i| format!("lag {}", i + 1));
     nodes.chain(shafts).chain(lags).collect()
 }

@@ -123,9 +123,9 @@ impl<T: Real> Plan<T> {
             outcome
         };
         let status = integrate().err().unwrap_or(Status::Completed);
-        let frictions = network.frictions.iter().map(|row| row.element.clone());
+        let frictions = network.frictions.iter().map(|row| row.element.to_string());
         let elements =
-            frictions.chain(network.losses.iter().map(|gear| gear.element.clone())).collect();
+            frictions.chain(network.losses.iter().map(|gear| gear.element.to_string())).collect();
         let (time, (columns, derivatives)) = (self.grid.clone(), recorder.finish());
         let audit = balance;
         Trajectory { time, columns, derivatives, elements, events, status, grazing, audit }
@@ -176,7 +176,7 @@ fn join<T: Real>(
         .iter()
         .map(|name| {
             let found = signals.iter().find(|signal| signal.0 == name);
-            found.copied().ok_or_else(|| InputError::Missing { name: name.clone() })
+            found.copied().ok_or_else(|| InputError::Missing { name: name.to_string() })
         })
         .collect::<Result<Vec<_>, _>>()?;
     for prescribed in &network.mechanism.prescribed {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! The state a run starts from, stated by names.
 
+use crate::model::Name;
 use crate::network::Network;
 use crate::network::channel::form;
-use crate::network::linalg::{Matrix, independent_rows, least_norm};
+use crate::network::linalg::{Matrix, independent_rows, solve};
 use crate::number::Real;
 use thiserror::Error;
 
@@ -69,63 +70,82 @@ pub enum StartError {
 impl<T: Real> Start<T> {
     /// The state of a network.
     pub fn state(&self, network: &Network<T>) -> Result<State<T>, StartError> {
-        let elements = network.frictions.iter().map(|f| &f.element);
-        let locked = self
-            .locked
-            .iter()
-            .map(|name| find("friction element", name, elements.clone()))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut x = self.speeds_of(network)?;
-        for friction in network.frictions.iter().filter(|friction| friction.one_way) {
-            let slip = form(&friction.slip, &x).re();
-            if slip > 1e-9 && !self.locked.contains(&friction.element) {
-                return Err(StartError::Overrun { element: friction.element.clone(), slip });
-            }
-        }
-        x.resize(network.states(), T::zero_());
-        let springs = network.mechanism.springs.iter().map(|s| &s.element);
-        for (name, twist) in &self.twists {
-            x[network.speeds() + find("shaft", name, springs.clone())?] = *twist;
-        }
-        Ok(State { x, locked })
+        let (speeds, twists) = (by_name(&self.speeds), by_name(&self.twists));
+        state_of(network, (&speeds, &twists), &self.locked)
     }
+}
 
-    fn speeds_of(&self, network: &Network<T>) -> Result<Vec<T>, StartError> {
-        let nodes = &network.mechanism.nodes;
-        let n = &network.coordinates.speeds;
-        let mut rows = Vec::new();
-        let mut values = Matrix::zeros(self.speeds.len(), 1);
-        for (i, (name, speed)) in self.speeds.iter().enumerate() {
-            rows.push(find("node", name, nodes.iter())?);
-            values[(i, 0)] = *speed;
+/// Values by the names of what has them.
+type Stated<'n, T> = [(&'n str, T)];
+
+fn by_name<T: Copy>(values: &[(String, T)]) -> Vec<(&str, T)> {
+    values.iter().map(|(name, value)| (name.as_str(), *value)).collect()
+}
+
+/// The state of a network from speeds of nodes, twists of shafts and elements without slip, see [`Start`].
+pub(super) fn state_of<T: Real>(
+    network: &Network<T>,
+    (speeds, twists): (&Stated<'_, T>, &Stated<'_, T>),
+    locked: &[String],
+) -> Result<State<T>, StartError> {
+    let elements = network.frictions.iter().map(|f| &f.element);
+    let indices = locked.iter().map(|name| find("friction element", name, elements.clone()));
+    let indices = indices.collect::<Result<Vec<_>, _>>()?;
+    let mut x = speeds_of(network, speeds)?;
+    for (j, friction) in network.frictions.iter().enumerate().filter(|(_, f)| f.one_way) {
+        let slip = form(&friction.slip, &x).re();
+        if slip > 1e-9 && !indices.contains(&j) {
+            return Err(StartError::Overrun { element: friction.element.to_string(), slip });
         }
-        let stated = n.select_rows(&rows);
-        let keep = independent_rows(&stated);
-        if keep.len() < network.speeds() {
-            let free = network.coordinates.independent.iter().map(|&i| nodes[i].as_str());
-            return Err(StartError::Undetermined { free: free.collect::<Vec<_>>().join(", ") });
-        }
-        let v = least_norm(&stated.select_rows(&keep), &values.select_rows(&keep));
-        let v: Vec<T> = (0..v.rows).map(|i| v[(i, 0)]).collect();
-        for (i, (name, speed)) in self.speeds.iter().enumerate() {
-            let (stated, implied) = (speed.re(), form(stated.row(i), &v).re());
-            if (stated - implied).abs() > 1e-6 * (1.0 + stated.abs()) {
-                return Err(StartError::Contradiction { node: name.clone(), stated, implied });
-            }
-        }
-        Ok(v)
     }
+    x.resize(network.states(), T::zero_());
+    let springs = network.mechanism.springs.iter().map(|s| &s.element);
+    for &(name, twist) in twists {
+        x[network.speeds() + find("shaft", name, springs.clone())?] = twist;
+    }
+    Ok(State { x, locked: indices })
+}
+
+/// The independent speeds, from speeds of nodes.
+fn speeds_of<T: Real>(network: &Network<T>, speeds: &Stated<'_, T>) -> Result<Vec<T>, StartError> {
+    let nodes = &network.mechanism.nodes;
+    let n = &network.coordinates.speeds;
+    let rows = speeds.iter().map(|(name, _)| find("node", name, nodes.iter()));
+    let stated = n.select_rows(&rows.collect::<Result<Vec<_>, _>>()?);
+    let mut values = Matrix::zeros(speeds.len(), 1);
+    for (i, &(_, speed)) in speeds.iter().enumerate() {
+        values[(i, 0)] = speed;
+    }
+    let keep = independent_rows(&stated);
+    let undetermined = || {
+        let free = network.coordinates.independent.iter().map(|&i| nodes[i].as_str());
+        StartError::Undetermined { free: free.collect::<Vec<_>>().join(", ") }
+    };
+    if keep.len() < network.speeds() {
+        return Err(undetermined());
+    }
+    let v = solve(stated.select_rows(&keep), values.select_rows(&keep));
+    let v = v.map_err(|_| undetermined())?;
+    let mut x = Vec::with_capacity(network.states());
+    x.extend((0..v.rows).map(|i| v[(i, 0)]));
+    for (i, &(name, speed)) in speeds.iter().enumerate() {
+        let (stated, implied) = (speed.re(), form(stated.row(i), &x).re());
+        if (stated - implied).abs() > 1e-6 * (1.0 + stated.abs()) {
+            return Err(StartError::Contradiction { node: name.to_owned(), stated, implied });
+        }
+    }
+    Ok(x)
 }
 
 /// Index of a name among the known ones.
 pub(super) fn find<'n>(
     kind: &'static str,
     name: &str,
-    known: impl Iterator<Item = &'n String> + Clone,
+    known: impl Iterator<Item = &'n Name> + Clone,
 ) -> Result<usize, StartError> {
     known.clone().position(|k| k == name).ok_or_else(|| StartError::Unknown {
         kind,
         name: name.to_owned(),
-        known: known.map(String::as_str).collect::<Vec<_>>().join(", "),
+        known: known.map(Name::as_str).collect::<Vec<_>>().join(", "),
     })
 }

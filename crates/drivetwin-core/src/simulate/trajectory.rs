@@ -321,7 +321,7 @@ fn passing_terms<'c, T: Real>(
 
 impl<T: Real> Column<T> {
     fn of(network: &Network<T>, target: Target) -> Self {
-        let speed = |node| network.over_speeds(&vec![(node, T::of(1.0))]);
+        let speed = |node| network.over_speeds(&[(node, T::of(1.0))]);
         match target {
             Target::Speed(node) => Self::Linear(terms(&speed(node))),
             Target::Angle(node) => Self::Angle(speed(node), T::zero_()),

@@ -392,6 +392,6 @@ pub(super) fn sign_of(value: f64) -> f64 {
 }
 
 fn self_locking<T>(network: &Network<T>, time: f64) -> Status {
-    let element = network.losses.first().map_or_else(String::new, |l| l.element.clone());
+    let element = network.losses.first().map_or_else(String::new, |l| l.element.to_string());
     Status::SelfLocking { time, element }
 }

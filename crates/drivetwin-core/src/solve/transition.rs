@@ -162,7 +162,7 @@ impl<T: Real> Integrator<'_, T> {
             g.row_mut(i).copy_from_slice(speed);
             excess[(i, 0)] = form(speed, &self.x) - self.expansion.inputs[*input][0];
         }
-        let response = solve(&network.mass, &g.transposed()).expect("the mass is regular");
+        let response = solve(network.mass.clone(), g.transposed()).expect("the mass is regular");
         let change = response.times(&least_norm(&g.times(&response), &excess));
         for i in 0..network.speeds() {
             self.x[i] -= change[(i, 0)];

@@ -19,27 +19,27 @@ use std::marker::PhantomData;
 pub type Signal = (&'static str, Vec<f64>, Vec<f64>);
 
 pub fn inertia(node: &str, inertia: f64) -> Element<f64> {
-    let name = format!("J {node}");
+    let name = format!("J {node}").into();
     Element::Inertia(Inertia { name, node: node.into(), inertia })
 }
 
 pub fn torque(node: &str, input: &str) -> Element<f64> {
-    let (name, node, input) = (format!("source {input}"), node.into(), input.into());
+    let (name, node, input) = (format!("source {input}").into(), node.into(), input.into());
     Element::Torque(Torque { name, node, input, number: PhantomData })
 }
 
 pub fn gear(a: &str, b: &str, ratio: f64) -> Element<f64> {
-    let name = format!("gear {a} {b}");
+    let name = format!("gear {a} {b}").into();
     Element::Gear(Gear { name, a: a.into(), b: b.into(), ratio, loss: None })
 }
 
 pub fn shaft(a: &str, b: &str, stiffness: f64, damping: f64) -> Element<f64> {
-    let name = format!("shaft {a} {b}");
+    let name = format!("shaft {a} {b}").into();
     Element::SpringDamper(SpringDamper { name, a: a.into(), b: b.into(), stiffness, damping })
 }
 
 pub fn load(node: &str, constant: f64, rolling: f64, aero: f64) -> Element<f64> {
-    let name = format!("load {node}");
+    let name = format!("load {node}").into();
     Element::RoadLoad(RoadLoad { name, node: node.into(), constant, rolling, aero })
 }
 
@@ -53,7 +53,7 @@ pub fn clutch(name: &str, a: &str, b: &str) -> Clutch<f64> {
         gain: 1.0,
         p0: 0.0,
         peak: 1.0,
-        pressure: format!("P {name}"),
+        pressure: format!("P {name}").into(),
         drum_inertia: 0.0,
     }
 }

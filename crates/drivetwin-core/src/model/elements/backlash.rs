@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A coupling with play.
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::mechanism::{Mechanism, Region, Spring, SpringLaw, Stop, TwistForm};
 use crate::number::Real;
@@ -11,11 +12,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Backlash<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Driving end.
-    pub a: String,
+    pub a: Name,
     /// Driven end.
-    pub b: String,
+    pub b: Name,
     /// N·m/rad. Must be > 0.
     pub stiffness: T,
     /// N·m·s/rad. Must be >= 0.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Dry and viscous friction of a bearing.
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::friction::{FrictionLaw, FrictionTable};
 use crate::model::mechanism::{Friction, Mechanism, Normal};
@@ -13,11 +14,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Bearing<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Shaft.
-    pub a: String,
+    pub a: Name,
     /// Housing; the ground as a rule.
-    pub b: String,
+    pub b: Name,
     /// Relative speed, rad/s, increasing from 0; the last piece goes on beyond the table.
     pub speed: Vec<f64>,
     /// Friction torque, N·m. Must be >= 0.

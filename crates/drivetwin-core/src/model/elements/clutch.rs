@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A friction clutch, or a brake where one side is the ground (paper eqs. 4-6).
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Friction, Inertia, Mechanism, Normal};
@@ -13,11 +14,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Clutch<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Driving side.
-    pub a: String,
+    pub a: Name,
     /// Driven side, or the ground for a brake.
-    pub b: String,
+    pub b: Name,
     /// μ over |slip|.
     pub friction: FrictionLaw<T>,
     /// N·D·A·r: surfaces, de-rating, area, effective radius, m³. Must be >= 0.
@@ -27,7 +28,7 @@ pub struct Clutch<T> {
     /// Static over kinetic capacity at zero slip. Must be >= 1.
     pub peak: T,
     /// Name of the pressure input, Pa.
-    pub pressure: String,
+    pub pressure: Name,
     /// Inertia that turns with the slip (a brake's drum in the dual-clutch picture,
     /// THEORY section 2), kg·m². Must be >= 0.
     pub drum_inertia: T,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! An engine by its steady-state map over throttle and speed (paper eq. 2).
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::model::torque_map::TorqueMap;
@@ -12,11 +13,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct EngineMap<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Node of the crankshaft.
-    pub node: String,
+    pub node: Name,
     /// Name of the throttle input, 1.
-    pub throttle: String,
+    pub throttle: Name,
     /// Torque over throttle and speed.
     pub map: TorqueMap,
     /// Time constant with which the torque follows the map, s; at once if absent.

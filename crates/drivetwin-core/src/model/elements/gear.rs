@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A gear pair, with a lumped efficiency where stated (THEORY section 3).
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::mechanism::{Constraint, Loss, LossLaw, Mechanism};
 use crate::number::Real;
@@ -61,11 +62,11 @@ impl<T: Real> GearLoss<T> {
 #[serde(deny_unknown_fields)]
 pub struct Gear<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Driving node.
-    pub a: String,
+    pub a: Name,
     /// Driven node.
-    pub b: String,
+    pub b: Name,
     /// Speed of `a` over speed of `b`. Must not be 0.
     pub ratio: T,
     /// Loss; none if absent.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A rotating mass.
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require, require_moving};
 use crate::model::mechanism::{self, Mechanism};
 use crate::number::Real;
@@ -11,9 +12,9 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Inertia<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Node it turns with.
-    pub node: String,
+    pub node: Name,
     /// kg·m². Must be >= 0.
     pub inertia: T,
 }

@@ -29,6 +29,7 @@ pub use spring_damper::SpringDamper;
 pub use torque::Torque;
 pub use torque_converter::TorqueConverter;
 
+use super::Name;
 use super::error::ModelError;
 use super::mechanism::Mechanism;
 use crate::number::Real;
@@ -45,7 +46,7 @@ macro_rules! elements {
 
         impl<T: Real> Element<T> {
             /// Unique name.
-            pub fn name(&self) -> &str {
+            pub fn name(&self) -> &Name {
                 match self { $(Self::$kind(e) => &e.name),* }
             }
 

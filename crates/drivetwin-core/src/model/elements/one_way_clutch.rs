@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A one-way clutch (freewheel), with a friction clutch beside it where a pressure is named.
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Friction, Mechanism, Normal};
@@ -13,11 +14,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct OneWayClutch<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Driving side.
-    pub a: String,
+    pub a: Name,
     /// Driven side, or the ground.
-    pub b: String,
+    pub b: Name,
     /// The parallel clutch, none if absent.
     #[serde(default = "Option::default")]
     pub clutch: Option<ParallelClutch<T>>,
@@ -36,7 +37,7 @@ pub struct ParallelClutch<T> {
     /// Static over kinetic capacity at zero slip. Must be >= 1.
     pub peak: T,
     /// Name of the pressure input, Pa.
-    pub pressure: String,
+    pub pressure: Name,
 }
 
 impl<T: Real> OneWayClutch<T> {

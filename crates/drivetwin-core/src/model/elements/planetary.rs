@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A planetary gear set.
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require};
 use crate::model::mechanism::{Constraint, Inertia, Mechanism};
 use crate::number::Real;
@@ -12,13 +13,13 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Planetary<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Node of the sun.
-    pub sun: String,
+    pub sun: Name,
     /// Node of the ring.
-    pub ring: String,
+    pub ring: Name,
     /// Node of the carrier.
-    pub carrier: String,
+    pub carrier: Name,
     /// Ring over sun teeth. Must not be 0 or -1.
     pub z: T,
     /// Spin inertia of all planets together about their own axes, kg·m²; none if absent. For single

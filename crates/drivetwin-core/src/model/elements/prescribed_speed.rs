@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A node that is driven at a given speed whatever torque that takes.
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require_moving};
 use crate::model::mechanism::{Mechanism, Prescribed};
 use crate::number::Real;
@@ -12,11 +13,11 @@ use std::marker::PhantomData;
 #[serde(deny_unknown_fields)]
 pub struct PrescribedSpeed<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// The node.
-    pub node: String,
+    pub node: Name,
     /// Name of the speed input, rad/s; it must not jump.
-    pub input: String,
+    pub input: Name,
     /// The element has no number of its own.
     #[serde(skip)]
     pub number: PhantomData<T>,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! External resistance of the vehicle (paper eq. 9): grade, rolling, aerodynamic.
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require, require_moving};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Account, Force, ForceLaw, Friction, Mechanism, Normal};
@@ -12,9 +13,9 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct RoadLoad<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Node of the wheel.
-    pub node: String,
+    pub node: Name,
     /// Independent of the direction of motion (grade, dynamometer), N·m.
     pub constant: T,
     /// Rolling resistance, opposes the motion and holds the vehicle at rest, N·m. Must be >= 0.
@@ -42,9 +43,10 @@ impl<T: Real> RoadLoad<T> {
             force(ForceLaw::Quadratic { coefficient: -self.aero, node });
         }
         if self.rolling.re() != 0.0 {
+            let row = m.row(&[(&self.node, T::of(1.0))]);
             m.frictions.push(Friction {
                 element: self.name.clone(),
-                row: vec![(node, T::of(1.0))],
+                row,
                 law: FrictionLaw::constant(T::of(1.0)),
                 normal: Normal::Constant(self.rolling),
                 peak: T::of(1.0),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A compliant shaft (paper eq. 8).
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::mechanism::{Mechanism, Spring, SpringLaw};
 use crate::number::Real;
@@ -11,11 +12,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct SpringDamper<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Driving end.
-    pub a: String,
+    pub a: Name,
     /// Driven end.
-    pub b: String,
+    pub b: Name,
     /// N·m/rad. Must be >= 0.
     pub stiffness: T,
     /// N·m·s/rad. Must be >= 0.

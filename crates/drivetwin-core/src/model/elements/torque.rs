@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A prescribed torque, such as a measured engine torque.
 
+use crate::model::Name;
 use crate::model::error::{ModelError, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::number::Real;
@@ -12,11 +13,11 @@ use std::marker::PhantomData;
 #[serde(deny_unknown_fields)]
 pub struct Torque<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Node it acts on.
-    pub node: String,
+    pub node: Name,
     /// Name of the input.
-    pub input: String,
+    pub input: Name,
     /// The element has no number of its own.
     #[serde(skip)]
     pub number: PhantomData<T>,

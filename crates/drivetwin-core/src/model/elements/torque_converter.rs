@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A hydrodynamic torque converter by its steady-state map.
 
+use crate::model::Name;
 use crate::model::converter_map::ConverterMap;
 use crate::model::error::{ModelError, require_apart, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
@@ -13,11 +14,11 @@ use std::marker::PhantomData;
 #[serde(deny_unknown_fields)]
 pub struct TorqueConverter<T> {
     /// Unique name.
-    pub name: String,
+    pub name: Name,
     /// Node of the pump (impeller).
-    pub pump: String,
+    pub pump: Name,
     /// Node of the turbine.
-    pub turbine: String,
+    pub turbine: Name,
     /// Steady-state map.
     pub map: ConverterMap,
     /// The map is data, not a number with derivatives.
