@@ -37,18 +37,6 @@ impl<T: Real> Recorded<T> {
         self.values[output].len()
     }
 
-    /// Add a multiple of a quantity to the values of an output from `from` on, where there are none to
-    /// nothing.
-    #[inline(always)]
-    pub fn add(&mut self, (output, from): (usize, usize), source: &Values, factor: f64) {
-        let (values, sums) = (source.values(), &mut self.values[output]);
-        if sums.len() > from {
-            add(&mut sums[from..], values, factor);
-        } else {
-            sums.extend(values.iter().map(|value| factor * value));
-        }
-    }
-
     /// The values that a block has summed up, out of it.
     #[inline(always)]
     pub fn take(&mut self, output: usize, block: &mut Block<T>) {
@@ -70,13 +58,6 @@ impl<T: Real> Recorded<T> {
             slopes.resize(self.points, T::NO_SLOPES);
         }
         (self.values, self.slopes)
-    }
-}
-
-#[inline(always)]
-fn add(to: &mut [f64], values: &[f64], factor: f64) {
-    for (to, value) in to.iter_mut().zip(values) {
-        *to += factor * value;
     }
 }
 
@@ -124,10 +105,6 @@ impl Picked {
     fn are_all(self) -> bool {
         self.count() == self.span()
     }
-
-    fn contains(self, k: usize) -> bool {
-        self.0 >> k & 1 == 1
-    }
 }
 
 /// Values with derivatives of one output over the samples of a block, while its terms are summed up.
@@ -167,6 +144,13 @@ impl<T: Real> Block<T> {
         (mut samples, mut picked): (impl Iterator<Item: Borrow<T>>, Picked),
         factor: T,
     ) {
+        if !T::DERIVATIVES && picked.are_all() {
+            for (value, sample) in self.values[..picked.count()].iter_mut().zip(samples) {
+                let term = sample.borrow().re() * factor.re();
+                *value = if FIRST { term } else { *value + term };
+            }
+            return;
+        }
         let mut at = 0;
         // Its length not known beforehand, the compiler does not take several samples at once, and
         // gather what is a vector already.
@@ -177,49 +161,6 @@ impl<T: Real> Block<T> {
             *slopes = sample.fma::<F>(factor, if FIRST { T::zero_() } else { sum }).slopes();
             at += 1;
         }
-    }
-}
-
-/// One quantity over the samples of a block, without derivatives.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Values {
-    /// Whether it has been taken up.
-    pub known: bool,
-    /// Number of samples.
-    count: usize,
-    /// Room for [`BLOCK`] of them.
-    values: Vec<f64>,
-}
-
-impl Values {
-    /// Take up the picked samples.
-    #[inline(always)]
-    pub fn set<T: Real>(&mut self, samples: impl Iterator<Item: Borrow<T>>, picked: Picked) {
-        self.values.resize(BLOCK, 0.0);
-        (self.known, self.count) = (true, picked.count());
-        if picked.are_all() {
-            for (to, number) in self.values[..self.count].iter_mut().zip(samples) {
-                *to = number.borrow().re();
-            }
-        } else {
-            self.set_each(samples, picked);
-        }
-    }
-
-    /// The same, one by one. Not inlined, so that it is not compiled for the widest instructions: these
-    /// would gather from strides, which takes longer.
-    #[inline(never)]
-    fn set_each<T: Real>(&mut self, samples: impl Iterator<Item: Borrow<T>>, picked: Picked) {
-        let samples = samples.take(picked.span()).enumerate();
-        let samples = samples.filter(|(k, _)| picked.contains(*k));
-        for (to, (_, number)) in self.values.iter_mut().zip(samples) {
-            *to = number.borrow().re();
-        }
-    }
-
-    #[inline(always)]
-    fn values(&self) -> &[f64] {
-        &self.values[..self.count]
     }
 }
 

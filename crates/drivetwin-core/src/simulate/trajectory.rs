@@ -2,7 +2,7 @@
 //! Chosen outputs on a time grid.
 
 use super::audit::EnergyAudit;
-use super::recorded::{Block, Picked, Recorded, Values};
+use super::recorded::{Block, Picked, Recorded};
 use super::start::{StartError, find};
 use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
@@ -126,7 +126,6 @@ pub(super) struct Recorder<'g, T: Real> {
     recorded: Recorded<T>,
     /// Working space: the basis, at an instant and over a block of samples.
     basis: Vec<T>,
-    values: Vec<Values>,
     block: Block<T>,
 }
 
@@ -135,9 +134,8 @@ impl<'g, T: Real> Recorder<'g, T> {
     pub fn new(network: &Network<T>, targets: &[Target], grid: &'g [f64]) -> Self {
         let columns = targets.iter().map(|&target| Column::of(network, target)).collect();
         let recorded = Recorded::new(targets.len(), grid.len());
-        let values = vec![Values::default(); network.basis()];
         let (basis, block) = (Vec::new(), Block::new());
-        Self { grid, next: 0, columns, recorded, basis, values, block }
+        Self { grid, next: 0, columns, recorded, basis, block }
     }
 
     /// Record the grid points before the end of the step; `last` includes the end.
@@ -205,12 +203,8 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
             Picked::of(&self.grid[self.next..], knots)
         };
         self.next += picked.count();
-        for values in &mut self.values {
-            values.known = false;
-        }
-        let (columns, recorded) = (&self.columns[..], &mut self.recorded);
-        let (values, block) = (&mut self.values[..], &mut self.block);
-        dispatch(Passed { columns, recorded, values, block, run, active, samples, picked, first });
+        let (columns, recorded, block) = (&self.columns[..], &mut self.recorded, &mut self.block);
+        dispatch(Passed { columns, recorded, block, run, active, samples, picked, first });
     }
 }
 
@@ -218,7 +212,6 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
 struct Passed<'p, 'a, T: Real, S> {
     columns: &'p [Column<T>],
     recorded: &'p mut Recorded<T>,
-    values: &'p mut [Values],
     block: &'p mut Block<T>,
     run: &'p Integrator<'a, T>,
     active: &'p [usize],
@@ -236,46 +229,16 @@ impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
         for (output, column) in self.columns.iter().enumerate() {
             let from = self.recorded.length(output);
             for &(position, factor) in &*passing_terms(column, self.run) {
-                if T::DERIVATIVES {
-                    self.add_to_block::<F>(position, factor);
-                } else {
-                    if !self.values[position].known {
-                        self.take_up(position);
-                    }
-                    self.recorded.add((output, from), &self.values[position], factor.re());
-                }
+                self.add_to_block::<F>(position, factor);
             }
-            if T::DERIVATIVES {
-                self.recorded.take(output, self.block);
-            }
+            self.recorded.take(output, self.block);
             self.recorded.fill(output, from + count);
         }
     }
 }
 
 impl<T: Real, S: Samples<T>> Passed<'_, '_, T, S> {
-    /// Take up an entry of the basis.
-    #[inline(always)]
-    fn take_up(&mut self, position: usize) {
-        let (network, values, picked) = (self.run.network, &mut self.values[position], self.picked);
-        let constant = |value: f64| std::iter::repeat_n(T::of(value), picked.span());
-        if position < self.run.x.len() {
-            values.set::<T>(self.samples.states(position), picked);
-        } else if position < network.one() {
-            let input = |k| self.run.input_at(self.first + k, position - network.first_input());
-            values.set::<T>((0..picked.span()).map(input), picked);
-        } else if position == network.one() {
-            values.set::<T>(constant(1.0), picked);
-        } else {
-            let channel = position - network.first_channel();
-            match self.active.iter().position(|&j| j == channel) {
-                Some(slot) => values.set::<T>(self.samples.torques(slot), picked),
-                None => values.set::<T>(constant(0.0), picked),
-            }
-        }
-    }
-
-    /// Add a multiple of an entry of the basis with its derivatives to the block.
+    /// Add a multiple of an entry of the basis to the block.
     #[inline(always)]
     fn add_to_block<const F: bool>(&mut self, position: usize, factor: T) {
         let (network, block, picked) = (self.run.network, &mut *self.block, self.picked);

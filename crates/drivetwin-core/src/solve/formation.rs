@@ -409,11 +409,13 @@ struct LaneView<'f, const N: usize> {
 
 impl<const N: usize> Samples<f64> for LaneView<'_, N> {
     fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
-        self.trail.states(i)[self.first..].iter().map(|x| x.0[self.lane])
+        let lane = self.lane % WIDTH;
+        self.trail.states(i)[self.first..].iter().map(move |x| x.0[lane])
     }
     fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
         let torques = &self.trail.torques(self.places[slot])[self.first..];
-        torques.iter().map(|torque| torque.0[self.lane])
+        let lane = self.lane % WIDTH;
+        torques.iter().map(move |torque| torque.0[lane])
     }
 }
 
