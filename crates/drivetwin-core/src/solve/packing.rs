@@ -8,6 +8,9 @@ use crate::number::{Lane, Pack};
 /// Places in a formation: channels by number, watched guards by number, channels of one lane.
 pub(super) type Places<'p> = (&'p [usize], &'p [usize], &'p [usize]);
 
+/// Place of a run's own channel for a slot of the formation, and the number of slots in use.
+type Own<P> = (P, usize);
+
 impl<const K: usize, const N: usize> Operators<Pack<K>, N> {
     /// Operators under which nothing moves and no guard falls.
     pub fn idle() -> Self {
@@ -35,7 +38,9 @@ impl<const K: usize, const N: usize> Operators<Pack<K>, N> {
         put(&mut self.constant, &from.constant, lane);
         for (slot, channel) in self.channels.iter_mut().enumerate().take(slots.len()) {
             match own(slot) {
-                Some(own_slot) => channel.set_lane(lane, &from.channels[own_slot], own),
+                Some(own_slot) => {
+                    channel.set_lane(lane, &from.channels[own_slot], (own, slots.len()))
+                }
                 None => channel.clear_lane(lane),
             }
         }
@@ -45,7 +50,7 @@ impl<const K: usize, const N: usize> Operators<Pack<K>, N> {
             watch.id = *id;
             let found = from.watched.iter().position(|w| w.id == *id);
             match found {
-                Some(found) => watch.set_lane(lane, &from.watched[found], own),
+                Some(found) => watch.set_lane(lane, &from.watched[found], (own, slots.len())),
                 None => watch.clear_lane(lane),
             }
             for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
@@ -53,7 +58,7 @@ impl<const K: usize, const N: usize> Operators<Pack<K>, N> {
             }
         }
         for (drive, from) in self.drives.iter_mut().zip(&from.drives) {
-            drive.set_lane(lane, from, own, slots.len());
+            drive.set_lane(lane, from, (own, slots.len()));
         }
         self.loads.resize_with(from.loads.len(), Line::idle);
         for (load, from) in self.loads.iter_mut().zip(&from.loads) {
@@ -80,8 +85,7 @@ impl<const K: usize, const N: usize> Drive<Pack<K>, N> {
         &mut self,
         lane: usize,
         from: &Drive<f64, N>,
-        own: impl Fn(usize) -> Option<usize>,
-        slots: usize,
+        (own, slots): Own<impl Fn(usize) -> Option<usize>>,
     ) {
         self.input = from.input;
         put(self.step.as_flattened_mut(), from.step.as_flattened(), lane);
@@ -101,7 +105,7 @@ impl<const K: usize, const N: usize> Watched<Pack<K>, N> {
         &mut self,
         lane: usize,
         from: &Watched<f64, N>,
-        own: impl Fn(usize) -> Option<usize>,
+        own: Own<impl Fn(usize) -> Option<usize>>,
     ) {
         self.form.set_lane(lane, &from.form, own);
         self.limit.set_lane(lane, &from.limit);
@@ -110,7 +114,7 @@ impl<const K: usize, const N: usize> Watched<Pack<K>, N> {
 
     fn clear_lane(&mut self, lane: usize) {
         let input = self.limit.input;
-        self.set_lane(lane, &Watched::idle(), |_| None);
+        self.set_lane(lane, &Watched::idle(), (|_| None, MAX_ACTIVE));
         self.limit.input = input;
     }
 }
@@ -120,7 +124,7 @@ impl<const K: usize, const N: usize> Carried<Pack<K>, N> {
         &mut self,
         lane: usize,
         from: &Carried<f64, N>,
-        own: impl Fn(usize) -> Option<usize> + Copy,
+        own: Own<impl Fn(usize) -> Option<usize> + Copy>,
     ) {
         put(self.moments.as_flattened_mut(), from.moments.as_flattened(), lane);
         put(&mut self.argument, &from.argument, lane);
@@ -133,7 +137,7 @@ impl<const K: usize, const N: usize> Carried<Pack<K>, N> {
 
     fn clear_lane(&mut self, lane: usize) {
         let input = self.law.normal.input;
-        self.set_lane(lane, &Carried::idle(), |_| None);
+        self.set_lane(lane, &Carried::idle(), (|_| None, MAX_ACTIVE));
         self.law.normal.input = input;
     }
 }
@@ -143,21 +147,26 @@ impl<const K: usize, const N: usize> StepForm<Pack<K>, N> {
         &mut self,
         lane: usize,
         from: &StepForm<f64, N>,
-        own: impl Fn(usize) -> Option<usize>,
+        (own, slots): Own<impl Fn(usize) -> Option<usize>>,
     ) {
         put(&mut self.state, &from.state, lane);
         self.constant.0[lane] = from.constant;
-        for (slot, cubic) in self.cubics.iter_mut().enumerate() {
+        for (slot, cubic) in self.cubics.iter_mut().enumerate().take(slots) {
             put(cubic, &own(slot).map_or([0.0; SHAPES], |own| from.cubics[own]), lane);
         }
     }
 }
 
 impl<const K: usize, const N: usize> Form<Pack<K>, N> {
-    fn set_lane(&mut self, lane: usize, from: &Form<f64, N>, own: impl Fn(usize) -> Option<usize>) {
+    fn set_lane(
+        &mut self,
+        lane: usize,
+        from: &Form<f64, N>,
+        (own, slots): Own<impl Fn(usize) -> Option<usize>>,
+    ) {
         put(&mut self.state, &from.state, lane);
         self.constant.0[lane] = from.constant;
-        for (slot, channel) in self.channels.iter_mut().enumerate() {
+        for (slot, channel) in self.channels.iter_mut().enumerate().take(slots) {
             channel.0[lane] = own(slot).map_or(0.0, |own| from.channels[own]);
         }
     }
