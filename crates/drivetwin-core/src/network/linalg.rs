@@ -61,7 +61,7 @@ impl<T: Real> Matrix<T> {
     }
 
     /// Subtract a multiple of `other` from row `i`.
-    pub fn subtract_row(&mut self, i: usize, (other, factor): (&[T], T)) {
+    pub fn subtract_from_row(&mut self, i: usize, (other, factor): (&[T], T)) {
         self.row_mut(i).iter_mut().zip(other).for_each(|(v, &o)| *v -= o * factor);
     }
 

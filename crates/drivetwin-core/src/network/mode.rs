@@ -313,7 +313,7 @@ impl<T: Real> Mode<T> {
             let mut residual = network.with_drag(self.key).into_owned();
             for (i, held) in nodes.iter().enumerate() {
                 for &(node, direction) in held {
-                    residual.subtract_row(node, (self.stuck_torque.row(i), direction));
+                    residual.subtract_from_row(node, (self.stuck_torque.row(i), direction));
                 }
             }
             residual.subtract(&inertia.times(&acceleration));

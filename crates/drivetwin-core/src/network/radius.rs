@@ -70,3 +70,21 @@ impl Chunked {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oscillation_and_decay_are_as_fast_as_their_eigenvalues_however_the_states_are_scaled() {
+        for (size, scale) in [(2, 1.0), (3, 1e5), (6, 1e9)] {
+            // ω = 70 rad/s over two states of unequal scale; the others decay with 1/s.
+            let mut a = Matrix::zeros(size, size + 3);
+            (a[(0, 1)], a[(1, 0)]) = (70.0 * scale, -70.0 / scale);
+            (2..size).for_each(|i| a[(i, i)] = -1.0);
+            let found = radius(&a);
+            assert!((found / 70.0 - 1.0).abs() < 1e-12, "{found} rad/s for {scale}");
+        }
+        assert_eq!(radius(&Matrix::<f64>::zeros(4, 7)), 0.0);
+    }
+}
