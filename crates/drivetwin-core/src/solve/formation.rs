@@ -9,7 +9,7 @@
 use super::inputs::Inputs;
 use super::integrator::{Integrator, Step};
 use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Guards, Room, Source, State, Trail, idle_guards, march, room};
+use super::march::{BLOCK, Carry, Guards, Room, Source, Trail, idle_guards, march, room};
 use super::operators::{MAX_ACTIVE, Operators};
 use super::sprint::{Lines, Ready, Samples, Sink};
 use super::status::Status;
@@ -102,7 +102,7 @@ struct Formation<const N: usize> {
     slots: Vec<usize>,
     /// Watched guards by number, likewise.
     watched: Vec<usize>,
-    state: State<Lanes, N>,
+    x: [Lanes; N],
     carry: [Carry<Lanes>; MAX_ACTIVE],
     guards: Guards<Lanes>,
     trail: Trail<Lanes, N>,
@@ -117,7 +117,7 @@ impl<const N: usize> Formation<N> {
             operators: Operators::idle(),
             slots: Vec::new(),
             watched: Vec::new(),
-            state: State::first([zero; N]),
+            x: [zero; N],
             carry: [Carry::idle(); MAX_ACTIVE],
             guards: idle_guards(),
             trail: Trail::in_columns(Vec::new(), MAX_ACTIVE),
@@ -150,7 +150,7 @@ impl<const N: usize> Formation<N> {
                 member.run.segment = segment + passed + usize::from(fallen != 0 && !fell);
                 if fell || member.run.segment == member.until {
                     let start = self.stretch.1 + passed;
-                    let x = |i| if fell { self.trail.states(i)[start] } else { self.state.x[i] };
+                    let x = |i| if fell { self.trail.states(i)[start] } else { self.x[i] };
                     let x: [f64; N] = std::array::from_fn(|i| x(i).0[lane]);
                     self.deliver(lane, member);
                     self.leave(lane, member, (&x, fell));
@@ -180,9 +180,8 @@ impl<const N: usize> Formation<N> {
                 self.operators.set_lane(lane, operators_of::<N>(ready), places);
             }
             if joining >> lane & 1 == 1 {
-                let State { x, early } = &mut self.state;
-                for ((x, early), &value) in x.iter_mut().zip(early).zip(&member.run.x) {
-                    (x.0[lane], early.0[lane]) = (value, value);
+                for (x, &value) in self.x.iter_mut().zip(&member.run.x) {
+                    x.0[lane] = value;
                 }
             }
         }
@@ -334,13 +333,13 @@ impl<const N: usize, const A: usize> Pass<'_, '_, N, A> {
     #[inline(always)]
     fn pass<const F: bool, U: Source<Lanes>>(self, source: &U) -> (usize, u32) {
         let Self { formation, source: (_, h), samples, lanes: (joining, live) } = self;
-        let Formation { operators, state, carry, guards, trail, stretch: (_, at), .. } = formation;
+        let Formation { operators, x, carry, guards, trail, stretch: (_, at), .. } = formation;
         let carry = carry.first_chunk_mut::<A>().expect("at most as many");
         if joining != 0 {
             let mut room = room();
             let sample = source.read(samples.0, &mut room);
-            let fresh: [_; A] = Carry::start::<F, N, A, _>(operators, (sample, h), &state.x);
-            let first = operators.guards::<_, F, A>(sample, (&state.x, &fresh));
+            let fresh: [_; A] = Carry::start::<F, N, A, _>(operators, (sample, h), x);
+            let first = operators.guards::<_, F, A>(sample, (x, &fresh));
             for lane in (0..WIDTH).filter(|lane| joining >> lane & 1 == 1) {
                 for (carry, fresh) in carry.iter_mut().zip(&fresh) {
                     carry.set_lane(lane, fresh);
@@ -351,7 +350,7 @@ impl<const N: usize, const A: usize> Pass<'_, '_, N, A> {
                 }
             }
         }
-        let state = (state, carry, guards);
+        let state = (&mut *x, carry, &mut *guards);
         let to = (trail, *at, live);
         march::<U, Lanes, F, N, A, 1>(operators, (source, h), samples, state, to)
     }

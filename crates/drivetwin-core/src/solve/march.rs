@@ -57,22 +57,6 @@ pub struct Carry<L> {
     pub stiction: L,
 }
 
-/// State at the start of a sample, and as the forms of the channels take it: see [`step`].
-#[derive(Clone, Copy, Debug)]
-pub struct State<L, const N: usize> {
-    /// State.
-    pub x: [L; N],
-    /// Without the last correction.
-    pub early: [L; N],
-}
-
-impl<L: Lane, const N: usize> State<L, N> {
-    /// Where no sample has been passed yet.
-    pub fn first(x: [L; N]) -> Self {
-        Self { x, early: x }
-    }
-}
-
 /// Limits and values of the watched forms at the start of a sample.
 pub type Guards<V> = [[V; 2]; MAX_WATCHED];
 
@@ -153,13 +137,13 @@ pub fn march<
     op: &Operators<L, N>,
     (source, h): (&S, f64),
     (first, count): (usize, usize),
-    (at_start, carry, guards): (&mut State<L, N>, &mut [Carry<L>; A], &mut Guards<L::Values>),
+    (state, carry, guards): (&mut [L; N], &mut [Carry<L>; A], &mut Guards<L::Values>),
     (trail, at, live): (&mut Trail<L, N>, usize, u32),
 ) -> (usize, u32) {
     let mut room = room();
     let mut ends = [[<S::Input as Lane>::Values::all(0.0); W]; MAX_INPUTS];
     // Of its own, for the processor's registers.
-    let State { mut x, mut early } = *at_start;
+    let mut x = *state;
     let mut outcome = (count, 0);
     // A loop: the body of `all` would be compiled apart, for the least of all processors.
     let mut loaded = true;
@@ -175,10 +159,9 @@ pub fn march<
             let u = source.read(first + from + k, &mut room);
             if S::Input::DERIVATIVES {
                 *carry = Carry::start::<F, N, A, _>(op, (u, h), &x);
-                early = x;
                 trail.put(op, at + from + k, (&x, carry));
             }
-            *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, &mut early, carry));
+            *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, carry));
             trail.put(op, at + from + k + 1, (&x, carry));
             if looks {
                 for (ends, [start, rate]) in ends.iter_mut().zip(u) {
@@ -206,7 +189,7 @@ pub fn march<
             }
         }
     }
-    *at_start = State { x, early };
+    *state = x;
     if outcome.1 != 0 {
         return outcome;
     }

@@ -6,7 +6,7 @@
 use super::inputs::Inputs;
 use super::integrator::{Integrator, RowState};
 use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Room, Source, State, Trail, march, room};
+use super::march::{BLOCK, Carry, Room, Source, Trail, march, room};
 use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
 use crate::network::channel::{self, Channel};
 use crate::network::smooth::{Law, Line, MAX_INPUTS, Sample, line_of};
@@ -336,12 +336,11 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Sprint<'_, '_, T, S, N
         x[..n].copy_from_slice(&run.x);
         let mut carry: [Carry<T>; A] = Carry::start::<F, N, A, _>(operators, (first, h), &x);
         let mut guards = operators.guards::<_, F, A>(first, (&x, &carry));
-        let mut state = State::first(x);
         let mut trail = Trail::in_columns(std::mem::take(&mut run.trail), A);
         let mut whole = true;
         while count > 0 && whole {
             let samples = (run.segment, count.min(BLOCK));
-            let at = (&mut state, &mut carry, &mut guards);
+            let at = (&mut x, &mut carry, &mut guards);
             // Samples with derivatives are dear.
             let to = (&mut trail, 0, 1);
             let (passed, fallen) = if T::DERIVATIVES {
@@ -353,14 +352,14 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Sprint<'_, '_, T, S, N
             run.segment += passed;
             count -= passed;
             if fallen != 0 {
-                state = State::first(std::array::from_fn(|i| trail.states(i)[passed]));
+                x = std::array::from_fn(|i| trail.states(i)[passed]);
                 whole = false;
             }
         }
-        run.x.copy_from_slice(&state.x[..n]);
+        run.x.copy_from_slice(&x[..n]);
         run.t = T::of(run.inputs.knot(run.segment));
         if run.segment == run.inputs.segments() {
-            trail.put(operators, 0, (&state.x, &carry));
+            trail.put(operators, 0, (&x, &carry));
             sink.passed(run, active, &trail, (run.segment, 1));
             run.segment -= 1;
         }

@@ -11,9 +11,8 @@ use crate::number::{Factor, Lane, SMALL, Values};
 const MAX_CUBIC: f64 = 2e-4;
 /// Largest distance over which stiction is moved by its series, relative to its decay.
 const MAX_MOVE: f64 = 0.05;
-/// Largest change of a channel by the last correction, likewise. What is left then is smaller by as much as
-/// this is smaller than the first.
-const MAX_CORRECTION: f64 = 4e-6;
+/// Largest change of a channel by the correction, likewise.
+const MAX_CORRECTION: f64 = 1e-6;
 
 /// Places among the shapes of what raises the value and the slope at the end.
 const VALUE: usize = 3;
@@ -21,9 +20,8 @@ const SLOPE: usize = 4;
 
 /// What a sample leads to, as far as it is known.
 struct Sampling<L: Lane, const N: usize, const A: usize> {
-    /// State at the end, and without the last correction.
+    /// State at the end.
     end: [L; N],
-    early: [L; N],
     /// Arguments at the end, and the part of their rates there that comes from the state.
     argument: [L; A],
     rate: [L; A],
@@ -42,20 +40,18 @@ struct Sampling<L: Lane, const N: usize, const A: usize> {
     guard: L::Values,
 }
 
-/// Pass one sample; returns something negative where a guard of the carried channels has fallen. `early` is
-/// the state that the forms of the channels take: without the last correction of the torques, which counts
-/// for next to nothing in them and would come late.
+/// Pass one sample; returns something negative where a guard of the carried channels has fallen.
 #[inline(always)]
 pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize>(
     op: &Operators<L, N>,
     (sample, h): (&Sample<U>, f64),
-    (x, early, carry): (&mut [L; N], &mut [L; N], &mut [Carry<L>; A]),
+    (x, carry): (&mut [L; N], &mut [Carry<L>; A]),
 ) -> L::Values {
     let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
-    let mut sampling = Sampling::known::<F, U>(op, channels, (sample, h), (x, early));
+    let mut sampling = Sampling::known::<F, U>(op, channels, (sample, h), x);
     sampling.predict::<F>(op, channels, carry, h);
     sampling.correct::<F>(op, channels, carry, h);
-    (*x, *early) = (sampling.end, sampling.early);
+    *x = sampling.end;
     sampling.guard
 }
 
@@ -66,12 +62,11 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
         (sample, h): (&Sample<U>, f64),
-        (x, early): (&[L; N], &[L; N]),
+        x: &[L; N],
     ) -> Self {
         let none = L::all(0.0);
         let mut s = Self {
             end: op.constant,
-            early: *early,
             argument: [none; A],
             rate: [none; A],
             direct: [none; A],
@@ -112,13 +107,13 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             for a in 0..A {
                 let c = &channels[a];
                 if !L::DERIVATIVES {
-                    s.argument[a] = c.argument_end.state[j].fma::<F>(early[j], s.argument[a]);
-                    s.rate[a] = c.rate_end.state[j].fma::<F>(early[j], s.rate[a]);
+                    s.argument[a] = c.argument_end.state[j].fma::<F>(x[j], s.argument[a]);
+                    s.rate[a] = c.rate_end.state[j].fma::<F>(x[j], s.rate[a]);
                 }
             }
         }
         for a in 0..A {
-            s.turning[a] = over_state::<L, F, N>(op, &channels[a].second.state, early);
+            s.turning[a] = over_state::<L, F, N>(op, &channels[a].second.state, x);
         }
         s
     }
@@ -217,7 +212,6 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             missing[a][SLOPE] = v.by_argument.times(h).fma::<F>(rate[a], drift - (a1 + a2 + a2));
         }
         add_moments::<L, F, N, A, VALUE, SHAPES>(op, &missing, &mut self.end);
-        self.early = self.end;
         let mut size = L::Values::all(0.0);
         for a in 0..A {
             size = size.larger(carry[a].value.value.values().magnitude());
@@ -228,13 +222,10 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let none = L::all(0.0);
             let ds = over_cubics::<L, F, N, A, VALUE, SHAPES>(argument_end, &missing, none);
             let corrected = self.value[a].moved::<F>(ds);
-            let correction = corrected.value - self.value[a].value;
-            for i in 0..N {
-                self.end[i] = channels[a].moments[VALUE][i].fma::<F>(correction, self.end[i]);
-            }
+            let correction = (corrected.value - self.value[a].value).values().magnitude();
             let [.., value, slope] = missing[a];
             let cubic = (slope - (value + value)).values().magnitude();
-            let close = size.times(MAX_CORRECTION) - correction.values().magnitude();
+            let close = size.times(MAX_CORRECTION) - correction;
             let guard = size.times(MAX_CUBIC) - cubic;
             self.guard = self.guard.negative_with(guard).negative_with(close);
             let (start, step) = (carry[a].argument.values(), carry[a].rate.values().times(h / 3.0));
