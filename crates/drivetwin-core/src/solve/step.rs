@@ -156,7 +156,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let Law { rate, .. } = channels[a].law;
             let decay = (carry[a].near - straight) * rate;
             (near[a], stiction[a]) = (carry[a].near, carry[a].stiction);
-            carry[a].near = second.fma::<F>(L::all(bend), straight);
+            carry[a].near = second.fma_times::<F>(bend, straight);
             let decay = rate.times(-bend).fma::<F>(second, decay);
             farthest = farthest.larger(decay.values().magnitude());
             faded[a] = stiction[a].grown::<F>(decay);
@@ -202,14 +202,13 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         h: f64,
     ) {
         let mut missing = [[L::all(0.0); SHAPES]; A];
-        let mut rate = [L::all(0.0); A];
         for a in 0..A {
             let (v, [a0, a1, a2, ..]) = (&self.value[a], self.cubics[a]);
             let known = self.rate[a] + self.direct[a];
-            rate[a] = over_channels::<L, F, N, A>(&channels[a].rate, &self.value, known);
+            let ds = over_channels::<L, F, N, A>(&channels[a].rate, &self.value, known);
             let drift = (v.by_normal * self.normal[a][1]).times(h);
             missing[a][VALUE] = v.value - (a0 + a1 + a2);
-            missing[a][SLOPE] = v.by_argument.times(h).fma::<F>(rate[a], drift - (a1 + a2 + a2));
+            missing[a][SLOPE] = v.by_argument.times(h).fma::<F>(ds, drift - (a1 + a2 + a2));
         }
         add_moments::<L, F, N, A, VALUE, SHAPES>(op, &missing, &mut self.end);
         let mut size = L::Values::all(0.0);
@@ -217,10 +216,13 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             size = size.larger(carry[a].value.value.values().magnitude());
         }
         size = size + L::Values::all(1.0);
+        let mut early = [L::Values::all(0.0); A];
         for a in 0..A {
-            let Carried { argument_end, rate_end, law, .. } = &channels[a];
+            let Carried { argument_end, rate_end, .. } = &channels[a];
             let none = L::all(0.0);
             let ds = over_cubics::<L, F, N, A, VALUE, SHAPES>(argument_end, &missing, none);
+            let rate = self.rate[a];
+            self.rate[a] = over_cubics::<L, F, N, A, VALUE, SHAPES>(rate_end, &missing, rate);
             let corrected = self.value[a].moved::<F>(ds);
             let correction = (corrected.value - self.value[a].value).values().magnitude();
             let [.., value, slope] = missing[a];
@@ -228,14 +230,17 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let close = size.times(MAX_CORRECTION) - correction;
             let guard = size.times(MAX_CUBIC) - cubic;
             self.guard = self.guard.negative_with(guard).negative_with(close);
-            let (start, step) = (carry[a].argument.values(), carry[a].rate.values().times(h / 3.0));
-            let early = step + start;
+            self.value[a] = corrected;
+            early[a] = carry[a].rate.values().times(h / 3.0) + carry[a].argument.values();
             carry[a].argument = self.argument[a] + ds;
-            carry[a].value = corrected;
-            // What the corrected torques change of the rate is of higher order.
-            carry[a].rate = over_cubics::<L, F, N, A, VALUE, SHAPES>(rate_end, &missing, rate[a]);
+        }
+        for a in 0..A {
+            let Carried { rate, law, .. } = &channels[a];
+            let known = self.rate[a] + self.direct[a];
+            carry[a].rate = over_channels::<L, F, N, A>(rate, &self.value, known);
+            carry[a].value = self.value[a];
             // Between its ends the argument stays within these (Bernstein's form of the cubic).
-            let end = carry[a].argument.values();
+            let (early, end) = (early[a], carry[a].argument.values());
             let late = end - carry[a].rate.values().times(h / 3.0);
             let above = early.smaller(late).smaller(end) - law.from.values();
             let below = law.to.values() - early.larger(late).larger(end);
