@@ -169,18 +169,7 @@ pub fn march<
                 }
             }
         }
-        // Apart from those of the step: sums over a loop that start from nothing stay in vectors.
-        let mut left = [L::Values::all(0.0); W];
-        for (place, before) in guards.iter_mut().enumerate().take(op.watched.len()) {
-            let after = op.guards_after::<_, F, A, W>(place, &ends, (trail, at + from));
-            op.falls(place, (before, &after), &mut left);
-            *before = after.map(|values| values[some - 1]);
-        }
-        if !loaded {
-            for load in &op.loads {
-                load.falls::<_, F, W>(&ends[load.input % MAX_INPUTS], &mut left);
-            }
-        }
+        let left = op.left::<_, F, A, W>(guards, (&ends, !loaded), (trail, at + from, some));
         for k in 0..some {
             let fallen = fallen[k].negative_with(left[k]);
             if fallen.any_negative() && fallen.negative() & live != 0 {
@@ -190,18 +179,40 @@ pub fn march<
         }
     }
     *state = x;
-    if outcome.1 != 0 {
-        return outcome;
-    }
     // What has grown beyond all bounds is left to the expansion, which says so.
     let sum = x.iter().fold(L::Values::all(0.0), |sum, x| x.values().magnitude() + sum);
-    match sum.unbounded() & live {
-        0 => outcome,
-        unbounded => (count.saturating_sub(1), unbounded),
+    match (outcome.1, sum.unbounded() & live) {
+        (0, unbounded) if unbounded != 0 => (count.saturating_sub(1), unbounded),
+        _ => outcome,
     }
 }
 
 impl<L: Lane, const N: usize> Operators<L, N> {
+    /// Negative where a watched form may leave its limits within one of `some` samples, or a normal load
+    /// falls at its end where `loads` are looked at; `guards` are moved on to the last of them.
+    ///
+    /// Apart from what falls in the step: sums over a loop that start from nothing stay in vectors.
+    #[inline(always)]
+    fn left<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
+        &self,
+        guards: &mut Guards<L::Values>,
+        (ends, loads): (&Ends<V, W>, bool),
+        (trail, from, some): (&Trail<L, N>, usize, usize),
+    ) -> [L::Values; W] {
+        let mut left = [L::Values::all(0.0); W];
+        for (place, before) in guards.iter_mut().enumerate().take(self.watched.len()) {
+            let after = self.guards_after::<_, F, A, W>(place, ends, (trail, from));
+            self.falls(place, (before, &after), &mut left);
+            *before = after.map(|values| values[some - 1]);
+        }
+        if loads {
+            for load in &self.loads {
+                load.falls::<_, F, W>(&ends[load.input % MAX_INPUTS], &mut left);
+            }
+        }
+        left
+    }
+
     /// All guards at the start of a segment.
     #[inline(always)]
     pub fn guards<U: Factor<L, Values: Factor<L::Values>>, const F: bool, const A: usize>(

@@ -49,7 +49,8 @@ pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize
 ) -> L::Values {
     let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
     let mut sampling = Sampling::known::<F, U>(op, channels, (sample, h), x);
-    sampling.predict::<F>(op, channels, carry, h);
+    let about = sampling.foresee::<F>(channels, carry, h);
+    sampling.predict::<F>(op, channels, &about, h);
     sampling.correct::<F>(op, channels, carry, h);
     *x = sampling.end;
     sampling.guard
@@ -118,17 +119,17 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         s
     }
 
-    /// The cubics by value, rate and second derivative at the start, and the end they lead to.
+    /// The cubics by value, rate and second derivative at the start. Returns the arguments about which the
+    /// law is taken at the end, with stiction there, and leaves those of the next sample to carry.
     #[inline(always)]
-    fn predict<const F: bool>(
+    fn foresee<const F: bool>(
         &mut self,
-        op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
         carry: &mut [Carry<L>; A],
         h: f64,
-    ) {
-        let mut near = [L::all(0.0); A];
-        let (mut stiction, mut faded, mut rise) = (near, near, near);
+    ) -> [[L; 2]; A] {
+        let mut about = [[L::all(0.0); 2]; A];
+        let (mut faded, mut rise) = ([L::all(0.0); A], [L::all(0.0); A]);
         for a in 0..A {
             let v = &carry[a].value;
             rise[a] = v.by_argument.fma::<F>(carry[a].rate, v.by_normal * self.normal[a][1]);
@@ -155,11 +156,11 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let (straight, bend) = (ds.times(2.0 * h) + carry[a].argument, 2.0 * h * h);
             let Law { rate, .. } = channels[a].law;
             let decay = (carry[a].near - straight) * rate;
-            (near[a], stiction[a]) = (carry[a].near, carry[a].stiction);
+            about[a] = [carry[a].near, carry[a].stiction];
             carry[a].near = second.fma_times::<F>(bend, straight);
             let decay = rate.times(-bend).fma::<F>(second, decay);
             farthest = farthest.larger(decay.values().magnitude());
-            faded[a] = stiction[a].grown::<F>(decay);
+            faded[a] = carry[a].stiction.grown::<F>(decay);
         }
         let far = (L::Values::all(SMALL) - farthest).negative();
         if far != 0 {
@@ -168,23 +169,36 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         for a in 0..A {
             carry[a].stiction = faded[a];
         }
+        about
+    }
+
+    /// The end that the cubics lead to, and the channels there.
+    #[inline(always)]
+    fn predict<const F: bool>(
+        &mut self,
+        op: &Operators<L, N>,
+        channels: &[Carried<L, N>; A],
+        about: &[[L; 2]; A],
+        h: f64,
+    ) {
         add_moments::<L, F, N, A, 0, 3>(op, &self.cubics, &mut self.end);
         for a in 0..A {
             let Carried { argument, argument_end, rate, rate_end, law, .. } = &channels[a];
+            let [near, stiction] = about[a];
             let distance = if L::DERIVATIVES {
                 // Few products by way of the state, where they count for more than their order.
                 self.argument[a] = over_state::<L, F, N>(op, argument, &self.end);
                 self.rate[a] = over_state::<L, F, N>(op, &rate.state, &self.end);
-                self.argument[a] - near[a]
+                self.argument[a] - near
             } else {
-                let (cubics, from_near) = (&self.cubics, self.argument[a] - near[a]);
+                let (cubics, from_near) = (&self.cubics, self.argument[a] - near);
                 self.rate[a] = over_cubics::<L, F, N, A, 0, 3>(rate_end, cubics, self.rate[a]);
                 let distance = over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, from_near);
-                self.argument[a] = near[a] + distance;
+                self.argument[a] = near + distance;
                 distance
             };
             let normal = self.normal[a][1].times(h) + self.normal[a][0];
-            let friction = law.about::<F>(near[a], stiction[a]);
+            let friction = law.about::<F>(near, stiction);
             self.value[a] = friction.at::<F>(distance, normal);
             let moved = law.rate * distance;
             let guard = L::Values::all(MAX_MOVE) - moved.values().magnitude();
