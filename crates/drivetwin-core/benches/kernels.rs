@@ -45,7 +45,7 @@ fn kernels(criterion: &mut Criterion) {
     let options = (Settings::default(), false);
     let plan = Plan::new(&network, &signals, &time, &outputs[4..5], options).expect("a plan");
     let begin = second_gear();
-    let state = begin.named().state(&network).expect("a start");
+    let state = begin.state(&network).expect("a start");
 
     criterion.bench_function("compile a network", |b| {
         b.iter(|| Network::compile(black_box(&driveline)));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! A run of the dual-clutch driveline with its usual outputs.
 
-use super::run::{SimulateError, run};
-use super::start::{Start, StartError, State, state_of};
+use super::run::{Plan, SimulateError};
+use super::start::{StartError, State, state_of};
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};
 use crate::network::Network;
@@ -37,7 +37,8 @@ pub fn simulate_dual_clutch<T: Real>(
     options: (Settings, bool),
 ) -> Result<DualClutchRun<T>, SimulateError> {
     let network = Network::compile(&model.driveline())?;
-    run(&network, signals, &start.named(), grid, &dual_clutch_outputs(model), options)
+    let plan = Plan::new(&network, signals, grid, &dual_clutch_outputs(model), options)?;
+    Ok(plan.run(&network, &start.state(&network)?))
 }
 
 /// The usual outputs, see [`DualClutchRun`].
@@ -62,19 +63,6 @@ impl<T: Real> DualClutchStart<T> {
         let speeds =
             [(ENGINE, self.engine_speed), (OUTPUT, self.output_speed), (WHEEL, self.wheel_speed)];
         state_of(network, (&speeds, &[(SHAFT, self.twist)]), &self.locked)
-    }
-
-    /// The start by the names of the network.
-    pub fn named(&self) -> Start<T> {
-        Start {
-            speeds: vec![
-                (ENGINE.into(), self.engine_speed),
-                (OUTPUT.into(), self.output_speed),
-                (WHEEL.into(), self.wheel_speed),
-            ],
-            twists: vec![(SHAFT.into(), self.twist)],
-            locked: self.locked.clone(),
-        }
     }
 }
 

@@ -8,7 +8,7 @@
 //! from the last a sample ahead, at about the argument that it is needed at, so that nothing waits for it.
 
 use super::operators::{Carried, MAX_WATCHED, Operators, Watched};
-use super::step::step;
+use super::step::{over_channels, step};
 use crate::network::smooth::{Line, MAX_INPUTS, Sample, Value};
 use crate::number::{Factor, Lane, Pack, Values};
 
@@ -369,6 +369,7 @@ impl<L: Lane> Carry<L> {
     ) -> [Self; A] {
         let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
         let mut out = [Self::idle(); A];
+        let mut values = [Value::zero(); A];
         for a in 0..A {
             let Carried { argument, law, .. } = &channels[a];
             for i in 0..op.columns() {
@@ -376,21 +377,18 @@ impl<L: Lane> Carry<L> {
             }
             let m = out[a].argument;
             let normal = law.normal.line::<F, U>(sample)[0];
-            out[a].value = law.about::<F>(m, law.stiction::<F>(m)).here(normal);
+            values[a] = law.about::<F>(m, law.stiction::<F>(m)).here(normal);
         }
         for a in 0..A {
             let form = &channels[a].rate;
-            let mut rate = form.constant;
-            for b in 0..A {
-                rate = form.channels[b].fma::<F>(out[b].value.value, rate);
-            }
+            let mut rate = over_channels::<L, F, N, A>(form, &values, form.constant);
             for i in 0..op.columns() {
                 rate = form.state[i].fma::<F>(x[i], rate);
             }
             for drive in &op.drives {
                 rate = sample[drive.input][0].onto::<F>(drive.now[a], rate);
             }
-            out[a].rate = rate;
+            (out[a].value, out[a].rate) = (values[a], rate);
             out[a].near = rate.times(h) + out[a].argument;
             out[a].stiction = channels[a].law.stiction::<F>(out[a].near);
         }
