@@ -2,7 +2,7 @@
 //! μ over slip: the Stribeck law of a wet clutch (paper Figure 8), or a table.
 
 use super::error::{ModelError, require};
-use crate::number::{Real, Series};
+use crate::number::{INVERSE, Real, Series, TERMS};
 use serde::{Deserialize, Serialize};
 
 /// `μ(s) = μ_c + (μ_s - μ_c) exp(-|s|/v_s) + μ_v |s|`.
@@ -45,6 +45,40 @@ pub enum FrictionLaw<T> {
     Table(FrictionTable<T>),
 }
 
+/// Taylor coefficients in time of `E = exp(-|s|/v_s)`.
+#[derive(Clone, Debug)]
+pub struct Decay<T> {
+    /// -1/v_s, s/rad.
+    rate: T,
+    /// Those of the exponent, times their order.
+    slopes: Series<T>,
+    values: Series<T>,
+}
+
+impl<T: Real> Default for Decay<T> {
+    fn default() -> Self {
+        let zero = [T::zero_(); TERMS];
+        Self { rate: T::zero_(), slopes: zero, values: zero }
+    }
+}
+
+impl<T: Real> Decay<T> {
+    /// Fill in coefficient `k`, order by order: `E' = -(|s|'/v_s) E`.
+    fn term(&mut self, slip: &Series<T>, v_s: T, k: usize) -> T {
+        if k == 0 {
+            self.rate = -v_s.recip();
+            self.values[0] = (slip[0] * self.rate).exp();
+        } else {
+            self.slopes[k] = slip[k] * self.rate * k as f64;
+            let earlier = self.values[..k].iter().rev();
+            let products = self.slopes[1..=k].iter().zip(earlier);
+            let sum = products.fold(T::zero_(), |sum, (&slope, &value)| sum + slope * value);
+            self.values[k] = sum * INVERSE[k];
+        }
+        self.values[k]
+    }
+}
+
 impl<T> FrictionLaw<T> {
     /// The same law over another number type.
     pub(crate) fn map<U>(&self, f: &impl Fn(&T) -> U) -> FrictionLaw<U> {
@@ -82,12 +116,12 @@ impl<T: Real> FrictionLaw<T> {
     }
 
     /// Taylor coefficient `k` of μ in time along the coefficients of |slip|, on piece `piece` of a table.
-    /// `exponential` holds those of exp(-|s|/v_s); order by order `E' = -(|s|'/v_s) E`.
+    /// `decay` is that of a Stribeck law.
     pub fn series_term(
         &self,
         slip: &Series<T>,
         piece: usize,
-        exponential: &mut Series<T>,
+        decay: &mut Decay<T>,
         k: usize,
     ) -> T {
         match self {
@@ -96,16 +130,7 @@ impl<T: Real> FrictionLaw<T> {
                 if k == 0 { value + slope * (slip[0] - from) } else { slope * slip[k] }
             }
             Self::Stribeck(Stribeck { mu_c, mu_s, v_s, mu_v }) => {
-                exponential[k] = if k == 0 {
-                    (-slip[0] / *v_s).exp()
-                } else {
-                    let mut sum = T::zero_();
-                    for i in 1..=k {
-                        sum += slip[i] * exponential[k - i] * i as f64;
-                    }
-                    -sum / (*v_s * k as f64)
-                };
-                let mu = (*mu_s - *mu_c) * exponential[k] + *mu_v * slip[k];
+                let mu = (*mu_s - *mu_c) * decay.term(slip, *v_s, k) + *mu_v * slip[k];
                 if k == 0 { mu + *mu_c } else { mu }
             }
         }

@@ -5,7 +5,7 @@
 //! cell's borders.
 
 use super::cell::Cell;
-use crate::model::FrictionLaw;
+use crate::model::friction::{Decay, FrictionLaw};
 use crate::model::converter_map::ConverterMap;
 use crate::model::mechanism::{Normal, Region, TwistForm};
 use crate::model::torque_map::TorqueMap;
@@ -61,8 +61,8 @@ pub struct ChannelSeries<T> {
     slip: Series<T>,
     /// Normal load of a friction law, and the number of the last coefficient that is not zero.
     normal: (Series<T>, usize),
-    /// exp(-|s|/v_s) of a Stribeck law.
-    exponential: Series<T>,
+    /// That of a Stribeck law.
+    decay: Decay<T>,
     /// μ of a friction law.
     mu: Series<T>,
     /// The torque, N·m.
@@ -76,7 +76,7 @@ impl<T: Real> Default for ChannelSeries<T> {
             arguments: [zero, zero],
             slip: zero,
             normal: (zero, 0),
-            exponential: zero,
+            decay: Decay::default(),
             mu: zero,
             torque: zero,
         }
@@ -103,7 +103,12 @@ impl<T: Real> Normal<T> {
 
     /// All coefficients of the normal load.
     pub fn series(&self, inputs: &[Series<T>]) -> Series<T> {
-        std::array::from_fn(|k| self.term(inputs, k))
+        let mut series = match *self {
+            Self::Pressure { input, gain, .. } => inputs[input].map(|p| gain * p),
+            Self::Constant(_) => [T::zero_(); TERMS],
+        };
+        series[0] = self.term(inputs, 0);
+        series
     }
 }
 
@@ -129,7 +134,7 @@ impl<T: Real> Channel<T> {
             }
             (Law::Friction { mu, normal, .. }, Cell::Moving { sign, piece }) => {
                 c.slip[k] = s[k] * sign;
-                c.mu[k] = mu.series_term(&c.slip, piece, &mut c.exponential, k);
+                c.mu[k] = mu.series_term(&c.slip, piece, &mut c.decay, k);
                 let (load, last) = &mut c.normal;
                 load[k] = normal.term(inputs, k);
                 *last = if k <= 1 || load[k].re() != 0.0 { k } else { *last };

@@ -58,7 +58,8 @@ pub fn batch<'p>(
     (keep, threads): (Keep<'_>, usize),
 ) -> Batch {
     let per_run = if count == 0 { 0 } else { plan_of(0).kept(keep) };
-    let mut values = vec![f64::NAN; count * per_run];
+    // Zeros, which cost nothing before they are written to: each group does so in its own thread.
+    let mut values = vec![0.0; count * per_run];
     let runs = count.div_ceil(WIDTH);
     let group = |(g, values): (usize, &mut [f64])| {
         let first = g * WIDTH;
@@ -223,6 +224,11 @@ fn side_by_side<'p>(
             ends[*place] = End::of(status, &run.events);
         }
         together = rest;
+    }
+    for (end, values) in ends.iter().zip(values.chunks_exact_mut(per_run)) {
+        if end.outcome != Outcome::Ran(Status::Completed) {
+            values.fill(f64::NAN);
+        }
     }
     ends
 }

@@ -10,7 +10,7 @@ use super::inputs::Inputs;
 use super::integrator::{Integrator, Step};
 use super::lanes::{Task, dispatch};
 use super::march::{BLOCK, Carry, Guards, Room, Source, Trail, idle_guards, march, room};
-use super::operators::{MAX_ACTIVE, Operators};
+use super::operators::{Carried, MAX_ACTIVE, Operators};
 use super::sprint::{Lines, Ready, Samples, Sink};
 use super::status::Status;
 use crate::network::smooth::Sample;
@@ -203,7 +203,10 @@ impl<const N: usize> Formation<N> {
             return false;
         }
         self.hand_over(members, segment);
-        self.operators = Operators::idle();
+        // Those that march get all their places anew; what is left of others moves nothing that counts.
+        if slots.len() == MAX_ACTIVE - 1 {
+            self.operators.channels[MAX_ACTIVE - 1] = Carried::idle();
+        }
         let slots = std::mem::replace(&mut self.slots, slots);
         let watched = std::mem::replace(&mut self.watched, watched);
         self.rearrange(&slots, &watched);
