@@ -169,6 +169,15 @@ pub(super) fn last_lock<T: Real>(events: &[Event<T>]) -> Option<T> {
     events.iter().rfind(|event| event.kind == EventKind::Lock).map(|event| event.time)
 }
 
+/// A run of a batch that has been started.
+struct Started<'p> {
+    /// Its place among its neighbours.
+    place: usize,
+    run: Integrator<'p, f64>,
+    recorder: Recorder<'p, f64>,
+    outcome: Result<(), Status>,
+}
+
 /// Run up to [`WIDTH`] scenarios, those over the same knots together.
 fn side_by_side<'p>(
     members: &[usize],
@@ -181,49 +190,29 @@ fn side_by_side<'p>(
 ) -> Vec<End> {
     let prepared: Vec<Result<Prepared, SimulateError>> = members.iter().map(|&i| make(i)).collect();
     let mut ends: Vec<End> = Vec::with_capacity(members.len());
-    let mut together = Vec::with_capacity(members.len());
-    for (&i, prepared) in members.iter().zip(&prepared) {
+    let mut started = Vec::with_capacity(members.len());
+    for (place, (&i, prepared)) in members.iter().zip(&prepared).enumerate() {
         let nothing =
             End { outcome: Outcome::Ran(Status::Completed), events: 0, last_lock: f64::NAN };
         ends.push(match prepared {
             Err(error) => End { outcome: Outcome::Refused(error.clone()), ..nothing },
             Ok((network, state)) => match plan_of(i).start(network, state) {
                 Err(status) => End { outcome: Outcome::Ran(status), ..nothing },
-                Ok(run) => {
-                    together.push((ends.len(), run));
+                Ok((run, recorder)) => {
+                    started.push(Started { place, run, recorder, outcome: Ok(()) });
                     nothing
                 }
             },
         });
     }
+    run_all(&mut started);
     let per_run = values.len() / members.len();
-    while !together.is_empty() {
-        let knots = together[0].1.0.knots();
-        let states = together[0].1.0.x.len();
-        let fits = |run: &(Integrator<'_, f64>, Recorder<'_, f64>)| {
-            let same = std::ptr::eq(run.0.knots(), knots) || run.0.knots() == knots;
-            run.0.can_sprint() && same && run.0.x.len() == states
-        };
-        let (group, rest): (Vec<_>, Vec<_>) = if fits(&together[0].1) {
-            together.into_iter().partition(|(_, run)| fits(run))
-        } else {
-            let rest = together.split_off(1);
-            (together, rest)
-        };
-        let (places, mut runs): (Vec<usize>, Vec<_>) = group.into_iter().unzip();
-        let outcomes = if fits(&runs[0]) {
-            run_together(&mut runs)
-        } else {
-            runs.iter_mut().map(|(run, recorder)| recorder.run_to_end(run)).collect()
-        };
-        for ((place, outcome), (run, recorder)) in places.iter().zip(outcomes).zip(runs) {
-            let status = outcome.err().unwrap_or(Status::Completed);
-            if status == Status::Completed {
-                keep.reduce(&recorder.finish().0, &mut values[place * per_run..][..per_run]);
-            }
-            ends[*place] = End::of(status, &run.events);
+    for Started { place, run, recorder, outcome } in started {
+        let status = outcome.err().unwrap_or(Status::Completed);
+        if status == Status::Completed {
+            keep.reduce(&recorder.finish().0, &mut values[place * per_run..][..per_run]);
         }
-        together = rest;
+        ends[place] = End::of(status, &run.events);
     }
     for (end, values) in ends.iter().zip(values.chunks_exact_mut(per_run)) {
         if end.outcome != Outcome::Ran(Status::Completed) {
@@ -231,6 +220,28 @@ fn side_by_side<'p>(
         }
     }
     ends
+}
+
+/// Bring runs to their ends: those that pass samples over the same knots with as many states together.
+fn run_all(started: &mut [Started<'_>]) {
+    let (mut marching, alone): (Vec<_>, Vec<_>) =
+        started.iter_mut().partition(|one| one.run.can_sprint());
+    for one in alone {
+        one.outcome = one.recorder.run_to_end(&mut one.run);
+    }
+    while let Some(first) = marching.first() {
+        let (knots, states) = (first.run.knots(), first.run.x.len());
+        let (mut group, rest): (Vec<_>, Vec<_>) = marching.into_iter().partition(|one| {
+            let same = std::ptr::eq(one.run.knots(), knots) || one.run.knots() == knots;
+            same && one.run.x.len() == states
+        });
+        let runs = group.iter_mut().map(|one| (&mut one.run, &mut one.recorder));
+        let outcomes = run_together(runs);
+        for (one, outcome) in group.into_iter().zip(outcomes) {
+            one.outcome = outcome;
+        }
+        marching = rest;
+    }
 }
 
 impl Keep<'_> {

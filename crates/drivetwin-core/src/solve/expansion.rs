@@ -16,6 +16,8 @@ pub struct Expansion<T> {
     pub inputs: Vec<Series<T>>,
     /// Highest coefficient that is filled in.
     pub order: usize,
+    /// The same of the inputs.
+    input_order: usize,
     /// One coefficient of the whole basis.
     basis: Vec<T>,
     /// 1 over the scale of each state.
@@ -39,6 +41,7 @@ impl<T: Real> Expansion<T> {
             channels: vec![ChannelSeries::default(); network.channels.len()],
             inputs: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             order: 0,
+            input_order: 0,
             basis: Vec::with_capacity(network.basis()),
             scales: vec![0.0; network.states()],
         }
@@ -49,8 +52,9 @@ impl<T: Real> Expansion<T> {
         let value = |series: &Series<T>| evaluate(series, self.order, h);
         basis.clear();
         basis.extend(self.states.iter().map(value));
-        basis.extend(self.inputs.iter().map(|input| evaluate(input, TERMS - 1, h)));
-        let rate = |&(_, input): &(Vec<T>, usize)| slope(&self.inputs[input], TERMS - 1, h);
+        basis.extend(self.inputs.iter().map(|input| evaluate(input, self.input_order, h)));
+        let rate =
+            |&(_, input): &(Vec<T>, usize)| slope(&self.inputs[input], self.input_order, h);
         basis.extend(network.prescribed.iter().map(rate));
         basis.push(T::of(1.0));
         basis.extend(self.channels.iter().map(|channel| value(&channel.torque)));
@@ -73,6 +77,7 @@ impl<T: Real> Expansion<T> {
         self.basis.clear();
         self.basis.resize(network.basis(), T::zero_());
         let curved = self.inputs.iter().any(|u| u[2].re() != 0.0 || u[3].re() != 0.0);
+        self.input_order = if curved { TERMS - 1 } else { 1 };
         let last = accuracy.order.unwrap_or(TERMS - 1);
         let products = network.channels.iter().any(Channel::is_product);
         // Successive terms that must be small: every other one of an even or odd motion is zero, and

@@ -43,11 +43,10 @@ struct Member<'r, 'a, S> {
 }
 
 /// Run up to [`WIDTH`] integrators, all over the same knots and with as many states, to their ends.
-pub fn run_together<'a, S: Recording>(
-    runs: &mut [(Integrator<'a, f64>, S)],
+pub fn run_together<'r, 'a: 'r, S: Recording + 'r>(
+    runs: impl Iterator<Item = (&'r mut Integrator<'a, f64>, &'r mut S)>,
 ) -> Vec<Result<(), Status>> {
-    let mut members: Vec<Member<'_, 'a, S>> = runs
-        .iter_mut()
+    let mut members: Vec<Member<'r, 'a, S>> = runs
         .map(|(run, sink)| {
             let (ready, outcome) = (None, Ok(()));
             let mut member = Member { run, sink, ready, until: 0, from: 0, joined: false, outcome };
@@ -102,6 +101,8 @@ struct Formation<const N: usize> {
     slots: Vec<usize>,
     /// Watched guards by number, likewise.
     watched: Vec<usize>,
+    /// Both as bits.
+    union: (u64, u64),
     x: [Lanes; N],
     carry: [Carry<Lanes>; MAX_ACTIVE],
     guards: Guards<Lanes>,
@@ -117,6 +118,7 @@ impl<const N: usize> Formation<N> {
             operators: Operators::idle(),
             slots: Vec::new(),
             watched: Vec::new(),
+            union: (0, 0),
             x: [zero; N],
             carry: [Carry::idle(); MAX_ACTIVE],
             guards: idle_guards(),
@@ -190,18 +192,18 @@ impl<const N: usize> Formation<N> {
 
     /// Find places for the channels and guards of all that march; whether they are others than before.
     fn arrange<S: Recording>(&mut self, members: &mut [Member<'_, '_, S>], segment: usize) -> bool {
-        let (mut slots, mut watched) = (Vec::new(), Vec::new());
+        let (mut slots, mut watched) = (0_u64, 0_u64);
         for ready in members.iter().filter(|m| m.joined).filter_map(|m| m.ready.as_ref()) {
-            slots.extend(&ready.active);
-            watched.extend(operators_of::<N>(ready).watched.iter().map(|w| w.id));
+            slots = ready.active.iter().fold(slots, |bits, j| bits | 1 << j);
+            let guards = operators_of::<N>(ready).watched.iter();
+            watched = guards.fold(watched, |bits, guard| bits | 1 << guard.id);
         }
-        for union in [&mut slots, &mut watched] {
-            union.sort_unstable();
-            union.dedup();
-        }
-        if (&slots, &watched) == (&self.slots, &self.watched) {
+        if (slots, watched) == self.union {
             return false;
         }
+        self.union = (slots, watched);
+        let places = |bits: u64| (0..64).filter(|id| bits >> id & 1 == 1).collect::<Vec<usize>>();
+        let (slots, watched) = (places(slots), places(watched));
         self.hand_over(members, segment);
         // Those that march get all their places anew; what is left of others moves nothing that counts.
         if slots.len() == MAX_ACTIVE - 1 {

@@ -167,8 +167,9 @@ impl<'a, T: Real> Integrator<'a, T> {
         let network = known.network;
         let t = inputs.span(0).0;
         let frictions = network.frictions.len();
-        let none = || vec![T::zero_(); frictions];
-        let mode = known.mode(ModeKey::default(), none).ok_or_else(|| self_locking(network, t))?;
+        let key = ModeKey::default();
+        let mode = known.known_mode(key).or_else(|| known.new_mode(key, &vec![T::zero_(); frictions]));
+        let mode = mode.ok_or_else(|| self_locking(network, t))?;
         let mut run = Self {
             rows: vec![RowState::Open; frictions],
             expansion: Expansion::new(network),
@@ -296,8 +297,10 @@ impl<'a, T: Real> Integrator<'a, T> {
 
     /// Mode of a key, compiled once.
     pub(super) fn mode(&mut self, key: ModeKey) -> Result<Arc<Mode<T>>, Status> {
-        let capacities = self.capacities();
-        let mode = self.known.mode(key, || capacities);
+        if let Some(mode) = self.known.known_mode(key) {
+            return Ok(mode);
+        }
+        let mode = self.known.new_mode(key, &self.capacities());
         mode.ok_or_else(|| self_locking(self.network, self.t.re()))
     }
 

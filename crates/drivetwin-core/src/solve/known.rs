@@ -27,17 +27,15 @@ impl<'n, T> Known<'n, T> {
 }
 
 impl<T: Real> Known<'_, T> {
-    /// A mode; `capacities` weigh the torque split of redundant locks. `None` if the efficiencies leave the
-    /// accelerations undetermined.
-    pub(super) fn mode(
-        &mut self,
-        key: ModeKey,
-        capacities: impl FnOnce() -> Vec<T>,
-    ) -> Option<Arc<Mode<T>>> {
-        if let Some(mode) = self.modes.get(&key) {
-            return Some(Arc::clone(mode));
-        }
-        let mode = Arc::new(self.network.mode(key, &capacities())?);
+    /// A mode that runs have needed.
+    pub(super) fn known_mode(&self, key: ModeKey) -> Option<Arc<Mode<T>>> {
+        self.modes.get(&key).map(Arc::clone)
+    }
+
+    /// A mode that is compiled; `capacities` weigh the torque split of redundant locks. `None` if the
+    /// efficiencies leave the accelerations undetermined.
+    pub(super) fn new_mode(&mut self, key: ModeKey, capacities: &[T]) -> Option<Arc<Mode<T>>> {
+        let mode = Arc::new(self.network.mode(key, capacities)?);
         if !mode.redundant {
             self.modes.insert(key, Arc::clone(&mode));
         }
