@@ -152,6 +152,9 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let half = 0.5 * h * h;
             let turned = turn * ds.times(half);
             self.cubics[a][2] = v.by_argument.times(half).fma::<F>(second, turned);
+            if L::DERIVATIVES {
+                continue;
+            }
             // The second derivative comes late: all else is summed up before it.
             let (straight, bend) = (ds.times(2.0 * h) + carry[a].argument, 2.0 * h * h);
             let Law { rate, .. } = channels[a].law;
@@ -161,6 +164,9 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let decay = rate.times(-bend).fma::<F>(second, decay);
             farthest = farthest.larger(decay.values().magnitude());
             faded[a] = carry[a].stiction.grown::<F>(decay);
+        }
+        if L::DERIVATIVES {
+            return about;
         }
         let far = (L::Values::all(SMALL) - farthest).negative();
         if far != 0 {
@@ -185,19 +191,20 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         for a in 0..A {
             let Carried { argument, argument_end, rate, rate_end, law, .. } = &channels[a];
             let [near, stiction] = about[a];
-            let distance = if L::DERIVATIVES {
-                // Few products by way of the state, where they count for more than their order.
+            let normal = self.normal[a][1].times(h) + self.normal[a][0];
+            if L::DERIVATIVES {
+                // Few products, by way of the state and at the argument itself, where they count for more
+                // than their order.
                 self.argument[a] = over_state::<L, F, N>(op, argument, &self.end);
                 self.rate[a] = over_state::<L, F, N>(op, &rate.state, &self.end);
-                self.argument[a] - near
-            } else {
-                let (cubics, from_near) = (&self.cubics, self.argument[a] - near);
-                self.rate[a] = over_cubics::<L, F, N, A, 0, 3>(rate_end, cubics, self.rate[a]);
-                let distance = over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, from_near);
-                self.argument[a] = near + distance;
-                distance
-            };
-            let normal = self.normal[a][1].times(h) + self.normal[a][0];
+                let stiction = law.stiction::<F>(self.argument[a]);
+                self.value[a] = law.about::<F>(self.argument[a], stiction).here(normal);
+                continue;
+            }
+            let (cubics, from_near) = (&self.cubics, self.argument[a] - near);
+            self.rate[a] = over_cubics::<L, F, N, A, 0, 3>(rate_end, cubics, self.rate[a]);
+            let distance = over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, from_near);
+            self.argument[a] = near + distance;
             let friction = law.about::<F>(near, stiction);
             self.value[a] = friction.at::<F>(distance, normal);
             let moved = law.rate * distance;
