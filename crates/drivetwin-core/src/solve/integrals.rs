@@ -37,12 +37,13 @@ pub fn integrals<T: Real, const F: bool, const N: usize>(
     (h, reach): (f64, f64),
 ) -> [Square<T, N>; CUBIC + 1] {
     let mut all = [[[T::zero_(); N]; N]; CUBIC + 1];
-    let mut sum = [[T::zero_(); N]; N];
-    add_to_diagonal(&mut sum, 1.0);
-    for i in (1..terms(reach)).rev() {
-        sum = multiply::<T, F, N>((a, h / (i + CUBIC) as f64), &sum);
-        add_to_diagonal(&mut sum, 1.0);
+    // Of the series but for its first factor.
+    let mut coefficients = [0.0; MAX_SERIES + 2];
+    coefficients[0] = 1.0;
+    for i in 1..terms(reach) {
+        coefficients[i] = coefficients[i - 1] * h / (i + CUBIC) as f64;
     }
+    let sum = polynomial::<T, F, N>(a, &coefficients[..terms(reach).next_multiple_of(3)]);
     let mut weights = [1.0; CUBIC + 1];
     for k in 1..=CUBIC {
         weights[k] = weights[k - 1] * h / k as f64;
@@ -57,6 +58,31 @@ pub fn integrals<T: Real, const F: bool, const N: usize>(
         add_to_diagonal(&mut all[k], weights[k]);
     }
     all
+}
+
+/// `Σ c_i A^i` over whole threes of coefficients, with a third of the products: by Horner's rule over the
+/// cube (Paterson and Stockmeyer 1973).
+#[inline(always)]
+fn polynomial<T: Real, const F: bool, const N: usize>(
+    a: &Square<T, N>,
+    coefficients: &[f64],
+) -> Square<T, N> {
+    let square = multiply::<T, F, N>((a, 1.0), a);
+    let cube = multiply::<T, F, N>((a, 1.0), &square);
+    let mut sum = [[T::zero_(); N]; N];
+    for at in (0..coefficients.len()).step_by(3).rev() {
+        if at + 3 < coefficients.len() {
+            sum = multiply::<T, F, N>((&cube, 1.0), &sum);
+        }
+        for i in 0..N {
+            for j in 0..N {
+                let low = a[i][j].fma_times::<F>(coefficients[at + 1], sum[i][j]);
+                sum[i][j] = square[i][j].fma_times::<F>(coefficients[at + 2], low);
+            }
+        }
+        add_to_diagonal(&mut sum, coefficients[at]);
+    }
+    sum
 }
 
 #[inline(always)]

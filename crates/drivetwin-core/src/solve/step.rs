@@ -12,7 +12,7 @@ const MAX_CUBIC: f64 = 2e-4;
 /// Largest distance over which stiction is moved by its series, relative to its decay.
 const MAX_MOVE: f64 = 0.05;
 /// Largest change of a channel by the correction, likewise.
-const MAX_CORRECTION: f64 = 2e-6;
+const MAX_CORRECTION: f64 = 1e-6;
 
 /// Places among the shapes of what raises the value and the slope at the end.
 const VALUE: usize = 3;
