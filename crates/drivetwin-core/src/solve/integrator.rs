@@ -87,7 +87,7 @@ impl Default for Settings {
 
 /// Truncation error allowed in steps between samples that are passed by operators, whose own error is
 /// larger.
-pub const AMID_SAMPLES: f64 = 1e-9;
+pub const AMID_SAMPLES: f64 = 1e-8;
 
 /// One step: the expansion of the integrator holds from `start` for `length` seconds.
 #[derive(Clone, Copy, Debug)]
