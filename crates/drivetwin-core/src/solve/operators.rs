@@ -53,8 +53,6 @@ pub struct Drive<L, const N: usize> {
     pub step: [[L; N]; 2],
     /// On the arguments at the end.
     pub argument: [[L; 2]; MAX_ACTIVE],
-    /// On the part of their rates there that comes from the state.
-    pub rate: [[L; 2]; MAX_ACTIVE],
     /// On the rates of the arguments, directly.
     pub now: [L; MAX_ACTIVE],
     /// On their second derivatives at the start, by the state.
@@ -94,8 +92,8 @@ pub struct Carried<L, const N: usize> {
     pub argument: [L; N],
     /// Argument at the end.
     pub argument_end: StepForm<L, N>,
-    /// Rate of the argument at the end as far as it comes from the state.
-    pub rate_end: StepForm<L, N>,
+    /// What the cubics of the carried channels add to its rate at the end by way of the state.
+    pub rate_end: [[L; SHAPES]; MAX_ACTIVE],
     /// Rate of the argument at any instant.
     pub rate: Form<L, N>,
     /// Second derivative at the start but for the rates of inputs and channels.
@@ -151,12 +149,11 @@ impl<T: Real, const N: usize> Operators<T, N> {
             let [held, ramp] = &drive.step;
             drive.argument[slot] =
                 [dot::<T, F, N>(&argument, held), dot::<T, F, N>(&argument, ramp)];
-            drive.rate[slot] = [dot::<T, F, N>(&rate, held), dot::<T, F, N>(&rate, ramp)];
             drive.now[slot] = now[network.first_input() + drive.input];
             drive.second[slot] = second[network.first_input() + drive.input];
         }
         let argument_end = self.at_end::<F>(&argument, moments);
-        let rate_end = self.at_end::<F>(&rate, moments);
+        let rate_end = over_moments::<T, F, N>(&rate, moments);
         self.channels.push(Carried {
             moments: moments[slot],
             argument,
@@ -176,11 +173,7 @@ impl<T: Real, const N: usize> Operators<T, N> {
             form.state[j] = dot::<T, F, N>(row, &self.transition[j]);
         }
         form.constant = dot::<T, F, N>(row, &self.constant);
-        for (cubic, moments) in form.cubics.iter_mut().zip(moments) {
-            for k in 0..SHAPES {
-                cubic[k] = dot::<T, F, N>(row, &moments[k]);
-            }
-        }
+        form.cubics = over_moments::<T, F, N>(row, moments);
         form
     }
 
@@ -269,6 +262,21 @@ impl<T: Real, const N: usize> Task for Build<'_, T, N> {
     }
 }
 
+/// A form over the states, over the cubics of the carried channels at the end of a sample.
+#[inline(always)]
+fn over_moments<T: Real, const F: bool, const N: usize>(
+    row: &[T; N],
+    moments: &[[[T; N]; SHAPES]],
+) -> [[T; SHAPES]; MAX_ACTIVE] {
+    let mut cubics = [[T::zero_(); SHAPES]; MAX_ACTIVE];
+    for (cubic, moments) in cubics.iter_mut().zip(moments) {
+        for k in 0..SHAPES {
+            cubic[k] = dot::<T, F, N>(row, &moments[k]);
+        }
+    }
+    cubics
+}
+
 /// Rates of the states by one entry of the basis.
 #[inline(always)]
 fn forcing<T: Real, const N: usize>(mode: &Mode<T>, column: usize) -> [T; N] {
@@ -311,7 +319,6 @@ impl<L: Lane, const N: usize> Drive<L, N> {
             input: 0,
             step: [[none; N]; 2],
             argument: [[none; 2]; MAX_ACTIVE],
-            rate: [[none; 2]; MAX_ACTIVE],
             now: [none; MAX_ACTIVE],
             second: [none; MAX_ACTIVE],
             watched: [none; MAX_WATCHED],
@@ -327,7 +334,7 @@ impl<L: Lane, const N: usize> Carried<L, N> {
             moments: [[none; N]; SHAPES],
             argument: [none; N],
             argument_end: StepForm::idle(),
-            rate_end: StepForm::idle(),
+            rate_end: [[none; SHAPES]; MAX_ACTIVE],
             rate: Form::idle(),
             second: Form::idle(),
             law: Law::idle(),

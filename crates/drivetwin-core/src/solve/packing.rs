@@ -93,7 +93,6 @@ impl<const K: usize, const N: usize> Drive<Pack<K>, N> {
             let own = own(slot);
             let value = |of: &[f64]| own.map_or(0.0, |own| of[own]);
             put(&mut self.argument[slot], &own.map_or([0.0; 2], |own| from.argument[own]), lane);
-            put(&mut self.rate[slot], &own.map_or([0.0; 2], |own| from.rate[own]), lane);
             self.now[slot].0[lane] = value(&from.now);
             self.second[slot].0[lane] = value(&from.second);
         }
@@ -129,7 +128,7 @@ impl<const K: usize, const N: usize> Carried<Pack<K>, N> {
         put(self.moments.as_flattened_mut(), from.moments.as_flattened(), lane);
         put(&mut self.argument, &from.argument, lane);
         self.argument_end.set_lane(lane, &from.argument_end, own);
-        self.rate_end.set_lane(lane, &from.rate_end, own);
+        put_cubics(&mut self.rate_end, lane, (&from.rate_end, own));
         self.rate.set_lane(lane, &from.rate, own);
         self.second.set_lane(lane, &from.second, own);
         self.law.set_lane(lane, &from.law);
@@ -151,9 +150,21 @@ impl<const K: usize, const N: usize> StepForm<Pack<K>, N> {
     ) {
         put(&mut self.state, &from.state, lane);
         self.constant.0[lane] = from.constant;
-        for (slot, cubic) in self.cubics.iter_mut().enumerate().take(slots) {
-            put(cubic, &own(slot).map_or([0.0; SHAPES], |own| from.cubics[own]), lane);
-        }
+        put_cubics(&mut self.cubics, lane, (&from.cubics, (own, slots)));
+    }
+}
+
+/// What stands over the cubics of the carried channels.
+fn put_cubics<const K: usize>(
+    to: &mut [[Pack<K>; SHAPES]; MAX_ACTIVE],
+    lane: usize,
+    (from, (own, slots)): (
+        &[[f64; SHAPES]; MAX_ACTIVE],
+        Own<impl Fn(usize) -> Option<usize>>,
+    ),
+) {
+    for (slot, cubic) in to.iter_mut().enumerate().take(slots) {
+        put(cubic, &own(slot).map_or([0.0; SHAPES], |own| from[own]), lane);
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::lanes::{Task, dispatch};
 use super::march::Carry;
-use super::operators::{Carried, Form, Operators, SHAPES, StepForm};
+use super::operators::{Carried, Form, MAX_ACTIVE, Operators, SHAPES};
 use crate::network::smooth::{Law, Sample, Value};
 use crate::number::{Factor, Lane, SMALL, Values};
 
@@ -81,7 +81,6 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         for a in 0..A {
             let c = &channels[a];
             s.argument[a] = c.argument_end.constant;
-            s.rate[a] = c.rate_end.constant;
             s.direct[a] = c.rate.constant;
             s.second[a] = c.second.constant;
             s.normal[a] = c.law.normal.line::<F, U>(sample);
@@ -95,7 +94,6 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             for a in 0..A {
                 if !L::DERIVATIVES {
                     s.argument[a] = pair::<L, U, F>(&drive.argument[a], (u, du), s.argument[a]);
-                    s.rate[a] = pair::<L, U, F>(&drive.rate[a], (u, du), s.rate[a]);
                 }
                 s.direct[a] = u_end.onto::<F>(drive.now[a], s.direct[a]);
                 s.second[a] = u.onto::<F>(drive.second[a], du.onto::<F>(drive.now[a], s.second[a]));
@@ -109,7 +107,6 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                 let c = &channels[a];
                 if !L::DERIVATIVES {
                     s.argument[a] = c.argument_end.state[j].fma::<F>(x[j], s.argument[a]);
-                    s.rate[a] = c.rate_end.state[j].fma::<F>(x[j], s.rate[a]);
                 }
             }
         }
@@ -189,21 +186,20 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
     ) {
         add_moments::<L, F, N, A, 0, 3>(op, &self.cubics, &mut self.end);
         for a in 0..A {
-            let Carried { argument, argument_end, rate, rate_end, law, .. } = &channels[a];
+            let Carried { argument, argument_end, rate, law, .. } = &channels[a];
             let [near, stiction] = about[a];
             let normal = self.normal[a][1].times(h) + self.normal[a][0];
+            self.rate[a] = over_state::<L, F, N>(op, &rate.state, &self.end);
             if L::DERIVATIVES {
                 // Few products, by way of the state and at the argument itself, where they count for more
                 // than their order.
                 self.argument[a] = over_state::<L, F, N>(op, argument, &self.end);
-                self.rate[a] = over_state::<L, F, N>(op, &rate.state, &self.end);
                 let stiction = law.stiction::<F>(self.argument[a]);
                 self.value[a] = law.about::<F>(self.argument[a], stiction).here(normal);
                 continue;
             }
             let (cubics, from_near) = (&self.cubics, self.argument[a] - near);
-            self.rate[a] = over_cubics::<L, F, N, A, 0, 3>(rate_end, cubics, self.rate[a]);
-            let distance = over_cubics::<L, F, N, A, 0, 3>(argument_end, cubics, from_near);
+            let distance = over_cubics::<L, F, A, 0, 3>(&argument_end.cubics, cubics, from_near);
             self.argument[a] = near + distance;
             let friction = law.about::<F>(near, stiction);
             self.value[a] = friction.at::<F>(distance, normal);
@@ -241,9 +237,9 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         for a in 0..A {
             let Carried { argument_end, rate_end, .. } = &channels[a];
             let none = L::all(0.0);
-            let ds = over_cubics::<L, F, N, A, VALUE, SHAPES>(argument_end, &missing, none);
+            let ds = over_cubics::<L, F, A, VALUE, SHAPES>(&argument_end.cubics, &missing, none);
             let rate = self.rate[a];
-            self.rate[a] = over_cubics::<L, F, N, A, VALUE, SHAPES>(rate_end, &missing, rate);
+            self.rate[a] = over_cubics::<L, F, A, VALUE, SHAPES>(rate_end, &missing, rate);
             let corrected = self.value[a].moved::<F>(ds);
             let correction = (corrected.value - self.value[a].value).values().magnitude();
             let [.., value, slope] = missing[a];
@@ -347,22 +343,15 @@ fn over_state<L: Lane, const F: bool, const N: usize>(
 }
 
 #[inline(always)]
-fn over_cubics<
-    L: Lane,
-    const F: bool,
-    const N: usize,
-    const A: usize,
-    const FROM: usize,
-    const TO: usize,
->(
-    form: &StepForm<L, N>,
+fn over_cubics<L: Lane, const F: bool, const A: usize, const FROM: usize, const TO: usize>(
+    form: &[[L; SHAPES]; MAX_ACTIVE],
     cubics: &[[L; SHAPES]; A],
     sum: L,
 ) -> L {
     let mut sum = sum;
     for k in FROM..TO {
         for a in 0..A {
-            sum = form.cubics[a][k].fma::<F>(cubics[a][k], sum);
+            sum = form[a][k].fma::<F>(cubics[a][k], sum);
         }
     }
     sum
