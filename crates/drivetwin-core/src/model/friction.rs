@@ -117,13 +117,7 @@ impl<T: Real> FrictionLaw<T> {
 
     /// Taylor coefficient `k` of μ in time along the coefficients of |slip|, on piece `piece` of a table.
     /// `decay` is that of a Stribeck law.
-    pub fn series_term(
-        &self,
-        slip: &Series<T>,
-        piece: usize,
-        decay: &mut Decay<T>,
-        k: usize,
-    ) -> T {
+    pub fn series_term(&self, slip: &Series<T>, piece: usize, decay: &mut Decay<T>, k: usize) -> T {
         match self {
             Self::Table(table) => {
                 let (Piece { from, value, slope }, _) = table.piece(piece);

@@ -5,8 +5,8 @@
 //! cell's borders.
 
 use super::cell::Cell;
-use crate::model::friction::{Decay, FrictionLaw};
 use crate::model::converter_map::ConverterMap;
+use crate::model::friction::{Decay, FrictionLaw};
 use crate::model::mechanism::{Normal, Region, TwistForm};
 use crate::model::torque_map::TorqueMap;
 use crate::number::{Real, Series, TERMS, product_term};

@@ -7,7 +7,7 @@ use super::status::Status;
 use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::{Cell, GearState, Mode, ModeKey, Row};
-use crate::number::{Real, evaluate};
+use crate::number::{Real, TERMS, evaluate};
 use std::sync::Arc;
 
 /// A trial: the state of every friction element and of every lossy gear.
@@ -110,7 +110,7 @@ impl<T: Real> Integrator<'_, T> {
     fn look_ahead(&mut self) {
         let remaining = self.inputs.span(self.segment).1 - self.t.re();
         let moment = T::of(LOOK_AHEAD.min(1e-4 * remaining.max(0.0)));
-        let order = self.inputs.order();
+        let order = if self.inputs.is_sampled() { 1 } else { TERMS - 1 };
         for (ahead, now) in self.ahead.iter_mut().zip(&self.expansion.inputs) {
             *ahead = *now;
             ahead[0] = evaluate(now, order, moment);
@@ -151,7 +151,7 @@ impl<T: Real> Integrator<'_, T> {
     }
 
     /// The basis at this instant under a trial.
-    fn basis_now(&self, trial: &Assignment, candidates: &[Row]) -> Vec<T> {
+    fn basis_now(&mut self, trial: &Assignment, candidates: &[Row]) -> Vec<T> {
         let mut basis = self.basis_without_channels();
         for (j, row) in self.network.frictions.iter().enumerate() {
             let at_rest = candidates.contains(&Row::Friction(j));

@@ -53,8 +53,7 @@ impl<T: Real> Expansion<T> {
         basis.clear();
         basis.extend(self.states.iter().map(value));
         basis.extend(self.inputs.iter().map(|input| evaluate(input, self.input_order, h)));
-        let rate =
-            |&(_, input): &(Vec<T>, usize)| slope(&self.inputs[input], self.input_order, h);
+        let rate = |&(_, input): &(Vec<T>, usize)| slope(&self.inputs[input], self.input_order, h);
         basis.extend(network.prescribed.iter().map(rate));
         basis.push(T::of(1.0));
         basis.extend(self.channels.iter().map(|channel| value(&channel.torque)));

@@ -413,11 +413,11 @@ struct LaneView<'f, const N: usize> {
 }
 
 impl<const N: usize> Samples<f64> for LaneView<'_, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> + Clone {
         let lane = self.lane % WIDTH;
         self.trail.states(i)[self.first..].iter().map(move |x| x.0[lane])
     }
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> + Clone {
         let torques = &self.trail.torques(self.places[slot])[self.first..];
         let lane = self.lane % WIDTH;
         torques.iter().map(move |torque| torque.0[lane])
@@ -431,10 +431,10 @@ struct LastSample<'f, const N: usize> {
 }
 
 impl<const N: usize> Samples<f64> for LastSample<'_, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> + Clone {
         std::iter::once(self.x[i])
     }
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> + Clone {
         std::iter::once(self.torques[slot])
     }
 }

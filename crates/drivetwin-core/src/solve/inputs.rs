@@ -2,7 +2,7 @@
 //! Inputs over time, linear between samples.
 
 use super::sprint::WORTH_WHILE;
-use crate::number::{Real, Series, TERMS};
+use crate::number::{Real, Series};
 use thiserror::Error;
 
 /// How one input varies.
@@ -231,11 +231,6 @@ impl<T: Real> Inputs<T> {
     /// Whether all inputs are linear within every segment.
     pub fn is_sampled(&self) -> bool {
         self.sines.iter().all(Option::is_none)
-    }
-
-    /// Highest coefficient of their series.
-    pub fn order(&self) -> usize {
-        if self.is_sampled() { 1 } else { TERMS - 1 }
     }
 
     /// Whether every point of an increasing grid [s] is a knot.

@@ -8,6 +8,7 @@ use super::known::Known;
 use super::march::Column;
 use super::sprint::{Sink, can_march};
 use super::status::Status;
+use crate::network::channel::ChannelSeries;
 use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
 use crate::number::{Real, Series, TERMS};
 use std::sync::Arc;
@@ -137,6 +138,7 @@ pub struct Integrator<'a, T> {
     /// Inputs and state as decisions see them.
     pub(super) ahead: Vec<Series<T>>,
     pub(super) x_ahead: Vec<T>,
+    pub(super) channel_ahead: ChannelSeries<T>,
     /// States of lossy gears during the last step.
     pub gears: Vec<GearState>,
     pub(super) inputs: &'a Inputs<T>,
@@ -168,7 +170,8 @@ impl<'a, T: Real> Integrator<'a, T> {
         let t = inputs.span(0).0;
         let frictions = network.frictions.len();
         let key = ModeKey::default();
-        let mode = known.known_mode(key).or_else(|| known.new_mode(key, &vec![T::zero_(); frictions]));
+        let mode =
+            known.known_mode(key).or_else(|| known.new_mode(key, &vec![T::zero_(); frictions]));
         let mode = mode.ok_or_else(|| self_locking(network, t))?;
         let mut run = Self {
             rows: vec![RowState::Open; frictions],
@@ -181,6 +184,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             pressed: vec![false; frictions],
             blocked: vec![false; network.losses.len()],
             x_ahead: x.clone(),
+            channel_ahead: ChannelSeries::default(),
             x,
             ahead: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             gears: vec![GearState::Rolling { sign: 1.0, backward: false }; network.losses.len()],

@@ -369,7 +369,6 @@ impl<L: Lane> Carry<L> {
     ) -> [Self; A] {
         let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
         let mut out = [Self::idle(); A];
-        let mut values = [Value::zero(); A];
         for a in 0..A {
             let Carried { argument, law, .. } = &channels[a];
             for i in 0..op.columns() {
@@ -377,18 +376,18 @@ impl<L: Lane> Carry<L> {
             }
             let m = out[a].argument;
             let normal = law.normal.line::<F, U>(sample)[0];
-            values[a] = law.about::<F>(m, law.stiction::<F>(m)).here(normal);
+            out[a].value = law.about::<F>(m, law.stiction::<F>(m)).here(normal);
         }
         for a in 0..A {
             let form = &channels[a].rate;
-            let mut rate = over_channels::<L, F, N, A>(form, &values, form.constant);
+            let mut rate = over_channels::<L, F, N, A>(form, &out, form.constant);
             for i in 0..op.columns() {
                 rate = form.state[i].fma::<F>(x[i], rate);
             }
             for drive in &op.drives {
                 rate = sample[drive.input][0].onto::<F>(drive.now[a], rate);
             }
-            (out[a].value, out[a].rate) = (values[a], rate);
+            out[a].rate = rate;
             out[a].near = rate.times(h) + out[a].argument;
             out[a].stiction = channels[a].law.stiction::<F>(out[a].near);
         }

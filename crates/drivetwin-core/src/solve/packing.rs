@@ -158,10 +158,7 @@ impl<const K: usize, const N: usize> StepForm<Pack<K>, N> {
 fn put_cubics<const K: usize>(
     to: &mut [[Pack<K>; SHAPES]; MAX_ACTIVE],
     lane: usize,
-    (from, (own, slots)): (
-        &[[f64; SHAPES]; MAX_ACTIVE],
-        Own<impl Fn(usize) -> Option<usize>>,
-    ),
+    (from, (own, slots)): (&[[f64; SHAPES]; MAX_ACTIVE], Own<impl Fn(usize) -> Option<usize>>),
 ) {
     for (slot, cubic) in to.iter_mut().enumerate().take(slots) {
         put(cubic, &own(slot).map_or([0.0; SHAPES], |own| from[own]), lane);

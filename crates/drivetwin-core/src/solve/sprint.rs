@@ -95,17 +95,17 @@ pub trait Sink<T> {
 /// States and torques of the active channels at the start of samples, at least of those passed.
 pub trait Samples<T> {
     /// State `i`.
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>>;
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>> + Clone;
 
     /// Torque of the active channel number `slot`.
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>>;
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>> + Clone;
 }
 
 impl<T: Real, const N: usize> Samples<T> for Trail<T, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>> {
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>> + Clone {
         self.states(i).iter()
     }
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>> {
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>> + Clone {
         self.torques(slot).iter()
     }
 }

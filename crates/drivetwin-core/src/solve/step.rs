@@ -4,7 +4,7 @@
 use super::lanes::{Task, dispatch};
 use super::march::Carry;
 use super::operators::{Carried, Form, MAX_ACTIVE, Operators, SHAPES};
-use crate::network::smooth::{Law, Sample, Value};
+use crate::network::smooth::{Law, Sample};
 use crate::number::{Factor, Lane, SMALL, Values};
 
 /// Largest cubic part of a channel over a sample, relative to the largest of all.
@@ -14,9 +14,10 @@ const MAX_MOVE: f64 = 0.05;
 /// Largest change of a channel by the correction, likewise.
 const MAX_CORRECTION: f64 = 1e-6;
 
-/// Places among the shapes of what raises the value and the slope at the end.
-const VALUE: usize = 3;
-const SLOPE: usize = 4;
+/// Number of shapes that value, rate and second derivative at the start give.
+const START: usize = 3;
+/// Number of those after them, which raise the value and the slope at the end.
+const END: usize = SHAPES - START;
 
 /// What a sample leads to, as far as it is known.
 struct Sampling<L: Lane, const N: usize, const A: usize> {
@@ -32,10 +33,10 @@ struct Sampling<L: Lane, const N: usize, const A: usize> {
     turning: [L; A],
     /// Normal loads at the start and their rates.
     normal: [[L; 2]; A],
-    /// Cubics of the torques.
-    cubics: [[L; SHAPES]; A],
-    /// Torques at the end.
-    value: [Value<L>; A],
+    /// The torques by what is known at the start.
+    cubics: [[L; START]; A],
+    /// Size of the torques at the start.
+    size: L::Values,
     /// Negative where a guard has fallen.
     guard: L::Values,
 }
@@ -48,9 +49,22 @@ pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize
     (x, carry): (&mut [L; N], &mut [Carry<L>; A]),
 ) -> L::Values {
     let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
-    let mut sampling = Sampling::known::<F, U>(op, channels, (sample, h), x);
+    let none = L::all(0.0);
+    let mut sampling = Sampling {
+        end: op.constant,
+        argument: [none; A],
+        rate: [none; A],
+        direct: [none; A],
+        second: [none; A],
+        turning: [none; A],
+        normal: [[none; 2]; A],
+        cubics: [[none; START]; A],
+        size: none.values(),
+        guard: none.values(),
+    };
+    sampling.know::<F, U>(op, channels, (sample, h), x);
     let about = sampling.foresee::<F>(channels, carry, h);
-    sampling.predict::<F>(op, channels, &about, h);
+    sampling.predict::<F>(op, channels, (carry, &about), h);
     sampling.correct::<F>(op, channels, carry, h);
     *x = sampling.end;
     sampling.guard
@@ -59,25 +73,14 @@ pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize
 impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
     /// What state and inputs alone lead to.
     #[inline(always)]
-    fn known<const F: bool, U: Factor<L>>(
+    fn know<const F: bool, U: Factor<L>>(
+        &mut self,
         op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
         (sample, h): (&Sample<U>, f64),
         x: &[L; N],
-    ) -> Self {
-        let none = L::all(0.0);
-        let mut s = Self {
-            end: op.constant,
-            argument: [none; A],
-            rate: [none; A],
-            direct: [none; A],
-            second: [none; A],
-            turning: [none; A],
-            normal: [[none; 2]; A],
-            cubics: [[none; SHAPES]; A],
-            value: [Value::zero(); A],
-            guard: L::Values::all(0.0),
-        };
+    ) {
+        let s = self;
         for a in 0..A {
             let c = &channels[a];
             s.argument[a] = c.argument_end.constant;
@@ -113,7 +116,6 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         for a in 0..A {
             s.turning[a] = over_state::<L, F, N>(op, &channels[a].second.state, x);
         }
-        s
     }
 
     /// The cubics by value, rate and second derivative at the start. Returns the arguments about which the
@@ -129,6 +131,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         let (mut faded, mut rise) = ([L::all(0.0); A], [L::all(0.0); A]);
         for a in 0..A {
             let v = &carry[a].value;
+            self.size = self.size.larger(v.value.values().magnitude());
             rise[a] = v.by_argument.fma::<F>(carry[a].rate, v.by_normal * self.normal[a][1]);
             self.cubics[a][0] = v.value;
             self.cubics[a][1] = rise[a].times(h);
@@ -181,10 +184,10 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         &mut self,
         op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
-        about: &[[L; 2]; A],
+        (carry, about): (&mut [Carry<L>; A], &[[L; 2]; A]),
         h: f64,
     ) {
-        add_moments::<L, F, N, A, 0, 3>(op, &self.cubics, &mut self.end);
+        add_moments::<L, F, N, A, 0, START>(op, &self.cubics, &mut self.end);
         for a in 0..A {
             let Carried { argument, argument_end, rate, law, .. } = &channels[a];
             let [near, stiction] = about[a];
@@ -195,14 +198,15 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                 // than their order.
                 self.argument[a] = over_state::<L, F, N>(op, argument, &self.end);
                 let stiction = law.stiction::<F>(self.argument[a]);
-                self.value[a] = law.about::<F>(self.argument[a], stiction).here(normal);
+                carry[a].value = law.about::<F>(self.argument[a], stiction).here(normal);
                 continue;
             }
             let (cubics, from_near) = (&self.cubics, self.argument[a] - near);
-            let distance = over_cubics::<L, F, A, 0, 3>(&argument_end.cubics, cubics, from_near);
+            let distance =
+                over_cubics::<L, F, A, 0, START>(&argument_end.cubics, cubics, from_near);
             self.argument[a] = near + distance;
             let friction = law.about::<F>(near, stiction);
-            self.value[a] = friction.at::<F>(distance, normal);
+            carry[a].value = friction.at::<F>(distance, normal);
             let moved = law.rate * distance;
             let guard = L::Values::all(MAX_MOVE) - moved.values().magnitude();
             self.guard = self.guard.negative_with(guard);
@@ -218,44 +222,39 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         carry: &mut [Carry<L>; A],
         h: f64,
     ) {
-        let mut missing = [[L::all(0.0); SHAPES]; A];
+        let mut missing = [[L::all(0.0); END]; A];
         for a in 0..A {
-            let (v, [a0, a1, a2, ..]) = (&self.value[a], self.cubics[a]);
+            let (v, [a0, a1, a2]) = (&carry[a].value, self.cubics[a]);
             let known = self.rate[a] + self.direct[a];
-            let ds = over_channels::<L, F, N, A>(&channels[a].rate, &self.value, known);
+            let ds = over_channels::<L, F, N, A>(&channels[a].rate, carry, known);
             let drift = (v.by_normal * self.normal[a][1]).times(h);
-            missing[a][VALUE] = v.value - (a0 + a1 + a2);
-            missing[a][SLOPE] = v.by_argument.times(h).fma::<F>(ds, drift - (a1 + a2 + a2));
+            let value = v.value - (a0 + a1 + a2);
+            missing[a] = [value, v.by_argument.times(h).fma::<F>(ds, drift - (a1 + a2 + a2))];
         }
-        add_moments::<L, F, N, A, VALUE, SHAPES>(op, &missing, &mut self.end);
-        let mut size = L::Values::all(0.0);
-        for a in 0..A {
-            size = size.larger(carry[a].value.value.values().magnitude());
-        }
-        size = size + L::Values::all(1.0);
+        add_moments::<L, F, N, A, START, END>(op, &missing, &mut self.end);
+        let size = self.size + L::Values::all(1.0);
         let mut early = [L::Values::all(0.0); A];
         for a in 0..A {
             let Carried { argument_end, rate_end, .. } = &channels[a];
             let none = L::all(0.0);
-            let ds = over_cubics::<L, F, A, VALUE, SHAPES>(&argument_end.cubics, &missing, none);
+            let ds = over_cubics::<L, F, A, START, END>(&argument_end.cubics, &missing, none);
             let rate = self.rate[a];
-            self.rate[a] = over_cubics::<L, F, A, VALUE, SHAPES>(rate_end, &missing, rate);
-            let corrected = self.value[a].moved::<F>(ds);
-            let correction = (corrected.value - self.value[a].value).values().magnitude();
-            let [.., value, slope] = missing[a];
+            self.rate[a] = over_cubics::<L, F, A, START, END>(rate_end, &missing, rate);
+            let corrected = carry[a].value.moved::<F>(ds);
+            let correction = (corrected.value - carry[a].value.value).values().magnitude();
+            let [value, slope] = missing[a];
             let cubic = (slope - (value + value)).values().magnitude();
             let close = size.times(MAX_CORRECTION) - correction;
             let guard = size.times(MAX_CUBIC) - cubic;
             self.guard = self.guard.negative_with(guard).negative_with(close);
-            self.value[a] = corrected;
+            carry[a].value = corrected;
             early[a] = carry[a].rate.values().times(h / 3.0) + carry[a].argument.values();
             carry[a].argument = self.argument[a] + ds;
         }
         for a in 0..A {
             let Carried { rate, law, .. } = &channels[a];
             let known = self.rate[a] + self.direct[a];
-            carry[a].rate = over_channels::<L, F, N, A>(rate, &self.value, known);
-            carry[a].value = self.value[a];
+            carry[a].rate = over_channels::<L, F, N, A>(rate, carry, known);
             // Between its ends the argument stays within these (Bernstein's form of the cubic).
             let (early, end) = (early[a], carry[a].argument.values());
             let late = end - carry[a].rate.values().times(h / 3.0);
@@ -312,16 +311,16 @@ fn add_moments<
     const N: usize,
     const A: usize,
     const FROM: usize,
-    const TO: usize,
+    const COUNT: usize,
 >(
     op: &Operators<L, N>,
-    cubics: &[[L; SHAPES]; A],
+    cubics: &[[L; COUNT]; A],
     end: &mut [L; N],
 ) {
-    for k in FROM..TO {
+    for k in 0..COUNT {
         for a in 0..A {
             for i in 0..N {
-                end[i] = op.channels[a].moments[k][i].fma::<F>(cubics[a][k], end[i]);
+                end[i] = op.channels[a].moments[FROM + k][i].fma::<F>(cubics[a][k], end[i]);
             }
         }
     }
@@ -343,15 +342,15 @@ fn over_state<L: Lane, const F: bool, const N: usize>(
 }
 
 #[inline(always)]
-fn over_cubics<L: Lane, const F: bool, const A: usize, const FROM: usize, const TO: usize>(
+fn over_cubics<L: Lane, const F: bool, const A: usize, const FROM: usize, const COUNT: usize>(
     form: &[[L; SHAPES]; MAX_ACTIVE],
-    cubics: &[[L; SHAPES]; A],
+    cubics: &[[L; COUNT]; A],
     sum: L,
 ) -> L {
     let mut sum = sum;
-    for k in FROM..TO {
+    for k in 0..COUNT {
         for a in 0..A {
-            sum = form[a][k].fma::<F>(cubics[a][k], sum);
+            sum = form[a][FROM + k].fma::<F>(cubics[a][k], sum);
         }
     }
     sum
@@ -360,12 +359,12 @@ fn over_cubics<L: Lane, const F: bool, const A: usize, const FROM: usize, const 
 #[inline(always)]
 pub fn over_channels<L: Lane, const F: bool, const N: usize, const A: usize>(
     form: &Form<L, N>,
-    values: &[Value<L>; A],
+    carry: &[Carry<L>; A],
     sum: L,
 ) -> L {
     let mut sum = sum;
     for a in 0..A {
-        sum = form.channels[a].fma::<F>(values[a].value, sum);
+        sum = form.channels[a].fma::<F>(carry[a].value.value, sum);
     }
     sum
 }

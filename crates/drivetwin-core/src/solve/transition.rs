@@ -5,7 +5,7 @@ use super::decide::Assignment;
 use super::guard::Cause;
 use super::integrator::{Event, EventKind, Integrator, RowState, sign_of};
 use super::status::Status;
-use crate::network::channel::{ChannelSeries, form};
+use crate::network::channel::form;
 use crate::network::linalg::{Matrix, least_norm, solve};
 use crate::network::{GearState, Row};
 use crate::number::Real;
@@ -181,13 +181,12 @@ impl<T: Real> Integrator<'_, T> {
     }
 
     /// Torque of a channel for a decision, in its present cell.
-    pub(super) fn channel_ahead(&self, i: usize) -> T {
-        let channel = &self.network.channels[i];
-        let mut series = ChannelSeries::default();
+    pub(super) fn channel_ahead(&mut self, i: usize) -> T {
+        let (channel, series) = (&self.network.channels[i], &mut self.channel_ahead);
         for (argument, row) in series.arguments.iter_mut().zip(&channel.arguments) {
             argument[0] = form(row, &self.x_ahead);
         }
-        channel.term(self.cells[i], &self.ahead, &mut series, 0);
+        channel.term(self.cells[i], &self.ahead, series, 0);
         series.torque[0]
     }
 
