@@ -41,7 +41,7 @@ impl<T: Real> Expansion<T> {
             channels: vec![ChannelSeries::default(); network.channels.len()],
             inputs: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             order: 0,
-            input_order: 0,
+            input_order: TERMS - 1,
             basis: Vec::with_capacity(network.basis()),
             scales: vec![0.0; network.states()],
         }

@@ -33,6 +33,9 @@ const MAX_STATES: usize = 24;
 /// The same with derivatives.
 const MAX_DERIVED: usize = 8;
 
+/// Most channels of a network that is marched: the bits of a key.
+const MAX_CHANNELS: usize = u64::BITS as usize;
+
 /// Whether a network is of the kind that passes samples by exact operators.
 pub fn can_march<T: Real>(network: &Network<T>) -> bool {
     let smooth = |channel: &Channel<T>| {
@@ -41,6 +44,7 @@ pub fn can_march<T: Real>(network: &Network<T>) -> bool {
     network.states() <= if T::DERIVATIVES { MAX_DERIVED } else { MAX_STATES }
         && network.prescribed.is_empty()
         && network.mechanism.inputs.len() <= MAX_INPUTS
+        && network.channels.len() <= MAX_CHANNELS
         && network.channels.iter().all(smooth)
 }
 
@@ -183,7 +187,7 @@ impl<T: Real> Integrator<'_, T> {
 
     /// Operators of the present mode, if they apply.
     fn operators(&mut self, active: &[usize], h: f64) -> Option<AnySize<T>> {
-        if active.len() > MAX_ACTIVE {
+        if active.len() > MAX_ACTIVE || self.cells.len() > MAX_CHANNELS {
             return None;
         }
         let key = self.key(active, h);
