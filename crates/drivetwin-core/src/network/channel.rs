@@ -61,7 +61,7 @@ pub struct ChannelSeries<T> {
     slip: Series<T>,
     /// Normal load of a friction law, and the number of the last coefficient that is not zero.
     normal: (Series<T>, usize),
-    /// That of a Stribeck law.
+    /// What stiction has decayed to, of a Stribeck law.
     decay: Decay<T>,
     /// μ of a friction law.
     mu: Series<T>,
@@ -103,12 +103,7 @@ impl<T: Real> Normal<T> {
 
     /// All coefficients of the normal load.
     pub fn series(&self, inputs: &[Series<T>]) -> Series<T> {
-        let mut series = match *self {
-            Self::Pressure { input, gain, .. } => inputs[input].map(|p| gain * p),
-            Self::Constant(_) => [T::zero_(); TERMS],
-        };
-        series[0] = self.term(inputs, 0);
-        series
+        std::array::from_fn(|k| self.term(inputs, k))
     }
 }
 

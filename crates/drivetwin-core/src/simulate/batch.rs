@@ -58,7 +58,7 @@ pub fn batch<'p>(
     (keep, threads): (Keep<'_>, usize),
 ) -> Batch {
     let per_run = if count == 0 { 0 } else { plan_of(0).kept(keep) };
-    // Zeros, which cost nothing before they are written to: each group does so in its own thread.
+    // Zeros: fresh from the system, memory is only touched when a group writes its results.
     let mut values = vec![0.0; count * per_run];
     let runs = count.div_ceil(WIDTH);
     let group = |(g, values): (usize, &mut [f64])| {

@@ -45,20 +45,6 @@ impl<T: Real> Recorded<T> {
         self.slopes[output].extend_from_slice(&block.slopes[..count]);
     }
 
-    /// Take the first `count` of samples over as they are.
-    #[inline(always)]
-    pub fn copy(
-        &mut self,
-        output: usize,
-        samples: impl Iterator<Item: Borrow<T>> + Clone,
-        count: usize,
-    ) {
-        let values = samples.clone().take(count).map(|sample| sample.borrow().re());
-        self.values[output].extend(values);
-        let slopes = samples.take(count).map(|sample| sample.borrow().slopes());
-        self.slopes[output].extend(slopes);
-    }
-
     /// Fill an output up to a length with zeros.
     pub fn fill(&mut self, output: usize, length: usize) {
         self.values[output].resize(length, 0.0);
@@ -116,7 +102,7 @@ impl Picked {
     }
 
     /// Whether none before the last is left out.
-    pub fn are_all(self) -> bool {
+    fn are_all(self) -> bool {
         self.count() == self.span()
     }
 }

@@ -228,9 +228,6 @@ impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
         let count = self.picked.count();
         for (output, column) in self.columns.iter().enumerate() {
             let from = self.recorded.length(output);
-            if self.copy(output, &passing_terms(column, self.run)) {
-                continue;
-            }
             for &(position, factor) in &*passing_terms(column, self.run) {
                 self.add_to_block::<F>(position, factor);
             }
@@ -241,25 +238,6 @@ impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
 }
 
 impl<T: Real, S: Samples<T>> Passed<'_, '_, T, S> {
-    /// Take an output over that is a state or a torque; whether it is.
-    #[inline(always)]
-    fn copy(&mut self, output: usize, terms: &[(usize, T)]) -> bool {
-        let [(position, factor)] = *terms else { return false };
-        if factor != T::of(1.0) || !self.picked.are_all() {
-            return false;
-        }
-        let (samples, count) = (self.samples, self.picked.count());
-        let channel = |j: &usize| self.run.network.first_channel() + j == position;
-        if position < self.run.x.len() {
-            self.recorded.copy(output, samples.states(position), count);
-        } else if let Some(slot) = self.active.iter().position(channel) {
-            self.recorded.copy(output, samples.torques(slot), count);
-        } else {
-            return false;
-        }
-        true
-    }
-
     /// Add a multiple of an entry of the basis to the block.
     #[inline(always)]
     fn add_to_block<const F: bool>(&mut self, position: usize, factor: T) {

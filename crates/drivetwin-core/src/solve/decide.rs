@@ -7,7 +7,7 @@ use super::status::Status;
 use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::{Cell, GearState, Mode, ModeKey, Row};
-use crate::number::{Real, TERMS, evaluate};
+use crate::number::{Real, evaluate};
 use std::sync::Arc;
 
 /// A trial: the state of every friction element and of every lossy gear.
@@ -110,7 +110,7 @@ impl<T: Real> Integrator<'_, T> {
     fn look_ahead(&mut self) {
         let remaining = self.inputs.span(self.segment).1 - self.t.re();
         let moment = T::of(LOOK_AHEAD.min(1e-4 * remaining.max(0.0)));
-        let order = if self.inputs.is_sampled() { 1 } else { TERMS - 1 };
+        let order = self.expansion.input_order();
         for (ahead, now) in self.ahead.iter_mut().zip(&self.expansion.inputs) {
             *ahead = *now;
             ahead[0] = evaluate(now, order, moment);

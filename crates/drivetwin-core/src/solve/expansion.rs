@@ -2,6 +2,7 @@
 //! Taylor expansion in time of the whole state in one mode.
 
 use crate::network::channel::{ChannelSeries, form};
+use crate::network::linalg::is_zero;
 use crate::network::{Cell, Channel, Mode, Network};
 use crate::number::{INVERSE, Real, Series, TERMS, evaluate, slope};
 
@@ -16,8 +17,6 @@ pub struct Expansion<T> {
     pub inputs: Vec<Series<T>>,
     /// Highest coefficient that is filled in.
     pub order: usize,
-    /// The same of the inputs.
-    input_order: usize,
     /// One coefficient of the whole basis.
     basis: Vec<T>,
     /// 1 over the scale of each state.
@@ -41,7 +40,6 @@ impl<T: Real> Expansion<T> {
             channels: vec![ChannelSeries::default(); network.channels.len()],
             inputs: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             order: 0,
-            input_order: TERMS - 1,
             basis: Vec::with_capacity(network.basis()),
             scales: vec![0.0; network.states()],
         }
@@ -49,11 +47,12 @@ impl<T: Real> Expansion<T> {
 
     /// The basis (x, u, prescribed accelerations, 1, φ) at `h` [s] after the start.
     pub fn basis_at(&self, network: &Network<T>, h: T, basis: &mut Vec<T>) {
+        let of_inputs = self.input_order();
         let value = |series: &Series<T>| evaluate(series, self.order, h);
         basis.clear();
         basis.extend(self.states.iter().map(value));
-        basis.extend(self.inputs.iter().map(|input| evaluate(input, self.input_order, h)));
-        let rate = |&(_, input): &(Vec<T>, usize)| slope(&self.inputs[input], self.input_order, h);
+        basis.extend(self.inputs.iter().map(|input| evaluate(input, of_inputs, h)));
+        let rate = |&(_, input): &(Vec<T>, usize)| slope(&self.inputs[input], of_inputs, h);
         basis.extend(network.prescribed.iter().map(rate));
         basis.push(T::of(1.0));
         basis.extend(self.channels.iter().map(|channel| value(&channel.torque)));
@@ -75,8 +74,7 @@ impl<T: Real> Expansion<T> {
         self.set_scales(network);
         self.basis.clear();
         self.basis.resize(network.basis(), T::zero_());
-        let curved = self.inputs.iter().any(|u| u[2].re() != 0.0 || u[3].re() != 0.0);
-        self.input_order = if curved { TERMS - 1 } else { 1 };
+        let curved = self.input_order() > 1;
         let last = accuracy.order.unwrap_or(TERMS - 1);
         let products = network.channels.iter().any(Channel::is_product);
         // Successive terms that must be small: every other one of an even or odd motion is zero, and
@@ -105,6 +103,12 @@ impl<T: Real> Expansion<T> {
         }
         let excess = largest(&sizes[TERMS - window..]) / accuracy.tolerance;
         h * (0.8 * excess.powf(-1.0 / last as f64)).min(1.0)
+    }
+
+    /// Highest coefficient of the inputs: lines have one, sines all.
+    pub fn input_order(&self) -> usize {
+        let curved = |input: &Series<T>| !is_zero(input[2]) || !is_zero(input[3]);
+        if self.inputs.iter().any(curved) { TERMS - 1 } else { 1 }
     }
 
     /// State at `h` [s] after the start.

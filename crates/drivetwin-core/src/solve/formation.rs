@@ -101,8 +101,6 @@ struct Formation<const N: usize> {
     slots: Vec<usize>,
     /// Watched guards by number, likewise.
     watched: Vec<usize>,
-    /// Both as bits.
-    union: (u64, u64),
     x: [Lanes; N],
     carry: [Carry<Lanes>; MAX_ACTIVE],
     guards: Guards<Lanes>,
@@ -118,7 +116,6 @@ impl<const N: usize> Formation<N> {
             operators: Operators::idle(),
             slots: Vec::new(),
             watched: Vec::new(),
-            union: (0, 0),
             x: [zero; N],
             carry: [Carry::idle(); MAX_ACTIVE],
             guards: idle_guards(),
@@ -194,16 +191,14 @@ impl<const N: usize> Formation<N> {
     fn arrange<S: Recording>(&mut self, members: &mut [Member<'_, '_, S>], segment: usize) -> bool {
         let (mut slots, mut watched) = (0_u64, 0_u64);
         for ready in members.iter().filter(|m| m.joined).filter_map(|m| m.ready.as_ref()) {
-            slots = ready.active.iter().fold(slots, |bits, j| bits | 1 << j);
-            let guards = operators_of::<N>(ready).watched.iter();
-            watched = guards.fold(watched, |bits, guard| bits | 1 << guard.id);
+            slots |= bits(ready.active.iter().copied());
+            watched |= bits(operators_of::<N>(ready).watched.iter().map(|guard| guard.id));
         }
-        if (slots, watched) == self.union {
+        let present = [&self.slots, &self.watched].map(|ids| bits(ids.iter().copied()));
+        if present == [slots, watched] {
             return false;
         }
-        self.union = (slots, watched);
-        let places = |bits: u64| (0..64).filter(|id| bits >> id & 1 == 1).collect::<Vec<usize>>();
-        let (slots, watched) = (places(slots), places(watched));
+        let [slots, watched] = [slots, watched].map(numbers);
         self.hand_over(members, segment);
         // Those that march get all their places anew; what is left of others moves nothing that counts.
         if slots.len() == MAX_ACTIVE - 1 {
@@ -304,6 +299,16 @@ impl<const N: usize> Formation<N> {
             member.go_on(fell);
         }
     }
+}
+
+/// A set of numbers as bits.
+fn bits(numbers: impl Iterator<Item = usize>) -> u64 {
+    numbers.fold(0, |bits, number| bits | 1 << number)
+}
+
+/// The numbers of the bits that are set, in order.
+fn numbers(bits: u64) -> Vec<usize> {
+    (0..u64::BITS as usize).filter(|number| bits >> number & 1 == 1).collect()
 }
 
 fn operators_of<const N: usize>(ready: &Ready<f64>) -> &Operators<f64, N> {
@@ -413,11 +418,11 @@ struct LaneView<'f, const N: usize> {
 }
 
 impl<const N: usize> Samples<f64> for LaneView<'_, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> + Clone {
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
         let lane = self.lane % WIDTH;
         self.trail.states(i)[self.first..].iter().map(move |x| x.0[lane])
     }
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> + Clone {
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
         let torques = &self.trail.torques(self.places[slot])[self.first..];
         let lane = self.lane % WIDTH;
         torques.iter().map(move |torque| torque.0[lane])
@@ -431,10 +436,10 @@ struct LastSample<'f, const N: usize> {
 }
 
 impl<const N: usize> Samples<f64> for LastSample<'_, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> + Clone {
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
         std::iter::once(self.x[i])
     }
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> + Clone {
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
         std::iter::once(self.torques[slot])
     }
 }

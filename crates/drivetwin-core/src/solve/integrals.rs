@@ -60,8 +60,8 @@ pub fn integrals<T: Real, const F: bool, const N: usize>(
     all
 }
 
-/// `Σ c_i A^i` over whole threes of coefficients, with a third of the products: by Horner's rule over the
-/// cube (Paterson and Stockmeyer 1973).
+/// `Σ c_i A^i` over whole threes of coefficients, by Horner's rule over the cube: less than half as many
+/// products of matrices as over A (Paterson and Stockmeyer 1973).
 #[inline(always)]
 fn polynomial<T: Real, const F: bool, const N: usize>(
     a: &Square<T, N>,

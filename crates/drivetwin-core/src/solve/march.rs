@@ -5,7 +5,8 @@
 //! ends. Its argument at the end is predicted with the second derivative of φ at the start, which
 //! leaves an error of fourth order; the cubic through the predicted end corrects it, and the law is
 //! moved to the corrected argument by its own derivatives. One exponential a sample and channel, grown
-//! from the last a sample ahead, at about the argument that it is needed at, so that nothing waits for it.
+//! from the last a sample ahead, at about the argument that it is needed at, so that nothing waits for it;
+//! with derivatives, where products count for more, at the predicted argument itself.
 
 use super::operators::{Carried, MAX_WATCHED, Operators, Watched};
 use super::step::{over_channels, step};

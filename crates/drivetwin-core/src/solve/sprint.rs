@@ -33,9 +33,6 @@ const MAX_STATES: usize = 24;
 /// The same with derivatives.
 const MAX_DERIVED: usize = 8;
 
-/// Most channels of a network that is marched: the bits of a key.
-const MAX_CHANNELS: usize = u64::BITS as usize;
-
 /// Whether a network is of the kind that passes samples by exact operators.
 pub fn can_march<T: Real>(network: &Network<T>) -> bool {
     let smooth = |channel: &Channel<T>| {
@@ -44,7 +41,6 @@ pub fn can_march<T: Real>(network: &Network<T>) -> bool {
     network.states() <= if T::DERIVATIVES { MAX_DERIVED } else { MAX_STATES }
         && network.prescribed.is_empty()
         && network.mechanism.inputs.len() <= MAX_INPUTS
-        && network.channels.len() <= MAX_CHANNELS
         && network.channels.iter().all(smooth)
 }
 
@@ -99,17 +95,17 @@ pub trait Sink<T> {
 /// States and torques of the active channels at the start of samples, at least of those passed.
 pub trait Samples<T> {
     /// State `i`.
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>> + Clone;
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>>;
 
     /// Torque of the active channel number `slot`.
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>> + Clone;
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>>;
 }
 
 impl<T: Real, const N: usize> Samples<T> for Trail<T, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>> + Clone {
+    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>> {
         self.states(i).iter()
     }
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>> + Clone {
+    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>> {
         self.torques(slot).iter()
     }
 }
@@ -187,7 +183,7 @@ impl<T: Real> Integrator<'_, T> {
 
     /// Operators of the present mode, if they apply.
     fn operators(&mut self, active: &[usize], h: f64) -> Option<AnySize<T>> {
-        if active.len() > MAX_ACTIVE || self.cells.len() > MAX_CHANNELS {
+        if active.len() > MAX_ACTIVE {
             return None;
         }
         let key = self.key(active, h);
