@@ -10,7 +10,7 @@ use drivetwin_core::network::engaged::EngagedError;
 use drivetwin_core::network::reduction::{Exchange, Reduction, ReductionError};
 use drivetwin_core::network::statics::Statics;
 use drivetwin_core::number::Dual;
-use drivetwin_core::number::Real;
+use drivetwin_core::number::{Number, Real};
 
 const Z: [f64; 3] = [1.694, 1.841, 2.49];
 const GEARS: [(&str, [&str; 2]); 7] = [

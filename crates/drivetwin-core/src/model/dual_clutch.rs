@@ -4,7 +4,7 @@
 use super::elements::{Clutch, Element, Gear, GearLoss, Inertia, RoadLoad, SpringDamper, Torque};
 use super::mechanism::LossLaw;
 use super::{Driveline, FrictionLaw, Name};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 use smol_str::SmolStrBuilder;
 use std::marker::PhantomData;
@@ -86,7 +86,7 @@ pub const SHAFT: &str = "output shaft";
 /// Name of the engine torque input.
 pub const ENGINE_TORQUE: &str = "engine torque";
 
-impl<T: Real> DualClutch<T> {
+impl<T: Number> DualClutch<T> {
     /// The same driveline as elements of the network.
     pub fn driveline(&self) -> Driveline<T> {
         let [engine, output, wheel] =
@@ -131,7 +131,7 @@ impl<T: Real> DualClutch<T> {
     }
 }
 
-impl<T: Real> ShiftElement<T> {
+impl<T: Number> ShiftElement<T> {
     /// Gear i_c, clutch, gear i_out between the input gear and the output (paper Figure 2).
     fn path(&self, input: &Name, output: &Name) -> [Element<T>; 3] {
         let (a, b) = (joined(&self.name, " input side"), joined(&self.name, " output side"));
@@ -160,11 +160,11 @@ fn joined(first: &str, second: &str) -> Name {
     name.finish()
 }
 
-fn inertia<T: Real>(name: Name, node: &Name, inertia: T) -> Element<T> {
+fn inertia<T: Number>(name: Name, node: &Name, inertia: T) -> Element<T> {
     Element::Inertia(Inertia { name, node: node.clone(), inertia })
 }
 
-fn gear<T: Real>(name: Name, a: &Name, b: &Name, ratio: T) -> Gear<T> {
+fn gear<T: Number>(name: Name, a: &Name, b: &Name, ratio: T) -> Gear<T> {
     Gear { name, a: a.clone(), b: b.clone(), ratio, loss: None }
 }
 
@@ -216,7 +216,7 @@ impl<T> DualClutch<T> {
 
 impl DualClutch<f64> {
     /// The same driveline over another number type.
-    pub fn lifted<T: Real>(&self) -> DualClutch<T> {
+    pub fn lifted<T: Number>(&self) -> DualClutch<T> {
         self.map(&|&value| T::of(value))
     }
 }

@@ -2,6 +2,7 @@
 //! Faults of a description, each naming its element.
 
 use super::Name;
+use crate::number::Values;
 use std::fmt;
 use thiserror::Error;
 
@@ -64,16 +65,17 @@ impl fmt::Display for ModelFaults {
 }
 
 /// Require a finite number that satisfies `accept`.
-pub(crate) fn require(
+pub(crate) fn require<V: Values>(
     element: &str,
     field: &'static str,
-    value: f64,
+    value: V,
     accept: impl Fn(f64) -> bool,
     requirement: &'static str,
 ) -> Result<(), ModelError> {
-    if value.is_finite() && accept(value) {
+    if value.decide(|value| value.is_finite() && accept(value)) {
         Ok(())
     } else {
+        let value = value.leading();
         Err(ModelError::Value { element: element.to_owned(), field, value, requirement })
     }
 }

@@ -2,7 +2,7 @@
 //! μ over slip: the Stribeck law of a wet clutch (paper Figure 8), or a table.
 
 use super::error::{ModelError, require};
-use crate::number::{INVERSE, Real, Series, TERMS};
+use crate::number::{INVERSE, Number, Series, TERMS, Values};
 use serde::{Deserialize, Serialize};
 
 /// `μ(s) = μ_c + (μ_s - μ_c) exp(-|s|/v_s) + μ_v |s|`.
@@ -55,14 +55,14 @@ pub struct Decay<T> {
     values: Series<T>,
 }
 
-impl<T: Real> Default for Decay<T> {
+impl<T: Number> Default for Decay<T> {
     fn default() -> Self {
         let zero = [T::zero_(); TERMS];
         Self { rate: T::zero_(), slopes: zero, values: zero }
     }
 }
 
-impl<T: Real> Decay<T> {
+impl<T: Number> Decay<T> {
     /// Fill in coefficient `k`, order by order: `E' = -(|s|'/v_s) E`.
     fn term(&mut self, slip: &Series<T>, v_s: T, k: usize) -> T {
         if k == 0 {
@@ -98,7 +98,7 @@ impl<T> FrictionLaw<T> {
     }
 }
 
-impl<T: Real> FrictionLaw<T> {
+impl<T: Number> FrictionLaw<T> {
     /// μ independent of slip.
     pub fn constant(mu: T) -> Self {
         Self::Table(FrictionTable { slip: vec![0.0], mu: vec![mu], extend: false })
@@ -111,7 +111,7 @@ impl<T: Real> FrictionLaw<T> {
                 let stiction = (law.mu_s - law.mu_c) * (-s / law.v_s).exp();
                 law.mu_c + stiction + law.mu_v * s
             }
-            Self::Table(table) => table.piece(table.cell(s.re())).0.at(s),
+            Self::Table(table) => table.piece(s.re().decide(|s| table.cell(s))).0.at(s),
         }
     }
 
@@ -155,14 +155,14 @@ pub struct Piece<T> {
     pub slope: T,
 }
 
-impl<T: Real> Piece<T> {
+impl<T: Number> Piece<T> {
     /// Value at `s`.
     pub fn at(&self, s: T) -> T {
         self.value + self.slope * (s - self.from)
     }
 }
 
-impl<T: Real> FrictionTable<T> {
+impl<T: Number> FrictionTable<T> {
     /// Index of the piece that holds |slip| `s`.
     pub fn cell(&self, s: f64) -> usize {
         let last =
@@ -196,7 +196,7 @@ impl<T: Real> FrictionTable<T> {
         if !self.slip.iter().all(|s| s.is_finite()) {
             return fault("has a slip that is not finite");
         }
-        if !self.mu.iter().all(|mu| mu.re().is_finite() && mu.re() >= 0.0) {
+        if !self.mu.iter().all(|mu| mu.re().decide(|v| v.is_finite() && v >= 0.0)) {
             return fault("has a value that is negative or not finite");
         }
         Ok(())

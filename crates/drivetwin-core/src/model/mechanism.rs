@@ -6,7 +6,7 @@ use super::converter_map::ConverterMap;
 use super::friction::FrictionLaw;
 use super::torque_map::TorqueMap;
 use super::{GROUND, Name};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
@@ -249,7 +249,7 @@ pub struct Mechanism<T> {
     pub prescribed: Vec<Prescribed>,
 }
 
-impl<T: Real> TwistForm<T> {
+impl<T: Number> TwistForm<T> {
     /// Value at a twist and its rate.
     pub fn at(&self, twist: T, rate: T) -> T {
         self.constant + self.per_twist * twist + self.per_rate * rate
@@ -277,7 +277,7 @@ impl<T> Default for Mechanism<T> {
     }
 }
 
-impl<T: Real> Mechanism<T> {
+impl<T: Number> Mechanism<T> {
     /// Nothing yet, with room for what so many elements state: about half of them are couplings, half
     /// masses.
     pub fn with_room(elements: usize) -> Self {

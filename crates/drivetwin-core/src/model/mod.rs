@@ -18,7 +18,7 @@ pub use error::{ModelError, ModelFaults};
 pub use friction::{FrictionLaw, FrictionTable, Stribeck};
 pub use mechanism::Mechanism;
 
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// Name of an element, a node or an input. Short ones stand in place: to compile a driveline, which is
@@ -36,7 +36,7 @@ pub struct Driveline<T> {
     pub elements: Vec<Element<T>>,
 }
 
-impl<T: Real> Driveline<T> {
+impl<T: Number> Driveline<T> {
     /// State every element's law; all faults of the description are reported together.
     pub fn mechanism(&self) -> Result<Mechanism<T>, ModelFaults> {
         let mut faults = Vec::new();

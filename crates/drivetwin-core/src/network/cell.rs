@@ -5,7 +5,7 @@ use super::channel::{Channel, ChannelSeries, Law};
 use crate::model::FrictionLaw;
 use crate::model::mechanism::{Region, TwistForm};
 use crate::model::torque_map::span_index;
-use crate::number::{Real, Series};
+use crate::number::{Number, Series, Values};
 
 /// The branch that is active.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,26 +47,28 @@ pub enum Cell {
 /// A border of a cell: the series must stay positive; beyond lies the cell.
 pub type Border<T> = (Series<T>, Cell);
 
-impl<T: Real> Channel<T> {
+impl<T: Number> Channel<T> {
     /// The cell that holds at the given arguments; `sign` is the direction of a friction element.
-    pub fn cell_at(&self, arguments: [f64; 2], sign: f64, inputs: &[Series<T>]) -> Cell {
+    pub fn cell_at(&self, arguments: [T::Values; 2], sign: f64, inputs: &[Series<T>]) -> Cell {
         let [s, r] = arguments;
         match &self.law {
             Law::Friction { mu: FrictionLaw::Table(table), .. } => {
-                Cell::Moving { sign, piece: table.cell((s * sign).max(0.0)) }
+                Cell::Moving { sign, piece: s.decide(|s| table.cell((s * sign).max(0.0))) }
             }
             Law::Friction { .. } | Law::Quadratic(_) => Cell::Moving { sign, piece: 0 },
             Law::Map { input, map } => Cell::Map {
-                throttle: span_index(&map.throttle, inputs[*input][0].re()),
-                speed: span_index(&map.speed, s),
+                throttle: inputs[*input][0].re().decide(|u| span_index(&map.throttle, u)),
+                speed: s.decide(|s| span_index(&map.speed, s)),
             },
             Law::Converter { map, .. } => {
-                let ratio = if s == 0.0 && r == 0.0 { 0.0 } else { r / s };
-                Cell::Converter { index: map.cell_index(ratio) }
+                let index = |s, r| map.cell_index(if s == 0.0 && r == 0.0 { 0.0 } else { r / s });
+                Cell::Converter { index: s.decide_with(r, index) }
             }
             Law::Regions(regions) => {
+                let (s, r) = (T::lifted(s), T::lifted(r));
+                let left = |(border, _): &(TwistForm<T>, usize)| border.at(s, r).re();
                 let inside = |region: &Region<T>| {
-                    region.borders.iter().all(|(b, _)| b.at(T::of(s), T::of(r)).re() >= 0.0)
+                    region.borders.iter().all(|border| left(border).decide(|left| left >= 0.0))
                 };
                 Cell::Region { index: regions.iter().position(inside).unwrap_or(0) }
             }
@@ -126,16 +128,16 @@ impl<T: Real> Channel<T> {
     }
 }
 
-fn scaled<T: Real>(series: &Series<T>, factor: f64) -> Series<T> {
+fn scaled<T: Number>(series: &Series<T>, factor: f64) -> Series<T> {
     series.map(|c| c * factor)
 }
 
-fn weighted<T: Real>(a: &Series<T>, wa: T, b: &Series<T>, wb: T) -> Series<T> {
+fn weighted<T: Number>(a: &Series<T>, wa: T, b: &Series<T>, wb: T) -> Series<T> {
     std::array::from_fn(|k| a[k] * wa + b[k] * wb)
 }
 
 /// Distances to the ends of a span that exist, each with the step to the neighbouring cell.
-fn between<T: Real>(
+fn between<T: Number>(
     series: &Series<T>,
     span: (f64, f64),
 ) -> impl Iterator<Item = (Series<T>, isize)> {

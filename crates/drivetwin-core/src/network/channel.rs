@@ -5,11 +5,12 @@
 //! cell's borders.
 
 use super::cell::Cell;
+use super::linalg::is_zero;
 use crate::model::converter_map::ConverterMap;
 use crate::model::friction::{Decay, FrictionLaw};
 use crate::model::mechanism::{Normal, Region, TwistForm};
 use crate::model::torque_map::TorqueMap;
-use crate::number::{Real, Series, TERMS, product_term};
+use crate::number::{Number, Series, TERMS, product_term};
 
 /// A law over one or two linear forms of the state, and the inputs.
 #[derive(Clone, Debug)]
@@ -69,7 +70,7 @@ pub struct ChannelSeries<T> {
     pub torque: Series<T>,
 }
 
-impl<T: Real> Default for ChannelSeries<T> {
+impl<T: Number> Default for ChannelSeries<T> {
     fn default() -> Self {
         let zero = [T::zero_(); TERMS];
         Self {
@@ -83,7 +84,7 @@ impl<T: Real> Default for ChannelSeries<T> {
     }
 }
 
-impl<T: Real> Normal<T> {
+impl<T: Number> Normal<T> {
     /// Coefficient `k` of the normal load (capacity over μ), not cut at zero.
     pub fn term(&self, inputs: &[Series<T>], k: usize) -> T {
         match *self {
@@ -107,7 +108,7 @@ impl<T: Real> Normal<T> {
     }
 }
 
-impl<T: Real> Channel<T> {
+impl<T: Number> Channel<T> {
     /// Whether the torque is a product of arguments: it may then start with a power of time twice as
     /// high as theirs, after terms that are all zero.
     pub fn is_product(&self) -> bool {
@@ -132,7 +133,7 @@ impl<T: Real> Channel<T> {
                 c.mu[k] = mu.series_term(&c.slip, piece, &mut c.decay, k);
                 let (load, last) = &mut c.normal;
                 load[k] = normal.term(inputs, k);
-                *last = if k <= 1 || load[k].re() != 0.0 { k } else { *last };
+                *last = if k <= 1 || !is_zero(load[k]) { k } else { *last };
                 let products = load[..=*last].iter().zip(c.mu[..=k].iter().rev());
                 products.fold(T::zero_(), |sum, (&load, &mu)| sum + load * mu) * sign
             }
@@ -170,6 +171,6 @@ impl<T: Real> Channel<T> {
 }
 
 /// Value of a linear form, given by its coefficients.
-pub fn form<T: Real>(coefficients: &[T], values: &[T]) -> T {
+pub fn form<T: Number>(coefficients: &[T], values: &[T]) -> T {
     coefficients.iter().zip(values).fold(T::zero_(), |sum, (&c, &v)| sum + c * v)
 }

@@ -4,11 +4,11 @@
 use super::channel::{Channel, Law};
 use super::constraints::{Coordinates, coordinates};
 use super::error::CompileError;
-use super::linalg::{Matrix, independent_rows, solve};
+use super::linalg::{Matrix, independent_rows, is_nothing, solve};
 use super::mode::{ModeKey, Motion};
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
 use crate::model::{Driveline, FrictionLaw, Name};
-use crate::number::Real;
+use crate::number::Number;
 use smallvec::smallvec;
 
 /// Most friction elements and lossy gears together: the bits of a mode key.
@@ -104,7 +104,7 @@ pub struct Network<T> {
     pub(super) motion: Option<Motion<T>>,
 }
 
-impl<T: Real> Network<T> {
+impl<T: Number> Network<T> {
     /// Compile a driveline.
     pub fn compile(driveline: &Driveline<T>) -> Result<Self, CompileError> {
         Self::from_mechanism(driveline.mechanism()?)
@@ -195,7 +195,7 @@ impl<T: Real> Network<T> {
     pub fn is_driven_by(&self, input: usize) -> bool {
         let position = self.first_input() + input;
         self.lags.iter().any(|lag| lag.target == position)
-            || (0..self.node_torques.rows).any(|i| self.node_torques[(i, position)].re() != 0.0)
+            || (0..self.node_torques.rows).any(|i| !is_nothing(self.node_torques[(i, position)]))
     }
 
     /// A linear form over nodes, expressed over the independent speeds.
@@ -231,12 +231,12 @@ impl<T: Real> Network<T> {
     /// Members without mass that only friction elements act on get a negligible one; whether there are
     /// any.
     fn give_mass_between_frictions(&mut self) -> bool {
-        let floor = self.inertia.max_abs() * MASSLESS;
+        let floor = T::lifted(self.inertia.max_abs() * MASSLESS);
         let mut given = false;
-        for j in (0..self.speeds()).filter(|&j| self.mass[(j, j)].re() == 0.0) {
+        for j in (0..self.speeds()).filter(|&j| is_nothing(self.mass[(j, j)])) {
             let node = self.coordinates.independent[j];
             let touches = |row: &Row<T>| {
-                row.iter().any(|&(n, _)| self.coordinates.speeds[(n, j)].re() != 0.0)
+                row.iter().any(|&(n, _)| !is_nothing(self.coordinates.speeds[(n, j)]))
             };
             let rubbed = self.mechanism.frictions.iter().any(|f| touches(&f.row));
             let sprung = self.mechanism.springs.iter().any(|s| touches(&s.row));
@@ -251,7 +251,7 @@ impl<T: Real> Network<T> {
     fn refuse_massless(&self) -> Result<(), CompileError> {
         let Some(column) = self.massless_speed() else { return Ok(()) };
         let n = &self.coordinates.speeds;
-        let moved = |&node: &usize| n[(node, column)].re() != 0.0;
+        let moved = |&node: &usize| !is_nothing(n[(node, column)]);
         let members =
             (0..n.rows).filter(moved).map(|i| self.mechanism.nodes[i].to_string()).collect();
         Err(CompileError::Massless { members })
@@ -395,7 +395,7 @@ impl<T: Real> Network<T> {
     }
 }
 
-fn node_inertia<T: Real>(m: &Mechanism<T>) -> Matrix<T> {
+fn node_inertia<T: Number>(m: &Mechanism<T>) -> Matrix<T> {
     let mut inertia = Matrix::zeros(m.nodes.len(), m.nodes.len());
     for term in &m.inertias {
         for &(i, a) in &term.row {

@@ -4,7 +4,7 @@
 use super::error::CompileError;
 use super::linalg::{Matrix, eliminate, independent_rows};
 use crate::model::mechanism::Mechanism;
-use crate::number::Real;
+use crate::number::{Number, Values};
 
 /// Split of the nodes and the map `ω = N v`.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub struct Coordinates<T> {
 }
 
 /// Choose coordinates for `C ω = 0`; faults name the elements.
-pub fn coordinates<T: Real>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileError> {
+pub fn coordinates<T: Number>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileError> {
     let mut c = constraint_matrix(m, |_| None);
     let dependent = eliminate(&mut c, &massless_first(m));
     if dependent.len() < c.rows {
@@ -35,7 +35,7 @@ pub fn coordinates<T: Real>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileE
 /// The map from node torques to generalised forces, `Kᵀ f`, like N, but built from the force rows: the
 /// constraints as their forces act on the nodes, see [`constraint_matrix`]. `None` where the efficiencies
 /// make the force balance singular (self-locking).
-pub fn force_map<T: Real>(
+pub fn force_map<T: Number>(
     mut force_rows: Matrix<T>,
     Coordinates { independent, dependent, .. }: &Coordinates<T>,
 ) -> Option<Matrix<T>> {
@@ -45,7 +45,7 @@ pub fn force_map<T: Real>(
 
 /// Rows of all constraints over the nodes; `efficiency` of a constraint by its index, where it has one,
 /// scales the entries other than the first.
-pub fn constraint_matrix<T: Real>(
+pub fn constraint_matrix<T: Number>(
     m: &Mechanism<T>,
     efficiency: impl Fn(usize) -> Option<T>,
 ) -> Matrix<T> {
@@ -60,7 +60,7 @@ pub fn constraint_matrix<T: Real>(
 }
 
 /// `[I; -C_dep⁻¹ C_ind]` in node order, where `C_dep` has been brought to unity.
-fn over_independent<T: Real>(
+fn over_independent<T: Number>(
     c: &Matrix<T>,
     independent: &[usize],
     dependent: &[usize],
@@ -76,9 +76,10 @@ fn over_independent<T: Real>(
 }
 
 /// The order in which nodes are made dependent: coordinates are then mostly the speeds of real masses.
-fn massless_first<T: Real>(m: &Mechanism<T>) -> Vec<usize> {
+fn massless_first<T: Number>(m: &Mechanism<T>) -> Vec<usize> {
     let massless = |node: usize| {
-        !m.inertias.iter().any(|i| i.inertia.re() > 0.0 && i.row.len() == 1 && i.row[0].0 == node)
+        let of_node = m.inertias.iter().filter(|i| i.row.len() == 1 && i.row[0].0 == node);
+        !of_node.map(|i| i.inertia.re()).any(|inertia| inertia.decide(|v| v > 0.0))
     };
     let (mut order, heavy): (Vec<usize>, Vec<usize>) =
         (0..m.nodes.len()).partition(|&i| massless(i));
@@ -87,7 +88,7 @@ fn massless_first<T: Real>(m: &Mechanism<T>) -> Vec<usize> {
 }
 
 /// Elements of a smallest set of dependent rows.
-fn dependent_elements<T: Real>(m: &Mechanism<T>) -> Vec<String> {
+fn dependent_elements<T: Number>(m: &Mechanism<T>) -> Vec<String> {
     let c = constraint_matrix(m, |_| None);
     let deficient = |rows: &[usize]| independent_rows(&c.select_rows(rows)).len() < rows.len();
     let mut rows: Vec<usize> = (0..c.rows).collect();

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-//! Dense linear algebra over [`Real`]: small systems, pivots chosen on the real part.
+//! Dense linear algebra over [`Number`]: small systems, pivots chosen on the real part.
 //!
 //! Written here because the library routines need a field of floats, while derivatives must pass
 //! through the solve.
 
-use crate::number::Real;
+use crate::number::{Number, Values};
 use smallvec::SmallVec;
 
 /// A dense row-major matrix.
@@ -17,7 +17,7 @@ pub struct Matrix<T> {
     data: Vec<T>,
 }
 
-impl<T: Real> Matrix<T> {
+impl<T: Number> Matrix<T> {
     /// A matrix of zeros.
     pub fn zeros(rows: usize, cols: usize) -> Self {
         Self { rows, cols, data: vec![T::zero_(); rows * cols] }
@@ -102,8 +102,8 @@ impl<T: Real> Matrix<T> {
     }
 
     /// Largest magnitude among the entries.
-    pub fn max_abs(&self) -> f64 {
-        self.data.iter().fold(0.0, |m, a| m.max(a.re().abs()))
+    pub fn max_abs(&self) -> T::Values {
+        self.data.iter().fold(T::Values::zero_(), |m, a| a.re().magnitude().larger(m))
     }
 
     fn swap_rows(&mut self, i: usize, j: usize) {
@@ -124,7 +124,7 @@ pub struct SparseRows<T> {
     ends: Vec<usize>,
 }
 
-impl<T: Real> SparseRows<T> {
+impl<T: Number> SparseRows<T> {
     /// Of a dense matrix.
     pub fn of(dense: &Matrix<T>) -> Self {
         let mut terms = Vec::with_capacity(8 * dense.rows);
@@ -165,12 +165,12 @@ impl<T> std::ops::IndexMut<(usize, usize)> for Matrix<T> {
 
 /// Solve `a x = b` for a square matrix; `Err(column)` where the matrix is singular to `1e-12`
 /// of its row scale. Sparse matrices are solved in fewer operations.
-pub fn solve<T: Real>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usize> {
+pub fn solve<T: Number>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usize> {
     let mut x = b;
-    let scale = a.max_abs().max(f64::MIN_POSITIVE);
+    let least = a.max_abs().larger(T::Values::of(f64::MIN_POSITIVE)) * 1e-12;
     for c in 0..a.rows {
         let pivot = largest_in_column(&a, c, c);
-        if a[(pivot, c)].re().abs() <= 1e-12 * scale {
+        if a[(pivot, c)].re().magnitude().decide_with(least, |entry, least| entry <= least) {
             return Err(c);
         }
         a.swap_rows(c, pivot);
@@ -194,8 +194,8 @@ pub fn solve<T: Real>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usize
 /// Bring `a` to a form in which those of the columns `order` that are linearly independent of the ones
 /// before them, to `1e-9` of the largest entry, are unit vectors: number i of those that are returned has
 /// its 1 in row i. Sparse matrices take fewer operations.
-pub fn eliminate<T: Real>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
-    let least = 1e-9 * a.max_abs();
+pub fn eliminate<T: Number>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
+    let least = a.max_abs() * 1e-9;
     let mut units = Vec::with_capacity(a.rows);
     for &column in order {
         let row = units.len();
@@ -203,7 +203,7 @@ pub fn eliminate<T: Real>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
             break;
         }
         let pivot = largest_in_column(a, column, row);
-        if a[(pivot, column)].re().abs() <= least {
+        if a[(pivot, column)].re().magnitude().decide_with(least, |entry, least| entry <= least) {
             continue;
         }
         a.swap_rows(row, pivot);
@@ -221,11 +221,11 @@ pub fn eliminate<T: Real>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
 }
 
 /// Rows of `a` that are linearly independent of those before them, to `1e-9` of their size.
-pub fn independent_rows<T: Real>(a: &Matrix<T>) -> Vec<usize> {
+pub fn independent_rows<T: Number>(a: &Matrix<T>) -> Vec<usize> {
     let most = a.rows.min(a.cols);
     let mut kept = Vec::with_capacity(most);
     // What is left of each kept row, with 1 as its largest entry, and where that stands.
-    let mut left = Matrix::<f64>::zeros(most, a.cols);
+    let mut left = Matrix::<T::Values>::zeros(most, a.cols);
     let mut pivots = SmallVec::<[usize; 8]>::new();
     for i in 0..a.rows {
         let k = kept.len();
@@ -234,20 +234,23 @@ pub fn independent_rows<T: Real>(a: &Matrix<T>) -> Vec<usize> {
         }
         let (before, rest) = left.data.split_at_mut(k * a.cols);
         let row = &mut rest[..a.cols];
-        let mut scale = 0.0_f64;
+        let mut scale = T::Values::zero_();
         for (to, from) in row.iter_mut().zip(a.row(i)) {
             *to = from.re();
-            scale = scale.max(to.abs());
+            scale = to.magnitude().larger(scale);
         }
         for (basis, &pivot) in before.chunks_exact(a.cols).zip(&pivots) {
             let factor = row[pivot];
-            if factor != 0.0 {
+            if !is_zero(factor) {
                 row.iter_mut().zip(basis).for_each(|(v, &b)| *v -= factor * b);
             }
         }
-        let larger = |j: usize, k: usize| if row[k].abs() > row[j].abs() { k } else { j };
+        let size = |j: usize| row[j].magnitude();
+        let larger = |j: usize, k: usize| {
+            if size(k).decide_with(size(j), |of_k, of_j| of_k > of_j) { k } else { j }
+        };
         let pivot = (1..a.cols).fold(0, larger);
-        if row[pivot].abs() > 1e-9 * scale {
+        if size(pivot).decide_with(scale, |size, scale| size > 1e-9 * scale) {
             let inverse = row[pivot].recip();
             row.iter_mut().for_each(|v| *v *= inverse);
             pivots.push(pivot);
@@ -259,7 +262,7 @@ pub fn independent_rows<T: Real>(a: &Matrix<T>) -> Vec<usize> {
 
 /// Least-norm solution of the consistent system `a x = b`, which may be rank deficient: with
 /// `a = l q` and orthonormal rows of `q`, `x = qᵀ l⁻¹ b`.
-pub fn least_norm<T: Real>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
+pub fn least_norm<T: Number>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
     let Orthogonalised { kept, q, l } = orthogonalised(a);
     let mut y = b.select_rows(&kept);
     let mut x = Matrix::zeros(a.cols, b.cols);
@@ -286,7 +289,7 @@ struct Orthogonalised<T> {
 }
 
 /// Modified Gram-Schmidt over the rows, twice for full orthogonality.
-fn orthogonalised<T: Real>(a: &Matrix<T>) -> Orthogonalised<T> {
+fn orthogonalised<T: Number>(a: &Matrix<T>) -> Orthogonalised<T> {
     let dot = |a: &[T], b: &[T]| a.iter().zip(b).fold(T::zero_(), |sum, (&a, &b)| sum + a * b);
     let mut kept = Vec::with_capacity(a.rows);
     // Independent rows move up in q as they are found.
@@ -305,7 +308,7 @@ fn orthogonalised<T: Real>(a: &Matrix<T>) -> Orthogonalised<T> {
             }
         }
         let (left, length) = (dot(row, row), dot(a.row(i), a.row(i)).re());
-        if left.re() > 1e-18 * length {
+        if left.re().decide_with(length, |left, length| left > 1e-18 * length) {
             let left = left.sqrt();
             l[(k, k)] = left;
             row.iter_mut().for_each(|r| *r /= left);
@@ -317,14 +320,16 @@ fn orthogonalised<T: Real>(a: &Matrix<T>) -> Orthogonalised<T> {
     Orthogonalised { kept, q, l }
 }
 
-fn largest_in_column<T: Real>(a: &Matrix<T>, c: usize, from: usize) -> usize {
-    (from..a.rows)
-        .max_by(|&i, &j| a[(i, c)].re().abs().total_cmp(&a[(j, c)].re().abs()))
-        .unwrap_or(from)
+fn largest_in_column<T: Number>(a: &Matrix<T>, c: usize, from: usize) -> usize {
+    let size = |i: usize| a[(i, c)].re().magnitude();
+    let larger = |i: usize, j: usize| {
+        if size(j).decide_with(size(i), |of_j, of_i| of_j >= of_i) { j } else { i }
+    };
+    (from + 1..a.rows).fold(from, larger)
 }
 
 /// Subtract a multiple of row `source` from row `target`, from column `from` on.
-fn subtract_row<T: Real>(
+fn subtract_row<T: Number>(
     a: &mut Matrix<T>,
     (target, source): (usize, usize),
     from: usize,
@@ -336,7 +341,13 @@ fn subtract_row<T: Real>(
     target[from..].iter_mut().zip(&source[from..]).for_each(|(t, &s)| *t -= s * factor);
 }
 
-/// Whether a number is zero with all its derivatives.
-pub fn is_zero<T: Real>(value: T) -> bool {
-    value.re() == 0.0 && value.is_constant()
+/// Whether a number is zero in every run and with all its derivatives, so that its products may be left
+/// out.
+pub fn is_zero<T: Number>(value: T) -> bool {
+    value.re().those(|v| v != 0.0) == 0 && value.is_constant()
+}
+
+/// Whether the value is zero, which is decided.
+pub fn is_nothing<T: Number>(value: T) -> bool {
+    value.re().decide(|v| v == 0.0)
 }

@@ -4,10 +4,10 @@
 
 use super::compile::Network;
 use super::constraints::{constraint_matrix, force_map};
-use super::linalg::{Matrix, SparseRows, independent_rows, is_zero, least_norm, solve};
+use super::linalg::{Matrix, SparseRows, independent_rows, is_nothing, is_zero, least_norm, solve};
 use super::radius::radius;
 use crate::model::mechanism::{self, Loss, LossLaw};
-use crate::number::Real;
+use crate::number::{Number, Values};
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
@@ -75,8 +75,8 @@ pub struct Mode<T> {
     pub derivative: Matrix<T>,
     /// Its entries that are not zero, for products with the basis.
     pub rates: SparseRows<T>,
-    /// About the spectral radius of the motion, 1/s.
-    pub radius: f64,
+    /// About the spectral radius of the motion, 1/s, without derivatives.
+    pub radius: T,
     /// Rows at rest.
     pub stuck: Vec<Row>,
     /// Their torques in that order (a held gear's is its loss torque), then the torques of
@@ -108,7 +108,7 @@ pub struct GearBounds<T> {
     pub lower: [(T, T); 2],
 }
 
-impl<T: Real> Loss<T> {
+impl<T: Number> Loss<T> {
     /// Whether the loss depends on the direction of power.
     pub fn is_directional(&self) -> bool {
         self.law == LossLaw::Dissipative
@@ -133,7 +133,7 @@ impl<T: Real> Loss<T> {
     /// Torque through the gear, in the direction of motion, above which power flows forward.
     pub fn threshold(&self) -> T {
         let slope = self.eta - self.eta_backward.recip();
-        if slope.re() == 0.0 { T::zero_() } else { (self.drag - self.drag_backward) / slope }
+        if is_nothing(slope) { T::zero_() } else { (self.drag - self.drag_backward) / slope }
     }
 
     /// Bounds at rest.
@@ -145,7 +145,7 @@ impl<T: Real> Loss<T> {
     }
 }
 
-impl<T: Real> Network<T> {
+impl<T: Number> Network<T> {
     /// Speed that a row keeps at zero, over the independent speeds.
     pub fn slip_of(&self, row: Row) -> &[T] {
         match row {
@@ -186,7 +186,7 @@ impl<T: Real> Network<T> {
         Some(Mode {
             key,
             rates: SparseRows::of(&derivative),
-            radius: radius(&derivative),
+            radius: T::lifted(radius(&derivative)),
             derivative,
             gear_torque: OnceLock::new(),
             stuck_torque,
@@ -266,17 +266,20 @@ impl<T: Real> Network<T> {
     /// What each held speed's torque can be, for the split of redundant locks; prescribed speeds,
     /// which come last, and one-way clutches carry what the others cannot.
     fn weights(&self, stuck: &[Row], capacity: &[T]) -> Vec<T> {
-        let largest = capacity.iter().fold(1.0, |m, c| c.re().max(m));
-        let unbounded = largest * 1e2;
+        let one = T::Values::of(1.0);
+        let largest = capacity.iter().fold(one, |largest, c| c.re().larger(largest));
+        let unbounded = T::lifted(largest * 1e2);
         let weight = |&row: &Row| match row {
             Row::Friction(j) if !self.frictions[j].one_way => {
                 let least = largest * 1e-3;
-                if capacity[j].re() > least { capacity[j] } else { T::of(least) }
+                let enough =
+                    capacity[j].re().decide_with(least, |capacity, least| capacity > least);
+                if enough { capacity[j] } else { T::lifted(least) }
             }
-            Row::Friction(_) => T::of(unbounded),
+            Row::Friction(_) => unbounded,
             Row::Gear(_) => T::of(1.0),
         };
-        let prescribed = std::iter::repeat_n(T::of(unbounded), self.prescribed.len());
+        let prescribed = std::iter::repeat_n(unbounded, self.prescribed.len());
         stuck.iter().map(weight).chain(prescribed).collect()
     }
 
@@ -298,7 +301,7 @@ impl<T: Real> Network<T> {
     }
 }
 
-impl<T: Real> Mode<T> {
+impl<T: Number> Mode<T> {
     /// Torque entering each lossy gear at its driving side, losses × basis: the multipliers of their
     /// constraints from the balance of the dependent nodes, `D_depᵀ λ = (f - I ω')_dep`, and at rest
     /// the loss torque on top. Computed when first asked for.
@@ -337,7 +340,7 @@ impl<T: Real> Mode<T> {
 /// Solve `W τ = b` for the torques that hold the speeds. For redundant locks the torques are those of
 /// least `Σ (τ_j / weight_j)²`. Prescribed speeds, from row `stuck` on, win where the rows contradict
 /// each other.
-fn holding_torque<T: Real>(
+fn holding_torque<T: Number>(
     w: Matrix<T>,
     b: Matrix<T>,
     weights: impl FnOnce() -> Vec<T>,

@@ -2,53 +2,54 @@
 //! How fast a linear motion is.
 
 use super::linalg::Matrix;
-use crate::number::Real;
+use crate::number::{Number, Values};
 
 /// Entries of a row that are multiplied together.
 const CHUNK: usize = 4;
 
 /// A square matrix by rows of whole chunks.
-struct Chunked {
+struct Chunked<V> {
     size: usize,
-    chunks: Vec<[f64; CHUNK]>,
+    chunks: Vec<[V; CHUNK]>,
 }
 
 /// Estimate of the spectral radius of the square matrix A that `rows` begin with, one per state: from
 /// `A^16`, of which a bad scaling of the states counts only by its sixteenth root.
-pub fn radius<T: Real>(rows: &Matrix<T>) -> f64 {
+pub fn radius<T: Number>(rows: &Matrix<T>) -> T::Values {
     let mut power = Chunked::zeros(rows.rows);
     for i in 0..rows.rows {
         for (to, from) in power.row_mut(i).iter_mut().zip(&rows.row(i)[..rows.rows]) {
             *to = from.re();
         }
     }
+    let least = T::Values::of(f64::MIN_POSITIVE);
     let size = power.max_abs();
-    if size < f64::MIN_POSITIVE {
-        return 0.0;
-    }
-    let inverse = size.recip();
+    let inverse = size.larger(least).recip();
     power.chunks.as_flattened_mut().iter_mut().for_each(|v| *v *= inverse);
     let mut square = Chunked::zeros(rows.rows);
     for _ in 0..4 {
         power.square(&mut square);
         std::mem::swap(&mut power, &mut square);
     }
-    let root = (0..4).fold(power.max_abs().max(f64::MIN_POSITIVE), |root, _| root.sqrt());
+    let root = (0..4).fold(power.max_abs().larger(least), |root, _| root.sqrt());
     size * root
 }
 
-impl Chunked {
+impl<V: Values> Chunked<V> {
     fn zeros(size: usize) -> Self {
-        Self { size, chunks: vec![[0.0; CHUNK]; size * size.div_ceil(CHUNK)] }
+        Self { size, chunks: vec![[V::zero_(); CHUNK]; size * size.div_ceil(CHUNK)] }
     }
 
-    fn row_mut(&mut self, i: usize) -> &mut [f64] {
+    fn row_mut(&mut self, i: usize) -> &mut [V] {
         let width = self.size.div_ceil(CHUNK);
         self.chunks[i * width..(i + 1) * width].as_flattened_mut()
     }
 
-    fn max_abs(&self) -> f64 {
-        self.chunks.as_flattened().iter().fold(0.0, |largest, v| v.abs().max(largest))
+    fn max_abs(&self) -> V {
+        self.chunks
+            .as_flattened()
+            .iter()
+            .fold(V::zero_(), |largest, v| v.magnitude().larger(largest))
     }
 
     /// The matrix times itself.
@@ -58,7 +59,7 @@ impl Chunked {
             self.chunks.chunks_exact(width).zip(out.chunks.chunks_exact_mut(width))
         {
             for (c, product) in products.iter_mut().enumerate() {
-                let mut sum = [0.0; CHUNK];
+                let mut sum = [V::zero_(); CHUNK];
                 for (&a, b) in row.as_flattened().iter().zip(self.chunks[c..].iter().step_by(width))
                 {
                     for i in 0..CHUNK {

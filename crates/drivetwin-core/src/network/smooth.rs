@@ -6,7 +6,7 @@ use super::cell::Cell;
 use super::channel::{self, Channel};
 use crate::model::FrictionLaw;
 use crate::model::mechanism::Normal;
-use crate::number::{Factor, Lane, Real};
+use crate::number::{Factor, Lane, Number};
 
 /// Most inputs of a network that is marched.
 pub const MAX_INPUTS: usize = 16;
@@ -76,7 +76,7 @@ impl<L: Lane> Law<L> {
     }
 }
 
-impl<T: Real> Law<T> {
+impl<T: Number> Law<T> {
     /// The law of a channel in its present cell; `None` where it is not smooth over one argument.
     pub fn of(channel: &Channel<T>, cell: Cell) -> Option<Self> {
         let Cell::Moving { sign, piece } = cell else { return None };
@@ -110,7 +110,7 @@ impl<T: Real> Law<T> {
 }
 
 /// The normal load over its input.
-pub fn line_of<T: Real>(normal: &Normal<T>) -> Line<T> {
+pub fn line_of<T: Number>(normal: &Normal<T>) -> Line<T> {
     match *normal {
         Normal::Pressure { input, gain, p0 } => Line { input, gain, offset: -(gain * p0) },
         Normal::Constant(normal) => Line { input: 0, gain: T::zero_(), offset: normal },
@@ -200,11 +200,6 @@ impl<L: Lane> Value<L> {
 }
 
 impl<L: Lane> Line<L> {
-    /// 1, whatever the input.
-    pub fn idle() -> Self {
-        Self { input: 0, gain: L::all(0.0), offset: L::all(1.0) }
-    }
-
     /// Value at the start of a sample and rate within it.
     #[inline(always)]
     pub fn line<const F: bool, U: Factor<L>>(&self, sample: &Sample<U>) -> [L; 2] {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A value with its derivatives by `P` parameters (forward mode).
 
-use super::Real;
+use super::{Number, Real};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// `re + Σ eps_i ε_i` with `ε_i ε_j = 0`.
@@ -162,26 +162,17 @@ where
     }
 }
 
-impl<const P: usize> Real for Dual<P> {
-    type Slopes = [f64; P];
-
-    const NO_SLOPES: [f64; P] = [f64::NAN; P];
-
+impl<const P: usize> Number for Dual<P> {
     #[inline(always)]
     fn of(value: f64) -> Self {
         Self { re: value, eps: [0.0; P] }
     }
     #[inline(always)]
-    fn re(&self) -> f64 {
-        self.re
+    fn lifted(value: f64) -> Self {
+        Self::of(value)
     }
-    #[inline(always)]
-    fn sloped(slopes: [f64; P]) -> Self {
-        Self { re: 0.0, eps: slopes }
-    }
-    #[inline(always)]
-    fn slopes(self) -> [f64; P] {
-        self.eps
+    fn gathered(value: impl Fn(usize) -> f64) -> Self {
+        Self::of(value(0))
     }
     fn is_constant(&self) -> bool {
         self.eps == [0.0; P]
@@ -197,6 +188,21 @@ impl<const P: usize> Real for Dual<P> {
     fn exp(self) -> Self {
         let value = self.re.exp();
         self.chain(value, value)
+    }
+}
+
+impl<const P: usize> Real for Dual<P> {
+    type Slopes = [f64; P];
+
+    const NO_SLOPES: [f64; P] = [f64::NAN; P];
+
+    #[inline(always)]
+    fn sloped(slopes: [f64; P]) -> Self {
+        Self { re: 0.0, eps: slopes }
+    }
+    #[inline(always)]
+    fn slopes(self) -> [f64; P] {
+        self.eps
     }
     fn sin(self) -> Self {
         self.chain(self.re.sin(), self.re.cos())

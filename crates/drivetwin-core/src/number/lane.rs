@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Arithmetic without decisions: what the inner loop over samples needs of a number.
 
-use super::Dual;
+use super::{Dual, Number};
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// One run, one run with derivatives, or several runs side by side. Operations act on every run alike,
@@ -15,6 +15,9 @@ pub trait Lane:
     /// Whether a value carries derivatives, so that inputs may jump in these alone.
     const DERIVATIVES: bool;
 
+    /// All runs, as bits.
+    const RUNS: u32;
+
     /// The values alone.
     type Values: Values;
 
@@ -26,6 +29,9 @@ pub trait Lane:
 
     /// `self · factor + b`.
     fn fma_times<const F: bool>(self, factor: f64, b: Self) -> Self;
+
+    /// `self · factor + b` with a factor of every run.
+    fn fma_values<const F: bool>(self, factor: Self::Values, b: Self) -> Self;
 
     /// Product with a number.
     fn times(self, factor: f64) -> Self;
@@ -76,7 +82,23 @@ impl<const P: usize> Factor<Self> for Dual<P> {
 }
 
 /// Values of one or several runs, as guards look at them: a guard falls where its sign bit is set.
-pub trait Values: Lane<Values = Self> {
+pub trait Values: Number + Lane<Values = Self> {
+    /// What `say` answers for the value of a run. Of several runs the first decides for all; those for
+    /// which another answer holds part with it, see [`together`](super::together).
+    fn decide<R: PartialEq>(self, say: impl Fn(f64) -> R) -> R;
+
+    /// The same over two values.
+    fn decide_with<R: PartialEq>(self, other: Self, say: impl Fn(f64, f64) -> R) -> R;
+
+    /// Runs for whose value `say` holds, as bits.
+    fn those(self, say: impl Fn(f64) -> bool) -> u32;
+
+    /// The value of the run that decides, for messages.
+    fn leading(self) -> f64;
+
+    /// The value of a run by its number.
+    fn of_run(self, run: usize) -> f64;
+
     /// Magnitude.
     fn magnitude(self) -> Self;
 
@@ -96,7 +118,9 @@ pub trait Values: Lane<Values = Self> {
     fn any_negative(self) -> bool;
 
     /// Runs whose value is infinite or no number, as bits.
-    fn unbounded(self) -> u32;
+    fn unbounded(self) -> u32 {
+        self.those(|value| !value.is_finite())
+    }
 }
 
 /// `a · b + c`, fused or not.
@@ -161,6 +185,8 @@ pub(super) fn growth<const F: bool>(x: f64) -> f64 {
 impl Lane for f64 {
     const DERIVATIVES: bool = false;
 
+    const RUNS: u32 = 1;
+
     type Values = Self;
 
     #[inline(always)]
@@ -174,6 +200,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn fma_times<const F: bool>(self, factor: f64, b: Self) -> Self {
         fused::<F>(self, factor, b)
+    }
+    #[inline(always)]
+    fn fma_values<const F: bool>(self, factor: f64, b: Self) -> Self {
+        self.fma_times::<F>(factor, b)
     }
     #[inline(always)]
     fn times(self, factor: f64) -> Self {
@@ -223,13 +253,31 @@ impl Values for f64 {
         self.is_sign_negative()
     }
     #[inline(always)]
-    fn unbounded(self) -> u32 {
-        u32::from(!self.is_finite())
+    fn decide<R: PartialEq>(self, say: impl Fn(f64) -> R) -> R {
+        say(self)
+    }
+    #[inline(always)]
+    fn decide_with<R: PartialEq>(self, other: Self, say: impl Fn(f64, f64) -> R) -> R {
+        say(self, other)
+    }
+    #[inline(always)]
+    fn those(self, say: impl Fn(f64) -> bool) -> u32 {
+        u32::from(say(self))
+    }
+    #[inline(always)]
+    fn leading(self) -> f64 {
+        self
+    }
+    #[inline(always)]
+    fn of_run(self, _: usize) -> f64 {
+        self
     }
 }
 
 impl<const P: usize> Lane for Dual<P> {
     const DERIVATIVES: bool = true;
+
+    const RUNS: u32 = 1;
 
     type Values = f64;
 
@@ -253,6 +301,10 @@ impl<const P: usize> Lane for Dual<P> {
             eps[i] = fused::<F>(self.eps[i], factor, eps[i]);
         }
         Self::new(fused::<F>(self.re, factor, b.re), eps)
+    }
+    #[inline(always)]
+    fn fma_values<const F: bool>(self, factor: f64, b: Self) -> Self {
+        self.fma_times::<F>(factor, b)
     }
     #[inline(always)]
     fn times(self, factor: f64) -> Self {

@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: MIT
 //! The number types the physics is written over: `f64` for values, [`Dual`] for derivatives, [`Pack`]
-//! for several runs side by side.
+//! for several runs side by side that move as one.
 
 mod dual;
 mod lane;
 mod pack;
 mod series;
+mod vote;
 
 pub use dual::Dual;
 pub use lane::{Factor, Lane, SMALL, Values};
 pub use pack::Pack;
 pub use series::{INVERSE, Series, TERMS, evaluate, product_term, slope};
+pub use vote::together;
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Sub, SubAssign};
 
-/// A real number, with or without derivatives. Decisions are taken on [`Real::re`].
-pub trait Real:
-    Factor<Self, Values = f64>
+/// A number that mechanisms are stated, compiled and moved in: of one run, with or without derivatives, or
+/// of several runs side by side. Decisions are taken on [`Number::re`], see [`Values::decide`].
+pub trait Number:
+    Factor<Self>
     + Debug
     + PartialEq
     + Send
@@ -37,13 +40,7 @@ pub trait Real:
     + MulAssign<f64>
     + DivAssign<f64>
 {
-    /// Derivatives by the parameters: an array.
-    type Slopes: Copy + Debug + Send + Sync;
-
-    /// Derivatives that are no numbers.
-    const NO_SLOPES: Self::Slopes;
-
-    /// A value without derivatives.
+    /// A value without derivatives, the same in every run.
     fn of(value: f64) -> Self;
 
     /// Zero, without derivatives.
@@ -51,14 +48,16 @@ pub trait Real:
         Self::of(0.0)
     }
 
-    /// The value.
-    fn re(&self) -> f64;
+    /// Values without derivatives.
+    fn lifted(values: Self::Values) -> Self;
 
-    /// Number zero with derivatives by the parameters.
-    fn sloped(slopes: Self::Slopes) -> Self;
+    /// A value of every run by its number; that of run 0 where there is but one.
+    fn gathered(value: impl Fn(usize) -> f64) -> Self;
 
-    /// Derivatives by the parameters.
-    fn slopes(self) -> Self::Slopes;
+    /// The value, of every run.
+    fn re(&self) -> Self::Values {
+        self.values()
+    }
 
     /// Whether it has no derivatives other than zero.
     fn is_constant(&self) -> bool;
@@ -71,6 +70,21 @@ pub trait Real:
 
     /// e^x.
     fn exp(self) -> Self;
+}
+
+/// A number of one run, with or without derivatives.
+pub trait Real: Number + Factor<Self, Values = f64> {
+    /// Derivatives by the parameters: an array.
+    type Slopes: Copy + Debug + Send + Sync;
+
+    /// Derivatives that are no numbers.
+    const NO_SLOPES: Self::Slopes;
+
+    /// Number zero with derivatives by the parameters.
+    fn sloped(slopes: Self::Slopes) -> Self;
+
+    /// Derivatives by the parameters.
+    fn slopes(self) -> Self::Slopes;
 
     /// Sine, x in rad.
     fn sin(self) -> Self;
@@ -79,26 +93,17 @@ pub trait Real:
     fn cos(self) -> Self;
 }
 
-impl Real for f64 {
-    type Slopes = [f64; 0];
-
-    const NO_SLOPES: Self::Slopes = [];
-
+impl Number for f64 {
     #[inline(always)]
     fn of(value: f64) -> Self {
         value
     }
     #[inline(always)]
-    fn re(&self) -> f64 {
-        *self
+    fn lifted(value: f64) -> Self {
+        value
     }
-    #[inline(always)]
-    fn sloped(_: Self::Slopes) -> Self {
-        0.0
-    }
-    #[inline(always)]
-    fn slopes(self) -> Self::Slopes {
-        []
+    fn gathered(value: impl Fn(usize) -> f64) -> Self {
+        value(0)
     }
     #[inline(always)]
     fn is_constant(&self) -> bool {
@@ -112,6 +117,21 @@ impl Real for f64 {
     }
     fn exp(self) -> Self {
         self.exp()
+    }
+}
+
+impl Real for f64 {
+    type Slopes = [f64; 0];
+
+    const NO_SLOPES: Self::Slopes = [];
+
+    #[inline(always)]
+    fn sloped(_: Self::Slopes) -> Self {
+        0.0
+    }
+    #[inline(always)]
+    fn slopes(self) -> Self::Slopes {
+        []
     }
     fn sin(self) -> Self {
         self.sin()

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! Values of several runs side by side.
 
+use super::Number;
 use super::lane::{Factor, Lane, Values, growth};
-use std::ops::{Add, Mul, Neg, Sub};
+use super::vote::{leader, vote};
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// `K` values, one of each run. The loops over the runs compile to vector instructions of the set that
 /// is active where they are inlined. Aligned to the cache's lines, so that no vector straddles two.
@@ -63,6 +65,116 @@ impl<const K: usize> Mul for Pack<K> {
     }
 }
 
+impl<const K: usize> Div for Pack<K> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, o: Self) -> Self {
+        self.zip(o, |a, b| a / b)
+    }
+}
+
+impl<const K: usize> Add<f64> for Pack<K> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: f64) -> Self {
+        self.each(|a| a + o)
+    }
+}
+
+impl<const K: usize> Sub<f64> for Pack<K> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: f64) -> Self {
+        self.each(|a| a - o)
+    }
+}
+
+impl<const K: usize> Mul<f64> for Pack<K> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: f64) -> Self {
+        self.each(|a| a * o)
+    }
+}
+
+impl<const K: usize> Div<f64> for Pack<K> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, o: f64) -> Self {
+        self.each(|a| a / o)
+    }
+}
+
+impl<R, const K: usize> AddAssign<R> for Pack<K>
+where
+    Self: Add<R, Output = Self>,
+{
+    #[inline(always)]
+    fn add_assign(&mut self, o: R) {
+        *self = *self + o;
+    }
+}
+
+impl<R, const K: usize> SubAssign<R> for Pack<K>
+where
+    Self: Sub<R, Output = Self>,
+{
+    #[inline(always)]
+    fn sub_assign(&mut self, o: R) {
+        *self = *self - o;
+    }
+}
+
+impl<R, const K: usize> MulAssign<R> for Pack<K>
+where
+    Self: Mul<R, Output = Self>,
+{
+    #[inline(always)]
+    fn mul_assign(&mut self, o: R) {
+        *self = *self * o;
+    }
+}
+
+impl<R, const K: usize> DivAssign<R> for Pack<K>
+where
+    Self: Div<R, Output = Self>,
+{
+    #[inline(always)]
+    fn div_assign(&mut self, o: R) {
+        *self = *self / o;
+    }
+}
+
+impl<const K: usize> Number for Pack<K> {
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        Self([value; K])
+    }
+    #[inline(always)]
+    fn lifted(values: Self) -> Self {
+        values
+    }
+    fn gathered(value: impl Fn(usize) -> f64) -> Self {
+        Self(std::array::from_fn(value))
+    }
+    #[inline(always)]
+    fn is_constant(&self) -> bool {
+        true
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        self.each(f64::recip)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.each(f64::sqrt)
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        self.each(f64::exp)
+    }
+}
+
 impl<const K: usize> Neg for Pack<K> {
     type Output = Self;
     #[inline(always)]
@@ -73,6 +185,8 @@ impl<const K: usize> Neg for Pack<K> {
 
 impl<const K: usize> Lane for Pack<K> {
     const DERIVATIVES: bool = false;
+
+    const RUNS: u32 = (1 << K) - 1;
 
     type Values = Self;
 
@@ -93,6 +207,10 @@ impl<const K: usize> Lane for Pack<K> {
         self.fma::<F>(Self::all(factor), b)
     }
     #[inline(always)]
+    fn fma_values<const F: bool>(self, factor: Self, b: Self) -> Self {
+        self.fma::<F>(factor, b)
+    }
+    #[inline(always)]
     fn times(self, factor: f64) -> Self {
         self.each(|a| a * factor)
     }
@@ -106,8 +224,11 @@ impl<const K: usize> Lane for Pack<K> {
     }
     #[inline(always)]
     fn with(self, runs: u32, other: Self) -> Self {
-        let own = |i: usize| runs >> i & 1 == 0;
-        Self(std::array::from_fn(|i| if own(i) { self.0[i] } else { other.0[i] }))
+        let mut out = self.0;
+        for i in 0..K {
+            out[i] = if runs >> i & 1 == 1 { other.0[i] } else { out[i] };
+        }
+        Self(out)
     }
     #[inline(always)]
     fn values(self) -> Self {
@@ -156,8 +277,23 @@ impl<const K: usize> Values for Pack<K> {
         any >> 63 == 1
     }
     #[inline(always)]
-    fn unbounded(self) -> u32 {
-        self.bits(|a| a.unbounded())
+    fn decide<R: PartialEq>(self, say: impl Fn(f64) -> R) -> R {
+        vote(|run| say(self.0[run % K]))
+    }
+    #[inline(always)]
+    fn decide_with<R: PartialEq>(self, other: Self, say: impl Fn(f64, f64) -> R) -> R {
+        vote(|run| say(self.0[run % K], other.0[run % K]))
+    }
+    #[inline(always)]
+    fn those(self, say: impl Fn(f64) -> bool) -> u32 {
+        self.bits(|a| u32::from(say(a)))
+    }
+    fn leading(self) -> f64 {
+        self.0[leader() % K]
+    }
+    #[inline(always)]
+    fn of_run(self, run: usize) -> f64 {
+        self.0[run % K]
     }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Truncated Taylor series in time.
 
-use super::Real;
+use super::Number;
 
 /// Number of Taylor coefficients of a step, order 0 included.
 pub const TERMS: usize = 15;
@@ -20,7 +20,7 @@ pub const INVERSE: Series<f64> = {
 };
 
 /// Value of a series at `h` [s], by Horner's rule over its first `order + 1` coefficients.
-pub fn evaluate<T: Real>(series: &Series<T>, order: usize, h: T) -> T {
+pub fn evaluate<T: Number>(series: &Series<T>, order: usize, h: T) -> T {
     let mut value = series[order];
     for k in (0..order).rev() {
         value = value * h + series[k];
@@ -29,7 +29,7 @@ pub fn evaluate<T: Real>(series: &Series<T>, order: usize, h: T) -> T {
 }
 
 /// Time derivative of a series at `h` [s].
-pub fn slope<T: Real>(series: &Series<T>, order: usize, h: T) -> T {
+pub fn slope<T: Number>(series: &Series<T>, order: usize, h: T) -> T {
     let mut value = T::zero_();
     for k in (1..=order).rev() {
         value = value * h + series[k] * k as f64;
@@ -38,7 +38,7 @@ pub fn slope<T: Real>(series: &Series<T>, order: usize, h: T) -> T {
 }
 
 /// Coefficient `k` of the product of two series (Cauchy product).
-pub fn product_term<T: Real>(a: &Series<T>, b: &Series<T>, k: usize) -> T {
+pub fn product_term<T: Number>(a: &Series<T>, b: &Series<T>, k: usize) -> T {
     let mut sum = T::zero_();
     for i in 0..=k {
         sum += a[i] * b[k - i];

@@ -54,13 +54,13 @@ impl Auditor {
     pub fn add<T: Real>(&mut self, run: &Integrator<'_, T>, step: &Step<T>) {
         let mut basis = Vec::new();
         for (node, weight) in GAUSS {
-            run.expansion.basis_at(run.network, step.length * node, &mut basis);
+            run.regime.expansion.basis_at(run.regime.network, step.length * node, &mut basis);
             self.add_powers(run, &basis, weight * step.length.re());
         }
     }
 
     fn add_powers<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
-        let network = run.network;
+        let network = run.regime.network;
         let n = &network.coordinates.speeds;
         let audit = &mut self.audit;
         for (j, row) in network.frictions.iter().enumerate() {
@@ -99,17 +99,18 @@ impl Auditor {
                 };
         }
         for (i, (speed, _)) in network.prescribed.iter().enumerate() {
-            let reaction = form(run.mode.stuck_torque.row(run.mode.stuck.len() + i), basis);
+            let reaction =
+                form(run.regime.mode.stuck_torque.row(run.regime.mode.stuck.len() + i), basis);
             audit.source -= (reaction * form(speed, basis)).re() * width;
         }
         self.add_gear_losses(run, basis, width);
     }
 
     fn add_gear_losses<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
-        for (i, gear) in run.network.losses.iter().enumerate() {
-            let torque = form(run.mode.gear_torque(run.network).row(i), basis);
+        for (i, gear) in run.regime.network.losses.iter().enumerate() {
+            let torque = form(run.regime.mode.gear_torque(run.regime.network).row(i), basis);
             let speed = form(&gear.speed, basis);
-            let lost = match run.gears[i] {
+            let lost = match run.regime.gears[i] {
                 GearState::Held => 0.0,
                 GearState::Rolling { sign, backward } => {
                     (gear.loss.loss_torque(torque, sign, backward) * speed).re() * width

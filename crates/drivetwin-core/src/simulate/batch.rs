@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
 //! Many runs over the same samples: parameter sets on one scenario, or scenarios on one driveline.
 
+use super::abreast;
 use super::dual_clutch::DualClutchStart;
 use super::run::{Plan, SimulateError};
 use super::sensitivity::SensitivityError;
 use super::start::State;
-use super::trajectory::Recorder;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
-use crate::number::Real;
-use crate::solve::{Event, EventKind, Integrator, Status, WIDTH, run_together};
+use crate::number::{Number, Real, together};
+use crate::solve::{Event, EventKind, Inputs, Known, Lanes, Status, WIDTH, run_together};
 use rayon::prelude::*;
 
 /// What is kept of every run.
@@ -46,43 +46,6 @@ pub struct Batch {
     pub last_lock: Vec<f64>,
 }
 
-/// A network and its start.
-pub type Prepared = (Network<f64>, State<f64>);
-
-/// Run `count` scenarios; `make` gives network and start of a run, `plan_of` its plan. Runs over the same
-/// knots go side by side; the result depends neither on that nor on the number of `threads`.
-pub fn batch<'p>(
-    count: usize,
-    plan_of: impl Fn(usize) -> &'p Plan<f64> + Sync,
-    make: impl Fn(usize) -> Result<Prepared, SimulateError> + Sync,
-    (keep, threads): (Keep<'_>, usize),
-) -> Batch {
-    let per_run = if count == 0 { 0 } else { plan_of(0).kept(keep) };
-    // Zeros: fresh from the system, memory is only touched when a group writes its results.
-    let mut values = vec![0.0; count * per_run];
-    let runs = count.div_ceil(WIDTH);
-    let group = |(g, values): (usize, &mut [f64])| {
-        let first = g * WIDTH;
-        let members: Vec<usize> = (first..count.min(first + WIDTH)).collect();
-        side_by_side(&members, (&plan_of, &make), keep, values)
-    };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let mut all =
-        || values.par_chunks_mut((WIDTH * per_run).max(1)).enumerate().map(group).collect();
-    let ends: Vec<Vec<End>> = match (per_run, pool) {
-        (0, _) => vec![Vec::new(); runs],
-        (_, Ok(pool)) => pool.install(all),
-        (_, Err(_)) => all(),
-    };
-    let mut result = Batch { values, outcomes: vec![], events: vec![], last_lock: vec![] };
-    for End { outcome, events, last_lock } in ends.into_iter().flatten() {
-        result.outcomes.push(outcome);
-        result.events.push(events);
-        result.last_lock.push(last_lock);
-    }
-    result
-}
-
 /// Simulate a dual-clutch driveline under `sets` of the named parameters (runs × parameters), in one
 /// scenario or in one for every run: `scenarios` are plans and starts, run i takes that of its number or
 /// the only one. Names are those of [`DualClutch::parameter_mut`] and, after `start.`, of the start.
@@ -90,35 +53,38 @@ pub fn dual_clutch_batch(
     model: &DualClutch<f64>,
     scenarios: &[(Plan<f64>, DualClutchStart<f64>)],
     (parameters, sets): (&[&str], &[f64]),
-    options: (Keep<'_>, usize),
+    (keep, threads): (Keep<'_>, usize),
 ) -> Result<Batch, SensitivityError> {
-    let width = parameters.len();
-    let count = sets.len().checked_div(width).unwrap_or(scenarios.len());
     if let Some((_, start)) = scenarios.first() {
         check_names(model, start, (parameters, sets))?;
     }
-    let scenario = |i: usize| &scenarios[i % scenarios.len()];
-    let make = |i: usize| {
-        let (model, start) = placed(model, &scenario(i).1, (parameters, sets), i);
-        let network = Network::compile(&model.driveline())?;
-        let state = start.state(&network)?;
-        Ok((network, state))
+    let starts = scenarios.iter().map(|(_, start)| start).collect();
+    let plans: Vec<&Plan<f64>> = scenarios.iter().map(|(plan, _)| plan).collect();
+    let sets = Sets { model, starts, parameters, sets };
+    let count = if scenarios.is_empty() { 0 } else { sets.count() };
+    let size = plans.first().map_or(0, |plan| keep.size(plan.targets.len(), plan.grid.len()));
+    // Zeros: fresh from the system, memory is only touched when a group writes its results.
+    let mut values = vec![0.0; count * size];
+    let mut rest = &mut values[..];
+    let job = |run| {
+        let (values, others) = std::mem::take(&mut rest).split_at_mut(size);
+        rest = others;
+        Job { run, values, outcome: None, events: Vec::new() }
     };
-    Ok(batch(count, |i| &scenario(i).0, make, options))
-}
-
-/// Model and start of run `i` of a batch, whose names have been checked.
-pub(super) fn placed(
-    model: &DualClutch<f64>,
-    start: &DualClutchStart<f64>,
-    (parameters, sets): (&[&str], &[f64]),
-    i: usize,
-) -> (DualClutch<f64>, DualClutchStart<f64>) {
-    let (mut model, mut start) = (model.clone(), start.clone());
-    for (&name, &value) in parameters.iter().zip(&sets[i * parameters.len()..]) {
-        *place(&mut model, &mut start, name).expect("names that were checked") = value;
+    let mut jobs: Vec<Job<'_>> = (0..count).map(job).collect();
+    let work = Work { sets, plans, keep };
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(|| work.do_all(&mut jobs)),
+        Err(_) => work.do_all(&mut jobs),
     }
-    (model, start)
+    let ends: Vec<_> = jobs.into_iter().map(|job| (job.outcome, job.events)).collect();
+    let mut result = Batch { values, outcomes: vec![], events: vec![], last_lock: vec![] };
+    for (outcome, events) in ends {
+        result.outcomes.push(outcome.expect("every job is done in the end"));
+        result.events.push(events.len() as u32);
+        result.last_lock.push(last_lock(&events).unwrap_or(f64::NAN));
+    }
+    Ok(result)
 }
 
 /// Refuse names that are no parameters.
@@ -135,32 +101,56 @@ pub(super) fn check_names(
     }
 }
 
-fn place<'m>(
-    model: &'m mut DualClutch<f64>,
-    start: &'m mut DualClutchStart<f64>,
+fn place<'m, T>(
+    model: &'m mut DualClutch<T>,
+    start: &'m mut DualClutchStart<T>,
     name: &str,
-) -> Option<&'m mut f64> {
+) -> Option<&'m mut T> {
     match name.split_once('.') {
         Some(("start", field)) => start.field_mut(field),
         _ => model.parameter_mut(name),
     }
 }
 
-/// How one run ended.
-#[derive(Clone, Debug)]
-struct End {
-    outcome: Outcome,
-    events: u32,
-    last_lock: f64,
+/// What the runs of a batch are: parameter sets of a driveline, in one scenario or in one each.
+pub(super) struct Sets<'s> {
+    pub model: &'s DualClutch<f64>,
+    pub starts: Vec<&'s DualClutchStart<f64>>,
+    pub parameters: &'s [&'s str],
+    /// Runs × parameters.
+    pub sets: &'s [f64],
 }
 
-impl End {
-    fn of(status: Status, events: &[Event<f64>]) -> Self {
-        Self {
-            outcome: Outcome::Ran(status),
-            events: events.len() as u32,
-            last_lock: last_lock(events).unwrap_or(f64::NAN),
+impl Sets<'_> {
+    /// Number of runs.
+    pub fn count(&self) -> usize {
+        self.sets.len().checked_div(self.parameters.len()).unwrap_or(self.starts.len())
+    }
+
+    /// Start of a run.
+    fn start(&self, run: usize) -> &DualClutchStart<f64> {
+        self.starts[run % self.starts.len()]
+    }
+
+    /// Model and start of runs side by side, at most as many as a number has; the first stands in for those
+    /// that it has more. The names must be parameters.
+    pub fn placed<T: Number>(&self, runs: &[usize]) -> (DualClutch<T>, DualClutchStart<T>) {
+        let of = |place: usize| runs.get(place).map_or(runs[0], |&run| run);
+        let mut model = self.model.lifted();
+        let mut start = DualClutchStart::gathered(|place| self.start(of(place)));
+        let width = self.parameters.len();
+        for (i, name) in self.parameters.iter().enumerate() {
+            let value = T::gathered(|place| self.sets[of(place) * width + i]);
+            *place(&mut model, &mut start, name).expect("names that were checked") = value;
         }
+        (model, start)
+    }
+
+    fn prepared<T: Number>(&self, runs: &[usize]) -> Result<(Network<T>, State<T>), SimulateError> {
+        let (model, start) = self.placed(runs);
+        let network = Network::compile(&model.driveline())?;
+        let state = start.state(&network)?;
+        Ok((network, state))
     }
 }
 
@@ -169,79 +159,96 @@ pub(super) fn last_lock<T: Real>(events: &[Event<T>]) -> Option<T> {
     events.iter().rfind(|event| event.kind == EventKind::Lock).map(|event| event.time)
 }
 
-/// A run of a batch that has been started.
-struct Started<'p> {
-    /// Its place among its neighbours.
-    place: usize,
-    run: Integrator<'p, f64>,
-    recorder: Recorder<'p, f64>,
-    outcome: Result<(), Status>,
+/// A run of a batch.
+struct Job<'v> {
+    run: usize,
+    /// What is kept of it.
+    values: &'v mut [f64],
+    outcome: Option<Outcome>,
+    events: Vec<Event<f64>>,
 }
 
-/// Run up to [`WIDTH`] scenarios, those over the same knots together.
-fn side_by_side<'p>(
-    members: &[usize],
-    (plan_of, make): (
-        &(impl Fn(usize) -> &'p Plan<f64> + Sync),
-        &(impl Fn(usize) -> Result<Prepared, SimulateError> + Sync),
-    ),
-    keep: Keep<'_>,
-    values: &mut [f64],
-) -> Vec<End> {
-    let prepared: Vec<Result<Prepared, SimulateError>> = members.iter().map(|&i| make(i)).collect();
-    let mut ends: Vec<End> = Vec::with_capacity(members.len());
-    let mut started = Vec::with_capacity(members.len());
-    for (place, (&i, prepared)) in members.iter().zip(&prepared).enumerate() {
-        let nothing =
-            End { outcome: Outcome::Ran(Status::Completed), events: 0, last_lock: f64::NAN };
-        ends.push(match prepared {
-            Err(error) => End { outcome: Outcome::Refused(error.clone()), ..nothing },
-            Ok((network, state)) => match plan_of(i).start(network, state) {
-                Err(status) => End { outcome: Outcome::Ran(status), ..nothing },
-                Ok((run, recorder)) => {
-                    started.push(Started { place, run, recorder, outcome: Ok(()) });
-                    nothing
-                }
-            },
-        });
-    }
-    run_all(&mut started);
-    let per_run = values.len() / members.len();
-    for Started { place, run, recorder, outcome } in started {
-        let status = outcome.err().unwrap_or(Status::Completed);
-        if status == Status::Completed {
-            keep.reduce(&recorder.finish().0, &mut values[place * per_run..][..per_run]);
-        }
-        ends[place] = End::of(status, &run.events);
-    }
-    for (end, values) in ends.iter().zip(values.chunks_exact_mut(per_run)) {
-        if end.outcome != Outcome::Ran(Status::Completed) {
-            values.fill(f64::NAN);
-        }
-    }
-    ends
+/// How often runs are tried side by side, those that have parted with new neighbours, before they are done
+/// alone.
+const ATTEMPTS: usize = 2;
+
+/// Runs to be done and what is kept of them.
+struct Work<'w> {
+    sets: Sets<'w>,
+    plans: Vec<&'w Plan<f64>>,
+    keep: Keep<'w>,
 }
 
-/// Bring runs to their ends: those that pass samples over the same knots with as many states together.
-fn run_all(started: &mut [Started<'_>]) {
-    let (mut marching, alone): (Vec<_>, Vec<_>) =
-        started.iter_mut().partition(|one| one.run.can_sprint());
-    for one in alone {
-        one.outcome = one.recorder.run_to_end(&mut one.run);
+impl Work<'_> {
+    fn plan(&self, run: usize) -> &Plan<f64> {
+        self.plans[run % self.plans.len()]
     }
-    while let Some(first) = marching.first() {
-        let (knots, states) = (first.run.knots(), first.run.x.len());
-        let (mut group, rest): (Vec<_>, Vec<_>) = marching.into_iter().partition(|one| {
-            let same = std::ptr::eq(one.run.knots(), knots) || one.run.knots() == knots;
-            same && one.run.x.len() == states
-        });
-        let runs = group.iter_mut().map(|one| (&mut one.run, &mut one.recorder));
-        let outcomes = run_together(runs);
-        for (one, outcome) in group.into_iter().zip(outcomes) {
-            one.outcome = outcome;
+
+    /// Do all jobs: side by side as far as they go together. The results depend neither on that nor on the
+    /// number of threads.
+    fn do_all(&self, jobs: &mut [Job<'_>]) {
+        let mut open: Vec<&mut Job<'_>> = jobs.iter_mut().collect();
+        for _ in 0..ATTEMPTS {
+            open.par_chunks_mut(WIDTH).for_each(|group| self.do_together(group));
+            open.retain(|job| job.outcome.is_none());
         }
-        marching = rest;
+        open.par_iter_mut().for_each(|job| self.do_alone(job));
     }
+
+    fn do_alone(&self, job: &mut Job<'_>) {
+        let (network, state) = match self.sets.prepared(&[job.run]) {
+            Ok(prepared) => prepared,
+            Err(error) => {
+                job.values.fill(f64::NAN);
+                job.outcome = Some(Outcome::Refused(error));
+                return;
+            }
+        };
+        let run = self.plan(job.run).run(&network, &state);
+        if run.status == Status::Completed {
+            self.keep.reduce(&run.columns, job.values);
+        } else {
+            job.values.fill(f64::NAN);
+        }
+        (job.outcome, job.events) = (Some(Outcome::Ran(run.status)), run.events);
+    }
+
+    /// Do those of a group that go together with its first.
+    fn do_together(&self, group: &mut [&mut Job<'_>]) {
+        let runs: Vec<usize> = group.iter().map(|job| job.run).collect();
+        let (plan, locked) = (self.plan(runs[0]), &self.sets.start(runs[0]).locked);
+        let Some(knots) = plan.inputs.knots_at(&plan.grid).filter(|_| runs.len() > 1) else {
+            return;
+        };
+        let alike = |&run: &usize| {
+            let (knots, others) = (plan.inputs.knots(), self.plan(run).inputs.knots());
+            (std::ptr::eq(knots, others) || knots == others)
+                && self.sets.start(run).locked == *locked
+        };
+        let alike = bits(runs.iter().map(alike));
+        let (prepared, parting) = together(alike, || self.sets.prepared::<Lanes>(&runs));
+        let (Ok((network, State { x, locked })), true) = (prepared, alike != parting) else {
+            return;
+        };
+        let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &self.plan(run).inputs).collect();
+        let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
+        let mut recorder = abreast::Recorder::new(&network, &plan.targets, all, &knots);
+        let (known, how) = (Known::of(&network), (plan.settings, alike & !parting));
+        let events = run_together(known, &inputs, how, (x, &locked), &mut recorder);
+        for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
+            let Some(events) = events else { continue };
+            let per_output = self.keep.size(1, plan.grid.len());
+            for (output, to) in job.values.chunks_exact_mut(per_output).enumerate() {
+                self.keep.reduce_column(output, recorder.values(output, place), to);
+            }
+            (job.outcome, job.events) = (Some(Outcome::Ran(Status::Completed)), events);
+        }
+    }
+}
+
+/// Answers as bits.
+fn bits(answers: impl Iterator<Item = bool>) -> u32 {
+    answers.enumerate().fold(0, |bits, (i, answer)| bits | u32::from(answer) << i)
 }
 
 impl Keep<'_> {
@@ -255,22 +262,25 @@ impl Keep<'_> {
 
     /// What is kept of the columns of a run.
     pub(super) fn reduce(self, columns: &[Vec<f64>], out: &mut [f64]) {
+        let Some(points) = columns.first().map(Vec::len) else { return };
+        for (output, out) in out.chunks_exact_mut(self.size(1, points)).enumerate() {
+            self.reduce_column(output, columns[output].iter().copied(), out);
+        }
+    }
+
+    /// What is kept of one output.
+    pub(super) fn reduce_column(
+        self,
+        output: usize,
+        mut column: impl DoubleEndedIterator<Item = f64>,
+        out: &mut [f64],
+    ) {
         match self {
-            Self::Columns => {
-                for (column, out) in columns.iter().zip(out.chunks_exact_mut(columns[0].len())) {
-                    out.copy_from_slice(column);
-                }
-            }
-            Self::Last => {
-                for (column, out) in columns.iter().zip(out) {
-                    *out = column[column.len() - 1];
-                }
-            }
+            Self::Columns => out.iter_mut().zip(column).for_each(|(to, value)| *to = value),
+            Self::Last => out.iter_mut().zip(column.next_back()).for_each(|(to, last)| *to = last),
             Self::Misfit(measured) => {
-                for ((column, measured), out) in columns.iter().zip(measured).zip(out) {
-                    let known = column.iter().zip(measured).filter(|(_, m)| !m.is_nan());
-                    *out = known.map(|(c, m)| (c - m) * (c - m)).sum();
-                }
+                let known = column.zip(&measured[output]).filter(|(_, m)| !m.is_nan());
+                out[0] = known.map(|(c, m)| (c - m) * (c - m)).sum();
             }
         }
     }

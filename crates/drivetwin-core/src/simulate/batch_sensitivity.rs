@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Exact derivatives of what a batch keeps, run by run over all cores.
 
-use super::batch::{Batch, Keep, Outcome, check_names, last_lock, placed};
+use super::batch::{Batch, Keep, Outcome, Sets, check_names, last_lock};
 use super::dual_clutch::DualClutchStart;
 use super::run::{Plan, SimulateError};
 use super::sensitivity::{LANES, Sampled, SensitivityError, delayed, variables};
@@ -39,7 +39,6 @@ pub fn dual_clutch_batch_sensitivities(
     by: &[&str],
     (keep, threads): (Keep<'_>, usize),
 ) -> Result<(Batch, BatchDerivatives), SensitivityError> {
-    let count = sets.len().checked_div(parameters.len()).unwrap_or(scenarios.len());
     if let Some((_, start)) = scenarios.first() {
         check_names(model, start, (parameters, sets))?;
     }
@@ -49,9 +48,11 @@ pub fn dual_clutch_batch_sensitivities(
         let plan = |names: &&[&str]| plan(model, (signals, start), (grid, outputs), names);
         plans.push(groups.iter().map(plan).collect::<Result<Vec<_>, _>>()?);
     }
+    let starts = scenarios.iter().map(|(_, start)| start).collect();
+    let sets = Sets { model, starts, parameters, sets };
     let run = |i: usize| -> Result<Vec<Kept>, SimulateError> {
-        let (signals, start) = &scenarios[i % scenarios.len()];
-        let (model, start) = placed(model, start, (parameters, sets), i);
+        let (signals, _) = &scenarios[i % scenarios.len()];
+        let (model, start) = sets.placed(&[i]);
         let passes = groups.iter().zip(&plans[i % plans.len()]).map(|(names, plan)| {
             let (model, start, _) =
                 variables(&model, signals, &start, names).expect("names that were checked");
@@ -61,7 +62,7 @@ pub fn dual_clutch_batch_sensitivities(
         });
         passes.collect()
     };
-    let all = || (0..count).into_par_iter().map(run).collect();
+    let all = || (0..sets.count()).into_par_iter().map(run).collect();
     let passes: Vec<Result<Vec<Kept>, SimulateError>> =
         match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
             Ok(pool) => pool.install(all),

@@ -6,7 +6,7 @@ use super::start::{StartError, State, state_of};
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};
 use crate::network::Network;
-use crate::number::Real;
+use crate::number::{Number, Real};
 use crate::solve::{Settings, Signal};
 
 /// Start of a dual-clutch run.
@@ -57,7 +57,7 @@ pub fn dual_clutch_outputs<T>(model: &DualClutch<T>) -> Vec<Output> {
     outputs
 }
 
-impl<T: Real> DualClutchStart<T> {
+impl<T: Number> DualClutchStart<T> {
     /// The state of a network of the dual clutch.
     pub fn state(&self, network: &Network<T>) -> Result<State<T>, StartError> {
         let speeds =
@@ -68,13 +68,18 @@ impl<T: Real> DualClutchStart<T> {
 
 impl DualClutchStart<f64> {
     /// The same start over another number type.
-    pub fn lifted<T: Real>(&self) -> DualClutchStart<T> {
+    pub fn lifted<T: Number>(&self) -> DualClutchStart<T> {
+        Self::gathered(|_| self)
+    }
+
+    /// The starts of runs by their numbers; elements without slip are those of run 0.
+    pub(super) fn gathered<'s, T: Number>(of: impl Fn(usize) -> &'s Self) -> DualClutchStart<T> {
         DualClutchStart {
-            engine_speed: T::of(self.engine_speed),
-            output_speed: T::of(self.output_speed),
-            wheel_speed: T::of(self.wheel_speed),
-            twist: T::of(self.twist),
-            locked: self.locked.clone(),
+            engine_speed: T::gathered(|run| of(run).engine_speed),
+            output_speed: T::gathered(|run| of(run).output_speed),
+            wheel_speed: T::gathered(|run| of(run).wheel_speed),
+            twist: T::gathered(|run| of(run).twist),
+            locked: of(0).locked.clone(),
         }
     }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! 4 A scenario in, a trajectory out.
 
+mod abreast;
 mod audit;
 mod batch;
 mod batch_sensitivity;
@@ -13,7 +14,7 @@ mod start;
 mod trajectory;
 
 pub use audit::EnergyAudit;
-pub use batch::{Batch, Keep, Outcome, batch, dual_clutch_batch};
+pub use batch::{Batch, Keep, Outcome, dual_clutch_batch};
 pub use batch_sensitivity::{BatchDerivatives, Stated, dual_clutch_batch_sensitivities};
 pub use dual_clutch::{DualClutchRun, DualClutchStart, dual_clutch_outputs, simulate_dual_clutch};
 pub use linear::{Linear, Slipping, linearise};

@@ -167,7 +167,7 @@ impl<T: Real> Block<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::number::Dual;
+    use crate::number::{Dual, Number};
 
     #[test]
     fn values_and_derivatives_stand_apart_and_what_was_not_reached_is_no_number() {

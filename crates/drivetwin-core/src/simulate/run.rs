@@ -2,7 +2,6 @@
 //! One run of a network over a time grid.
 
 use super::audit::Auditor;
-use super::batch::Keep;
 use super::start::{Start, StartError, State};
 use super::trajectory::{Output, Recorder, Target, Trajectory};
 use crate::network::{CompileError, Mode, ModeKey, Network};
@@ -41,10 +40,10 @@ pub enum SimulateError {
 /// outputs found by name.
 #[derive(Clone, Debug)]
 pub struct Plan<T> {
-    inputs: Inputs<T>,
-    grid: Vec<f64>,
-    targets: Vec<Target>,
-    settings: Settings,
+    pub(super) inputs: Inputs<T>,
+    pub(super) grid: Vec<f64>,
+    pub(super) targets: Vec<Target>,
+    pub(super) settings: Settings,
     audit: bool,
 }
 
@@ -68,23 +67,8 @@ impl<T: Real> Plan<T> {
         let span = (grid[0], grid[grid.len() - 1]);
         let inputs = join(network, signals, (span, if fine { grid } else { &[] }))?;
         let inputs = if fine { divided(network, inputs) } else { inputs };
-        let settings = Settings { sprint: sprint && inputs.has_knots(grid), ..settings };
+        let settings = Settings { sprint: sprint && inputs.knots_at(grid).is_some(), ..settings };
         Ok(Self { inputs, grid: grid.to_vec(), targets, settings, audit })
-    }
-
-    /// Numbers that a batch keeps of one run.
-    pub(super) fn kept(&self, keep: Keep<'_>) -> usize {
-        keep.size(self.targets.len(), self.grid.len())
-    }
-
-    /// A run that has not begun, and its empty columns.
-    pub(super) fn start<'r>(
-        &'r self,
-        network: &'r Network<T>,
-        start: &State<T>,
-    ) -> Result<(Integrator<'r, T>, Recorder<'r, T>), Status> {
-        let run = self.integrator(Known::of(network), start)?;
-        Ok((run, Recorder::new(network, &self.targets, &self.grid)))
     }
 
     fn integrator<'r>(
@@ -109,17 +93,17 @@ impl<T: Real> Plan<T> {
         let mut integrate = || -> Result<(), Status> {
             let mut run = self.integrator(std::mem::replace(known, Known::of(network)), start)?;
             let outcome = if self.audit {
-                let mut auditor = Auditor::new(network, &run.x);
+                let mut auditor = Auditor::new(network, &run.regime.x);
                 let outcome =
                     recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
-                balance = Some(auditor.close(network, &run.x));
+                balance = Some(auditor.close(network, &run.regime.x));
                 outcome
             } else {
                 recorder.run_to_end(&mut run)
             };
-            events = std::mem::take(&mut run.events);
+            events = std::mem::take(&mut run.regime.events);
             grazing = run.grazing.take();
-            *known = run.known;
+            *known = run.regime.known;
             outcome
         };
         let status = integrate().err().unwrap_or(Status::Completed);
@@ -157,6 +141,7 @@ fn divided<T: Real>(network: &Network<T>, inputs: Inputs<T>) -> Inputs<T> {
     let Some(Mode { radius, .. }) = network.mode(ModeKey::default(), &capacity) else {
         return inputs;
     };
+    let radius = radius.re();
     inputs.divided(|length| match (radius * length, (radius * length / FINE).ceil()) {
         (reach, _) if reach <= MAX_SLIPPING => 1,
         (_, parts) if parts <= MAX_PARTS as f64 => parts as usize,

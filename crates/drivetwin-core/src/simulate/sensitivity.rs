@@ -5,7 +5,7 @@ use super::dual_clutch::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
 use super::run::SimulateError;
 use super::trajectory::Trajectory;
 use crate::model::dual_clutch::DualClutch;
-use crate::number::{Dual, Real};
+use crate::number::{Dual, Number};
 use crate::solve::{Event, Settings, Signal};
 use thiserror::Error;
 

@@ -5,7 +5,7 @@ use crate::model::Name;
 use crate::network::Network;
 use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows, solve};
-use crate::number::Real;
+use crate::number::{Number, Values};
 use thiserror::Error;
 
 /// Speeds of nodes, twists of shafts, and the elements that start without slip.
@@ -67,7 +67,7 @@ pub enum StartError {
     },
 }
 
-impl<T: Real> Start<T> {
+impl<T: Number> Start<T> {
     /// The state of a network.
     pub fn state(&self, network: &Network<T>) -> Result<State<T>, StartError> {
         let (speeds, twists) = (by_name(&self.speeds), by_name(&self.twists));
@@ -83,7 +83,7 @@ fn by_name<T: Copy>(values: &[(String, T)]) -> Vec<(&str, T)> {
 }
 
 /// The state of a network from speeds of nodes, twists of shafts and elements without slip, see [`Start`].
-pub(super) fn state_of<T: Real>(
+pub(super) fn state_of<T: Number>(
     network: &Network<T>,
     (speeds, twists): (&Stated<'_, T>, &Stated<'_, T>),
     locked: &[String],
@@ -94,7 +94,8 @@ pub(super) fn state_of<T: Real>(
     let mut x = speeds_of(network, speeds)?;
     for (j, friction) in network.frictions.iter().enumerate().filter(|(_, f)| f.one_way) {
         let slip = form(&friction.slip, &x).re();
-        if slip > 1e-9 && !indices.contains(&j) {
+        if slip.decide(|slip| slip > 1e-9) && !indices.contains(&j) {
+            let slip = slip.leading();
             return Err(StartError::Overrun { element: friction.element.to_string(), slip });
         }
     }
@@ -107,7 +108,10 @@ pub(super) fn state_of<T: Real>(
 }
 
 /// The independent speeds, from speeds of nodes.
-fn speeds_of<T: Real>(network: &Network<T>, speeds: &Stated<'_, T>) -> Result<Vec<T>, StartError> {
+fn speeds_of<T: Number>(
+    network: &Network<T>,
+    speeds: &Stated<'_, T>,
+) -> Result<Vec<T>, StartError> {
     let nodes = &network.mechanism.nodes;
     let n = &network.coordinates.speeds;
     let rows = speeds.iter().map(|(name, _)| find("node", name, nodes.iter()));
@@ -130,7 +134,10 @@ fn speeds_of<T: Real>(network: &Network<T>, speeds: &Stated<'_, T>) -> Result<Ve
     x.extend((0..v.rows).map(|i| v[(i, 0)]));
     for (i, &(name, speed)) in speeds.iter().enumerate() {
         let (stated, implied) = (speed.re(), form(stated.row(i), &x).re());
-        if (stated - implied).abs() > 1e-6 * (1.0 + stated.abs()) {
+        let contradicts =
+            |stated: f64, implied: f64| (stated - implied).abs() > 1e-6 * (1.0 + stated.abs());
+        if stated.decide_with(implied, contradicts) {
+            let (stated, implied) = (stated.leading(), implied.leading());
             return Err(StartError::Contradiction { node: name.to_owned(), stated, implied });
         }
     }

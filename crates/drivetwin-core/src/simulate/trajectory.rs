@@ -7,9 +7,9 @@ use super::start::{StartError, find};
 use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
 use crate::network::{Network, Row};
-use crate::number::Real;
+use crate::number::{Number, Real, Values};
 use crate::solve::{
-    Event, Integrator, Recording, RowState, Samples, Sink, Status, Step, Task, dispatch,
+    Event, Integrator, Regime, RowState, Samples, Sink, Status, Step, Task, dispatch,
 };
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -50,7 +50,7 @@ pub(super) enum Target {
 }
 
 impl Output {
-    pub(super) fn find<T: Real>(&self, network: &Network<T>) -> Result<Target, StartError> {
+    pub(super) fn find<T>(&self, network: &Network<T>) -> Result<Target, StartError> {
         let m = &network.mechanism;
         let node = |name| find("node", name, m.nodes.iter());
         let shaft = |name| find("shaft", name, m.springs.iter().map(|s| &s.element));
@@ -87,7 +87,7 @@ impl Target {
 }
 
 /// A target of one network over its basis.
-enum Column<T> {
+pub(super) enum Column<T> {
     /// Linear form over the basis: position and coefficient of its terms.
     Linear(Vec<(usize, T)>),
     /// Speed of a node over the independent speeds, and the angle at the start of the present step.
@@ -146,11 +146,12 @@ impl<'g, T: Real> Recorder<'g, T> {
                 break;
             }
             let h = if t >= start { -step.start + t } else { T::zero_() };
-            run.expansion.basis_at(run.network, h, &mut self.basis);
+            let regime = &run.regime;
+            regime.expansion.basis_at(regime.network, h, &mut self.basis);
             for (output, column) in self.columns.iter().enumerate() {
                 let value = match column {
-                    Column::Angle(row, angle) => *angle + integral(run, row, h),
-                    other => value(other, run, &self.basis),
+                    Column::Angle(row, angle) => *angle + integral(regime, row, h),
+                    other => value(other, regime, &self.basis),
                 };
                 self.recorded.push(output, value);
             }
@@ -158,7 +159,7 @@ impl<'g, T: Real> Recorder<'g, T> {
         }
         for column in &mut self.columns {
             if let Column::Angle(row, angle) = column {
-                *angle += integral(run, row, step.length);
+                *angle += integral(&run.regime, row, step.length);
             }
         }
     }
@@ -228,7 +229,7 @@ impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
         let count = self.picked.count();
         for (output, column) in self.columns.iter().enumerate() {
             let from = self.recorded.length(output);
-            for &(position, factor) in &*passing_terms(column, self.run) {
+            for &(position, factor) in &*passing_terms(column, &self.run.regime) {
                 self.add_to_block::<F>(position, factor);
             }
             self.recorded.take(output, self.block);
@@ -241,49 +242,71 @@ impl<T: Real, S: Samples<T>> Passed<'_, '_, T, S> {
     /// Add a multiple of an entry of the basis to the block.
     #[inline(always)]
     fn add_to_block<const F: bool>(&mut self, position: usize, factor: T) {
-        let (network, block, picked) = (self.run.network, &mut *self.block, self.picked);
-        let channel = |j: &usize| network.first_channel() + j == position;
-        if position < self.run.x.len() {
-            block.add::<F>((self.samples.states(position), picked), factor);
-        } else if position < network.one() {
-            let input = |k| self.run.input_at(self.first + k, position - network.first_input());
-            block.add::<F>(((0..picked.span()).map(input), picked), factor);
-        } else if position == network.one() {
-            block.add::<F>((std::iter::repeat(T::of(1.0)), picked), factor);
-        } else if let Some(slot) = self.active.iter().position(channel) {
-            block.add::<F>((self.samples.torques(slot), picked), factor);
-        } else {
-            block.add::<F>((std::iter::repeat(T::zero_()), picked), factor);
+        let (block, picked) = (&mut *self.block, self.picked);
+        match Entry::at(position, self.run.regime.network, self.active) {
+            Entry::State(i) => block.add::<F>((self.samples.states(i), picked), factor),
+            Entry::Input(i) => {
+                let input = |k| self.run.input_at(self.first + k, i);
+                block.add::<F>(((0..picked.span()).map(input), picked), factor);
+            }
+            Entry::One => block.add::<F>((std::iter::repeat(T::of(1.0)), picked), factor),
+            Entry::Torque(slot) => block.add::<F>((self.samples.torques(slot), picked), factor),
+            Entry::Nothing => block.add::<F>((std::iter::repeat(T::zero_()), picked), factor),
         }
     }
 }
 
-impl Recording for Recorder<'_, f64> {
-    fn stepped(&mut self, run: &Integrator<'_, f64>, step: &Step<f64>, last: bool) {
-        self.sample(run, step, last);
+/// What stands at a position of the basis while samples are passed.
+pub(super) enum Entry {
+    /// State.
+    State(usize),
+    /// Input.
+    Input(usize),
+    /// The constant 1.
+    One,
+    /// Torque of an active channel, by its number among these.
+    Torque(usize),
+    /// A channel that is off.
+    Nothing,
+}
+
+impl Entry {
+    /// By the position, with the channels `active`.
+    pub fn at<T: Number>(position: usize, network: &Network<T>, active: &[usize]) -> Self {
+        let channel = |j: &usize| network.first_channel() + j == position;
+        if position < network.states() {
+            Self::State(position)
+        } else if position < network.one() {
+            Self::Input(position - network.first_input())
+        } else if position == network.one() {
+            Self::One
+        } else {
+            active.iter().position(channel).map_or(Self::Nothing, Self::Torque)
+        }
     }
 }
 
 /// What a column is a sum of while the mode lasts: positions in the basis and coefficients.
-fn passing_terms<'c, T: Real>(
+pub(super) fn passing_terms<'c, T: Number>(
     column: &'c Column<T>,
-    run: &Integrator<'_, T>,
+    regime: &Regime<'_, T>,
 ) -> Cow<'c, [(usize, T)]> {
     match column {
         Column::Linear(terms) => Cow::Borrowed(terms),
         Column::Angle(..) => unreachable!("angles need the motion between samples"),
-        Column::Friction(j) => Cow::Owned(match run.rows[*j] {
+        Column::Friction(j) => Cow::Owned(match regime.rows[*j] {
             RowState::Open => Vec::new(),
-            RowState::Stuck => terms(holding_row(run, *j)),
+            RowState::Stuck => terms(holding_row(regime, *j)),
             RowState::Slipping { .. } | RowState::Saturated { .. } => {
-                vec![(run.network.first_channel() + j, T::of(1.0))]
+                vec![(regime.network.first_channel() + j, T::of(1.0))]
             }
         }),
     }
 }
 
-impl<T: Real> Column<T> {
-    fn of(network: &Network<T>, target: Target) -> Self {
+impl<T: Number> Column<T> {
+    /// That of a target.
+    pub fn of(network: &Network<T>, target: Target) -> Self {
         let speed = |node| network.over_speeds(&[(node, T::of(1.0))]);
         match target {
             Target::Speed(node) => Self::Linear(terms(&speed(node))),
@@ -297,11 +320,12 @@ impl<T: Real> Column<T> {
 }
 
 /// Terms of a row that are not zero.
-fn terms<T: Real>(row: &[T]) -> Vec<(usize, T)> {
-    row.iter().copied().enumerate().filter(|(_, c)| c.re() != 0.0).collect()
+fn terms<T: Number>(row: &[T]) -> Vec<(usize, T)> {
+    let counts = |(_, c): &(usize, T)| c.re().those(|c| c != 0.0) != 0;
+    row.iter().copied().enumerate().filter(counts).collect()
 }
 
-fn shaft_torque<T: Real>(network: &Network<T>, i: usize) -> Column<T> {
+fn shaft_torque<T: Number>(network: &Network<T>, i: usize) -> Column<T> {
     match network.mechanism.springs[i].law {
         SpringLaw::Linear { stiffness, damping } => {
             let mut row: Vec<T> = network.twist_rates.row(i).iter().map(|&c| c * damping).collect();
@@ -319,35 +343,35 @@ fn shaft_torque<T: Real>(network: &Network<T>, i: usize) -> Column<T> {
 }
 
 /// Value of a column from the basis at an instant; an angle is that at the start of the step.
-fn value<T: Real>(column: &Column<T>, run: &Integrator<'_, T>, basis: &[T]) -> T {
+pub(super) fn value<T: Number>(column: &Column<T>, regime: &Regime<'_, T>, basis: &[T]) -> T {
     match column {
         Column::Linear(terms) => {
             terms.iter().fold(T::zero_(), |sum, &(position, c)| sum + c * basis[position])
         }
         Column::Angle(_, angle) => *angle,
-        Column::Friction(j) => match run.rows[*j] {
+        Column::Friction(j) => match regime.rows[*j] {
             RowState::Open => T::zero_(),
             RowState::Slipping { .. } | RowState::Saturated { .. } => {
-                basis[run.network.first_channel() + j]
+                basis[regime.network.first_channel() + j]
             }
-            RowState::Stuck => form(holding_row(run, *j), basis),
+            RowState::Stuck => form(holding_row(regime, *j), basis),
         },
     }
 }
 
 /// Torque of a stuck element over the basis.
-fn holding_row<'r, T: Real>(run: &'r Integrator<'_, T>, j: usize) -> &'r [T] {
-    let position = run.mode.stuck.iter().position(|&s| s == Row::Friction(j));
-    run.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode"))
+fn holding_row<'r, T: Number>(regime: &'r Regime<'_, T>, j: usize) -> &'r [T] {
+    let position = regime.mode.stuck.iter().position(|&s| s == Row::Friction(j));
+    regime.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode"))
 }
 
 /// Angle turned within the first `h` seconds of the present step.
-fn integral<T: Real>(run: &Integrator<'_, T>, row: &[T], h: T) -> T {
+fn integral<T: Real>(regime: &Regime<'_, T>, row: &[T], h: T) -> T {
     let mut sum = T::zero_();
-    for (&c, series) in row.iter().zip(&run.expansion.states) {
+    for (&c, series) in row.iter().zip(&regime.expansion.states) {
         if c.re() != 0.0 {
             let mut value = T::zero_();
-            for k in (0..=run.expansion.order).rev() {
+            for k in (0..=regime.expansion.order).rev() {
                 value = value * h + series[k] / (k + 1) as f64;
             }
             sum += c * value * h;

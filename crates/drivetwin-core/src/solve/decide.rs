@@ -2,12 +2,12 @@
 //! Who stays stuck (THEORY section 1): the box-constrained programme over all friction elements at
 //! zero slip, together with the states of lossy gears.
 
-use super::integrator::{Integrator, RowState};
+use super::regime::{Regime, RowState, sign_of};
 use super::status::Status;
 use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::{Cell, GearState, Mode, ModeKey, Row};
-use crate::number::{Real, evaluate};
+use crate::number::{Number, Values, evaluate};
 use std::sync::Arc;
 
 /// A trial: the state of every friction element and of every lossy gear.
@@ -40,7 +40,7 @@ enum Fault {
     Reversed(usize),
 }
 
-impl<T: Real> Integrator<'_, T> {
+impl<T: Number> Regime<'_, T> {
     /// Decide anew the state of everything at zero speed. `overloaded` names what has just reached
     /// its bound, with the torque's sign.
     pub(super) fn decide(&mut self, overloaded: Option<(Row, f64)>) -> Result<(), Status> {
@@ -102,14 +102,14 @@ impl<T: Real> Integrator<'_, T> {
             }
         }
         let element = candidates.first().map_or("a gear", |&row| self.network.element_of(row));
-        Err(Status::Undecidable { time: self.t.re(), element: element.to_owned() })
+        Err(Status::Undecidable { time: self.time(), element: element.to_owned() })
     }
 
     /// Inputs and state a moment from now, as the present mode would have them: where torques and
     /// capacities agree, or all start from zero, their rates decide.
     fn look_ahead(&mut self) {
-        let remaining = self.inputs.span(self.segment).1 - self.t.re();
-        let moment = T::of(LOOK_AHEAD.min(1e-4 * remaining.max(0.0)));
+        let remaining = self.remaining.re().larger(T::Values::zero_());
+        let moment = T::lifted((remaining * 1e-4).smaller(T::Values::of(LOOK_AHEAD)));
         let order = self.expansion.input_order();
         for (ahead, now) in self.ahead.iter_mut().zip(&self.expansion.inputs) {
             *ahead = *now;
@@ -135,8 +135,9 @@ impl<T: Real> Integrator<'_, T> {
         let near = |row: Row| {
             let slip = self.network.slip_of(row);
             let terms = slip.iter().zip(&self.x);
-            let scale = terms.map(|(c, v)| (c.re() * v.re()).abs()).fold(0.0, f64::max);
-            form(slip, &self.x).re().abs() <= 1e-11 * scale.max(1.0)
+            let terms = terms.map(|(c, v)| (c.re() * v.re()).magnitude());
+            let scale = terms.fold(T::Values::of(1.0), |largest, term| term.larger(largest));
+            form(slip, &self.x).re().decide_with(scale, |slip, scale| slip.abs() <= 1e-11 * scale)
         };
         let pressed = |j: &usize| self.rows[*j] != RowState::Open;
         let directional = |i: &usize| self.network.losses[*i].loss.is_directional();
@@ -171,7 +172,11 @@ impl<T: Real> Integrator<'_, T> {
     /// Normal load of an element now, cut at zero.
     fn normal(&self, j: usize) -> T {
         let normal = self.network.frictions[j].normal.term(&self.ahead, 0);
-        if self.pressed[j] && normal.re() > 0.0 { normal } else { T::zero_() }
+        if self.pressed[j] && normal.re().decide(|normal| normal > 0.0) {
+            normal
+        } else {
+            T::zero_()
+        }
     }
 
     /// Static capacities of the friction elements.
@@ -193,7 +198,9 @@ impl<T: Real> Integrator<'_, T> {
                 let returning = |&&row: &&Row| {
                     trial.direction(row).is_some_and(|sign| {
                         let (a, scale) = self.acceleration(row, mode, basis);
-                        a * sign < -(ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION)
+                        (a * sign).decide_with(scale, |a, scale| {
+                            a < -(ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION)
+                        })
                     })
                 };
                 candidates.iter().find(returning).map(|&row| Fault::Returning(row))
@@ -207,50 +214,54 @@ impl<T: Real> Integrator<'_, T> {
     /// The row at rest that exceeds its bounds most, relative to their size.
     fn overload(&self, mode: &Mode<T>, basis: &[T]) -> Option<Fault> {
         let capacities = self.capacities();
-        let mut worst: Option<(f64, Fault)> = None;
+        let mut worst: Option<(T::Values, Fault)> = None;
         for (i, &row) in mode.stuck.iter().enumerate() {
             let torque = form(mode.stuck_torque.row(i), basis).re();
             let (low, high) = match row {
                 Row::Friction(j) if self.network.frictions[j].one_way => {
-                    (-capacities[j].re(), f64::INFINITY)
+                    (-capacities[j].re(), T::Values::of(f64::INFINITY))
                 }
                 Row::Friction(j) => (-capacities[j].re(), capacities[j].re()),
                 Row::Gear(g) => {
                     self.gear_bounds(g, form(mode.gear_torque(self.network).row(g), basis).re())
                 }
             };
-            let (excess, sign) =
-                if torque > high { (torque - high, 1.0) } else { (low - torque, -1.0) };
-            let size = if sign > 0.0 { high.abs() } else { low.abs() };
-            let relative = excess / size.max(1e-9 * torque.abs()).max(1e-12);
-            if relative > 1e-12 && worst.as_ref().is_none_or(|w| relative > w.0) {
+            let above = torque.decide_with(high, |torque, high| torque > high);
+            let (excess, size, sign) = if above {
+                (torque - high, high.magnitude(), 1.0)
+            } else {
+                (low - torque, low.magnitude(), -1.0)
+            };
+            let size = size.larger(torque.magnitude() * 1e-9).larger(T::Values::of(1e-12));
+            let relative = excess / size;
+            let least = worst.as_ref().map_or(T::Values::of(1e-12), |worst| worst.0);
+            if relative.decide_with(least, |relative, least| relative > least.max(1e-12)) {
                 worst = Some((relative, Fault::Overloaded(row, sign)));
             }
-            let a = self.acceleration(row, mode, basis).0;
-            if worst.is_none() && a.abs() > self.forced_acceleration() {
-                worst = Some((0.0, Fault::Overloaded(row, a.signum())));
+            if worst.is_none() && !self.network.prescribed.is_empty() {
+                let a = self.acceleration(row, mode, basis).0;
+                let forced = self.forced_acceleration();
+                if a.decide_with(forced, |a, forced| a.abs() > forced) {
+                    worst = Some((T::Values::zero_(), Fault::Overloaded(row, sign_of(a))));
+                }
             }
         }
         worst.map(|(_, fault)| fault)
     }
 
     /// What a row at rest may accelerate by round-off; more is forced on it by prescribed speeds.
-    fn forced_acceleration(&self) -> f64 {
-        let rate = |&(_, input): &(Vec<T>, usize)| self.ahead[input][1].re().abs();
-        self.network
-            .prescribed
-            .iter()
-            .map(rate)
-            .reduce(f64::max)
-            .map_or(f64::INFINITY, |largest| 1e-9 * (1.0 + largest))
+    fn forced_acceleration(&self) -> T::Values {
+        let rates = self.network.prescribed.iter().map(|&(_, input)| self.ahead[input][1].re());
+        let one = T::Values::of(1.0);
+        (rates.fold(T::Values::zero_(), |largest, r| r.magnitude().larger(largest)) + one) * 1e-9
     }
 
-    fn gear_bounds(&self, g: usize, torque: f64) -> (f64, f64) {
+    fn gear_bounds(&self, g: usize, torque: T::Values) -> (T::Values, T::Values) {
         let bounds = self.network.losses[g].loss.bounds();
         let line = |(slope, drag): (T, T)| slope.re() * torque + drag.re();
         let [u, v] = bounds.upper.map(line);
         let [l, m] = bounds.lower.map(line);
-        (l.min(m), u.max(v))
+        (l.smaller(m), u.larger(v))
     }
 
     fn is_reversed(&self, gear: GearState, i: usize, (mode, basis): (&Mode<T>, &[T])) -> bool {
@@ -261,16 +272,18 @@ impl<T: Real> Integrator<'_, T> {
         }
         let (torque, scale) = sum_and_scale(mode.gear_torque(self.network).row(i), basis);
         let excess = torque * sign - loss.threshold().re();
-        excess.abs() > ROUND_OFF * scale && (excess < 0.0) != backward
+        excess.decide_with(scale, |excess, scale| {
+            excess.abs() > ROUND_OFF * scale && (excess < 0.0) != backward
+        })
     }
 
     /// Acceleration [rad/s²] of a row's speed and the size of the terms it is the sum of.
-    fn acceleration(&self, row: Row, mode: &Mode<T>, basis: &[T]) -> (f64, f64) {
-        let (mut sum, mut scale) = (0.0, 0.0);
+    fn acceleration(&self, row: Row, mode: &Mode<T>, basis: &[T]) -> (T::Values, T::Values) {
+        let (mut sum, mut scale) = (T::Values::zero_(), T::Values::zero_());
         for (i, c) in self.network.slip_of(row).iter().enumerate() {
             let (part, size) = sum_and_scale(mode.derivative.row(i), basis);
             sum += c.re() * part;
-            scale += c.re().abs() * size;
+            scale += c.re().magnitude() * size;
         }
         (sum, scale)
     }
@@ -328,9 +341,9 @@ impl<T: Real> Integrator<'_, T> {
                 _ if !self.pressed[j] => Cell::Off,
                 RowState::Saturated { sign } => Cell::Saturated { sign },
                 RowState::Slipping { sign } => {
-                    let slip = form(&row.slip, &self.x).re();
+                    let (slip, none) = (form(&row.slip, &self.x).re(), T::Values::zero_());
                     let inputs = &self.expansion.inputs;
-                    self.network.channels[j].cell_at([slip, 0.0], sign, inputs)
+                    self.network.channels[j].cell_at([slip, none], sign, inputs)
                 }
             };
         }
@@ -384,9 +397,10 @@ impl Assignment {
 
 /// Real part of the scalar product and of the sum of the magnitudes of its terms, which tells
 /// zero from round-off.
-fn sum_and_scale<T: Real>(row: &[T], basis: &[T]) -> (f64, f64) {
-    row.iter().zip(basis).fold((0.0, 0.0), |(sum, scale), (a, b)| {
+fn sum_and_scale<T: Number>(row: &[T], basis: &[T]) -> (T::Values, T::Values) {
+    let none = T::Values::zero_();
+    row.iter().zip(basis).fold((none, none), |(sum, scale), (a, b)| {
         let term = a.re() * b.re();
-        (sum + term, scale + term.abs())
+        (sum + term, scale + term.magnitude())
     })
 }

@@ -4,7 +4,7 @@
 use crate::network::channel::{ChannelSeries, form};
 use crate::network::linalg::is_zero;
 use crate::network::{Cell, Channel, Mode, Network};
-use crate::number::{INVERSE, Real, Series, TERMS, evaluate, slope};
+use crate::number::{INVERSE, Lane, Number, Series, TERMS, Values, evaluate, slope};
 
 /// Coefficients of states and channels over one step, and the working space to compute them.
 #[derive(Clone, Debug)]
@@ -15,12 +15,14 @@ pub struct Expansion<T> {
     pub channels: Vec<ChannelSeries<T>>,
     /// Inputs.
     pub inputs: Vec<Series<T>>,
-    /// Highest coefficient that is filled in.
+    /// Highest coefficient that is filled in, with zeros for runs whose series ends before.
     pub order: usize,
+    /// Runs whose series ends with each order, as bits.
+    ended: [u32; TERMS],
     /// One coefficient of the whole basis.
     basis: Vec<T>,
-    /// 1 over the scale of each state.
-    scales: Vec<f64>,
+    /// 1 over the scale of each state, without derivatives.
+    scales: Vec<T>,
 }
 
 /// What the step control needs.
@@ -32,7 +34,7 @@ pub struct Accuracy {
     pub order: Option<usize>,
 }
 
-impl<T: Real> Expansion<T> {
+impl<T: Number> Expansion<T> {
     /// Working space for a network.
     pub fn new(network: &Network<T>) -> Self {
         Self {
@@ -40,8 +42,9 @@ impl<T: Real> Expansion<T> {
             channels: vec![ChannelSeries::default(); network.channels.len()],
             inputs: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             order: 0,
+            ended: [0; TERMS],
             basis: Vec::with_capacity(network.basis()),
-            scales: vec![0.0; network.states()],
+            scales: vec![T::zero_(); network.states()],
         }
     }
 
@@ -58,16 +61,16 @@ impl<T: Real> Expansion<T> {
         basis.extend(self.channels.iter().map(|channel| value(&channel.torque)));
     }
 
-    /// Expand from state `x`; returns the step `<= h` [s] over which the truncation error stays within
-    /// the tolerance. Inputs must have been set.
+    /// Expand the runs `runs`, as bits, from state `x`; returns the step `<= h` [s] over which the truncation
+    /// error stays within the tolerance. Inputs must have been set.
     pub fn expand(
         &mut self,
         network: &Network<T>,
         mode: &Mode<T>,
         cells: &[Cell],
-        x: &[T],
-        (h, accuracy): (f64, Accuracy),
-    ) -> f64 {
+        (runs, x): (u32, &[T]),
+        (h, accuracy): (T::Values, Accuracy),
+    ) -> T::Values {
         for (series, &value) in self.states.iter_mut().zip(x) {
             series[0] = value;
         }
@@ -80,8 +83,10 @@ impl<T: Real> Expansion<T> {
         // Successive terms that must be small: every other one of an even or odd motion is zero, and
         // products of motions that start with high powers of time leave longer gaps.
         let window = if products { 4 } else { 2 };
-        let mut sizes = [f64::INFINITY; TERMS];
-        let mut power = 1.0;
+        let mut sizes = [T::Values::of(f64::INFINITY); TERMS];
+        let mut power = T::Values::of(1.0);
+        let mut growing = runs;
+        self.ended = [0; TERMS];
         for k in 0..last {
             self.channel_terms(network, cells, k);
             // Of lines only two coefficients are left to enter, and the zeros after them.
@@ -90,39 +95,42 @@ impl<T: Real> Expansion<T> {
             }
             power *= h;
             let size = self.next_term(mode, k);
-            sizes[k + 1] = power * if curved { size.max(self.input_size(k + 1)) } else { size };
-            let recent = largest(&sizes[(k + 2).saturating_sub(window)..k + 2]);
-            if accuracy.order.is_none() && recent <= accuracy.tolerance {
+            sizes[k + 1] = power * if curved { size.larger(self.input_size(k + 1)) } else { size };
+            if accuracy.order.is_none() {
+                let recent = largest(&sizes[(k + 2).saturating_sub(window)..k + 2]);
+                self.ended[k + 1] = recent.those(|size| size <= accuracy.tolerance) & growing;
+                growing &= !self.ended[k + 1];
+            }
+            if growing == 0 {
                 self.finish(network, cells, k + 1);
                 return h;
             }
         }
+        self.ended[last] |= growing;
         self.finish(network, cells, last);
         if accuracy.order.is_some() {
             return h;
         }
         let excess = largest(&sizes[TERMS - window..]) / accuracy.tolerance;
-        h * (0.8 * excess.powf(-1.0 / last as f64)).min(1.0)
+        let shorter = |run| (0.8 * excess.of_run(run).powf(-1.0 / last as f64)).min(1.0);
+        h.with(growing, h * T::Values::gathered(shorter))
+    }
+
+    /// Highest coefficient of one run.
+    pub fn order_of(&self, run: usize) -> usize {
+        self.ended.iter().position(|ended| ended >> run & 1 == 1).unwrap_or(self.order)
     }
 
     /// Highest coefficient of the inputs: lines have one, sines all.
     pub fn input_order(&self) -> usize {
-        let curved = |input: &Series<T>| !is_zero(input[2]) || !is_zero(input[3]);
-        if self.inputs.iter().any(curved) { TERMS - 1 } else { 1 }
-    }
-
-    /// State at `h` [s] after the start.
-    pub fn state_at(&self, h: T, x: &mut [T]) {
-        for (value, series) in x.iter_mut().zip(&self.states) {
-            *value = evaluate(series, self.order, h);
-        }
+        if self.inputs.iter().any(is_curved) { TERMS - 1 } else { 1 }
     }
 
     /// Coefficients of a linear form over the basis (x, u, 1, φ).
     pub fn form(&self, network: &Network<T>, row: &[T]) -> Series<T> {
         let mut out = self.speed_form(&row[..self.states.len()]);
         let mut add = |c: T, series: &Series<T>| {
-            if c.re() != 0.0 || T::DERIVATIVES {
+            if !is_zero(c) || T::DERIVATIVES {
                 out[..=self.order].iter_mut().zip(series).for_each(|(sum, &v)| *sum += c * v);
             }
         };
@@ -152,6 +160,22 @@ impl<T: Real> Expansion<T> {
     fn finish(&mut self, network: &Network<T>, cells: &[Cell], order: usize) {
         self.channel_terms(network, cells, order);
         self.order = order;
+        let mut done = 0;
+        for k in 1..order {
+            done |= self.ended[k];
+            if done != 0 {
+                self.end_before(k + 1, done);
+            }
+        }
+    }
+
+    /// Coefficient `k` is none of some runs', as bits.
+    fn end_before(&mut self, k: usize, runs: u32) {
+        let channels = self.channels.iter_mut();
+        let channels = channels.flat_map(|c| c.arguments.iter_mut().chain([&mut c.torque]));
+        for series in self.states.iter_mut().chain(channels) {
+            series[k] = series[k].with(runs, T::zero_());
+        }
     }
 
     /// Coefficient `k` of the channels from that of the states, both into the basis.
@@ -186,24 +210,23 @@ impl<T: Real> Expansion<T> {
 
     /// Coefficient `k + 1` of the states, by coefficient `k` of the basis. Returns the largest, relative
     /// to the scale of its state.
-    fn next_term(&mut self, mode: &Mode<T>, k: usize) -> f64 {
-        let mut largest = 0.0;
+    fn next_term(&mut self, mode: &Mode<T>, k: usize) -> T::Values {
+        let mut largest = T::Values::zero_();
         let states = self.states.iter_mut().zip(&self.scales);
         for ((state, scale), rate) in states.zip(mode.rates.times(&self.basis)) {
             state[k + 1] = rate * INVERSE[k + 1];
-            let size = state[k + 1].re().abs() * scale;
-            largest = if size > largest { size } else { largest };
+            largest = (state[k + 1].re().magnitude() * scale.re()).larger(largest);
         }
         largest
     }
 
     /// Largest coefficient `k` of an input that is not linear, relative to its size now: guards depend
     /// on inputs even where the states rest.
-    fn input_size(&self, k: usize) -> f64 {
-        let curved =
-            self.inputs.iter().filter(|input| input[2].re() != 0.0 || input[3].re() != 0.0);
-        let scale = |input: &Series<T>| input[0].re().abs() + input[1].re().abs();
-        curved.map(|input| input[k].re().abs() / scale(input)).fold(0.0, f64::max)
+    fn input_size(&self, k: usize) -> T::Values {
+        let curved = self.inputs.iter().filter(|input| is_curved(input));
+        let size = |input: &Series<T>, k: usize| input[k].re().magnitude();
+        let relative = curved.map(|input| size(input, k) / (size(input, 0) + size(input, 1)));
+        relative.fold(T::Values::zero_(), |largest, size| size.larger(largest))
     }
 
     /// Scales are the states now: speeds of 1 rad/s, twists of 1 mrad, lagging torques of 1 N·m at least.
@@ -211,11 +234,17 @@ impl<T: Real> Expansion<T> {
         let twists = network.speeds()..network.first_lag();
         for (i, (scale, state)) in self.scales.iter_mut().zip(&self.states).enumerate() {
             let floor = if twists.contains(&i) { 1e-3 } else { 1.0 };
-            *scale = 1.0 / state[0].re().abs().max(floor);
+            let size = state[0].re().magnitude().larger(T::Values::of(floor));
+            *scale = T::lifted(size.recip());
         }
     }
 }
 
-fn largest(sizes: &[f64]) -> f64 {
-    sizes.iter().fold(0.0, |largest, &size| if size > largest { size } else { largest })
+/// Whether an input is no line.
+fn is_curved<T: Number>(input: &Series<T>) -> bool {
+    !is_zero(input[2]) || !is_zero(input[3])
+}
+
+fn largest<V: Values>(sizes: &[V]) -> V {
+    sizes.iter().fold(V::zero_(), |largest, size| size.larger(largest))
 }

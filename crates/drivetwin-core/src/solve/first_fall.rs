@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! The first instant at which a guard polynomial falls below zero.
 
-use crate::number::{Real, Series, TERMS, evaluate, slope};
+use crate::number::{Real, Series, TERMS, Values, evaluate, slope};
 
 /// Coefficients with the real parts of a guard, for the search.
 type Polynomial = [f64; TERMS];
@@ -37,6 +37,16 @@ pub fn first_fall<T: Real>(guard: &Series<T>, order: usize, h: f64) -> Option<f6
         order -= leading;
     }
     search(&c, order, 0.0, h, 0)
+}
+
+/// Runs whose guard stays positive over [0, h] as its coefficients tell at once, as bits.
+pub fn stay_positive<V: Values>(guard: &Series<V>, order: usize, h: V) -> u32 {
+    let (mut reach, mut power) = (V::zero_(), V::of(1.0));
+    for &c in &guard[1..=order] {
+        power *= h;
+        reach += c.magnitude() * power;
+    }
+    (guard[0] - reach).those(|left| left > 0.0)
 }
 
 /// First root of a polynomial that is positive at `from`.

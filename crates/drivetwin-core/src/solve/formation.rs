@@ -1,445 +1,335 @@
 // SPDX-License-Identifier: MIT
-//! Several runs over the same knots, side by side through the inner loop.
+//! Several runs side by side as one, over packs of numbers.
 //!
-//! Every lane owns the operators of its own mode; what a lane does not have is zero there, so that runs
-//! in different modes need no masks. A run in which a guard could fall leaves the formation, passes
-//! its event alone by Taylor expansion, and joins again at a later sample. No operation mixes lanes and
-//! every run does what it would do alone: results depend neither on the neighbours nor on their number.
+//! Every run advances to its next event: whole samples together with the others, the rest by Taylor
+//! expansions of its own time. Where all have come to the same event they decide together. A run that
+//! meets another event, or decides otherwise, parts: it has to be run again in other company or alone. No
+//! operation mixes runs: a result depends neither on the neighbours nor on their number.
 
+use super::guard::{Cause, earliest_of_each};
 use super::inputs::Inputs;
-use super::integrator::{Integrator, Step};
-use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Guards, Room, Source, Trail, idle_guards, march, room};
-use super::operators::{Carried, MAX_ACTIVE, Operators};
-use super::sprint::{Lines, Ready, Samples, Sink};
-use super::status::Status;
-use crate::network::smooth::Sample;
-use crate::number::{Lane, Pack};
-use std::borrow::Borrow;
+use super::integrator::Settings;
+use super::known::Known;
+use super::march::Column;
+use super::passage::Passage;
+use super::progress::Progress;
+use super::ready::{AnySize, can_march};
+use super::regime::{Event, Regime};
+use super::sprint::Samples;
+use crate::number::{Lane, Number, Pack, Series, TERMS, Values, together};
 
 /// Runs in a formation: two vectors of the narrower sets, one of the widest.
 pub const WIDTH: usize = 8;
 
-type Lanes = Pack<WIDTH>;
+/// A number of every run of a formation.
+pub type Lanes = Pack<WIDTH>;
 
-/// Takes samples and steps of one run.
-pub trait Recording: Sink<f64> {
-    /// A step of the Taylor expansion; `last` where the run ends with it.
-    fn stepped(&mut self, run: &Integrator<'_, f64>, step: &Step<f64>, last: bool);
+/// Takes what the runs of a formation come by.
+pub trait Record {
+    /// Samples from number `first` on that were passed in one mode with the channels `active`, and for each
+    /// the runs that stood at it, as bits.
+    fn passed(
+        &mut self,
+        regime: &Regime<'_, Lanes>,
+        active: &[usize],
+        samples: &impl Samples<Lanes>,
+        range: (usize, &[u32]),
+    );
+
+    /// The runs `runs`, as bits, are at samples of their own, `h` [s] after the start of the expansion.
+    fn reached(&mut self, regime: &Regime<'_, Lanes>, at: (u32, &[usize; WIDTH]), h: Lanes);
 }
 
-/// One run and where it stands.
-struct Member<'r, 'a, S> {
-    run: &'r mut Integrator<'a, f64>,
-    sink: &'r mut S,
-    /// What it joins or has joined with; none once it has ended.
-    ready: Option<Ready<f64>>,
-    /// Segment at which its operators end.
-    until: usize,
-    /// First sample that its sink has not got.
-    from: usize,
-    joined: bool,
-    outcome: Result<(), Status>,
+/// Where a run stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Standing {
+    /// At the start of its segment, to pass samples.
+    Ahead,
+    /// In need of an expansion.
+    Due,
+    /// At an event.
+    Event(Cause),
+    /// At the start of a segment without length: the inputs jump.
+    Jump,
+    /// At the end of the inputs.
+    Ended,
+    /// On its own from here on.
+    Parted,
 }
 
-/// Run up to [`WIDTH`] integrators, all over the same knots and with as many states, to their ends.
-pub fn run_together<'r, 'a: 'r, S: Recording + 'r>(
-    runs: impl Iterator<Item = (&'r mut Integrator<'a, f64>, &'r mut S)>,
-) -> Vec<Result<(), Status>> {
-    let mut members: Vec<Member<'r, 'a, S>> = runs
-        .map(|(run, sink)| {
-            let (ready, outcome) = (None, Ok(()));
-            let mut member = Member { run, sink, ready, until: 0, from: 0, joined: false, outcome };
-            member.go_on(false);
-            member
-        })
-        .collect();
-    let states = members.first().map_or(0, |member| member.run.x.len());
-    match states {
-        0..=4 => Formation::<4>::new().march(&mut members),
-        _ => Formation::<8>::new().march(&mut members),
+impl Standing {
+    /// Whether the run is still on its way.
+    fn is_open(self) -> bool {
+        !matches!(self, Self::Ended | Self::Parted)
     }
-    members.into_iter().map(|member| member.outcome).collect()
 }
 
-impl<S: Recording> Member<'_, '_, S> {
-    /// Pass samples alone until the formation can be joined; `step` where an expansion is due.
-    fn go_on(&mut self, step: bool) {
-        self.joined = false;
-        self.ready = None;
-        match self.alone(step) {
-            Ok(ready) => {
-                self.until = ready.as_ref().map_or(0, |ready| self.run.segment + ready.count);
-                self.ready = ready;
-            }
-            Err(status) => self.outcome = Err(status),
-        }
+/// One run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Member<'a> {
+    /// Its inputs.
+    pub inputs: &'a Inputs<f64>,
+    /// Segment in which it stands; their number at the end.
+    pub segment: usize,
+    /// Where there.
+    pub standing: Standing,
+    progress: Progress,
+}
+
+/// Runs in one regime.
+struct Formation<'a> {
+    regime: Regime<'a, Lanes>,
+    settings: Settings,
+    members: Vec<Member<'a>>,
+    /// Events of those that have come to their end.
+    events: Vec<Option<Vec<Event<f64>>>>,
+    /// Runs that have not moved since they last decided, as bits.
+    fresh: u32,
+    /// Working space of passages.
+    columns: Vec<Column<Lanes>>,
+    /// Inputs of one run.
+    own_inputs: Vec<Series<f64>>,
+}
+
+/// Bring runs over the same knots to their ends: the runs `runs`, as bits, with these inputs, from states `x`
+/// with the elements `locked` at rest. Returns the events of every run, nothing for one that has parted.
+pub fn run_together<'a>(
+    known: Known<'a, Lanes>,
+    inputs: &[&'a Inputs<f64>],
+    (settings, runs): (Settings, u32),
+    (x, locked): (Vec<Lanes>, &[usize]),
+    record: &mut impl Record,
+) -> Vec<Option<Vec<Event<f64>>>> {
+    let events = vec![None; inputs.len()];
+    if !settings.sprint || !can_march(known.network) {
+        return events;
+    }
+    let start = inputs[0].knot(0);
+    let (regime, parting) = together(runs, || Regime::start(known, x, Lanes::of(start)));
+    let Ok(regime) = regime else { return events };
+    let member = |(run, &inputs): (usize, &&'a Inputs<f64>)| {
+        let standing = if runs >> run & 1 == 1 { Standing::Due } else { Standing::Parted };
+        Member { inputs, segment: 0, standing, progress: Progress::from(start) }
+    };
+    let members = inputs.iter().enumerate().map(member).collect();
+    let own_inputs = vec![[0.0; TERMS]; regime.ahead.len()];
+    let (fresh, columns) = (0, Vec::new());
+    let mut all = Formation { regime, settings, members, events, fresh, columns, own_inputs };
+    all.part(parting);
+    all.decide(all.open(), |regime| regime.take_up(locked));
+    while all.open() != 0 {
+        all.advance(record);
+        all.change();
+    }
+    all.events
+}
+
+impl Formation<'_> {
+    /// Runs of which `say` holds, as bits.
+    fn those(&self, say: impl Fn(&Member<'_>) -> bool) -> u32 {
+        let members = self.members.iter().enumerate();
+        members.fold(0, |runs, (run, member)| runs | u32::from(say(member)) << run)
     }
 
-    fn alone(&mut self, mut step: bool) -> Result<Option<Ready<f64>>, Status> {
+    /// Runs that are still on their way.
+    fn open(&self) -> u32 {
+        self.those(|member| member.standing.is_open())
+    }
+
+    fn part(&mut self, runs: u32) {
+        each(runs).for_each(|run| self.members[run].standing = Standing::Parted);
+    }
+
+    /// Bring every run to its next event or to its end.
+    fn advance(&mut self, record: &mut impl Record) {
         loop {
-            if step {
-                let step = self.run.expand_step()?;
-                let last = self.run.is_at_end();
-                self.sink.stepped(self.run, &step, last);
+            while self.pass_samples(record) {}
+            let due = self.those(|member| member.standing == Standing::Due);
+            if due == 0 {
+                return;
             }
-            if !self.run.take_up_next()? {
-                return Ok(None);
-            }
-            if let Some(ready) = self.run.ready_to_sprint() {
-                return Ok(Some(ready));
-            }
-            step = true;
-        }
-    }
-}
-
-/// Operators and states of all lanes, over at most `N` states.
-struct Formation<const N: usize> {
-    operators: Operators<Lanes, N>,
-    /// Carried channels by number, the union over the lanes, in order.
-    slots: Vec<usize>,
-    /// Watched guards by number, likewise.
-    watched: Vec<usize>,
-    x: [Lanes; N],
-    carry: [Carry<Lanes>; MAX_ACTIVE],
-    guards: Guards<Lanes>,
-    trail: Trail<Lanes, N>,
-    /// Segment of the first sample in the trail, and number of samples.
-    stretch: (usize, usize),
-}
-
-impl<const N: usize> Formation<N> {
-    fn new() -> Self {
-        let zero = Lanes::all(0.0);
-        Self {
-            operators: Operators::idle(),
-            slots: Vec::new(),
-            watched: Vec::new(),
-            x: [zero; N],
-            carry: [Carry::idle(); MAX_ACTIVE],
-            guards: idle_guards(),
-            trail: Trail::in_columns(Vec::new(), MAX_ACTIVE),
-            stretch: (0, 0),
+            let fresh = due & self.fresh;
+            self.expand(if fresh != 0 { fresh } else { due }, record);
+            // What was released has moved off, in the others when they passed samples.
+            self.fresh = 0;
+            self.regime.released.fill(false);
         }
     }
 
-    /// March until every member has ended.
-    fn march<S: Recording>(mut self, members: &mut [Member<'_, '_, S>]) {
-        let live = |member: &Member<'_, '_, S>| member.ready.is_some();
-        while let Some(segment) = members.iter().filter(|m| live(m)).map(|m| m.run.segment).min() {
-            if segment != self.stretch.0 + self.stretch.1 || self.stretch.1 == BLOCK {
-                self.hand_over(members, segment);
-            }
-            let joining = self.join(members, segment);
-            let ahead = |m: &Member<'_, '_, S>| if m.joined { m.until } else { m.run.segment };
-            let until = members.iter().filter(|m| live(m)).map(ahead).min().unwrap_or(segment);
-            let samples = (segment, (until - segment).min(BLOCK - self.stretch.1));
-            let marching = members.iter().find(|m| m.joined).and_then(|m| m.ready.as_ref());
-            let Some(h) = marching.map(|ready| ready.h) else { break };
-            let inputs: [&Inputs<f64>; WIDTH] = std::array::from_fn(|lane| {
-                members[if lane < members.len() { lane } else { 0 }].run.inputs
-            });
-            let live = members.iter().enumerate().filter(|(_, m)| m.joined);
-            let live = live.fold(0, |bits, (lane, _)| bits | 1 << lane);
-            let (passed, fallen) = self.pass((&inputs, h), samples, (joining, live));
-            for (lane, member) in members.iter_mut().enumerate().filter(|(_, m)| m.joined) {
-                let fell = fallen >> lane & 1 == 1;
-                // Those that did not fall have passed the sample in which others did.
-                member.run.segment = segment + passed + usize::from(fallen != 0 && !fell);
-                if fell || member.run.segment == member.until {
-                    let start = self.stretch.1 + passed;
-                    let x = |i| if fell { self.trail.states(i)[start] } else { self.x[i] };
-                    let x: [f64; N] = std::array::from_fn(|i| x(i).0[lane]);
-                    self.deliver(lane, member);
-                    self.leave(lane, member, (&x, fell));
+    /// Carry out the event at which most runs are; the others part.
+    fn change(&mut self) {
+        let open = self.open();
+        let same = |run: usize| {
+            let standing = self.members[run].standing;
+            (self.those(|member| member.standing == standing), standing)
+        };
+        let Some((runs, standing)) = each(open).map(same).reduce(most) else { return };
+        self.part(open & !runs);
+        match standing {
+            Standing::Event(cause) => {
+                for run in each(runs) {
+                    let member = &mut self.members[run];
+                    let t = &mut self.regime.t.0[run];
+                    if let Some(next) = member.inputs.just_before(member.segment, *t) {
+                        (member.segment, *t) = (next, member.inputs.knot(next));
+                    }
                 }
+                self.decide(runs, |regime| regime.change(cause));
             }
-            self.stretch.1 += passed + usize::from(fallen != 0);
+            _ => {
+                each(runs).for_each(|run| self.members[run].segment += 1);
+                self.decide(runs, |regime| regime.refresh());
+            }
         }
     }
 
-    /// Take in the members that stand at `segment`; their lanes as bits.
-    fn join<S: Recording>(&mut self, members: &mut [Member<'_, '_, S>], segment: usize) -> u32 {
-        let mut joining = 0;
-        for (lane, member) in members.iter_mut().enumerate() {
-            if member.ready.is_some() && !member.joined && member.run.segment == segment {
-                (member.joined, member.from) = (true, segment);
-                joining |= 1 << lane;
-            }
+    /// Let runs decide together, by the inputs about their instants.
+    fn decide<E>(&mut self, runs: u32, act: impl FnOnce(&mut Regime<'_, Lanes>) -> Result<(), E>) {
+        if runs == 0 {
+            return;
         }
-        if joining == 0 {
-            return 0;
-        }
-        let anew = self.arrange(members, segment);
-        for (lane, member) in members.iter().enumerate().filter(|(_, m)| m.joined) {
-            if anew || joining >> lane & 1 == 1 {
-                let ready = member.ready.as_ref().expect("a member that has joined");
-                let places = (&self.slots[..], &self.watched[..], &ready.active[..]);
-                self.operators.set_lane(lane, operators_of::<N>(ready), places);
-            }
-            if joining >> lane & 1 == 1 {
-                for (x, &value) in self.x.iter_mut().zip(&member.run.x) {
-                    x.0[lane] = value;
-                }
-            }
-        }
-        joining
+        self.take_inputs(runs);
+        let (result, parting) = together(runs, || act(&mut self.regime));
+        // Splits of torque are decided anew at every sample, each run at its own.
+        let all = result.is_err() || self.regime.is_split();
+        self.part(if all { runs } else { parting });
+        self.fresh = self.open();
+        each(self.fresh).for_each(|run| self.settle(run));
     }
 
-    /// Find places for the channels and guards of all that march; whether they are others than before.
-    fn arrange<S: Recording>(&mut self, members: &mut [Member<'_, '_, S>], segment: usize) -> bool {
-        let (mut slots, mut watched) = (0_u64, 0_u64);
-        for ready in members.iter().filter(|m| m.joined).filter_map(|m| m.ready.as_ref()) {
-            slots |= bits(ready.active.iter().copied());
-            watched |= bits(operators_of::<N>(ready).watched.iter().map(|guard| guard.id));
+    /// Inputs about the present instants.
+    fn take_inputs(&mut self, runs: u32) {
+        let Regime { expansion, t, remaining, .. } = &mut self.regime;
+        for run in each(runs) {
+            let Member { inputs, segment, .. } = self.members[run];
+            inputs.expand(segment, t.0[run], &mut self.own_inputs);
+            for (to, own) in expansion.inputs.iter_mut().zip(&self.own_inputs) {
+                to[0].0[run] = own[0];
+                to[1].0[run] = own[1];
+            }
+            remaining.0[run] = inputs.span(segment).1 - t.0[run];
         }
-        let present = [&self.slots, &self.watched].map(|ids| bits(ids.iter().copied()));
-        if present == [slots, watched] {
+    }
+
+    /// See where a run stands now that it has got on.
+    fn settle(&mut self, run: usize) {
+        let (member, t) = (&mut self.members[run], self.regime.t.0[run]);
+        let segments = member.inputs.segments();
+        if member.segment < segments {
+            let (from, to) = member.inputs.span(member.segment);
+            member.segment += usize::from(t >= to && from < to);
+        }
+        if member.segment == segments {
+            member.standing = Standing::Ended;
+            self.events[run] = Some(self.regime.events.iter().map(|e| e.of_run(run)).collect());
+            return;
+        }
+        let (from, to) = member.inputs.span(member.segment);
+        member.standing = match (from == to, t == from) {
+            (true, _) => Standing::Jump,
+            (false, true) => Standing::Ahead,
+            (false, false) => Standing::Due,
+        };
+    }
+
+    /// Pass samples with those that stand before some; false where there are none.
+    fn pass_samples(&mut self, record: &mut impl Record) -> bool {
+        let ahead = self.those(|member| member.standing == Standing::Ahead);
+        let Some(first) = each(ahead).map(|run| self.members[run].segment).min() else {
             return false;
-        }
-        let [slots, watched] = [slots, watched].map(numbers);
-        self.hand_over(members, segment);
-        // Those that march get all their places anew; what is left of others moves nothing that counts.
-        if slots.len() == MAX_ACTIVE - 1 {
-            self.operators.channels[MAX_ACTIVE - 1] = Carried::idle();
-        }
-        let slots = std::mem::replace(&mut self.slots, slots);
-        let watched = std::mem::replace(&mut self.watched, watched);
-        self.rearrange(&slots, &watched);
+        };
+        let h = self.members[0].inputs.length_worth_while(first, self.settings.max_step);
+        let (ready, parting) = together(self.open(), || self.regime.ready(h?));
+        self.part(parting);
+        let (Some(ready), Some(h)) = (ready, h) else {
+            for run in each(ahead & !parting) {
+                if self.members[run].segment == first {
+                    self.members[run].standing = Standing::Due;
+                }
+            }
+            return true;
+        };
+        let Self { regime, members, columns, .. } = self;
+        let passage = Passage { regime, members, active: &ready.active, h, columns };
+        let (passed, arrived) = match &ready.operators {
+            AnySize::Four(operators) => passage.pass(operators, record),
+            AnySize::Eight(operators) => passage.pass(operators, record),
+            AnySize::Twelve(_) | AnySize::Many(_) => unreachable!("they are of plain numbers"),
+        };
+        self.fresh &= !passed;
+        each(arrived).for_each(|run| self.settle(run));
         true
     }
 
-    /// Carry and guards from the old places to the new ones.
-    fn rearrange(&mut self, slots: &[usize], watched: &[usize]) {
-        let (carry, guards) = (self.carry, self.guards);
-        self.carry = [Carry::idle(); MAX_ACTIVE];
-        self.guards = idle_guards();
-        for (to, id) in self.slots.iter().enumerate() {
-            if let Some(from) = slots.iter().position(|old| old == id) {
-                self.carry[to] = carry[from];
-            }
+    /// Expand the motion of runs, each to its next event or to the end of its segment.
+    fn expand(&mut self, runs: u32, record: &mut impl Record) {
+        self.take_inputs(runs);
+        let none = Lanes::zero_();
+        let remaining = none.with(runs, self.regime.remaining);
+        let wish = remaining.smaller(Lanes::of(self.settings.max_step));
+        let accuracy = self.settings.accuracy(true);
+        let ((h, events), parting) = together(runs, || {
+            let h = self.regime.expand(runs, (wish, accuracy));
+            (h, earliest_of_each(&self.regime, (runs, h)))
+        });
+        let mut lengths = h;
+        for run in each(runs) {
+            let (own, left) = (&mut lengths.0[run], remaining.0[run]);
+            *own = events[run].map_or(if *own >= left { left } else { *own }, |(at, _)| at);
         }
-        for (to, id) in self.watched.iter().enumerate() {
-            if let Some(from) = watched.iter().position(|old| old == id) {
-                self.guards[to] = guards[from];
-            }
+        self.record_start(runs & lengths.those(|length| length > 0.0), record);
+        self.regime.move_on(runs, lengths);
+        self.part(parting);
+        let (mut at, last) = (0, self.members[0].inputs.segments());
+        for run in each(runs & !parting) {
+            let whole = h.0[run] >= remaining.0[run];
+            let event = events[run].map(|(_, cause)| cause);
+            self.step(run, (lengths.0[run], h.0[run]), whole, event);
+            at |= u32::from(self.members[run].standing == Standing::Ended) << run;
+        }
+        if at != 0 {
+            record.reached(&self.regime, (at, &[last; WIDTH]), lengths);
         }
     }
 
-    /// Pass samples with the inner loop for the number of carried channels.
-    fn pass(
-        &mut self,
-        source: (&Together<'_>, f64),
-        samples: (usize, usize),
-        lanes: (u32, u32),
-    ) -> (usize, u32) {
-        match self.slots.len() {
-            0 => dispatch(Pass::<N, 0> { formation: self, source, samples, lanes }),
-            1 => dispatch(Pass::<N, 1> { formation: self, source, samples, lanes }),
-            2 => dispatch(Pass::<N, 2> { formation: self, source, samples, lanes }),
-            _ => dispatch(Pass::<N, MAX_ACTIVE> { formation: self, source, samples, lanes }),
+    /// Record the samples at which runs start.
+    fn record_start(&self, runs: u32, record: &mut impl Record) {
+        let mut at = (0, [0; WIDTH]);
+        for run in each(runs) {
+            let Member { inputs, segment, .. } = self.members[run];
+            at.0 |= u32::from(self.regime.t.0[run] == inputs.knot(segment)) << run;
+            at.1[run] = segment;
+        }
+        if at.0 != 0 {
+            record.reached(&self.regime, (at.0, &at.1), Lanes::zero_());
         }
     }
 
-    /// Hand the samples of all that march on, and begin the trail anew at `segment`.
-    fn hand_over<S: Recording>(&mut self, members: &mut [Member<'_, '_, S>], segment: usize) {
-        for (lane, member) in members.iter_mut().enumerate().filter(|(_, m)| m.joined) {
-            self.deliver(lane, member);
-        }
-        self.stretch = (segment, 0);
-    }
-
-    /// Hand the samples up to the segment of a member on.
-    fn deliver<S: Recording>(&self, lane: usize, member: &mut Member<'_, '_, S>) {
-        let (from, to) = (member.from, member.run.segment);
-        if from == to {
-            return;
-        }
-        let active = &member.ready.as_ref().expect("a member that has joined").active;
-        let (first, places) = (from - self.stretch.0, self.places(active));
-        let view = LaneView { trail: &self.trail, first, lane, places };
-        member.sink.passed(member.run, active, &view, (from, to - from));
-        member.from = to;
-    }
-
-    /// Slots of the channels of one lane.
-    fn places(&self, active: &[usize]) -> [usize; MAX_ACTIVE] {
-        let mut places = [0; MAX_ACTIVE];
-        for (place, id) in places.iter_mut().zip(active) {
-            *place = self.slots.iter().position(|slot| slot == id).unwrap_or(0);
-        }
-        places
-    }
-
-    /// Let a member go with its state `x` at the start of its segment, in which a guard may fall.
-    fn leave<S: Recording>(
-        &mut self,
-        lane: usize,
-        member: &mut Member<'_, '_, S>,
-        (x, fell): (&[f64; N], bool),
-    ) {
-        let run = &mut *member.run;
-        let n = run.x.len();
-        run.x.copy_from_slice(&x[..n]);
-        run.t = run.inputs.knot(run.segment);
-        let ended = run.segment == run.inputs.segments();
-        if ended {
-            let active = member.ready.take().map_or_else(Vec::new, |ready| ready.active);
-            let places = self.places(&active);
-            let torque =
-                |&slot: &usize| self.operators.channels[slot].torque(&self.carry[slot]).0[lane];
-            let torques = places[..active.len()].iter().map(torque).collect();
-            let end = LastSample { x, torques };
-            member.sink.passed(member.run, &active, &end, (member.run.segment, 1));
-            member.run.segment -= 1;
-            member.joined = false;
+    /// Let a run take the step that it has expanded: its length, the length it could have had [s], whether it
+    /// leads to the end of the segment, and the event that ends it.
+    fn step(&mut self, run: usize, (length, h): (f64, f64), whole: bool, event: Option<Cause>) {
+        let (member, t) = (&mut self.members[run], &mut self.regime.t.0[run]);
+        let end = member.inputs.span(member.segment).1;
+        let small = h < 1e-14 * (1.0 + end.abs()) && !whole;
+        *t = if whole && event.is_none() { end } else { *t + length };
+        let finite = self.regime.x.iter().all(|x| x.0[run].is_finite());
+        let advances = member.progress.note((*t, length), event.is_some()).is_ok();
+        if small || !finite || !advances || member.progress.is_stalled() {
+            member.standing = Standing::Parted;
+        } else if let Some(cause) = event {
+            member.standing = Standing::Event(cause);
         } else {
-            member.run.resume();
-            member.go_on(fell);
+            self.settle(run);
         }
     }
 }
 
-/// A set of numbers as bits.
-fn bits(numbers: impl Iterator<Item = usize>) -> u64 {
-    numbers.fold(0, |bits, number| bits | 1 << number)
+/// What more runs have in common, a number of bits.
+fn most<S>(one: (u32, S), other: (u32, S)) -> (u32, S) {
+    if other.0.count_ones() > one.0.count_ones() { other } else { one }
 }
 
-/// The numbers of the bits that are set, in order.
-fn numbers(bits: u64) -> Vec<usize> {
-    (0..u64::BITS as usize).filter(|number| bits >> number & 1 == 1).collect()
-}
-
-fn operators_of<const N: usize>(ready: &Ready<f64>) -> &Operators<f64, N> {
-    ready.operators.of_size::<N>().expect("all members have as many states")
-}
-
-/// One call of the inner loop.
-struct Pass<'f, 's, const N: usize, const A: usize> {
-    formation: &'f mut Formation<N>,
-    source: (&'s Together<'s>, f64),
-    samples: (usize, usize),
-    /// Those that join and all that march, as bits.
-    lanes: (u32, u32),
-}
-
-impl<const N: usize, const A: usize> Task for Pass<'_, '_, N, A> {
-    type Output = (usize, u32);
-
-    #[inline(always)]
-    fn run<const F: bool>(self) -> (usize, u32) {
-        let first = self.source.0[0];
-        if self.source.0.iter().all(|inputs| std::ptr::eq(*inputs, first)) {
-            self.pass::<F, _>(&Lines(first))
-        } else {
-            let source = self.source.0;
-            self.pass::<F, _>(source)
-        }
-    }
-}
-
-impl<const N: usize, const A: usize> Pass<'_, '_, N, A> {
-    #[inline(always)]
-    fn pass<const F: bool, U: Source<Lanes>>(self, source: &U) -> (usize, u32) {
-        let Self { formation, source: (_, h), samples, lanes: (joining, live) } = self;
-        let Formation { operators, x, carry, guards, trail, stretch: (_, at), .. } = formation;
-        let carry = carry.first_chunk_mut::<A>().expect("at most as many");
-        if joining != 0 {
-            let mut room = room();
-            let sample = source.read(samples.0, &mut room);
-            let fresh: [_; A] = Carry::start::<F, N, A, _>(operators, (sample, h), x);
-            let first = operators.guards::<_, F, A>(sample, (x, &fresh));
-            for lane in (0..WIDTH).filter(|lane| joining >> lane & 1 == 1) {
-                for (carry, fresh) in carry.iter_mut().zip(&fresh) {
-                    carry.set_lane(lane, fresh);
-                }
-                for (guard, first) in guards.as_flattened_mut().iter_mut().zip(first.as_flattened())
-                {
-                    guard.0[lane] = first.0[lane];
-                }
-            }
-        }
-        let state = (&mut *x, carry, &mut *guards);
-        let to = (trail, *at, live);
-        march::<U, Lanes, F, N, A, 1>(operators, (source, h), samples, state, to)
-    }
-}
-
-/// The inputs of every lane.
-type Together<'a> = [&'a Inputs<f64>; WIDTH];
-
-impl Source<Lanes> for Together<'_> {
-    type Input = Lanes;
-
-    #[inline(always)]
-    fn read<'s>(&'s self, segment: usize, room: &'s mut Room<Lanes>) -> &'s Sample<Lanes> {
-        for (lane, inputs) in self.iter().enumerate() {
-            for (to, &[start, rate]) in room.iter_mut().zip(inputs.lines(segment)) {
-                (to[0].0[lane], to[1].0[lane]) = (start, rate);
-            }
-        }
-        &room[..self[0].lines(segment).len()]
-    }
-
-    #[inline(always)]
-    fn bounds(&self, input: usize, samples: (usize, usize)) -> [Lanes; 2] {
-        let mut bounds = [Pack::all(0.0); 2];
-        for (lane, inputs) in self.iter().enumerate() {
-            let [low, high] = inputs.bounds(input, samples);
-            (bounds[0].0[lane], bounds[1].0[lane]) = (low, high);
-        }
-        bounds
-    }
-}
-
-/// The inputs that all lanes share.
-impl Source<Lanes> for Lines<'_, f64> {
-    type Input = f64;
-
-    #[inline(always)]
-    fn read<'s>(&'s self, segment: usize, _: &'s mut Room<f64>) -> &'s Sample<f64> {
-        self.0.lines(segment)
-    }
-
-    #[inline(always)]
-    fn bounds(&self, input: usize, samples: (usize, usize)) -> [Lanes; 2] {
-        self.0.bounds(input, samples).map(Pack::all)
-    }
-}
-
-/// The samples of one lane.
-struct LaneView<'f, const N: usize> {
-    trail: &'f Trail<Lanes, N>,
-    /// Place of the first.
-    first: usize,
-    lane: usize,
-    places: [usize; MAX_ACTIVE],
-}
-
-impl<const N: usize> Samples<f64> for LaneView<'_, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
-        let lane = self.lane % WIDTH;
-        self.trail.states(i)[self.first..].iter().map(move |x| x.0[lane])
-    }
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
-        let torques = &self.trail.torques(self.places[slot])[self.first..];
-        let lane = self.lane % WIDTH;
-        torques.iter().map(move |torque| torque.0[lane])
-    }
-}
-
-/// The end of one lane.
-struct LastSample<'f, const N: usize> {
-    x: &'f [f64; N],
-    torques: Vec<f64>,
-}
-
-impl<const N: usize> Samples<f64> for LastSample<'_, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<f64>> {
-        std::iter::once(self.x[i])
-    }
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<f64>> {
-        std::iter::once(self.torques[slot])
-    }
+/// Numbers of the runs in a set of bits.
+pub(super) fn each(runs: u32) -> impl Iterator<Item = usize> {
+    (0..WIDTH).filter(move |run| runs >> run & 1 == 1)
 }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! Guards: polynomials that must stay positive while a mode holds, and the earliest that falls.
 
-use super::expansion::Expansion;
-use super::first_fall::first_fall;
-use super::integrator::RowState;
-use crate::network::{Cell, GearState, Mode, Network, Row};
-use crate::number::{Real, Series, TERMS, evaluate, slope};
+use super::first_fall::{first_fall, stay_positive};
+use super::regime::{Regime, RowState};
+use crate::network::{Cell, GearState, Row};
+use crate::number::{Number, Pack, Real, Series, TERMS, Values, evaluate, slope};
 
 /// What happens when a guard falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,79 +23,79 @@ pub enum Cause {
     Stalled,
 }
 
-/// The discrete state that guards depend on.
-pub struct Watch<'a, T> {
-    /// Network.
-    pub network: &'a Network<T>,
-    /// Active mode.
-    pub mode: &'a Mode<T>,
-    /// State of every friction element.
-    pub rows: &'a [RowState],
-    /// Whether an element has a normal load.
-    pub pressed: &'a [bool],
-    /// Whether a rolling gear is kept at rest by others.
-    pub blocked: &'a [bool],
-    /// Whether an element or gear moves off from exact zero at the start of the step.
-    pub released: &'a [bool],
-    /// Active cell of every channel.
-    pub cells: &'a [Cell],
-    /// State of every lossy gear.
-    pub gears: &'a [GearState],
-}
-
 /// The earliest fall within `h` [s], refined so that the time carries derivatives, and whether it
 /// grazes.
-pub fn earliest<T: Real>(
-    watch: &Watch<'_, T>,
-    expansion: &Expansion<T>,
-    h: f64,
-) -> Option<(T, Cause, bool)> {
+pub fn earliest<T: Real>(regime: &Regime<'_, T>, h: f64) -> Option<(T, Cause, bool)> {
     let mut best: Option<(f64, Series<T>, Cause)> = None;
-    let mut consider = |series: Series<T>, cause: Cause| {
+    all_guards(regime, &mut |series: Series<T>, cause: Cause| {
         let horizon = best.as_ref().map_or(h, |b| b.0);
-        if let Some(t) = first_fall(&series, expansion.order, horizon)
+        if let Some(t) = first_fall(&series, regime.expansion.order, horizon)
             && best.as_ref().is_none_or(|b| t < b.0)
         {
             best = Some((t, series, cause));
         }
-    };
-    for j in 0..watch.rows.len() {
-        friction_guards(watch, expansion, j, &mut consider);
-    }
-    for i in 0..watch.gears.len() {
-        gear_guards(watch, expansion, i, &mut consider);
-    }
-    for (i, channel) in watch.network.channels.iter().enumerate() {
-        let series = &expansion.channels[i];
-        for (border, next) in channel.borders(watch.cells[i], &expansion.inputs, series) {
-            consider(border, Cause::Border(i, next));
-        }
-    }
+    });
     best.map(|(t, series, cause)| {
-        let order = expansion.order;
+        let order = regime.expansion.order;
         (refined(&series, order, t), cause, grazes(&series, order, (t, h)))
     })
 }
 
-fn friction_guards<T: Real>(
-    watch: &Watch<'_, T>,
-    expansion: &Expansion<T>,
+/// The earliest falls of several runs, `runs` as bits, each within its own `h` [s].
+pub fn earliest_of_each<const K: usize>(
+    regime: &Regime<'_, Pack<K>>,
+    (runs, h): (u32, Pack<K>),
+) -> [Option<(f64, Cause)>; K] {
+    let mut best = [None; K];
+    all_guards(regime, &mut |series: Series<Pack<K>>, cause: Cause| {
+        let near = runs & !stay_positive(&series, regime.expansion.order, h);
+        for run in (0..K).filter(|run| near >> run & 1 == 1) {
+            let horizon = best[run].map_or(h.0[run], |(t, _)| t);
+            let own = series.map(|c| c.0[run]);
+            if let Some(t) = first_fall(&own, regime.expansion.order_of(run), horizon)
+                && best[run].is_none_or(|(before, _)| t < before)
+            {
+                best[run] = Some((t, cause));
+            }
+        }
+    });
+    best
+}
+
+/// Hand on every guard with what its fall causes.
+fn all_guards<T: Number>(regime: &Regime<'_, T>, consider: &mut impl FnMut(Series<T>, Cause)) {
+    for j in 0..regime.rows.len() {
+        friction_guards(regime, j, consider);
+    }
+    for i in 0..regime.gears.len() {
+        gear_guards(regime, i, consider);
+    }
+    for (i, channel) in regime.network.channels.iter().enumerate() {
+        let series = &regime.expansion.channels[i];
+        for (border, next) in channel.borders(regime.cells[i], &regime.expansion.inputs, series) {
+            consider(border, Cause::Border(i, next));
+        }
+    }
+}
+
+fn friction_guards<T: Number>(
+    regime: &Regime<'_, T>,
     j: usize,
     consider: &mut impl FnMut(Series<T>, Cause),
 ) {
-    let row = &watch.network.frictions[j];
-    let normal = row.normal.series(&expansion.inputs);
-    let pressed = watch.pressed[j];
+    let row = &regime.network.frictions[j];
+    let normal = row.normal.series(&regime.expansion.inputs);
+    let pressed = regime.pressed[j];
     consider(if pressed { normal } else { scaled(&normal, T::of(-1.0)) }, Cause::Pressed(j));
-    match watch.rows[j] {
+    match regime.rows[j] {
         RowState::Open | RowState::Saturated { .. } => {}
         RowState::Slipping { sign } => {
-            let slip = &expansion.channels[j].arguments[0];
+            let slip = &regime.expansion.channels[j].arguments[0];
             let cause = Cause::AtRest(Row::Friction(j));
-            consider(departing(slip, sign, watch.released[j]), cause);
+            consider(departing(slip, sign, regime.released[j]), cause);
         }
         RowState::Stuck => {
-            let torque = holding_torque(watch, expansion, Row::Friction(j));
+            let torque = holding_torque(regime, Row::Friction(j));
             let capacity = row.law.at(T::zero_()) * row.peak;
             let cap = scaled(&normal, if pressed { capacity } else { T::zero_() });
             consider(combined(&cap, &torque, 1.0), Cause::Overload(Row::Friction(j), -1.0));
@@ -107,32 +106,32 @@ fn friction_guards<T: Real>(
     }
 }
 
-fn gear_guards<T: Real>(
-    watch: &Watch<'_, T>,
-    expansion: &Expansion<T>,
+fn gear_guards<T: Number>(
+    regime: &Regime<'_, T>,
     i: usize,
     consider: &mut impl FnMut(Series<T>, Cause),
 ) {
-    let gear = &watch.network.losses[i];
+    let gear = &regime.network.losses[i];
     if !gear.loss.is_directional() {
         return;
     }
-    let torque = expansion.form(watch.network, watch.mode.gear_torque(watch.network).row(i));
-    match watch.gears[i] {
+    let torque =
+        regime.expansion.form(regime.network, regime.mode.gear_torque(regime.network).row(i));
+    match regime.gears[i] {
         GearState::Rolling { sign, backward } => {
             let mut power = scaled(&torque, T::of(sign));
             power[0] -= gear.loss.threshold();
             let power = if backward { scaled(&power, T::of(-1.0)) } else { power };
             consider(power, Cause::PowerReversal(i));
-            if watch.blocked[i] {
+            if regime.blocked[i] {
                 return;
             }
-            let released = watch.released[watch.rows.len() + i];
-            let speed = expansion.speed_form(&gear.speed);
+            let released = regime.released[regime.rows.len() + i];
+            let speed = regime.expansion.speed_form(&gear.speed);
             consider(departing(&speed, sign, released), Cause::AtRest(Row::Gear(i)));
         }
         GearState::Held => {
-            let loss = holding_torque(watch, expansion, Row::Gear(i));
+            let loss = holding_torque(regime, Row::Gear(i));
             let bounds = gear.loss.bounds();
             let line = |(slope, drag): (T, T)| {
                 let mut line = scaled(&torque, slope);
@@ -148,40 +147,43 @@ fn gear_guards<T: Real>(
 }
 
 /// The line that is the larger one now; where the other takes over the mode is decided anew.
-fn larger<T: Real>([a, b]: [Series<T>; 2]) -> Series<T> {
-    let ahead = a[0].re() > b[0].re() || (a[0].re() == b[0].re() && a[1].re() >= b[1].re());
+fn larger<T: Number>([a, b]: [Series<T>; 2]) -> Series<T> {
+    let [above, level] =
+        [|a, b| a > b, |a, b| a == b].map(|say| a[0].re().decide_with(b[0].re(), say));
+    let ahead = above || (level && a[1].re().decide_with(b[1].re(), |a, b| a >= b));
     if ahead { a } else { b }
 }
 
-fn holding_torque<T: Real>(watch: &Watch<'_, T>, expansion: &Expansion<T>, row: Row) -> Series<T> {
-    let position = watch.mode.stuck.iter().position(|&s| s == row);
+fn holding_torque<T: Number>(regime: &Regime<'_, T>, row: Row) -> Series<T> {
+    let position = regime.mode.stuck.iter().position(|&s| s == row);
     let position = position.expect("what is at rest belongs to the mode");
-    expansion.form(watch.network, watch.mode.stuck_torque.row(position))
+    regime.expansion.form(regime.network, regime.mode.stuck_torque.row(position))
 }
 
 /// Slip in its direction. What is released at this instant starts from exact zero, and where static
 /// and kinetic capacities agree also from zero acceleration: what is left of these is round-off
 /// and would look like an immediate return.
-fn departing<T: Real>(slip: &Series<T>, sign: f64, released: bool) -> Series<T> {
+fn departing<T: Number>(slip: &Series<T>, sign: f64, released: bool) -> Series<T> {
     let mut guard = scaled(slip, T::of(sign));
     if released {
         guard[0] = T::zero_();
-        if guard[1].re().abs() <= 1e-9 * guard[2].re().abs().max(1.0) {
+        let [rate, bend] = [guard[1], guard[2]].map(|c| c.re().magnitude());
+        if rate.decide_with(bend, |rate, bend| rate <= 1e-9 * bend.max(1.0)) {
             guard[1] = T::zero_();
         }
     }
     guard
 }
 
-fn negative<T: Real>(series: Series<T>) -> Series<T> {
+fn negative<T: Number>(series: Series<T>) -> Series<T> {
     scaled(&series, T::of(-1.0))
 }
 
-fn scaled<T: Real>(series: &Series<T>, factor: T) -> Series<T> {
+fn scaled<T: Number>(series: &Series<T>, factor: T) -> Series<T> {
     series.map(|c| c * factor)
 }
 
-fn combined<T: Real>(a: &Series<T>, b: &Series<T>, sign: f64) -> Series<T> {
+fn combined<T: Number>(a: &Series<T>, b: &Series<T>, sign: f64) -> Series<T> {
     let mut out = [T::zero_(); TERMS];
     for (o, (&a, &b)) in out.iter_mut().zip(a.iter().zip(b)) {
         *o = a + b * sign;

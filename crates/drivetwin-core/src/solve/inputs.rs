@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 //! Inputs over time, linear between samples.
 
-use super::sprint::WORTH_WHILE;
 use crate::number::{Real, Series};
 use thiserror::Error;
 
@@ -54,6 +53,9 @@ pub struct Inputs<T> {
     /// Least and largest value within every [`STRETCH`] segments, stretches × inputs.
     extremes: Vec<[f64; 2]>,
 }
+
+/// Fewest segments of equal length that make operators worth while.
+const WORTH_WHILE: usize = 8;
 
 /// Segments of which the extremes are known together.
 const STRETCH: usize = 64;
@@ -203,9 +205,13 @@ impl<T: Real> Inputs<T> {
         self.equal[i] as usize
     }
 
-    /// Whether segments as long as `i` are frequent, next to each other or not.
-    pub fn recurs(&self, i: usize) -> bool {
-        self.recurs[i]
+    /// Length of segment `i` [s] where that is no longer than `most` and segments as long as it are frequent,
+    /// next to each other or not, so that operators pay.
+    pub fn length_worth_while(&self, i: usize, most: f64) -> Option<f64> {
+        let (from, to) = self.span(i);
+        let h = to - from;
+        let frequent = self.equal_from(i) >= WORTH_WHILE || self.recurs[i];
+        (self.is_sampled() && frequent && h > 0.0 && h <= most).then_some(h)
     }
 
     /// Number of segments between knots.
@@ -228,15 +234,40 @@ impl<T: Real> Inputs<T> {
         self.knots[i]
     }
 
+    /// The segment after `i` where that ends within round-off of time `t` [s]: what happens there is decided by
+    /// what holds from there on.
+    pub fn just_before(&self, i: usize, t: f64) -> Option<usize> {
+        let (end, next) = (self.span(i).1, i + 1);
+        let near = end - t <= 1e-12 * (1.0 + end.abs());
+        (near && next < self.segments() && self.span(next).1 > end).then_some(next)
+    }
+
+    /// Value of an input at a knot.
+    #[inline(always)]
+    pub fn at_knot(&self, i: usize, input: usize) -> T {
+        if i < self.segments() {
+            return self.line(i, input)[0];
+        }
+        let [start, rate] = self.line(i - 1, input);
+        start + rate * (self.knot(i) - self.knot(i - 1))
+    }
+
     /// Whether all inputs are linear within every segment.
     pub fn is_sampled(&self) -> bool {
         self.sines.iter().all(Option::is_none)
     }
 
-    /// Whether every point of an increasing grid [s] is a knot.
-    pub fn has_knots(&self, grid: &[f64]) -> bool {
-        let mut knots = self.knots.iter();
-        grid.iter().all(|&t| knots.any(|&knot| knot == t))
+    /// Knots at the points of an increasing grid [s], of a jump that behind it; nothing where one is missing.
+    pub fn knots_at(&self, grid: &[f64]) -> Option<Vec<usize>> {
+        let mut knots = self.knots.iter().enumerate().peekable();
+        let find = |&t: &f64| {
+            let (mut found, _) = knots.find(|&(_, &knot)| knot == t)?;
+            while let Some((next, _)) = knots.next_if(|&(_, &knot)| knot == t) {
+                found = next;
+            }
+            Some(found)
+        };
+        grid.iter().map(find).collect()
     }
 
     /// Value at the start of segment `i` and rate within it, of every input, without derivatives.

@@ -5,7 +5,7 @@
 //! Plain loops throughout: the body of a closure would be compiled apart, for the least of all processors.
 
 use super::operators::SHAPES;
-use crate::number::Real;
+use crate::number::{Lane, Number, Values};
 
 /// A square matrix by rows.
 type Square<T, const N: usize> = [[T; N]; N];
@@ -17,33 +17,36 @@ const REMAINDER: f64 = 1e-24;
 /// Most terms of the series.
 const MAX_SERIES: usize = 40;
 
-/// Terms that the series of the operators needs.
-fn terms(reach: f64) -> usize {
-    let mut left = 1.0;
-    (1..MAX_SERIES)
-        .find(|&k| {
-            left *= reach / k as f64;
-            left < REMAINDER
-        })
-        .unwrap_or(MAX_SERIES)
+/// Coefficients of the series of the operators but for its first factor, and their number. Those that a run
+/// does not need are zero.
+#[inline(always)]
+fn coefficients<T: Number>(h: f64, reach: T) -> ([T::Values; MAX_SERIES + 2], usize) {
+    let none = T::Values::zero_();
+    let (mut all, mut left) = ([none; MAX_SERIES + 2], T::Values::of(1.0));
+    all[0] = left;
+    let mut ended = 0;
+    for i in 1..MAX_SERIES {
+        left *= reach.re() / i as f64;
+        ended |= left.those(|left| left < REMAINDER);
+        if ended == T::RUNS {
+            return (all, i);
+        }
+        all[i] = (all[i - 1] * h / (i + CUBIC) as f64).with(ended, none);
+    }
+    (all, MAX_SERIES)
 }
 
 /// `S_k = Σ_i A^i h^(i+k) / (i+k)!` for k = 0 .. CUBIC: S_0 is the transition matrix, and
 /// `k! S_(k+1) e` the response to a force `e t^k`. The highest by its series, the lower ones by
 /// `S_(k-1) = I h^(k-1)/(k-1)! + A S_k`.
 #[inline(always)]
-pub fn integrals<T: Real, const F: bool, const N: usize>(
+pub fn integrals<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
-    (h, reach): (f64, f64),
+    (h, reach): (f64, T),
 ) -> [Square<T, N>; CUBIC + 1] {
     let mut all = [[[T::zero_(); N]; N]; CUBIC + 1];
-    // Of the series but for its first factor.
-    let mut coefficients = [0.0; MAX_SERIES + 2];
-    coefficients[0] = 1.0;
-    for i in 1..terms(reach) {
-        coefficients[i] = coefficients[i - 1] * h / (i + CUBIC) as f64;
-    }
-    let sum = polynomial::<T, F, N>(a, &coefficients[..terms(reach).next_multiple_of(3)]);
+    let (coefficients, terms) = coefficients(h, reach);
+    let sum = polynomial::<T, F, N>(a, &coefficients[..terms.next_multiple_of(3)]);
     let mut weights = [1.0; CUBIC + 1];
     for k in 1..=CUBIC {
         weights[k] = weights[k - 1] * h / k as f64;
@@ -55,7 +58,7 @@ pub fn integrals<T: Real, const F: bool, const N: usize>(
     }
     for k in (0..CUBIC).rev() {
         all[k] = multiply::<T, F, N>((a, 1.0), &all[k + 1]);
-        add_to_diagonal(&mut all[k], weights[k]);
+        add_to_diagonal(&mut all[k], T::of(weights[k]));
     }
     all
 }
@@ -63,9 +66,9 @@ pub fn integrals<T: Real, const F: bool, const N: usize>(
 /// `Σ c_i A^i` over whole threes of coefficients, by Horner's rule over the cube: less than half as many
 /// products of matrices as over A (Paterson and Stockmeyer 1973).
 #[inline(always)]
-fn polynomial<T: Real, const F: bool, const N: usize>(
+fn polynomial<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
-    coefficients: &[f64],
+    coefficients: &[T::Values],
 ) -> Square<T, N> {
     let square = multiply::<T, F, N>((a, 1.0), a);
     let cube = multiply::<T, F, N>((a, 1.0), &square);
@@ -76,17 +79,17 @@ fn polynomial<T: Real, const F: bool, const N: usize>(
         }
         for i in 0..N {
             for j in 0..N {
-                let low = a[i][j].fma_times::<F>(coefficients[at + 1], sum[i][j]);
-                sum[i][j] = square[i][j].fma_times::<F>(coefficients[at + 2], low);
+                let low = a[i][j].fma_values::<F>(coefficients[at + 1], sum[i][j]);
+                sum[i][j] = square[i][j].fma_values::<F>(coefficients[at + 2], low);
             }
         }
-        add_to_diagonal(&mut sum, coefficients[at]);
+        add_to_diagonal(&mut sum, T::lifted(coefficients[at]));
     }
     sum
 }
 
 #[inline(always)]
-fn add_to_diagonal<T: Real, const N: usize>(a: &mut Square<T, N>, value: f64) {
+fn add_to_diagonal<T: Number, const N: usize>(a: &mut Square<T, N>, value: T) {
     for i in 0..N {
         a[i][i] += value;
     }
@@ -94,7 +97,7 @@ fn add_to_diagonal<T: Real, const N: usize>(a: &mut Square<T, N>, value: f64) {
 
 /// Product of a scaled matrix with another.
 #[inline(always)]
-fn multiply<T: Real, const F: bool, const N: usize>(
+fn multiply<T: Number, const F: bool, const N: usize>(
     (a, scale): (&Square<T, N>, f64),
     b: &Square<T, N>,
 ) -> Square<T, N> {
@@ -113,7 +116,7 @@ fn multiply<T: Real, const F: bool, const N: usize>(
 
 /// A matrix times a vector.
 #[inline(always)]
-pub fn apply<T: Real, const F: bool, const N: usize>(a: &Square<T, N>, v: &[T; N]) -> [T; N] {
+pub fn apply<T: Number, const F: bool, const N: usize>(a: &Square<T, N>, v: &[T; N]) -> [T; N] {
     let mut out = [T::zero_(); N];
     for i in 0..N {
         out[i] = dot::<T, F, N>(&a[i], v);
@@ -123,7 +126,7 @@ pub fn apply<T: Real, const F: bool, const N: usize>(a: &Square<T, N>, v: &[T; N
 
 /// Scalar product.
 #[inline(always)]
-pub fn dot<T: Real, const F: bool, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
+pub fn dot<T: Number, const F: bool, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
     let mut sum = T::zero_();
     for i in 0..unrolled::<T, N>() {
         sum = a[i].fma::<F>(b[i], sum);
@@ -134,13 +137,13 @@ pub fn dot<T: Real, const F: bool, const N: usize>(a: &[T; N], b: &[T; N]) -> T 
 /// `N`, but with derivatives hidden from the compiler: a sum that it unrolls it would also take for
 /// several entries at once, and gather what is a vector already.
 #[inline(always)]
-fn unrolled<T: Real, const N: usize>() -> usize {
+fn unrolled<T: Number, const N: usize>() -> usize {
     if T::DERIVATIVES { std::hint::black_box(N) } else { N }
 }
 
 /// Response of the state at the end to a force `e` times each of the [`SHAPES`].
 #[inline(always)]
-pub fn moments<T: Real, const F: bool, const N: usize>(
+pub fn moments<T: Number, const F: bool, const N: usize>(
     s: &[Square<T, N>; CUBIC + 1],
     force: &[T; N],
     h: f64,

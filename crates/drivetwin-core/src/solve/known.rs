@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! What runs of a network have compiled: modes and step operators.
 
-use super::sprint::{AnySize, Key};
+use super::ready::{AnySize, Key};
 use crate::network::{Mode, ModeKey, Network};
-use crate::number::Real;
+use crate::number::Number;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ impl<'n, T> Known<'n, T> {
     }
 }
 
-impl<T: Real> Known<'_, T> {
+impl<T: Number> Known<'_, T> {
     /// A mode that runs have needed.
     pub(super) fn known_mode(&self, key: ModeKey) -> Option<Arc<Mode<T>>> {
         self.modes.get(&key).map(Arc::clone)

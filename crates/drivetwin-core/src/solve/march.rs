@@ -11,7 +11,7 @@
 use super::operators::{Carried, MAX_WATCHED, Operators, Watched};
 use super::step::{over_channels, step};
 use crate::network::smooth::{Line, MAX_INPUTS, Sample, Value};
-use crate::number::{Factor, Lane, Pack, Values};
+use crate::number::{Factor, Lane, Values};
 
 /// Samples that are passed before they are handed on.
 pub const BLOCK: usize = 64;
@@ -361,6 +361,25 @@ impl<L: Lane> Carry<L> {
         Self { argument: none, rate: none, value: Value::zero(), near: none, stiction: none }
     }
 
+    /// Those of another in the runs named by bits.
+    #[inline(always)]
+    pub fn with(&self, runs: u32, other: &Self) -> Self {
+        let (own, value) = (&self.value, &other.value);
+        Self {
+            argument: self.argument.with(runs, other.argument),
+            rate: self.rate.with(runs, other.rate),
+            value: Value {
+                value: own.value.with(runs, value.value),
+                by_argument: own.by_argument.with(runs, value.by_argument),
+                bend: own.bend.with(runs, value.bend),
+                by_normal: own.by_normal.with(runs, value.by_normal),
+                mixed: own.mixed.with(runs, value.mixed),
+            },
+            near: self.near.with(runs, other.near),
+            stiction: self.stiction.with(runs, other.stiction),
+        }
+    }
+
     /// All channels at the start of a segment of length `h`.
     #[inline(always)]
     pub fn start<const F: bool, const N: usize, const A: usize, U: Factor<L>>(
@@ -401,22 +420,5 @@ impl<L: Lane, const N: usize> Carried<L, N> {
     #[inline(always)]
     pub fn torque(&self, carry: &Carry<L>) -> L {
         self.law.sign * carry.value.value
-    }
-}
-
-impl<const K: usize> Carry<Pack<K>> {
-    /// Replace one run.
-    #[inline(always)]
-    pub fn set_lane(&mut self, lane: usize, from: &Self) {
-        self.argument.0[lane] = from.argument.0[lane];
-        self.rate.0[lane] = from.rate.0[lane];
-        self.near.0[lane] = from.near.0[lane];
-        self.stiction.0[lane] = from.stiction.0[lane];
-        let (to, from) = (&mut self.value, &from.value);
-        to.value.0[lane] = from.value.0[lane];
-        to.by_argument.0[lane] = from.by_argument.0[lane];
-        to.bend.0[lane] = from.bend.0[lane];
-        to.by_normal.0[lane] = from.by_normal.0[lane];
-        to.mixed.0[lane] = from.mixed.0[lane];
     }
 }

@@ -10,7 +10,7 @@ use super::integrals::{apply, dot, integrals, moments};
 use super::lanes::{Task, dispatch};
 use crate::network::smooth::{Law, Line};
 use crate::network::{Mode, Network};
-use crate::number::{Lane, Real};
+use crate::number::{Lane, Number, Values};
 
 /// What a channel's cubic over a sample is a sum of, with `t` from 0 to 1 over it: 1, t, t², and Hermite's
 /// `3t² - 2t³` and `t³ - t²`, which raise the value and the slope at its end and nothing else.
@@ -112,15 +112,13 @@ pub struct Watched<L, const N: usize> {
     pub limit: Line<L>,
     /// 1 where both signs are bounded, else -1.
     pub side: L,
-    /// What is watched: the number of the friction element, or after these of a gear's power and speed.
-    pub id: usize,
 }
 
 /// Largest `ρ(A) h` for which a cubic follows a slipping element.
 pub const MAX_SLIPPING: f64 = 0.7;
 /// Largest `ρ(A) h` for which the series of the operators is summed directly.
 const MAX_LINEAR: f64 = 3.0;
-impl<T: Real, const N: usize> Operators<T, N> {
+impl<T: Number, const N: usize> Operators<T, N> {
     /// Build for steps of length `h` [s] with the channels `active` under `laws`; `None` where the step
     /// is too long for the mode. Nothing is watched yet.
     pub fn build(
@@ -183,7 +181,7 @@ impl<T: Real, const N: usize> Operators<T, N> {
         network: &Network<T>,
         active: &[usize],
         row: &[T],
-        (id, limit, both): (usize, Line<T>, bool),
+        (limit, both): (Line<T>, bool),
     ) {
         let place = self.watched.len();
         for drive in &mut self.drives {
@@ -192,7 +190,7 @@ impl<T: Real, const N: usize> Operators<T, N> {
         }
         let form = Form::over(network, (active, &[T::of(1.0); MAX_ACTIVE]), row);
         let side = T::of(if both { 1.0 } else { -1.0 });
-        self.watched.push(Watched { form, limit, side, id });
+        self.watched.push(Watched { form, limit, side });
     }
 }
 
@@ -205,14 +203,15 @@ struct Build<'b, T, const N: usize> {
     h: f64,
 }
 
-impl<T: Real, const N: usize> Task for Build<'_, T, N> {
+impl<T: Number, const N: usize> Task for Build<'_, T, N> {
     type Output = Option<Operators<T, N>>;
 
     #[inline(always)]
     fn run<const F: bool>(self) -> Option<Operators<T, N>> {
         let Self { network, mode, active, laws, h } = self;
         let reach = mode.radius * h;
-        if reach > if active.is_empty() { MAX_LINEAR } else { MAX_SLIPPING } {
+        let longest = if active.is_empty() { MAX_LINEAR } else { MAX_SLIPPING };
+        if reach.re().decide(|reach| reach > longest) {
             return None;
         }
         // Plain loops: the body of a closure would be compiled apart, for the least of all processors.
@@ -264,7 +263,7 @@ impl<T: Real, const N: usize> Task for Build<'_, T, N> {
 
 /// A form over the states, over the cubics of the carried channels at the end of a sample.
 #[inline(always)]
-fn over_moments<T: Real, const F: bool, const N: usize>(
+fn over_moments<T: Number, const F: bool, const N: usize>(
     row: &[T; N],
     moments: &[[[T; N]; SHAPES]],
 ) -> [[T; SHAPES]; MAX_ACTIVE] {
@@ -279,7 +278,7 @@ fn over_moments<T: Real, const F: bool, const N: usize>(
 
 /// Rates of the states by one entry of the basis.
 #[inline(always)]
-fn forcing<T: Real, const N: usize>(mode: &Mode<T>, column: usize) -> [T; N] {
+fn forcing<T: Number, const N: usize>(mode: &Mode<T>, column: usize) -> [T; N] {
     let mut force = [T::zero_(); N];
     for i in 0..mode.derivative.rows {
         force[i] = mode.derivative[(i, column)];
@@ -287,12 +286,16 @@ fn forcing<T: Real, const N: usize>(mode: &Mode<T>, column: usize) -> [T; N] {
     force
 }
 
-impl<T: Real, const N: usize> Operators<T, N> {
+impl<T: Number, const N: usize> Operators<T, N> {
     /// Of `n` states that turn by `reach` within a step, without any effect.
-    fn empty(n: usize, reach: f64) -> Self {
+    fn empty(n: usize, reach: T) -> Self {
+        let (reach, none) = (reach.re(), T::zero_());
         // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
-        let bow = [reach.max(0.05), (0.25 * reach * reach).max(0.005)].map(T::of);
-        let none = T::zero_();
+        let bow = [
+            reach.larger(T::Values::of(0.05)),
+            (reach * 0.25 * reach).larger(T::Values::of(0.005)),
+        ]
+        .map(T::lifted);
         Self {
             states: n,
             bow,
@@ -342,13 +345,6 @@ impl<L: Lane, const N: usize> Carried<L, N> {
     }
 }
 
-impl<L: Lane, const N: usize> Watched<L, N> {
-    /// Never falls.
-    pub fn idle() -> Self {
-        Self { form: Form::idle(), limit: Line::idle(), side: L::all(1.0), id: 0 }
-    }
-}
-
 impl<L: Lane, const N: usize> StepForm<L, N> {
     /// Always zero.
     fn idle() -> Self {
@@ -365,7 +361,7 @@ impl<L: Lane, const N: usize> Form<L, N> {
     }
 }
 
-impl<T: Real, const N: usize> Form<T, N> {
+impl<T: Number, const N: usize> Form<T, N> {
     /// Of a row over the basis or over the states alone.
     fn over(
         network: &Network<T>,
@@ -392,7 +388,7 @@ impl<L: Copy, const N: usize> Operators<L, N> {
 
 /// A form over the states, differentiated: over the basis.
 #[inline(always)]
-fn over_basis<T: Real, const F: bool, const N: usize>(
+fn over_basis<T: Number, const F: bool, const N: usize>(
     network: &Network<T>,
     mode: &Mode<T>,
     row: &[T; N],

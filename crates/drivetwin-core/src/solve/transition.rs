@@ -3,19 +3,16 @@
 
 use super::decide::Assignment;
 use super::guard::Cause;
-use super::integrator::{Event, EventKind, Integrator, RowState, sign_of};
+use super::regime::{Event, EventKind, Regime, RowState, sign_of};
 use super::status::Status;
 use crate::network::channel::form;
 use crate::network::linalg::{Matrix, least_norm, solve};
 use crate::network::{GearState, Row};
-use crate::number::Real;
+use crate::number::{Number, Values};
 
-impl<T: Real> Integrator<'_, T> {
-    /// Carry out what the last event caused.
-    pub(super) fn change_mode(&mut self) -> Result<(), Status> {
-        let Some(cause) = self.pending.take() else { return Ok(()) };
-        self.move_to_sample();
-        self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
+impl<T: Number> Regime<'_, T> {
+    /// Carry out what an event caused; the inputs are those about this instant.
+    pub(super) fn change(&mut self, cause: Cause) -> Result<(), Status> {
         match cause {
             Cause::AtRest(row) => {
                 self.bring_to_rest(&[row]);
@@ -50,15 +47,9 @@ impl<T: Real> Integrator<'_, T> {
         }
     }
 
-    /// An event within round-off of a sample is decided by what holds from there on.
-    fn move_to_sample(&mut self) {
-        let end = self.inputs.span(self.segment).1;
-        let next = self.segment + 1;
-        let near = end - self.t.re() <= 1e-12 * (1.0 + end.abs());
-        if near && next < self.inputs.segments() && self.inputs.span(next).1 > end {
-            self.t += end - self.t.re();
-            self.segment = next;
-        }
+    /// Speed that a row keeps at zero where it is at rest.
+    fn slip(&self, row: Row) -> T {
+        form(self.network.slip_of(row), &self.x)
     }
 
     /// Rows that can have moved only within the moment that a stalled run moved on.
@@ -67,7 +58,7 @@ impl<T: Real> Integrator<'_, T> {
         let directional = |i: &usize| self.network.losses[*i].loss.is_directional();
         let gears = (0..self.gears.len()).filter(directional);
         let rows = frictions.map(Row::Friction).chain(gears.map(Row::Gear));
-        rows.filter(|&row| form(self.network.slip_of(row), &self.x).re().abs() < 1e-6).collect()
+        rows.filter(|&row| self.slip(row).re().decide(|slip| slip.abs() < 1e-6)).collect()
     }
 
     /// Whether the normal load is gone within round-off of the time: what is left of the capacity is
@@ -75,13 +66,13 @@ impl<T: Real> Integrator<'_, T> {
     fn is_about_to_vent(&self, j: usize) -> bool {
         let normal = &self.network.frictions[j].normal;
         let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
-        now <= -rate * 1e-11
+        now.decide_with(rate, |now, rate| now <= -rate * 1e-11)
     }
 
     /// Start of a run: prescribed speeds, elements at rest, directions of gears, cells.
-    pub(super) fn take_up(&mut self, locked: &[Row]) -> Result<(), Status> {
-        self.inputs.expand(self.segment, self.t, &mut self.expansion.inputs);
-        self.bring_to_rest(locked);
+    pub(super) fn take_up(&mut self, locked: &[usize]) -> Result<(), Status> {
+        let locked: Vec<Row> = locked.iter().map(|&j| Row::Friction(j)).collect();
+        self.bring_to_rest(&locked);
         for (gear, loss) in self.gears.iter_mut().zip(&self.network.losses) {
             let sign = sign_of(form(&loss.speed, &self.x).re());
             *gear = GearState::Rolling { sign, backward: false };
@@ -89,7 +80,9 @@ impl<T: Real> Integrator<'_, T> {
         for i in self.rows.len()..self.network.channels.len() {
             self.cells[i] = self.cell_now(i);
         }
-        self.refresh()
+        self.refresh()?;
+        self.events.clear();
+        Ok(())
     }
 
     /// Take up everything that follows the inputs anew at this instant, as after a jump.
@@ -97,7 +90,8 @@ impl<T: Real> Integrator<'_, T> {
         for j in 0..self.rows.len() {
             let normal = &self.network.frictions[j].normal;
             let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
-            let pressed = now > 0.0 || (now == 0.0 && rate > 0.0);
+            let pressed =
+                now.decide_with(rate, |now, rate| now > 0.0 || (now == 0.0 && rate > 0.0));
             self.press(j, pressed);
         }
         for i in self.rows.len()..self.network.channels.len() {
@@ -108,15 +102,11 @@ impl<T: Real> Integrator<'_, T> {
         self.decide(None)
     }
 
-    /// Locks of which one carries its full capacity, or whose split follows the capacities, are
-    /// decided anew at every sample; accelerations do not depend on the split.
-    pub(super) fn refresh_split(&mut self) -> Result<(), Status> {
+    /// Whether one of the locks carries its full capacity, or their split follows the capacities: they are
+    /// then decided anew at every sample; accelerations do not depend on the split.
+    pub(super) fn is_split(&self) -> bool {
         let saturated = |row: &RowState| matches!(row, RowState::Saturated { .. });
-        let full = self.rows.iter().any(saturated) || self.blocked.contains(&true);
-        if self.mode.redundant || full {
-            self.decide(None)?;
-        }
-        Ok(())
+        self.mode.redundant || self.rows.iter().any(saturated) || self.blocked.contains(&true)
     }
 
     /// Give an element a normal load or take it away.
@@ -192,7 +182,7 @@ impl<T: Real> Integrator<'_, T> {
 
     fn cell_now(&self, i: usize) -> crate::network::Cell {
         let channel = &self.network.channels[i];
-        let mut arguments = [0.0; 2];
+        let mut arguments = [T::Values::zero_(); 2];
         for (argument, row) in arguments.iter_mut().zip(&channel.arguments) {
             *argument = form(row, &self.x).re();
         }

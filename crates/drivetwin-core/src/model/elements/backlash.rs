@@ -4,7 +4,7 @@
 use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::mechanism::{Mechanism, Region, Spring, SpringLaw, Stop, TwistForm};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// No torque while the twist lies within the gap; beyond it a spring-damper that can only push.
@@ -25,7 +25,7 @@ pub struct Backlash<T> {
     pub gap: T,
 }
 
-impl<T: Real> Backlash<T> {
+impl<T: Number> Backlash<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         require(&self.name, "stiffness", self.stiffness.re(), |v| v > 0.0, "> 0 N m/rad")?;

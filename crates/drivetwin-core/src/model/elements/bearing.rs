@@ -5,7 +5,7 @@ use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::friction::{FrictionLaw, FrictionTable};
 use crate::model::mechanism::{Friction, Mechanism, Normal};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// Torque against the relative speed of `a` and `b` from a table over its magnitude; at rest up to
@@ -27,7 +27,7 @@ pub struct Bearing<T> {
     pub peak: T,
 }
 
-impl<T: Real> Bearing<T> {
+impl<T: Number> Bearing<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         self.law().check(&self.name)?;

@@ -5,7 +5,7 @@ use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Friction, Inertia, Mechanism, Normal};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// Slip `s = ω_a - ω_b`; torque `cap · Sgn(s)` on `b`, opposite on `a`;
@@ -34,7 +34,7 @@ pub struct Clutch<T> {
     pub drum_inertia: T,
 }
 
-impl<T: Real> Clutch<T> {
+impl<T: Number> Clutch<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         self.friction.check(&self.name)?;

@@ -5,7 +5,7 @@ use crate::model::Name;
 use crate::model::error::{ModelError, require, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::model::torque_map::TorqueMap;
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// Torque on one node from a map over a throttle input and the node's speed.
@@ -25,7 +25,7 @@ pub struct EngineMap<T> {
     pub lag: Option<T>,
 }
 
-impl<T: Real> EngineMap<T> {
+impl<T: Number> EngineMap<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_moving(&self.name, &self.node)?;
         if let Some(lag) = self.lag {

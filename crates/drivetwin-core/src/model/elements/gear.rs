@@ -4,7 +4,7 @@
 use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::mechanism::{Constraint, Loss, LossLaw, Mechanism};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// Lumped efficiency of a gear.
@@ -27,7 +27,7 @@ pub struct GearLoss<T> {
     pub drag_backward: Option<T>,
 }
 
-impl<T: Real> GearLoss<T> {
+impl<T: Number> GearLoss<T> {
     /// A loss by its efficiency alone.
     pub fn by_efficiency(law: LossLaw, eta: T) -> Self {
         Self { law, eta, eta_backward: None, drag: None, drag_backward: None }
@@ -74,7 +74,7 @@ pub struct Gear<T> {
     pub loss: Option<GearLoss<T>>,
 }
 
-impl<T: Real> Gear<T> {
+impl<T: Number> Gear<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         require(&self.name, "ratio", self.ratio.re(), |v| v != 0.0, "not 0")?;

@@ -4,7 +4,7 @@
 use crate::model::Name;
 use crate::model::error::{ModelError, require, require_moving};
 use crate::model::mechanism::{self, Mechanism};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// Inertia on one node: `inertia · ω' = Σ torques`.
@@ -19,7 +19,7 @@ pub struct Inertia<T> {
     pub inertia: T,
 }
 
-impl<T: Real> Inertia<T> {
+impl<T: Number> Inertia<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_moving(&self.name, &self.node)?;
         require(&self.name, "inertia", self.inertia.re(), |v| v >= 0.0, ">= 0 kg m^2")

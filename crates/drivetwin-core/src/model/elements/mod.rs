@@ -32,7 +32,7 @@ pub use torque_converter::TorqueConverter;
 use super::Name;
 use super::error::ModelError;
 use super::mechanism::Mechanism;
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 macro_rules! elements {
@@ -44,7 +44,7 @@ macro_rules! elements {
             $(#[doc = concat!("See [`", stringify!($kind), "`].")] $kind($kind<T>)),*
         }
 
-        impl<T: Real> Element<T> {
+        impl<T: Number> Element<T> {
             /// Unique name.
             pub fn name(&self) -> &Name {
                 match self { $(Self::$kind(e) => &e.name),* }

@@ -5,7 +5,7 @@ use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Friction, Mechanism, Normal};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// `a` can drive `b` forward with any torque and cannot overrun it: slip `ω_a - ω_b ≤ 0`.
@@ -40,7 +40,7 @@ pub struct ParallelClutch<T> {
     pub pressure: Name,
 }
 
-impl<T: Real> OneWayClutch<T> {
+impl<T: Number> OneWayClutch<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         let Some(clutch) = &self.clutch else { return Ok(()) };

@@ -4,7 +4,7 @@
 use crate::model::Name;
 use crate::model::error::{ModelError, require};
 use crate::model::mechanism::{Constraint, Inertia, Mechanism};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// `ω_sun + z ω_ring = (1 + z) ω_carrier` with z = teeth of ring over teeth of sun, negative for a
@@ -28,7 +28,7 @@ pub struct Planetary<T> {
     pub planet_inertia: Option<T>,
 }
 
-impl<T: Real> Planetary<T> {
+impl<T: Number> Planetary<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require(&self.name, "z", self.z.re(), |z| z != 0.0 && z != -1.0, "neither 0 nor -1")?;
         let Some(spin) = self.planet_inertia else { return Ok(()) };

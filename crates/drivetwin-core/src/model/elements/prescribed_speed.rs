@@ -4,7 +4,7 @@
 use crate::model::Name;
 use crate::model::error::{ModelError, require_moving};
 use crate::model::mechanism::{Mechanism, Prescribed};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
@@ -23,7 +23,7 @@ pub struct PrescribedSpeed<T> {
     pub number: PhantomData<T>,
 }
 
-impl<T: Real> PrescribedSpeed<T> {
+impl<T: Number> PrescribedSpeed<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_moving(&self.name, &self.node)
     }

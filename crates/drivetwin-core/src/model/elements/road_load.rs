@@ -5,7 +5,7 @@ use crate::model::Name;
 use crate::model::error::{ModelError, require, require_moving};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Account, Force, ForceLaw, Friction, Mechanism, Normal};
-use crate::number::Real;
+use crate::number::{Number, Values};
 use serde::{Deserialize, Serialize};
 
 /// Torque against positive speed: `constant + rolling · Sgn(ω) + aero · ω|ω|`.
@@ -24,7 +24,7 @@ pub struct RoadLoad<T> {
     pub aero: T,
 }
 
-impl<T: Real> RoadLoad<T> {
+impl<T: Number> RoadLoad<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_moving(&self.name, &self.node)?;
         require(&self.name, "constant", self.constant.re(), |_| true, "finite")?;
@@ -39,10 +39,10 @@ impl<T: Real> RoadLoad<T> {
             m.forces.push(Force { element, node, law, lag: None, account });
         };
         force(ForceLaw::Constant(-self.constant));
-        if self.aero.re() != 0.0 {
+        if self.aero.re().decide(|v| v != 0.0) {
             force(ForceLaw::Quadratic { coefficient: -self.aero, node });
         }
-        if self.rolling.re() != 0.0 {
+        if self.rolling.re().decide(|v| v != 0.0) {
             let row = m.row(&[(&self.node, T::of(1.0))]);
             m.frictions.push(Friction {
                 element: self.name.clone(),

@@ -4,7 +4,7 @@
 use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::mechanism::{Mechanism, Spring, SpringLaw};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
 /// `twist' = ω_a - ω_b`; torque `k · twist + c · twist'` on `b`, opposite on `a`.
@@ -23,7 +23,7 @@ pub struct SpringDamper<T> {
     pub damping: T,
 }
 
-impl<T: Real> SpringDamper<T> {
+impl<T: Number> SpringDamper<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         require(&self.name, "stiffness", self.stiffness.re(), |v| v >= 0.0, ">= 0 N m/rad")?;

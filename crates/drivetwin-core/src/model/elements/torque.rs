@@ -4,7 +4,7 @@
 use crate::model::Name;
 use crate::model::error::{ModelError, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
@@ -23,7 +23,7 @@ pub struct Torque<T> {
     pub number: PhantomData<T>,
 }
 
-impl<T: Real> Torque<T> {
+impl<T: Number> Torque<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_moving(&self.name, &self.node)
     }

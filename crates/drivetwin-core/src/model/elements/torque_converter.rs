@@ -5,7 +5,7 @@ use crate::model::Name;
 use crate::model::converter_map::ConverterMap;
 use crate::model::error::{ModelError, require_apart, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
-use crate::number::Real;
+use crate::number::Number;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
@@ -26,7 +26,7 @@ pub struct TorqueConverter<T> {
     pub number: PhantomData<T>,
 }
 
-impl<T: Real> TorqueConverter<T> {
+impl<T: Number> TorqueConverter<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.pump, &self.turbine)?;
         require_moving(&self.name, &self.pump)?;

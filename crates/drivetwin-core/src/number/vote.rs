@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+//! How several runs side by side decide: the first of those that take part decides for all, and those for
+//! which another answer holds are found out. What was done then does not hold for them.
+
+use std::cell::Cell;
+
+thread_local! {
+    /// Runs that take part, and those of them that part with the first, as bits.
+    static VOTE: Cell<(u32, u32)> = const { Cell::new((1, 0)) };
+}
+
+/// Do something for the runs `runs`, as bits, of which there is at least one. Returns also those for which
+/// it would have gone otherwise.
+pub fn together<R>(runs: u32, act: impl FnOnce() -> R) -> (R, u32) {
+    debug_assert!(runs != 0, "nobody decides");
+    let outer = VOTE.replace((runs, 0));
+    let result = act();
+    let (_, parting) = VOTE.replace(outer);
+    (result, parting)
+}
+
+/// The run that decides.
+pub(super) fn leader() -> usize {
+    VOTE.get().0.trailing_zeros() as usize
+}
+
+/// What `say` answers for the run that decides.
+#[inline]
+pub(super) fn vote<R: PartialEq>(say: impl Fn(usize) -> R) -> R {
+    let (runs, mut parting) = VOTE.get();
+    let answer = say(runs.trailing_zeros() as usize);
+    let mut others = runs & runs.wrapping_sub(1);
+    while others != 0 {
+        let run = others.trailing_zeros();
+        parting |= u32::from(say(run as usize) != answer) << run;
+        others &= others - 1;
+    }
+    VOTE.set((runs, parting));
+    answer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::number::{Pack, Values};
+
+    #[test]
+    fn the_first_that_takes_part_decides_and_those_that_disagree_are_named() {
+        let values = Pack::<4>([-5.0, 1.0, -1.0, 2.0]);
+        let (positive, parting) = together(0b1110, || values.decide(|v| v > 0.0));
+        assert!(positive);
+        assert_eq!(parting, 0b0100);
+    }
+
+    #[test]
+    fn who_has_parted_once_is_not_forgotten_by_later_decisions() {
+        let (one, other) = (Pack::<4>([1.0, 2.0, 1.0, 1.0]), Pack([3.0, 3.0, 3.0, 4.0]));
+        let ((), parting) = together(0b1111, || {
+            one.decide(|v| v == 1.0);
+            other.decide_with(one, |a, b| a > b);
+            other.decide(|v| v == 3.0);
+        });
+        assert_eq!(parting, 0b1010);
+    }
+}
