@@ -64,15 +64,17 @@ impl<T: Number> Default for Decay<T> {
 
 impl<T: Number> Decay<T> {
     /// Fill in coefficient `k`, order by order: `E' = -(|s|'/v_s) E`.
+    #[inline(always)]
     fn term(&mut self, slip: &Series<T>, v_s: T, k: usize) -> T {
         if k == 0 {
             self.rate = -v_s.recip();
             self.values[0] = (slip[0] * self.rate).exp();
         } else {
             self.slopes[k] = slip[k] * self.rate * k as f64;
-            let earlier = self.values[..k].iter().rev();
-            let products = self.slopes[1..=k].iter().zip(earlier);
-            let sum = products.fold(T::zero_(), |sum, (&slope, &value)| sum + slope * value);
+            let mut sum = T::zero_();
+            for i in 1..=k {
+                sum += self.slopes[i] * self.values[k - i];
+            }
             self.values[k] = sum * INVERSE[k];
         }
         self.values[k]
@@ -117,6 +119,7 @@ impl<T: Number> FrictionLaw<T> {
 
     /// Taylor coefficient `k` of μ in time along the coefficients of |slip|, on piece `piece` of a table.
     /// `decay` is that of a Stribeck law.
+    #[inline(always)]
     pub fn series_term(&self, slip: &Series<T>, piece: usize, decay: &mut Decay<T>, k: usize) -> T {
         match self {
             Self::Table(table) => {

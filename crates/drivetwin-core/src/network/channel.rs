@@ -121,6 +121,7 @@ impl<T: Number> Channel<T> {
     }
 
     /// Fill in coefficient `k` of the torque; the arguments' coefficients up to `k` are given.
+    #[inline(always)]
     pub fn term(&self, cell: Cell, inputs: &[Series<T>], c: &mut ChannelSeries<T>, k: usize) {
         let [s, r] = &c.arguments;
         c.torque[k] = match (&self.law, cell) {
@@ -134,8 +135,11 @@ impl<T: Number> Channel<T> {
                 let (load, last) = &mut c.normal;
                 load[k] = normal.term(inputs, k);
                 *last = if k <= 1 || !is_zero(load[k]) { k } else { *last };
-                let products = load[..=*last].iter().zip(c.mu[..=k].iter().rev());
-                products.fold(T::zero_(), |sum, (&load, &mu)| sum + load * mu) * sign
+                let mut sum = T::zero_();
+                for i in 0..=*last {
+                    sum += load[i] * c.mu[k - i];
+                }
+                sum * sign
             }
             (Law::Quadratic(coefficient), Cell::Moving { sign, .. }) => {
                 *coefficient * product_term(s, s, k) * sign
@@ -171,6 +175,11 @@ impl<T: Number> Channel<T> {
 }
 
 /// Value of a linear form, given by its coefficients.
+#[inline(always)]
 pub fn form<T: Number>(coefficients: &[T], values: &[T]) -> T {
-    coefficients.iter().zip(values).fold(T::zero_(), |sum, (&c, &v)| sum + c * v)
+    let mut sum = T::zero_();
+    for (&c, &v) in coefficients.iter().zip(values) {
+        sum += c * v;
+    }
+    sum
 }

@@ -140,13 +140,15 @@ impl<T: Number> SparseRows<T> {
         Self { terms, ends }
     }
 
-    /// The products of all rows with a vector.
-    pub fn times<'s>(&'s self, vector: &'s [T]) -> impl Iterator<Item = T> + 's {
-        let mut start = 0;
-        self.ends.iter().map(move |&end| {
-            let row = &self.terms[std::mem::replace(&mut start, end)..end];
-            row.iter().fold(T::zero_(), |sum, &(j, value)| sum + value * vector[j])
-        })
+    /// The product of row `i` with a vector.
+    #[inline(always)]
+    pub fn times(&self, i: usize, vector: &[T]) -> T {
+        let start = if i == 0 { 0 } else { self.ends[i - 1] };
+        let mut sum = T::zero_();
+        for &(j, value) in &self.terms[start..self.ends[i]] {
+            sum += value * vector[j];
+        }
+        sum
     }
 }
 

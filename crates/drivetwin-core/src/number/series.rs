@@ -38,6 +38,7 @@ pub fn slope<T: Number>(series: &Series<T>, order: usize, h: T) -> T {
 }
 
 /// Coefficient `k` of the product of two series (Cauchy product).
+#[inline(always)]
 pub fn product_term<T: Number>(a: &Series<T>, b: &Series<T>, k: usize) -> T {
     let mut sum = T::zero_();
     for i in 0..=k {

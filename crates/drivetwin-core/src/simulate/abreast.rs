@@ -4,61 +4,50 @@
 use super::trajectory::{Column, Entry, Target, passing_terms, value};
 use crate::network::Network;
 use crate::number::{Lane, Number};
-use crate::solve::{BLOCK, Inputs, Lanes, Record, Regime, Samples, Task, WIDTH, dispatch};
+use crate::solve::{
+    BLOCK, Inputs, Lanes, NO_POINT, Record, Regime, Samples, Stretch, Task, WIDTH, dispatch,
+};
 use std::borrow::Borrow;
+use std::hint::black_box;
 
 /// Fills columns while runs advance, each at its own samples.
-pub(super) struct Recorder<'p> {
+pub(super) struct Recorder<'p, 'v> {
     /// Inputs of every run.
     inputs: [&'p Inputs<f64>; WIDTH],
-    /// Point of the grid at every knot, [`NONE`] where there is none.
-    points: Vec<usize>,
+    /// Point of the grid at every knot, or [`NO_POINT`]; number of points.
+    points: (&'p [usize], usize),
     columns: Vec<Column<Lanes>>,
-    /// Outputs × points.
-    values: Vec<Vec<Lanes>>,
+    /// Of every run, outputs × points.
+    values: Vec<&'v mut [f64]>,
     /// Working space: the basis at an instant, and one output over a block of samples.
     basis: Vec<Lanes>,
     block: Vec<Lanes>,
 }
 
-/// No point of the grid.
-const NONE: usize = usize::MAX;
-
-impl<'p> Recorder<'p> {
-    /// Columns of a network, on a grid of which the points stand at `knots`.
+impl<'p, 'v> Recorder<'p, 'v> {
+    /// Columns of a network, to be filled into `values`, outputs × points of every run; with the point at
+    /// every knot and their number.
     pub fn new(
         network: &Network<Lanes>,
         targets: &[Target],
-        inputs: [&'p Inputs<f64>; WIDTH],
-        knots: &[usize],
+        (inputs, points): ([&'p Inputs<f64>; WIDTH], (&'p [usize], usize)),
+        values: Vec<&'v mut [f64]>,
     ) -> Self {
-        let mut points = vec![NONE; inputs[0].knots().len()];
-        knots.iter().enumerate().for_each(|(point, &knot)| points[knot] = point);
         let columns = targets.iter().map(|&target| Column::of(network, target)).collect();
-        let values = vec![vec![Lanes::zero_(); knots.len()]; targets.len()];
         let (basis, block) = (Vec::new(), vec![Lanes::zero_(); BLOCK + 1]);
         Self { inputs, points, columns, values, basis, block }
     }
-
-    /// An output of one run.
-    pub fn values(
-        &self,
-        output: usize,
-        run: usize,
-    ) -> impl DoubleEndedIterator<Item = f64> + ExactSizeIterator {
-        self.values[output].iter().map(move |values| values.0[run % WIDTH])
-    }
 }
 
-impl Record for Recorder<'_> {
+impl Record for Recorder<'_, '_> {
     fn passed(
         &mut self,
         regime: &Regime<'_, Lanes>,
         active: &[usize],
         samples: &impl Samples<Lanes>,
-        range: (usize, &[u32]),
+        stretch: &Stretch,
     ) {
-        dispatch(Passed { recorder: self, regime, active, samples, range });
+        dispatch(Passed { recorder: self, regime, active, samples, stretch });
     }
 
     fn reached(
@@ -68,11 +57,13 @@ impl Record for Recorder<'_> {
         h: Lanes,
     ) {
         regime.expansion.basis_at(regime.network, h, &mut self.basis);
-        for (column, values) in self.columns.iter().zip(&mut self.values) {
+        let (points, count) = self.points;
+        for (output, column) in self.columns.iter().enumerate() {
             let now = value(column, regime, &self.basis);
-            for run in (0..WIDTH).filter(|run| runs >> run & 1 == 1) {
-                if let Some(to) = values.get_mut(self.points[knots[run]]) {
-                    to.0[run] = now.0[run];
+            for (run, values) in self.values.iter_mut().enumerate() {
+                let point = points[knots[run % WIDTH]];
+                if runs >> run & 1 == 1 && point != NO_POINT {
+                    values[output * count + point] = now.0[run % WIDTH];
                 }
             }
         }
@@ -80,48 +71,66 @@ impl Record for Recorder<'_> {
 }
 
 /// Samples to be added to the columns, with the widest instructions.
-struct Passed<'r, 'p, 'a, S> {
-    recorder: &'r mut Recorder<'p>,
+struct Passed<'r, 'p, 'v, 'a, S> {
+    recorder: &'r mut Recorder<'p, 'v>,
     regime: &'r Regime<'a, Lanes>,
     active: &'r [usize],
     samples: &'r S,
-    range: (usize, &'r [u32]),
+    stretch: &'r Stretch,
 }
 
-impl<S: Samples<Lanes>> Task for Passed<'_, '_, '_, S> {
+impl<S: Samples<Lanes>> Task for Passed<'_, '_, '_, '_, S> {
     type Output = ();
 
     #[inline(always)]
     fn run<const F: bool>(self) {
-        let Self { recorder, regime, active, samples, range: (first, runs) } = self;
-        let Recorder { inputs, points, columns, values, block, .. } = recorder;
-        let block = &mut block[..runs.len()];
-        let points = &points[first..first + runs.len()];
-        for (column, values) in columns.iter().zip(values) {
+        let Self { recorder, regime, active, samples, stretch } = self;
+        let Recorder { inputs, points: (points, per_output), columns, values, block, .. } =
+            recorder;
+        let numbers = stretch.first..stretch.first + stretch.count;
+        let block = &mut block[..stretch.count];
+        let points = &points[numbers.clone()];
+        for (output, column) in columns.iter().enumerate() {
             let mut begun = false;
             for &(position, factor) in &*passing_terms(column, regime) {
+                let how = (factor, begun);
                 match Entry::at(position, regime.network, active) {
-                    Entry::State(i) => add(block, samples.states(i), (factor, begun)),
+                    Entry::State(i) => add(block, samples.states(i), how),
                     Entry::Input(i) => {
                         let at = |knot| Lanes::gathered(|run| inputs[run].at_knot(knot, i));
-                        add(block, (first..first + runs.len()).map(at), (factor, begun));
+                        add(block, numbers.clone().map(at), how);
                     }
-                    Entry::One => add(block, std::iter::repeat(Lanes::all(1.0)), (factor, begun)),
-                    Entry::Torque(slot) => add(block, samples.torques(slot), (factor, begun)),
-                    Entry::Nothing => {
-                        add(block, std::iter::repeat(Lanes::zero_()), (factor, begun));
-                    }
+                    Entry::One => add(block, std::iter::repeat(Lanes::all(1.0)), how),
+                    Entry::Torque(slot) => add(block, samples.torques(slot), how),
+                    Entry::Nothing => add(block, std::iter::repeat(Lanes::zero_()), how),
                 }
                 begun = true;
             }
             if !begun {
                 block.fill(Lanes::zero_());
             }
-            for k in 0..block.len() {
-                if let Some(to) = values.get_mut(points[k]) {
-                    *to = to.with(runs[k], block[k]);
-                }
+            for (run, values) in values.iter_mut().enumerate() {
+                let (from, to) = stretch.spans[run];
+                let values = &mut values[output * *per_output..][..*per_output];
+                hand_out((&block[from..to], run), &points[from..to], values);
             }
+        }
+    }
+}
+
+/// Give one run its values at the points of the grid.
+#[inline(always)]
+fn hand_out((block, run): (&[Lanes], usize), points: &[usize], values: &mut [f64]) {
+    let [Some(&first), Some(&last)] = [points.first(), points.last()] else { return };
+    if last != NO_POINT && last.wrapping_sub(first) == points.len() - 1 {
+        for (to, from) in values[first..=last].iter_mut().zip(block) {
+            *to = from.0[run % WIDTH];
+        }
+        return;
+    }
+    for (from, &point) in block.iter().zip(points) {
+        if let Some(to) = values.get_mut(point) {
+            *to = from.0[run % WIDTH];
         }
     }
 }
@@ -134,7 +143,8 @@ fn add(
     (factor, begun): (Lanes, bool),
 ) {
     for (sum, sample) in block.iter_mut().zip(samples) {
-        let term = *sample.borrow() * factor;
+        // Hidden, the compiler does not take several samples at once, and gather what is a vector already.
+        let term = *black_box(sample.borrow()) * factor;
         *sum = if begun { *sum + term } else { term };
     }
 }

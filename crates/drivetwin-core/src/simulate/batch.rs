@@ -206,7 +206,7 @@ impl Work<'_> {
         };
         let run = self.plan(job.run).run(&network, &state);
         if run.status == Status::Completed {
-            self.keep.reduce(&run.columns, job.values);
+            self.keep.reduce(&run.columns.concat(), run.time.len(), job.values);
         } else {
             job.values.fill(f64::NAN);
         }
@@ -217,9 +217,7 @@ impl Work<'_> {
     fn do_together(&self, group: &mut [&mut Job<'_>]) {
         let runs: Vec<usize> = group.iter().map(|job| job.run).collect();
         let (plan, locked) = (self.plan(runs[0]), &self.sets.start(runs[0]).locked);
-        let Some(knots) = plan.inputs.knots_at(&plan.grid).filter(|_| runs.len() > 1) else {
-            return;
-        };
+        let Some(points) = plan.points.as_deref().filter(|_| runs.len() > 1) else { return };
         let alike = |&run: &usize| {
             let (knots, others) = (plan.inputs.knots(), self.plan(run).inputs.knots());
             (std::ptr::eq(knots, others) || knots == others)
@@ -232,14 +230,23 @@ impl Work<'_> {
         };
         let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &self.plan(run).inputs).collect();
         let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
-        let mut recorder = abreast::Recorder::new(&network, &plan.targets, all, &knots);
         let (known, how) = (Known::of(&network), (plan.settings, alike & !parting));
+        let columns = plan.targets.len() * plan.grid.len();
+        let mut spare = Vec::new();
+        let values: Vec<&mut [f64]> = match self.keep {
+            Keep::Columns => group.iter_mut().map(|job| &mut *job.values).collect(),
+            _ => {
+                spare.resize(runs.len() * columns, 0.0);
+                spare.chunks_exact_mut(columns.max(1)).collect()
+            }
+        };
+        let shared = (all, (points, plan.grid.len()));
+        let mut recorder = abreast::Recorder::new(&network, &plan.targets, shared, values);
         let events = run_together(known, &inputs, how, (x, &locked), &mut recorder);
         for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
             let Some(events) = events else { continue };
-            let per_output = self.keep.size(1, plan.grid.len());
-            for (output, to) in job.values.chunks_exact_mut(per_output).enumerate() {
-                self.keep.reduce_column(output, recorder.values(output, place), to);
+            if !spare.is_empty() {
+                self.keep.reduce(&spare[place * columns..][..columns], plan.grid.len(), job.values);
             }
             (job.outcome, job.events) = (Some(Outcome::Ran(Status::Completed)), events);
         }
@@ -260,27 +267,16 @@ impl Keep<'_> {
         }
     }
 
-    /// What is kept of the columns of a run.
-    pub(super) fn reduce(self, columns: &[Vec<f64>], out: &mut [f64]) {
-        let Some(points) = columns.first().map(Vec::len) else { return };
-        for (output, out) in out.chunks_exact_mut(self.size(1, points)).enumerate() {
-            self.reduce_column(output, columns[output].iter().copied(), out);
-        }
-    }
-
-    /// What is kept of one output.
-    pub(super) fn reduce_column(
-        self,
-        output: usize,
-        mut column: impl DoubleEndedIterator<Item = f64>,
-        out: &mut [f64],
-    ) {
-        match self {
-            Self::Columns => out.iter_mut().zip(column).for_each(|(to, value)| *to = value),
-            Self::Last => out.iter_mut().zip(column.next_back()).for_each(|(to, last)| *to = last),
-            Self::Misfit(measured) => {
-                let known = column.zip(&measured[output]).filter(|(_, m)| !m.is_nan());
-                out[0] = known.map(|(c, m)| (c - m) * (c - m)).sum();
+    /// What is kept of the columns of a run, outputs × points.
+    pub(super) fn reduce(self, columns: &[f64], points: usize, out: &mut [f64]) {
+        for (output, column) in columns.chunks_exact(points).enumerate() {
+            match self {
+                Self::Columns => out[output * points..][..points].copy_from_slice(column),
+                Self::Last => out[output] = column[points - 1],
+                Self::Misfit(measured) => {
+                    let known = column.iter().zip(&measured[output]).filter(|(_, m)| !m.is_nan());
+                    out[output] = known.map(|(c, m)| (c - m) * (c - m)).sum();
+                }
             }
         }
     }

@@ -102,7 +102,7 @@ impl Kept {
         let mut values = vec![f64::NAN; size];
         let mut derivatives = vec![f64::NAN; LANES * size];
         if !failed && size > 0 {
-            keep.reduce(&run.columns, &mut values);
+            keep.reduce(&run.columns.concat(), run.time.len(), &mut values);
             keep.reduce_slopes(&run.columns, &run.derivatives, &mut derivatives);
         }
         let nothing = Derived::new(f64::NAN, [f64::NAN; LANES]);

@@ -42,6 +42,8 @@ pub enum SimulateError {
 pub struct Plan<T> {
     pub(super) inputs: Inputs<T>,
     pub(super) grid: Vec<f64>,
+    /// Point of the grid at every knot, see [`Inputs::points`].
+    pub(super) points: Option<Vec<usize>>,
     pub(super) targets: Vec<Target>,
     pub(super) settings: Settings,
     audit: bool,
@@ -67,8 +69,9 @@ impl<T: Real> Plan<T> {
         let span = (grid[0], grid[grid.len() - 1]);
         let inputs = join(network, signals, (span, if fine { grid } else { &[] }))?;
         let inputs = if fine { divided(network, inputs) } else { inputs };
-        let settings = Settings { sprint: sprint && inputs.knots_at(grid).is_some(), ..settings };
-        Ok(Self { inputs, grid: grid.to_vec(), targets, settings, audit })
+        let points = inputs.points(grid);
+        let settings = Settings { sprint: sprint && points.is_some(), ..settings };
+        Ok(Self { inputs, grid: grid.to_vec(), points, targets, settings, audit })
     }
 
     fn integrator<'r>(

@@ -63,6 +63,7 @@ impl<T: Number> Expansion<T> {
 
     /// Expand the runs `runs`, as bits, from state `x`; returns the step `<= h` [s] over which the truncation
     /// error stays within the tolerance. Inputs must have been set.
+    #[inline(always)]
     pub fn expand(
         &mut self,
         network: &Network<T>,
@@ -157,6 +158,7 @@ impl<T: Number> Expansion<T> {
         out
     }
 
+    #[inline(always)]
     fn finish(&mut self, network: &Network<T>, cells: &[Cell], order: usize) {
         self.channel_terms(network, cells, order);
         self.order = order;
@@ -179,6 +181,7 @@ impl<T: Number> Expansion<T> {
     }
 
     /// Coefficient `k` of the channels from that of the states, both into the basis.
+    #[inline(always)]
     fn channel_terms(&mut self, network: &Network<T>, cells: &[Cell], k: usize) {
         let (states, others) = self.basis.split_at_mut(self.states.len());
         for (to, state) in states.iter_mut().zip(&self.states) {
@@ -196,6 +199,7 @@ impl<T: Number> Expansion<T> {
     }
 
     /// Coefficient `k` of what the inputs and the constant give to the basis.
+    #[inline(always)]
     fn input_terms(&mut self, network: &Network<T>, k: usize) {
         let given = &mut self.basis[network.first_input()..];
         for (to, input) in given.iter_mut().zip(&self.inputs) {
@@ -210,12 +214,12 @@ impl<T: Number> Expansion<T> {
 
     /// Coefficient `k + 1` of the states, by coefficient `k` of the basis. Returns the largest, relative
     /// to the scale of its state.
+    #[inline(always)]
     fn next_term(&mut self, mode: &Mode<T>, k: usize) -> T::Values {
         let mut largest = T::Values::zero_();
-        let states = self.states.iter_mut().zip(&self.scales);
-        for ((state, scale), rate) in states.zip(mode.rates.times(&self.basis)) {
-            state[k + 1] = rate * INVERSE[k + 1];
-            largest = (state[k + 1].re().magnitude() * scale.re()).larger(largest);
+        for (i, state) in self.states.iter_mut().enumerate() {
+            state[k + 1] = mode.rates.times(i, &self.basis) * INVERSE[k + 1];
+            largest = (state[k + 1].re().magnitude() * self.scales[i].re()).larger(largest);
         }
         largest
     }

@@ -11,7 +11,7 @@ use super::inputs::Inputs;
 use super::integrator::Settings;
 use super::known::Known;
 use super::march::Column;
-use super::passage::Passage;
+use super::passage::{Passage, Stretch};
 use super::progress::Progress;
 use super::ready::{AnySize, can_march};
 use super::regime::{Event, Regime};
@@ -26,14 +26,13 @@ pub type Lanes = Pack<WIDTH>;
 
 /// Takes what the runs of a formation come by.
 pub trait Record {
-    /// Samples from number `first` on that were passed in one mode with the channels `active`, and for each
-    /// the runs that stood at it, as bits.
+    /// A stretch of samples that were passed in one mode with the channels `active`.
     fn passed(
         &mut self,
         regime: &Regime<'_, Lanes>,
         active: &[usize],
         samples: &impl Samples<Lanes>,
-        range: (usize, &[u32]),
+        stretch: &Stretch,
     );
 
     /// The runs `runs`, as bits, are at samples of their own, `h` [s] after the start of the expansion.
@@ -238,7 +237,7 @@ impl Formation<'_> {
         let Some(first) = each(ahead).map(|run| self.members[run].segment).min() else {
             return false;
         };
-        let h = self.members[0].inputs.length_worth_while(first, self.settings.max_step);
+        let h = self.members[0].inputs.usual_length(first, self.settings.max_step);
         let (ready, parting) = together(self.open(), || self.regime.ready(h?));
         self.part(parting);
         let (Some(ready), Some(h)) = (ready, h) else {

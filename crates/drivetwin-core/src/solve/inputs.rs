@@ -48,8 +48,8 @@ pub struct Inputs<T> {
     sines: Vec<Option<Sine<T>>>,
     /// For every segment the number of segments of its length from it on.
     equal: Vec<u32>,
-    /// For every segment whether its length recurs often.
-    recurs: Vec<bool>,
+    /// See [`usual_lengths`].
+    usual: Vec<f64>,
     /// Least and largest value within every [`STRETCH`] segments, stretches × inputs.
     extremes: Vec<[f64; 2]>,
 }
@@ -59,6 +59,9 @@ const WORTH_WHILE: usize = 8;
 
 /// Segments of which the extremes are known together.
 const STRETCH: usize = 64;
+
+/// Of a knot that is no point of the grid.
+pub const NO_POINT: usize = usize::MAX;
 
 /// Offset, amplitude, angular frequency [rad/s], phase [rad].
 type Sine<T> = (T, T, f64, f64);
@@ -173,9 +176,9 @@ impl<T: Real> Inputs<T> {
         (shifts, sines): (Vec<T>, Vec<Option<Sine<T>>>),
     ) -> Self {
         let equal = equal_lengths(&knots);
-        let recurs = recurring(&knots, &equal);
+        let usual = usual_lengths(&knots, &equal);
         let extremes = extremes(&knots, &lines, shifts.len());
-        Self { knots, lines, shifts, sines, equal, recurs, extremes }
+        Self { knots, lines, shifts, sines, equal, usual, extremes }
     }
 
     /// The same inputs over shorter segments: one of length l [s] becomes `parts(l)`.
@@ -205,13 +208,11 @@ impl<T: Real> Inputs<T> {
         self.equal[i] as usize
     }
 
-    /// Length of segment `i` [s] where that is no longer than `most` and segments as long as it are frequent,
-    /// next to each other or not, so that operators pay.
-    pub fn length_worth_while(&self, i: usize, most: f64) -> Option<f64> {
-        let (from, to) = self.span(i);
-        let h = to - from;
-        let frequent = self.equal_from(i) >= WORTH_WHILE || self.recurs[i];
-        (self.is_sampled() && frequent && h > 0.0 && h <= most).then_some(h)
+    /// Length of segment `i` [s], the same for all as long as it, where that is no more than `most` and
+    /// segments of it are so frequent that operators pay.
+    pub fn usual_length(&self, i: usize, most: f64) -> Option<f64> {
+        let h = self.usual[i];
+        (self.is_sampled() && h > 0.0 && h <= most).then_some(h)
     }
 
     /// Number of segments between knots.
@@ -257,17 +258,18 @@ impl<T: Real> Inputs<T> {
         self.sines.iter().all(Option::is_none)
     }
 
-    /// Knots at the points of an increasing grid [s], of a jump that behind it; nothing where one is missing.
-    pub fn knots_at(&self, grid: &[f64]) -> Option<Vec<usize>> {
-        let mut knots = self.knots.iter().enumerate().peekable();
-        let find = |&t: &f64| {
-            let (mut found, _) = knots.find(|&(_, &knot)| knot == t)?;
-            while let Some((next, _)) = knots.next_if(|&(_, &knot)| knot == t) {
-                found = next;
+    /// For every knot the number of its point of an increasing grid [s], or [`NO_POINT`]; of a jump the knot
+    /// behind it counts. Nothing where a point has no knot.
+    pub fn points(&self, grid: &[f64]) -> Option<Vec<usize>> {
+        let mut points = vec![NO_POINT; self.knots.len()];
+        let mut found = 0;
+        for (i, knot) in self.knots.iter().enumerate() {
+            if grid.get(found) == Some(knot) && self.knots.get(i + 1) != Some(knot) {
+                points[i] = found;
+                found += 1;
             }
-            Some(found)
-        };
-        grid.iter().map(find).collect()
+        }
+        (found == grid.len()).then_some(points)
     }
 
     /// Value at the start of segment `i` and rate within it, of every input, without derivatives.
@@ -325,12 +327,13 @@ impl<T: Real> Inputs<T> {
 /// Lengths of segments that are told apart.
 const LENGTHS: usize = 8;
 
-/// For every segment whether its length is one of the first [`LENGTHS`] and stands often.
-fn recurring(knots: &[f64], equal: &[u32]) -> Vec<bool> {
+/// For every segment the length that its operators are made for [s]: that of the first of those as long as
+/// it, of which there are enough; else zero. The first [`LENGTHS`] lengths are known again later on.
+fn usual_lengths(knots: &[f64], equal: &[u32]) -> Vec<f64> {
     let mut known: Vec<(f64, usize)> = Vec::with_capacity(LENGTHS);
-    let mut class = vec![LENGTHS; equal.len()];
-    let mut i = 0;
-    while i < equal.len() {
+    let mut class = Vec::with_capacity(equal.len());
+    while class.len() < equal.len() {
+        let i = class.len();
         let (length, count) = (knots[i + 1] - knots[i], equal[i] as usize);
         // Short ones are differences of long times.
         let same = |&(other, _): &(f64, usize)| (length - other).abs() <= 1e-12 + 1e-9 * length;
@@ -341,10 +344,11 @@ fn recurring(knots: &[f64], equal: &[u32]) -> Vec<bool> {
         if let Some((_, number)) = known.get_mut(place) {
             *number += count;
         }
-        class[i..i + count].fill(place);
-        i += count;
+        class.resize(i + count, (place, (length, count)));
     }
-    class.iter().map(|&c| known.get(c).is_some_and(|known| known.1 >= WORTH_WHILE)).collect()
+    let usual = |&(place, own): &(usize, (f64, usize))| known.get(place).copied().unwrap_or(own);
+    let worth_while = |(length, count)| if count >= WORTH_WHILE { length } else { 0.0 };
+    class.iter().map(usual).map(worth_while).collect()
 }
 
 fn extremes(knots: &[f64], lines: &[[f64; 2]], inputs: usize) -> Vec<[f64; 2]> {

@@ -52,7 +52,7 @@ pub fn integrals<T: Number, const F: bool, const N: usize>(
         weights[k] = weights[k - 1] * h / k as f64;
     }
     for i in 0..N {
-        for j in 0..N {
+        for j in 0..unrolled::<T, N>() {
             all[CUBIC][i][j] = sum[i][j] * weights[CUBIC];
         }
     }
@@ -78,7 +78,7 @@ fn polynomial<T: Number, const F: bool, const N: usize>(
             sum = multiply::<T, F, N>((&cube, 1.0), &sum);
         }
         for i in 0..N {
-            for j in 0..N {
+            for j in 0..unrolled::<T, N>() {
                 let low = a[i][j].fma_values::<F>(coefficients[at + 1], sum[i][j]);
                 sum[i][j] = square[i][j].fma_values::<F>(coefficients[at + 2], low);
             }
@@ -134,11 +134,11 @@ pub fn dot<T: Number, const F: bool, const N: usize>(a: &[T; N], b: &[T; N]) -> 
     sum
 }
 
-/// `N`, but with derivatives hidden from the compiler: a sum that it unrolls it would also take for
-/// several entries at once, and gather what is a vector already.
+/// `N`, but hidden from the compiler where a number is a vector already: a loop that it unrolls it would
+/// also take for several entries at once, and gather these.
 #[inline(always)]
-fn unrolled<T: Number, const N: usize>() -> usize {
-    if T::DERIVATIVES { std::hint::black_box(N) } else { N }
+pub fn unrolled<T: Number, const N: usize>() -> usize {
+    if T::DERIVATIVES || T::RUNS > 1 { std::hint::black_box(N) } else { N }
 }
 
 /// Response of the state at the end to a force `e` times each of the [`SHAPES`].
@@ -154,11 +154,11 @@ pub fn moments<T: Number, const F: bool, const N: usize>(
     for k in 0..CUBIC {
         weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
         let response = apply::<T, F, N>(&s[k + 1], force);
-        for i in 0..N {
+        for i in 0..unrolled::<T, N>() {
             all[k][i] = response[i] * weight;
         }
     }
-    for i in 0..N {
+    for i in 0..unrolled::<T, N>() {
         let (square, cube) = (all[2][i], all[3][i]);
         all[3][i] = square * 3.0 - cube * 2.0;
         all[4][i] = cube - square;

@@ -28,12 +28,13 @@ mod transition;
 
 pub use expansion::Expansion;
 pub use formation::{Lanes, Record, WIDTH, run_together};
-pub use inputs::{InputError, Inputs, Signal};
+pub use inputs::{InputError, Inputs, NO_POINT, Signal};
 pub use integrator::{Integrator, Settings, Step};
 pub use known::Known;
 pub(crate) use lanes::{Task, dispatch};
 pub use march::BLOCK;
 pub use operators::MAX_SLIPPING;
+pub use passage::Stretch;
 pub use ready::can_march;
 pub use regime::{Event, EventKind, Regime, RowState};
 pub use sprint::{Samples, Sink};

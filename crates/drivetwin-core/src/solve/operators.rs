@@ -6,7 +6,7 @@
 //! every channel there and its rate are linear in x, u, u', a. Channels count in their direction of
 //! motion: `τ = sign · φ` over `m = sign · s`.
 
-use super::integrals::{apply, dot, integrals, moments};
+use super::integrals::{apply, dot, integrals, moments, unrolled};
 use super::lanes::{Task, dispatch};
 use crate::network::smooth::{Law, Line};
 use crate::network::{Mode, Network};
@@ -223,7 +223,7 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
         let s = integrals::<T, F, N>(&a, (h, reach));
         let mut operators = Operators::empty(n, reach);
         for i in 0..N {
-            for j in 0..N {
+            for j in 0..unrolled::<T, N>() {
                 operators.transition[j][i] = s[0][i][j];
             }
         }
@@ -239,7 +239,7 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
         for (slot, &j) in active.iter().enumerate() {
             operators.signs[slot] = laws[slot].sign;
             let mut force = forcing(mode, network.first_channel() + j);
-            for i in 0..N {
+            for i in 0..unrolled::<T, N>() {
                 force[i] *= laws[slot].sign;
             }
             responses[slot] = moments::<T, F, N>(&s, &force, h);
@@ -395,8 +395,9 @@ fn over_basis<T: Number, const F: bool, const N: usize>(
 ) -> Vec<T> {
     let mut out = vec![T::zero_(); network.basis()];
     for i in 0..network.states() {
-        for (sum, &d) in out.iter_mut().zip(mode.derivative.row(i)) {
-            *sum = row[i].fma::<F>(d, *sum);
+        let rates = mode.derivative.row(i);
+        for j in 0..rates.len() {
+            out[j] = row[i].fma::<F>(rates[j], out[j]);
         }
     }
     out

@@ -67,18 +67,29 @@ impl<R: Record, const N: usize, const A: usize> Task for Pass<'_, '_, '_, R, N, 
 }
 
 /// Samples that have been passed but not handed on.
-struct Stretch {
+pub struct Stretch {
     /// Number of the first.
-    first: usize,
-    /// Runs that stood at each, as bits.
-    runs: [u32; BLOCK + 1],
-    count: usize,
+    pub first: usize,
+    /// How many.
+    pub count: usize,
+    /// Of these those at which each run stood: from one to before another.
+    pub spans: [(usize, usize); WIDTH],
 }
 
 impl Stretch {
+    fn from(first: usize) -> Self {
+        Self { first, count: 0, spans: [(0, 0); WIDTH] }
+    }
+
+    /// Samples begin for some runs, as bits.
+    fn begin(&mut self, runs: u32) {
+        each(runs).for_each(|run| self.spans[run] = (self.count, self.count));
+    }
+
+    /// More samples, for some runs, as bits.
     fn add(&mut self, count: usize, runs: u32) {
-        self.runs[self.count..self.count + count].fill(runs);
         self.count += count;
+        each(runs).for_each(|run| self.spans[run].1 = self.count);
     }
 }
 
@@ -94,7 +105,7 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
             (inputs.segments(), segment + inputs.equal_from(segment))
         };
         let mut trail = Trail::in_columns(std::mem::take(columns), A);
-        let mut stretch = Stretch { first: segment, runs: [0; BLOCK + 1], count: 0 };
+        let mut stretch = Stretch::from(segment);
         let mut front =
             Front { x: [Lanes::zero_(); N], carry: [Carry::idle(); A], guards: idle_guards() };
         let (mut abreast, mut passed, mut room) = (0, 0, room());
@@ -105,17 +116,13 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
                 front.join::<F, _>(operators, (joining, &regime.x), (sample, h));
                 abreast |= joining;
                 waiting &= !joining;
+                stretch.begin(joining);
             }
             let until = next(members, waiting).min(end);
             if abreast == 0 || stretch.count == BLOCK {
-                record.passed(
-                    regime,
-                    active,
-                    &trail,
-                    (stretch.first, &stretch.runs[..stretch.count]),
-                );
+                record.passed(regime, active, &trail, &stretch);
                 segment = if abreast == 0 { until } else { segment };
-                (stretch.first, stretch.count) = (segment, 0);
+                stretch = Stretch::from(segment);
                 continue;
             }
             let samples = (segment, (until - segment).min(BLOCK - stretch.count));
@@ -144,7 +151,7 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
         if segment == last {
             stretch.add(1, abreast);
         }
-        record.passed(regime, active, &trail, (stretch.first, &stretch.runs[..stretch.count]));
+        record.passed(regime, active, &trail, &stretch);
         *columns = trail.into_columns();
         (passed, abreast)
     }

@@ -4,6 +4,7 @@
 use super::expansion::{Accuracy, Expansion};
 use super::guard::Cause;
 use super::known::Known;
+use super::lanes::{Task, dispatch};
 use super::status::Status;
 use crate::network::channel::ChannelSeries;
 use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
@@ -128,8 +129,7 @@ impl<'a, T: Number> Regime<'a, T> {
 
     /// Expand the motion of the runs `runs`, as bits, from here on: [`Expansion::expand`].
     pub(super) fn expand(&mut self, runs: u32, step: (T::Values, Accuracy)) -> T::Values {
-        let Self { expansion, network, mode, cells, x, .. } = self;
-        expansion.expand(network, mode, cells, (runs, x), step)
+        dispatch(Expand { regime: self, runs, step })
     }
 
     /// State of the runs `runs`, as bits, `h` [s] after the start of the expansion.
@@ -173,6 +173,23 @@ impl<'a, T: Number> Regime<'a, T> {
             Row::Friction(j) => j,
             Row::Gear(i) => self.rows.len() + i,
         }
+    }
+}
+
+/// [`Regime::expand`], to be dispatched.
+struct Expand<'r, 'a, T: Number> {
+    regime: &'r mut Regime<'a, T>,
+    runs: u32,
+    step: (T::Values, Accuracy),
+}
+
+impl<T: Number> Task for Expand<'_, '_, T> {
+    type Output = T::Values;
+
+    #[inline(always)]
+    fn run<const F: bool>(self) -> T::Values {
+        let Regime { expansion, network, mode, cells, x, .. } = self.regime;
+        expansion.expand(network, mode, cells, (self.runs, x), self.step)
     }
 }
 

@@ -86,7 +86,7 @@ impl<T: Real> Integrator<'_, T> {
     /// What a sprint from here on needs, if one is possible: with the length [s] and number of its samples.
     fn ready_to_sprint(&mut self) -> Option<(Ready<T>, (f64, usize))> {
         let (from, _) = self.inputs.span(self.segment);
-        let h = self.inputs.length_worth_while(self.segment, self.settings.max_step)?;
+        let h = self.inputs.usual_length(self.segment, self.settings.max_step)?;
         let ready = (self.regime.t.re() == from).then(|| self.regime.ready(h)).flatten()?;
         Some((ready, (h, self.inputs.equal_from(self.segment))))
     }
