@@ -5,6 +5,7 @@
 mod common;
 
 use common::{compile, inertia, paper_driveline, second_gear, shaft, start, torque, upshift};
+use drivetwin_core::model::dual_clutch::DualClutch;
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::network::Network;
 use drivetwin_core::number::{Lane, Pack};
@@ -14,8 +15,8 @@ use drivetwin_core::simulate::{
 use drivetwin_core::solve::{Settings, Signal, Status, WIDTH};
 use proptest::prelude::*;
 
-/// Shaft torque of the paper's shift under several efficiencies, one thread.
-fn shifts(eta: &[f64], settings: Settings) -> Batch {
+/// Shaft torque of the paper's shift under several sets of the named parameters, one thread.
+fn shifts_of(names: &[&str], sets: &[f64], settings: Settings) -> Batch {
     let model = paper_driveline::<f64>(LossLaw::Paper);
     let network = Network::compile(&model.driveline()).expect("a driveline");
     let columns = upshift(1.0);
@@ -24,7 +25,12 @@ fn shifts(eta: &[f64], settings: Settings) -> Batch {
     let outputs = &dual_clutch_outputs(&model)[4..5];
     let plan = Plan::new(&network, &signals, &columns[0].1, outputs, (settings, false));
     let scenarios = [(plan.expect("a plan"), second_gear())];
-    dual_clutch_batch(&model, &scenarios, (&["eta"], eta), (Keep::Columns, 1)).expect("names")
+    dual_clutch_batch(&model, &scenarios, (names, sets), (Keep::Columns, 1)).expect("names")
+}
+
+/// The same under several efficiencies.
+fn shifts(eta: &[f64], settings: Settings) -> Batch {
+    shifts_of(&["eta"], eta, settings)
 }
 
 fn efficiencies(count: usize) -> Vec<f64> {
@@ -94,4 +100,88 @@ fn events_of_all_lanes_within_few_samples_are_located_one_by_one() {
     for (a, b) in fast.last_lock.iter().zip(&exact.last_lock) {
         assert!((a - b).abs() < 1e-6, "{a} {b}");
     }
+}
+
+/// 9: neighbours decide together; whoever decides otherwise, has other events, or is no driveline at all is
+/// as it would be alone, wherever it stands.
+#[test]
+fn runs_that_decide_otherwise_are_as_they_would_be_alone() {
+    let names = ["eta", "k_o", "B2.gain", "B3.gain", "B3.P0", "B3.mu_s", "start.twist"];
+    let model = paper_driveline::<f64>(LossLaw::Paper);
+    let nominal: Vec<f64> = names.iter().map(|name| nominal(&model, name)).collect();
+    let mut noise = 1_u64;
+    let mut scatter = |by: f64| {
+        noise =
+            noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        1.0 + by * ((noise >> 11) as f64 / (1_u64 << 52) as f64 - 1.0)
+    };
+    let runs = 2 * WIDTH + 5;
+    let mut sets: Vec<Vec<f64>> = (0..runs)
+        .map(|run| {
+            nominal.iter().map(|v| v * scatter(if run % 3 == 0 { 0.5 } else { 0.05 })).collect()
+        })
+        .collect();
+    // Locks never, is refused, slips from the start.
+    (sets[2][3], sets[WIDTH + 1][1], sets[WIDTH + 3][2]) = (0.0, -1.0, nominal[2] * 1e-3);
+    let of = |order: &[usize]| {
+        let flat: Vec<f64> = order.iter().flat_map(|&run| sets[run].iter().copied()).collect();
+        shifts_of(&names, &flat, Settings::default())
+    };
+    let forward: Vec<usize> = (0..runs).collect();
+    let shuffled: Vec<usize> = (0..runs).map(|i| (i * 8 + 3) % runs).collect();
+    let (one, other) = (of(&forward), of(&shuffled));
+    let points = one.values.len() / runs;
+    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    for (place, &run) in shuffled.iter().enumerate() {
+        let alone = of(&[run]);
+        for (batch, at) in [(&one, run), (&other, place)] {
+            let values = &batch.values[at * points..][..points];
+            assert!(bits(values) == bits(&alone.values), "run {run}");
+            assert_eq!(batch.outcomes[at], alone.outcomes[0], "run {run}");
+            assert_eq!(batch.events[at], alone.events[0], "run {run}");
+            assert_eq!(batch.last_lock[at].to_bits(), alone.last_lock[0].to_bits(), "run {run}");
+        }
+    }
+    let refused = |outcome: &&Outcome| matches!(outcome, Outcome::Refused(_));
+    assert_eq!(one.outcomes.iter().filter(refused).count(), 1);
+    let counts: std::collections::BTreeSet<u32> = one.events.iter().copied().collect();
+    assert!(counts.len() > 2, "{counts:?}");
+}
+
+/// Pressures that jump at a sample between others change the modes of all runs there, as they do for one alone
+/// and without operators.
+#[test]
+fn jumps_between_samples_are_met_together_and_alone() {
+    let model = paper_driveline::<f64>(LossLaw::Paper);
+    let network = Network::compile(&model.driveline()).expect("a driveline");
+    let grid: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
+    let time: Vec<f64> = [&grid[..=500], &grid[500..]].concat();
+    let step = |before: f64, after: f64| [vec![before; 501], vec![after; 501]].concat();
+    let (torque, off, on) = (step(1545.0, 1500.0), step(14e5, 0.0), step(0.0, 9e5));
+    let columns = [("engine torque", torque), ("B2", off), ("B3", on)];
+    let signals: Vec<(&str, Signal<'_, f64>)> =
+        columns.iter().map(|(name, values)| (*name, Signal::samples(&time, values))).collect();
+    let outputs = &dual_clutch_outputs(&model)[4..5];
+    let run = |settings, eta: &[f64]| {
+        let plan =
+            Plan::new(&network, &signals, &grid, outputs, (settings, false)).expect("a plan");
+        let scenarios = [(plan, second_gear())];
+        dual_clutch_batch(&model, &scenarios, (&["eta"], eta), (Keep::Columns, 1)).expect("names")
+    };
+    let eta = efficiencies(WIDTH);
+    let (fast, exact) = (run(Settings::default(), &eta), run(Settings::exact(), &eta));
+    assert_eq!(fast.events, exact.events);
+    assert!(exact.events.iter().all(|&events| events >= 3), "{:?}", exact.events);
+    let errors = fast.values.iter().zip(&exact.values).map(|(a, b)| (a - b).abs());
+    let worst = errors.fold(0.0, f64::max);
+    assert!(worst < 0.02, "{worst} N m");
+    let alone = run(Settings::default(), &eta[3..4]);
+    let (together, alone) = (&fast.values[3 * grid.len()..][..grid.len()], &alone.values);
+    let apart = together.iter().zip(alone).position(|(a, b)| a != b);
+    assert_eq!(apart, None, "{:?}", apart.map(|k| (together[k], alone[k])));
+}
+
+fn nominal(model: &DualClutch<f64>, name: &str) -> f64 {
+    let mut model = model.clone();
+    model.parameter_mut(name).copied().unwrap_or_else(|| second_gear::<f64>().twist)
 }

@@ -82,8 +82,6 @@ struct Formation<'a> {
     members: Vec<Member<'a>>,
     /// Events of those that have come to their end.
     events: Vec<Option<Vec<Event<f64>>>>,
-    /// Runs that have not moved since they last decided, as bits.
-    fresh: u32,
     /// Working space of passages.
     columns: Vec<Column<Lanes>>,
     /// Inputs of one run.
@@ -112,8 +110,8 @@ pub fn run_together<'a>(
     };
     let members = inputs.iter().enumerate().map(member).collect();
     let own_inputs = vec![[0.0; TERMS]; regime.ahead.len()];
-    let (fresh, columns) = (0, Vec::new());
-    let mut all = Formation { regime, settings, members, events, fresh, columns, own_inputs };
+    let columns = Vec::new();
+    let mut all = Formation { regime, settings, members, events, columns, own_inputs };
     all.part(parting);
     all.decide(all.open(), |regime| regime.take_up(locked));
     while all.open() != 0 {
@@ -147,10 +145,8 @@ impl Formation<'_> {
             if due == 0 {
                 return;
             }
-            let fresh = due & self.fresh;
-            self.expand(if fresh != 0 { fresh } else { due }, record);
-            // What was released has moved off, in the others when they passed samples.
-            self.fresh = 0;
+            self.expand(due, record);
+            // What was released has moved off in all of them: nobody passes samples with it.
             self.regime.released.fill(false);
         }
     }
@@ -192,8 +188,7 @@ impl Formation<'_> {
         // Splits of torque are decided anew at every sample, each run at its own.
         let all = result.is_err() || self.regime.is_split();
         self.part(if all { runs } else { parting });
-        self.fresh = self.open();
-        each(self.fresh).for_each(|run| self.settle(run));
+        each(self.open()).for_each(|run| self.settle(run));
     }
 
     /// Inputs about the present instants.
@@ -250,12 +245,11 @@ impl Formation<'_> {
         };
         let Self { regime, members, columns, .. } = self;
         let passage = Passage { regime, members, active: &ready.active, h, columns };
-        let (passed, arrived) = match &ready.operators {
+        let arrived = match &ready.operators {
             AnySize::Four(operators) => passage.pass(operators, record),
             AnySize::Eight(operators) => passage.pass(operators, record),
             AnySize::Twelve(_) | AnySize::Many(_) => unreachable!("they are of plain numbers"),
         };
-        self.fresh &= !passed;
         each(arrived).for_each(|run| self.settle(run));
         true
     }

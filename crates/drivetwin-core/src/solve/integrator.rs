@@ -178,10 +178,11 @@ impl<'a, T: Real> Integrator<'a, T> {
             if self.segment + 1 == self.inputs.segments() {
                 return Ok(false);
             }
-            self.segment += 1;
-            entered = true;
+            // Samples may also have been passed up to the jump.
             let (from, to) = self.inputs.span(self.segment);
             jumped |= from == to;
+            self.segment += 1;
+            entered = true;
         }
         self.take_inputs();
         // Where a prescribed acceleration jumps, everything that holds against it is decided anew.

@@ -10,6 +10,7 @@ mod expansion;
 mod first_fall;
 mod formation;
 mod guard;
+mod input_error;
 mod inputs;
 mod integrals;
 mod integrator;
@@ -28,7 +29,8 @@ mod transition;
 
 pub use expansion::Expansion;
 pub use formation::{Lanes, Record, WIDTH, run_together};
-pub use inputs::{InputError, Inputs, NO_POINT, Signal};
+pub use input_error::InputError;
+pub use inputs::{Inputs, NO_POINT, Signal};
 pub use integrator::{Integrator, Settings, Step};
 pub use known::Known;
 pub(crate) use lanes::{Task, dispatch};

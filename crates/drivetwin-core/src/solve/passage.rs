@@ -25,13 +25,13 @@ pub(super) struct Passage<'p, 'a> {
 }
 
 impl Passage<'_, '_> {
-    /// Let all that stand before such samples pass them. Returns, as bits, those that have passed some, and
-    /// those that have arrived at the end of such samples; the others are due.
+    /// Let all that stand before such samples pass them. Returns, as bits, those that have arrived at the end
+    /// of such samples; the others are due.
     pub fn pass<const N: usize>(
         self,
         operators: &Operators<Lanes, N>,
         record: &mut impl Record,
-    ) -> (u32, u32) {
+    ) -> u32 {
         let passage = self;
         match operators.channels.len() {
             0 => dispatch(Pass::<_, N, 0> { passage, operators, record }),
@@ -50,10 +50,10 @@ struct Pass<'o, 'p, 'a, R, const N: usize, const A: usize> {
 }
 
 impl<R: Record, const N: usize, const A: usize> Task for Pass<'_, '_, '_, R, N, A> {
-    type Output = (u32, u32);
+    type Output = u32;
 
     #[inline(always)]
-    fn run<const F: bool>(self) -> (u32, u32) {
+    fn run<const F: bool>(self) -> u32 {
         let members = &*self.passage.members;
         let first = members[0].inputs;
         if members.iter().all(|member| std::ptr::eq(member.inputs, first)) {
@@ -95,7 +95,7 @@ impl Stretch {
 
 impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
     #[inline(always)]
-    fn pass<const F: bool, U: Source<Lanes>>(self, source: &U) -> (u32, u32) {
+    fn pass<const F: bool, U: Source<Lanes>>(self, source: &U) -> u32 {
         let Self { passage, operators, record } = self;
         let Passage { regime, members, active, h, columns } = passage;
         let mut waiting = ahead(members);
@@ -108,7 +108,7 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
         let mut stretch = Stretch::from(segment);
         let mut front =
             Front { x: [Lanes::zero_(); N], carry: [Carry::idle(); A], guards: idle_guards() };
-        let (mut abreast, mut passed, mut room) = (0, 0, room());
+        let (mut abreast, mut room) = (0, room());
         while segment < end {
             let joining = waiting & those_at(members, segment);
             if joining != 0 {
@@ -131,7 +131,6 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
             let (count, fallen) =
                 march::<U, Lanes, F, N, A, 1>(operators, (source, h), samples, at, to);
             stretch.add(count, abreast);
-            passed |= if count > 0 { abreast } else { abreast & !fallen };
             segment += count;
             if fallen != 0 {
                 for run in each(fallen) {
@@ -153,7 +152,7 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
         }
         record.passed(regime, active, &trail, &stretch);
         *columns = trail.into_columns();
-        (passed, abreast)
+        abreast
     }
 }
 
