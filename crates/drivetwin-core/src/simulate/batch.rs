@@ -63,28 +63,11 @@ pub fn dual_clutch_batch(
     let sets = Sets { model, starts, parameters, sets };
     let count = if scenarios.is_empty() { 0 } else { sets.count() };
     let size = plans.first().map_or(0, |plan| keep.size(plan.targets.len(), plan.grid.len()));
-    // Zeros: fresh from the system, memory is only touched when a group writes its results.
-    let mut values = vec![0.0; count * size];
-    let mut rest = &mut values[..];
-    let job = |run| {
-        let (values, others) = std::mem::take(&mut rest).split_at_mut(size);
-        rest = others;
-        Job { run, values, outcome: None, events: Vec::new() }
-    };
-    let mut jobs: Vec<Job<'_>> = (0..count).map(job).collect();
     let work = Work { sets, plans, keep };
-    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(|| work.do_all(&mut jobs)),
-        Err(_) => work.do_all(&mut jobs),
-    }
-    let ends: Vec<_> = jobs.into_iter().map(|job| (job.outcome, job.events)).collect();
-    let mut result = Batch { values, outcomes: vec![], events: vec![], last_lock: vec![] };
-    for (outcome, events) in ends {
-        result.outcomes.push(outcome.expect("every job is done in the end"));
-        result.events.push(events.len() as u32);
-        result.last_lock.push(last_lock(&events).unwrap_or(f64::NAN));
-    }
-    Ok(result)
+    Ok(match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(|| work.result(count, size)),
+        Err(_) => work.result(count, size),
+    })
 }
 
 /// Refuse names that are no parameters.
@@ -184,6 +167,28 @@ impl Work<'_> {
         self.plans[run % self.plans.len()]
     }
 
+    /// Do so many runs, of each of which `size` numbers are kept.
+    fn result(&self, count: usize, size: usize) -> Batch {
+        // Cleared by all threads.
+        let mut values: Vec<f64> = rayon::iter::repeat_n(0.0, count * size).collect();
+        let mut rest = &mut values[..];
+        let job = |run| {
+            let (values, others) = std::mem::take(&mut rest).split_at_mut(size);
+            rest = others;
+            Job { run, values, outcome: None, events: Vec::new() }
+        };
+        let mut jobs: Vec<Job<'_>> = (0..count).map(job).collect();
+        self.do_all(&mut jobs);
+        let ends: Vec<_> = jobs.into_iter().map(|job| (job.outcome, job.events)).collect();
+        let mut result = Batch { values, outcomes: vec![], events: vec![], last_lock: vec![] };
+        for (outcome, events) in ends {
+            result.outcomes.push(outcome.expect("every job is done in the end"));
+            result.events.push(events.len() as u32);
+            result.last_lock.push(last_lock(&events).unwrap_or(f64::NAN));
+        }
+        result
+    }
+
     /// Do all jobs: side by side as far as they go together. The results depend neither on that nor on the
     /// number of threads.
     fn do_all(&self, jobs: &mut [Job<'_>]) {
@@ -217,7 +222,9 @@ impl Work<'_> {
     fn do_together(&self, group: &mut [&mut Job<'_>]) {
         let runs: Vec<usize> = group.iter().map(|job| job.run).collect();
         let (plan, locked) = (self.plan(runs[0]), &self.sets.start(runs[0]).locked);
-        let Some(points) = plan.points.as_deref().filter(|_| runs.len() > 1) else { return };
+        // Fewer are done as fast alone.
+        let enough = runs.len() > WIDTH / 2;
+        let Some(points) = plan.points.as_deref().filter(|_| enough) else { return };
         let alike = |&run: &usize| {
             let (knots, others) = (plan.inputs.knots(), self.plan(run).inputs.knots());
             (std::ptr::eq(knots, others) || knots == others)

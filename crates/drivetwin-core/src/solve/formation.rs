@@ -234,9 +234,12 @@ impl Formation<'_> {
         };
         let h = self.members[0].inputs.usual_length(first, self.settings.max_step);
         let (ready, parting) = together(self.open(), || self.regime.ready(h?));
-        self.part(parting);
+        if parting != 0 {
+            self.part(parting);
+            return true;
+        }
         let (Some(ready), Some(h)) = (ready, h) else {
-            for run in each(ahead & !parting) {
+            for run in each(ahead) {
                 if self.members[run].segment == first {
                     self.members[run].standing = Standing::Due;
                 }
