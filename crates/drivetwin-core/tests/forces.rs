@@ -4,13 +4,16 @@
 mod common;
 
 use common::{clutch, compile, constant, grid, inertia, load, shaft, simulate, start, torque};
+use drivetwin_core::model::Driveline;
 use drivetwin_core::model::FrictionLaw;
 use drivetwin_core::model::FrictionTable;
-use drivetwin_core::model::elements::{Clutch, Element, EngineMap, Planetary};
+use drivetwin_core::model::elements::{Clutch, Element, EngineMap, Inertia, Planetary, Torque};
 use drivetwin_core::model::torque_map::TorqueMap;
-use drivetwin_core::network::CompileError;
-use drivetwin_core::simulate::Output;
-use drivetwin_core::solve::Status;
+use drivetwin_core::network::{CompileError, Network};
+use drivetwin_core::number::{Dual, Number as _};
+use drivetwin_core::simulate::{Output, Start, run};
+use drivetwin_core::solve::{Settings, Signal, Status};
+use std::marker::PhantomData;
 
 fn speed(node: &str) -> Output {
     Output::Speed(node.into())
@@ -197,5 +200,40 @@ fn repeated_couplings_are_named() {
             assert_eq!(elements, ["gear a b", "gear b c", "again"]);
         }
         other => panic!("{other}"),
+    }
+}
+
+/// A sine of amplitude zero moves nothing, but what its amplitude would change is known:
+/// `ω_A = (1 - cos 2πft) / (2πf J)`.
+#[test]
+fn a_sine_without_amplitude_is_differentiated_by_it() {
+    type Number = Dual<1>;
+    let (j, f) = (2.0, 3.0);
+    let elements = vec![
+        Element::Inertia(Inertia { name: "J".into(), node: "a".into(), inertia: Number::of(j) }),
+        Element::Torque(Torque {
+            name: "source".into(),
+            node: "a".into(),
+            input: "T".into(),
+            number: PhantomData,
+        }),
+    ];
+    let network = Network::compile(&Driveline { elements }).expect("a driveline");
+    let signal = Signal::Sine {
+        offset: Number::of(0.0),
+        amplitude: Number::variable(0.0, 0),
+        frequency: f,
+        phase: 0.0,
+    };
+    let begin =
+        Start { speeds: vec![("a".into(), Number::of(10.0))], twists: vec![], locked: vec![] };
+    let options = (Settings::default(), false);
+    let run = run(&network, &[("T", signal)], &begin, &grid(1.0, 41), &[speed("a")], options);
+    let run = run.expect("a scenario");
+    let omega = 2.0 * std::f64::consts::PI * f;
+    for ((t, w), slope) in run.time.iter().zip(&run.columns[0]).zip(&run.derivatives[0]) {
+        assert_eq!(*w, 10.0);
+        let exact = (1.0 - (omega * t).cos()) / (omega * j);
+        assert!((slope[0] - exact).abs() < 1e-11, "{t} s: {} {exact}", slope[0]);
     }
 }

@@ -164,10 +164,6 @@ where
 
 impl<const P: usize> Number for Dual<P> {
     #[inline(always)]
-    fn of(value: f64) -> Self {
-        Self { re: value, eps: [0.0; P] }
-    }
-    #[inline(always)]
     fn lifted(value: f64) -> Self {
         Self::of(value)
     }
@@ -176,6 +172,9 @@ impl<const P: usize> Number for Dual<P> {
     }
     fn is_constant(&self) -> bool {
         self.eps == [0.0; P]
+    }
+    fn size(&self) -> f64 {
+        self.eps.iter().fold(self.re.abs(), |sum, e| sum + e.abs())
     }
     fn recip(self) -> Self {
         let inverse = self.re.recip();

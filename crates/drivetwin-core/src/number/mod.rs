@@ -41,7 +41,10 @@ pub trait Number:
     + DivAssign<f64>
 {
     /// A value without derivatives, the same in every run.
-    fn of(value: f64) -> Self;
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        Self::all(value)
+    }
 
     /// Zero, without derivatives.
     fn zero_() -> Self {
@@ -61,6 +64,11 @@ pub trait Number:
 
     /// Whether it has no derivatives other than zero.
     fn is_constant(&self) -> bool;
+
+    /// Its magnitude and those of its derivatives.
+    fn size(&self) -> Self::Values {
+        self.re().magnitude()
+    }
 
     /// 1 / x.
     fn recip(self) -> Self;
@@ -94,10 +102,6 @@ pub trait Real: Number + Factor<Self, Values = f64> {
 }
 
 impl Number for f64 {
-    #[inline(always)]
-    fn of(value: f64) -> Self {
-        value
-    }
     #[inline(always)]
     fn lifted(value: f64) -> Self {
         value

@@ -147,10 +147,6 @@ where
 
 impl<const K: usize> Number for Pack<K> {
     #[inline(always)]
-    fn of(value: f64) -> Self {
-        Self([value; K])
-    }
-    #[inline(always)]
     fn lifted(values: Self) -> Self {
         values
     }

@@ -225,11 +225,10 @@ impl<T: Number> Expansion<T> {
     }
 
     /// Largest coefficient `k` of an input that is not linear, relative to its size now: guards depend
-    /// on inputs even where the states rest.
+    /// on inputs even where the states rest, and derivatives may where the values do.
     fn input_size(&self, k: usize) -> T::Values {
         let curved = self.inputs.iter().filter(|input| is_curved(input));
-        let size = |input: &Series<T>, k: usize| input[k].re().magnitude();
-        let relative = curved.map(|input| size(input, k) / (size(input, 0) + size(input, 1)));
+        let relative = curved.map(|u| u[k].size() / (u[0].size() + u[1].size()));
         relative.fold(T::Values::zero_(), |largest, size| size.larger(largest))
     }
 

@@ -10,7 +10,7 @@ use super::operators::Operators;
 use super::regime::Regime;
 use super::sprint::Lines;
 use crate::network::smooth::Sample;
-use crate::number::{Lane, Number, Pack};
+use crate::number::{Factor, Lane, Number, Pack};
 
 /// Runs before samples of one length.
 pub(super) struct Passage<'p, 'a> {
@@ -166,10 +166,7 @@ struct Front<const N: usize, const A: usize> {
 impl<const N: usize, const A: usize> Front<N, A> {
     /// Take runs in, as bits, with their states.
     #[inline(always)]
-    fn join<
-        const F: bool,
-        U: crate::number::Factor<Lanes, Values: crate::number::Factor<Lanes>>,
-    >(
+    fn join<const F: bool, U: Factor<Lanes, Values: Factor<Lanes>>>(
         &mut self,
         operators: &Operators<Lanes, N>,
         (runs, x): (u32, &[Lanes]),
