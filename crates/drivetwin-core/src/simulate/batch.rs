@@ -223,7 +223,7 @@ impl Work<'_> {
         let runs: Vec<usize> = group.iter().map(|job| job.run).collect();
         let (plan, locked) = (self.plan(runs[0]), &self.sets.start(runs[0]).locked);
         // Fewer are done as fast alone.
-        let enough = runs.len() > WIDTH / 2;
+        let enough = runs.len() > WIDTH / 2 && plan.settings.sprint;
         let Some(points) = plan.points.as_deref().filter(|_| enough) else { return };
         let alike = |&run: &usize| {
             let (knots, others) = (plan.inputs.knots(), self.plan(run).inputs.knots());
@@ -232,9 +232,7 @@ impl Work<'_> {
         };
         let alike = bits(runs.iter().map(alike));
         let (prepared, parting) = together(alike, || self.sets.prepared::<Lanes>(&runs));
-        let (Ok((network, State { x, locked })), true) = (prepared, alike != parting) else {
-            return;
-        };
+        let Ok((network, State { x, locked })) = prepared else { return };
         let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &self.plan(run).inputs).collect();
         let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
         let (known, how) = (Known::of(&network), (plan.settings, alike & !parting));
