@@ -181,6 +181,35 @@ fn jumps_between_samples_are_met_together_and_alone() {
     assert_eq!(apart, None, "{:?}", apart.map(|k| (together[k], alone[k])));
 }
 
+/// A grid of fewer points than there are samples gets the values at its points, also where samples that are
+/// none begin a block: here from sample 61 on, after the on-coming clutch has been filled.
+#[test]
+fn a_coarse_grid_is_met_at_its_points() {
+    let model = paper_driveline::<f64>(LossLaw::Paper);
+    let network = Network::compile(&model.driveline()).expect("a driveline");
+    let mut columns = upshift(1.0);
+    for (t, pressure) in columns[0].1.clone().iter().zip(&mut columns[2].2) {
+        *pressure = 0.8e5 / 0.0605 * t.min(0.2);
+    }
+    let signals: Vec<(&str, Signal<'_, f64>)> =
+        columns.iter().map(|(name, t, v)| (*name, Signal::samples(t, v))).collect();
+    let outputs = &dual_clutch_outputs(&model)[3..5];
+    let run = |every: usize| {
+        let grid: Vec<f64> = columns[0].1.iter().copied().step_by(every).collect();
+        let plan = Plan::new(&network, &signals, &grid, outputs, (Settings::default(), false));
+        let scenarios = [(plan.expect("a plan"), second_gear())];
+        let eta = efficiencies(WIDTH);
+        let batch = dual_clutch_batch(&model, &scenarios, (&["eta"], &eta), (Keep::Columns, 1));
+        (batch.expect("names").values, grid.len())
+    };
+    let (fine, points) = run(1);
+    for every in [2, 3, 50, 300] {
+        let (coarse, _) = run(every);
+        let expected = fine.chunks_exact(points).flat_map(|column| column.iter().step_by(every));
+        assert!(coarse.iter().eq(expected), "every {every}");
+    }
+}
+
 fn nominal(model: &DualClutch<f64>, name: &str) -> f64 {
     let mut model = model.clone();
     model.parameter_mut(name).copied().unwrap_or_else(|| second_gear::<f64>().twist)

@@ -122,7 +122,7 @@ impl<S: Samples<Lanes>> Task for Passed<'_, '_, '_, '_, S> {
 #[inline(always)]
 fn hand_out((block, run): (&[Lanes], usize), points: &[usize], values: &mut [f64]) {
     let [Some(&first), Some(&last)] = [points.first(), points.last()] else { return };
-    if last != NO_POINT && last.wrapping_sub(first) == points.len() - 1 {
+    if first != NO_POINT && last != NO_POINT && last - first == points.len() - 1 {
         for (to, from) in values[first..=last].iter_mut().zip(block) {
             *to = from.0[run % WIDTH];
         }
