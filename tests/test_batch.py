@@ -16,6 +16,8 @@ from drivetwin.driveline import (
     Accuracy,
     DualClutch,
     FloatArray,
+    FrictionTable,
+    LossLaw,
     RoadLoad,
     ShiftElement,
     Signal,
@@ -115,6 +117,56 @@ def test_order_threads_and_company_do_not_matter(
     mixed = simulate_batch(MODEL, [scenario()], TIME, part, threads=threads)
     np.testing.assert_array_equal(mixed.values, whole.values[chosen])
     np.testing.assert_array_equal(mixed.last_lock, whole.last_lock[chosen])
+
+
+def jumping(of: Scenario, at: float) -> Scenario:
+    """The same with pressures that fall to a half at an instant."""
+
+    def halved(signal: Signal) -> Signal:
+        time, values = (np.asarray(column) for column in (signal.time, signal.values))
+        before, after = time < at, time > at
+        there = float(np.interp(at, time, values))
+        return Signal(
+            np.concatenate([time[before], [at, at], time[after]]),
+            np.concatenate([values[before], [there, 0.5 * there], 0.5 * values[after]]),
+        )
+
+    pressures = {name: halved(signal) for name, signal in of.pressures.items()}
+    return dataclasses.replace(of, pressures=pressures)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    spread=st.sampled_from([0.02, 0.2, 1.0]),
+    every=st.sampled_from([1, 2, 7]),
+    table=st.booleans(),
+    lossy=st.booleans(),
+    jump=st.one_of(st.none(), st.integers(50, 950), st.floats(50.0, 950.0)),
+)
+def test_in_any_company_a_run_is_what_it_is_alone(
+    seed: int, spread: float, every: int, table: bool, lossy: bool, jump: float | None
+) -> None:
+    rng, runs = np.random.default_rng(seed), 21
+    law = FrictionTable((0.0, 5.0, 40.0), (0.145, 0.128, 0.12)) if table else FRICTION
+    elements = tuple(dataclasses.replace(element, friction=law) for element in MODEL.elements)
+    loss_law: LossLaw = "dissipative" if lossy else "paper"
+    model = dataclasses.replace(MODEL, loss_law=loss_law, elements=elements)
+    nominal = {"eta": 0.85, "J_v": 6e3, "k_o": 1.8e5, "B2.gain": 2.9e-2, "B3.gain": 4.7e-2}
+    nominal |= {"B3.P0": 8e4, "start.twist": START.twist}
+    values = {k: v * (1 + spread * rng.standard_normal(runs)) for k, v in nominal.items()}
+    stated = scenario(seed % 5)
+    stated = stated if jump is None else jumping(stated, jump / 1000)
+
+    def batch(sets: Mapping[str, FloatArray]) -> Batch:
+        return simulate_batch(model, [stated], TIME[::every], sets, outputs=["shaft_torque"])
+
+    together = batch(values)
+    for run in rng.choice(runs, 4, replace=False):
+        one = batch({name: column[run : run + 1] for name, column in values.items()})
+        np.testing.assert_array_equal(one.values[0], together.values[run])
+        assert one.events[0] == together.events[run]
+        assert one.failed.get(0) == together.failed.get(int(run))
 
 
 def test_scenarios_on_one_model_are_what_they_are_alone() -> None:
