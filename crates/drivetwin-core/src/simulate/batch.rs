@@ -9,7 +9,7 @@ use super::start::State;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::{Number, Real, together};
-use crate::solve::{Event, EventKind, Inputs, Known, Lanes, Status, WIDTH, run_together};
+use crate::solve::{Event, EventKind, Inputs, Known, Lanes, Status, WIDTH, bits, run_together};
 use rayon::prelude::*;
 
 /// What is kept of every run.
@@ -256,11 +256,6 @@ impl Work<'_> {
             (job.outcome, job.events) = (Some(Outcome::Ran(Status::Completed)), events);
         }
     }
-}
-
-/// Answers as bits.
-fn bits(answers: impl Iterator<Item = bool>) -> u32 {
-    answers.enumerate().fold(0, |bits, (i, answer)| bits | u32::from(answer) << i)
 }
 
 impl Keep<'_> {

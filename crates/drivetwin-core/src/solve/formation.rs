@@ -12,7 +12,7 @@ use super::integrator::Settings;
 use super::known::Known;
 use super::march::Column;
 use super::passage::{Passage, Stretch};
-use super::progress::Progress;
+use super::progress::{Progress, is_lost};
 use super::ready::{AnySize, can_march};
 use super::regime::{Event, Regime};
 use super::sprint::Samples;
@@ -124,8 +124,7 @@ pub fn run_together<'a>(
 impl Formation<'_> {
     /// Runs of which `say` holds, as bits.
     fn those(&self, say: impl Fn(&Member<'_>) -> bool) -> u32 {
-        let members = self.members.iter().enumerate();
-        members.fold(0, |runs, (run, member)| runs | u32::from(say(member)) << run)
+        bits(self.members.iter().map(say))
     }
 
     /// Runs that are still on their way.
@@ -306,11 +305,11 @@ impl Formation<'_> {
     fn step(&mut self, run: usize, (length, h): (f64, f64), whole: bool, event: Option<Cause>) {
         let (member, t) = (&mut self.members[run], &mut self.regime.t.0[run]);
         let end = member.inputs.span(member.segment).1;
-        let small = h < 1e-14 * (1.0 + end.abs()) && !whole;
         *t = if whole && event.is_none() { end } else { *t + length };
         let finite = self.regime.x.iter().all(|x| x.0[run].is_finite());
         let advances = member.progress.note((*t, length), event.is_some()).is_ok();
-        if small || !finite || !advances || member.progress.is_stalled() {
+        let lost = is_lost(h, end) && !whole;
+        if lost || !finite || !advances || member.progress.is_stalled() {
             member.standing = Standing::Parted;
         } else if let Some(cause) = event {
             member.standing = Standing::Event(cause);
@@ -323,6 +322,11 @@ impl Formation<'_> {
 /// What more runs have in common, a number of bits.
 fn most<S>(one: (u32, S), other: (u32, S)) -> (u32, S) {
     if other.0.count_ones() > one.0.count_ones() { other } else { one }
+}
+
+/// Runs for which the answer is yes, as bits.
+pub fn bits(answers: impl Iterator<Item = bool>) -> u32 {
+    answers.enumerate().fold(0, |bits, (run, answer)| bits | u32::from(answer) << run)
 }
 
 /// Numbers of the runs in a set of bits.

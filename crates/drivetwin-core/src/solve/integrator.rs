@@ -6,7 +6,7 @@ use super::guard::{Cause, earliest};
 use super::inputs::Inputs;
 use super::known::Known;
 use super::march::Column;
-use super::progress::{Lack, Progress};
+use super::progress::{Lack, Progress, is_lost};
 use super::ready::can_march;
 use super::regime::Regime;
 use super::sprint::Sink;
@@ -135,7 +135,7 @@ impl<'a, T: Real> Integrator<'a, T> {
         let remaining = (-regime.t + end).re();
         let wish = remaining.min(self.settings.max_step);
         let h = regime.expand(1, (wish, self.settings.accuracy(self.marches)));
-        if h < 1e-14 * (1.0 + end.abs()) && h < remaining {
+        if is_lost(h, end) && h < remaining {
             return Err(Status::StepTooSmall { time: regime.time() });
         }
         let event = match self.progress.is_stalled() {

@@ -28,7 +28,7 @@ mod step;
 mod transition;
 
 pub use expansion::Expansion;
-pub use formation::{Lanes, Record, WIDTH, run_together};
+pub use formation::{Lanes, Record, WIDTH, bits, run_together};
 pub use input_error::InputError;
 pub use inputs::{Inputs, NO_POINT, Signal};
 pub use integrator::{Integrator, Settings, Step};

@@ -103,7 +103,7 @@ pub struct Carried<L, const N: usize> {
 }
 
 /// A guard, over the torques of the carried channels: `limit(u) - |form|` where both signs are bounded,
-/// else `limit(u) + form`. In lanes that do not watch it the limit is 1 and the form 0.
+/// else `limit(u) + form`.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<L, const N: usize> {
     /// Torque or speed.

@@ -2,7 +2,7 @@
 //! Samples of several runs side by side: each joins at its own and leaves before the one in which a guard
 //! could fall.
 
-use super::formation::{Lanes, Member, Record, Standing, WIDTH, each};
+use super::formation::{Lanes, Member, Record, Standing, WIDTH, bits, each};
 use super::inputs::Inputs;
 use super::lanes::{Task, dispatch};
 use super::march::{BLOCK, Carry, Column, Guards, Room, Source, Trail, idle_guards, march, room};
@@ -202,13 +202,12 @@ fn leave(
 
 /// Runs that stand before samples, as bits.
 fn ahead(members: &[Member<'_>]) -> u32 {
-    let members = members.iter().enumerate();
-    members.fold(0, |runs, (i, m)| runs | u32::from(m.standing == Standing::Ahead) << i)
+    bits(members.iter().map(|member| member.standing == Standing::Ahead))
 }
 
 /// Runs at a segment, as bits.
 fn those_at(members: &[Member<'_>], segment: usize) -> u32 {
-    members.iter().enumerate().fold(0, |runs, (i, m)| runs | u32::from(m.segment == segment) << i)
+    bits(members.iter().map(|member| member.segment == segment))
 }
 
 /// The first segment at which one of these runs stands.

@@ -32,6 +32,11 @@ pub(super) enum Lack {
     Creeping,
 }
 
+/// Whether a step of length `h` before the time `end` [s] is lost in round-off.
+pub(super) fn is_lost(h: f64, end: f64) -> bool {
+    h < 1e-14 * (1.0 + end.abs())
+}
+
 impl Progress {
     /// Of a run that starts at `time` [s].
     pub fn from(time: f64) -> Self {
