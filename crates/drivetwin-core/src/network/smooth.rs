@@ -52,7 +52,7 @@ pub struct Value<L> {
     pub value: L,
     /// τ_m.
     pub by_argument: L,
-    /// τ_mm.
+    /// τ_mm / 2.
     pub bend: L,
     /// τ_N.
     pub by_normal: L,
@@ -129,38 +129,38 @@ impl<L: Lane> Law<L> {
     pub fn about<const F: bool>(&self, m: L, stiction: L) -> Friction<L> {
         let [c0, c1, c2] = self.polynomial;
         let faded = self.rate * stiction;
-        let fading = self.rate * faded;
+        let bend = self.rate.times(0.5) * faded;
         Friction {
             mu: c2.fma::<F>(m, c1).fma::<F>(m, c0) + stiction,
             slope: (c2 + c2).fma::<F>(m, c1) - faded,
-            bend: c2 + c2 + fading,
-            third: -(self.rate * fading),
+            bend: c2 + bend,
+            cubic: self.rate.times(-1.0 / 3.0) * bend,
         }
     }
 }
 
-/// μ and its derivatives at one argument.
+/// μ about one argument: its Taylor coefficients.
 #[derive(Clone, Copy, Debug)]
 pub struct Friction<L> {
     mu: L,
     slope: L,
     bend: L,
-    third: L,
+    cubic: L,
 }
 
 impl<L: Lane> Friction<L> {
     /// The torque where the argument is larger by a small `dm`, at normal load `normal`.
     #[inline(always)]
     pub fn at<const F: bool>(&self, dm: L, normal: L) -> Value<L> {
-        let (half, sixth) = (self.bend.times(0.5), self.third.times(1.0 / 6.0));
         // Low and high powers apart, for a shorter chain of dependent products.
-        let (low, high) = (self.slope.fma::<F>(dm, self.mu), sixth.fma::<F>(dm, half));
+        let (low, high) = (self.slope.fma::<F>(dm, self.mu), self.cubic.fma::<F>(dm, self.bend));
         let mu = high.fma::<F>(dm * dm, low);
-        let slope = self.third.times(0.5).fma::<F>(dm, self.bend).fma::<F>(dm, self.slope);
+        let (twice, thrice) = (self.bend + self.bend, self.cubic.times(3.0));
+        let slope = thrice.fma::<F>(dm, twice).fma::<F>(dm, self.slope);
         Value {
             value: normal * mu,
             by_argument: normal * slope,
-            bend: normal * self.third.fma::<F>(dm, self.bend),
+            bend: normal * thrice.fma::<F>(dm, self.bend),
             by_normal: mu,
             mixed: slope,
         }
@@ -192,7 +192,7 @@ impl<L: Lane> Value<L> {
     pub fn moved<const F: bool>(&self, ds: L) -> Self {
         Self {
             value: self.by_argument.fma::<F>(ds, self.value),
-            by_argument: self.bend.fma::<F>(ds, self.by_argument),
+            by_argument: self.bend.fma::<F>(ds + ds, self.by_argument),
             by_normal: self.mixed.fma::<F>(ds, self.by_normal),
             ..*self
         }
@@ -200,11 +200,10 @@ impl<L: Lane> Value<L> {
 }
 
 impl<L: Lane> Line<L> {
-    /// Value at the start of a sample and rate within it.
+    /// Value at the start of a sample.
     #[inline(always)]
-    pub fn line<const F: bool, U: Factor<L>>(&self, sample: &Sample<U>) -> [L; 2] {
-        let [start, rate] = sample[self.input];
-        [start.onto::<F>(self.gain, self.offset), rate.product(self.gain)]
+    pub fn start<const F: bool, U: Factor<L>>(&self, sample: &Sample<U>) -> L {
+        sample[self.input][0].onto::<F>(self.gain, self.offset)
     }
 }
 

@@ -44,7 +44,7 @@ impl Record for Recorder<'_, '_> {
         &mut self,
         regime: &Regime<'_, Lanes>,
         active: &[usize],
-        samples: &impl Samples<Lanes>,
+        samples: Samples<'_, Lanes>,
         stretch: &Stretch,
     ) {
         dispatch(Passed { recorder: self, regime, active, samples, stretch });
@@ -71,15 +71,15 @@ impl Record for Recorder<'_, '_> {
 }
 
 /// Samples to be added to the columns, with the widest instructions.
-struct Passed<'r, 'p, 'v, 'a, S> {
+struct Passed<'r, 'p, 'v, 'a> {
     recorder: &'r mut Recorder<'p, 'v>,
     regime: &'r Regime<'a, Lanes>,
     active: &'r [usize],
-    samples: &'r S,
+    samples: Samples<'r, Lanes>,
     stretch: &'r Stretch,
 }
 
-impl<S: Samples<Lanes>> Task for Passed<'_, '_, '_, '_, S> {
+impl Task for Passed<'_, '_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -95,13 +95,13 @@ impl<S: Samples<Lanes>> Task for Passed<'_, '_, '_, '_, S> {
             for &(position, factor) in &*passing_terms(column, regime) {
                 let how = (factor, begun);
                 match Entry::at(position, regime.network, active) {
-                    Entry::State(i) => add(block, samples.states(i), how),
+                    Entry::State(i) => add(block, samples.states[i].iter(), how),
                     Entry::Input(i) => {
                         let at = |knot| Lanes::gathered(|run| inputs[run].at_knot(knot, i));
                         add(block, numbers.clone().map(at), how);
                     }
                     Entry::One => add(block, std::iter::repeat(Lanes::all(1.0)), how),
-                    Entry::Torque(slot) => add(block, samples.torques(slot), how),
+                    Entry::Torque(slot) => add(block, samples.torques[slot].iter(), how),
                     Entry::Nothing => add(block, std::iter::repeat(Lanes::zero_()), how),
                 }
                 begun = true;

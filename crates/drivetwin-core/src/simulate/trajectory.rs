@@ -193,7 +193,7 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
         &mut self,
         run: &Integrator<'_, T>,
         active: &[usize],
-        samples: &impl Samples<T>,
+        samples: Samples<'_, T>,
         (first, count): (usize, usize),
     ) {
         let knots = &run.knots()[first..first + count];
@@ -210,18 +210,18 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
 }
 
 /// Samples to be added to the columns, with the widest instructions.
-struct Passed<'p, 'a, T: Real, S> {
+struct Passed<'p, 'a, T: Real> {
     columns: &'p [Column<T>],
     recorded: &'p mut Recorded<T>,
     block: &'p mut Block<T>,
     run: &'p Integrator<'a, T>,
     active: &'p [usize],
-    samples: &'p S,
+    samples: Samples<'p, T>,
     picked: Picked,
     first: usize,
 }
 
-impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
+impl<T: Real> Task for Passed<'_, '_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -238,19 +238,21 @@ impl<T: Real, S: Samples<T>> Task for Passed<'_, '_, T, S> {
     }
 }
 
-impl<T: Real, S: Samples<T>> Passed<'_, '_, T, S> {
+impl<T: Real> Passed<'_, '_, T> {
     /// Add a multiple of an entry of the basis to the block.
     #[inline(always)]
     fn add_to_block<const F: bool>(&mut self, position: usize, factor: T) {
         let (block, picked) = (&mut *self.block, self.picked);
         match Entry::at(position, self.run.regime.network, self.active) {
-            Entry::State(i) => block.add::<F>((self.samples.states(i), picked), factor),
+            Entry::State(i) => block.add::<F>((self.samples.states[i].iter(), picked), factor),
             Entry::Input(i) => {
                 let input = |k| self.run.input_at(self.first + k, i);
                 block.add::<F>(((0..picked.span()).map(input), picked), factor);
             }
             Entry::One => block.add::<F>((std::iter::repeat(T::of(1.0)), picked), factor),
-            Entry::Torque(slot) => block.add::<F>((self.samples.torques(slot), picked), factor),
+            Entry::Torque(slot) => {
+                block.add::<F>((self.samples.torques[slot].iter(), picked), factor);
+            }
             Entry::Nothing => block.add::<F>((std::iter::repeat(T::zero_()), picked), factor),
         }
     }

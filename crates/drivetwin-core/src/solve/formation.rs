@@ -10,12 +10,11 @@ use super::guard::{Cause, earliest_of_each};
 use super::inputs::Inputs;
 use super::integrator::Settings;
 use super::known::Known;
-use super::march::Column;
+use super::march::{Column, Samples};
 use super::passage::{Passage, Stretch};
 use super::progress::{Progress, is_lost};
 use super::ready::{AnySize, can_march};
 use super::regime::{Event, Regime};
-use super::sprint::Samples;
 use crate::number::{Lane, Number, Pack, Series, TERMS, Values, together};
 
 /// Runs in a formation: two vectors of the narrower sets, one of the widest.
@@ -31,7 +30,7 @@ pub trait Record {
         &mut self,
         regime: &Regime<'_, Lanes>,
         active: &[usize],
-        samples: &impl Samples<Lanes>,
+        samples: Samples<'_, Lanes>,
         stretch: &Stretch,
     );
 
@@ -249,8 +248,7 @@ impl Formation<'_> {
         let passage = Passage { regime, members, active: &ready.active, h, columns };
         let arrived = match &ready.operators {
             AnySize::Four(operators) => passage.pass(operators, record),
-            AnySize::Eight(operators) => passage.pass(operators, record),
-            AnySize::Twelve(_) | AnySize::Many(_) => unreachable!("they are of plain numbers"),
+            _ => unreachable!("more states are of one run"),
         };
         each(arrived).for_each(|run| self.settle(run));
         true

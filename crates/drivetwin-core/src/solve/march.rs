@@ -48,7 +48,7 @@ pub fn room<U: Lane>() -> Room<U> {
 pub struct Carry<L> {
     /// Argument.
     pub argument: L,
-    /// Its rate.
+    /// Its rate over a sample.
     pub rate: L,
     /// Torque with its slopes.
     pub value: Value<L>,
@@ -73,6 +73,15 @@ pub struct Trail<L, const N: usize>(Vec<Column<L>>);
 /// One value at every sample.
 pub type Column<L> = [L; BLOCK + 1];
 
+/// States and torques of the active channels at the start of samples, at least of those passed.
+#[derive(Clone, Copy, Debug)]
+pub struct Samples<'s, L> {
+    /// By state.
+    pub states: &'s [Column<L>],
+    /// By the number of the active channel.
+    pub torques: &'s [Column<L>],
+}
+
 impl<L: Lane, const N: usize> Trail<L, N> {
     /// For so many carried channels, in columns of old.
     pub fn in_columns(mut columns: Vec<Column<L>>, channels: usize) -> Self {
@@ -80,6 +89,12 @@ impl<L: Lane, const N: usize> Trail<L, N> {
             columns.resize(N + channels, [L::all(0.0); BLOCK + 1]);
         }
         Self(columns)
+    }
+
+    /// What has been set.
+    pub fn samples(&self) -> Samples<'_, L> {
+        let (states, torques) = self.0.split_at(N);
+        Samples { states, torques }
     }
 
     /// The columns, for another trail.
@@ -95,7 +110,7 @@ impl<L: Lane, const N: usize> Trail<L, N> {
         k: usize,
         (x, carry): (&[L; N], &[Carry<L>; A]),
     ) {
-        let (states, torques) = self.0.split_at_mut(N);
+        let (states, torques) = self.0.split_first_chunk_mut::<N>().expect("a column by state");
         for i in 0..op.columns() {
             states[i][k] = x[i];
         }
@@ -159,7 +174,7 @@ pub fn march<
         for (k, fallen) in fallen.iter_mut().enumerate().take(some) {
             let u = source.read(first + from + k, &mut room);
             if S::Input::DERIVATIVES {
-                *carry = Carry::start::<F, N, A, _>(op, (u, h), &x);
+                *carry = Carry::start::<F, N, A, _>(op, u, &x);
                 trail.put(op, at + from + k, (&x, carry));
             }
             *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, carry));
@@ -249,7 +264,7 @@ impl<L: Lane, const N: usize> Operators<L, N> {
             let carried = self.channels[a].torque(&carry[a]).values();
             torque = form.channels[a].values().fma::<F>(carried, torque);
         }
-        [limit.line::<F, U>(sample)[0].values(), torque]
+        [limit.start::<F, U>(sample).values(), torque]
     }
 
     /// The same at the end of `W` samples from `from` on.
@@ -380,11 +395,11 @@ impl<L: Lane> Carry<L> {
         }
     }
 
-    /// All channels at the start of a segment of length `h`.
+    /// All channels at the start of a segment.
     #[inline(always)]
     pub fn start<const F: bool, const N: usize, const A: usize, U: Factor<L>>(
         op: &Operators<L, N>,
-        (sample, h): (&Sample<U>, f64),
+        sample: &Sample<U>,
         x: &[L; N],
     ) -> [Self; A] {
         let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
@@ -395,7 +410,7 @@ impl<L: Lane> Carry<L> {
                 out[a].argument = argument[i].fma::<F>(x[i], out[a].argument);
             }
             let m = out[a].argument;
-            let normal = law.normal.line::<F, U>(sample)[0];
+            let normal = law.normal.start::<F, U>(sample);
             out[a].value = law.about::<F>(m, law.stiction::<F>(m)).here(normal);
         }
         for a in 0..A {
@@ -408,7 +423,7 @@ impl<L: Lane> Carry<L> {
                 rate = sample[drive.input][0].onto::<F>(drive.now[a], rate);
             }
             out[a].rate = rate;
-            out[a].near = rate.times(h) + out[a].argument;
+            out[a].near = rate + out[a].argument;
             out[a].stiction = channels[a].law.stiction::<F>(out[a].near);
         }
         out

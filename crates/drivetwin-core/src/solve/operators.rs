@@ -44,7 +44,7 @@ pub struct Operators<L, const N: usize> {
     pub loads: Vec<Line<L>>,
 }
 
-/// Effect of one input; pairs are those of its value at the start and of its rate.
+/// Effect of one input; pairs are those of its value at the start and of its rate [1/s].
 #[derive(Clone, Copy, Debug)]
 pub struct Drive<L, const N: usize> {
     /// Its index.
@@ -55,8 +55,8 @@ pub struct Drive<L, const N: usize> {
     pub argument: [[L; 2]; MAX_ACTIVE],
     /// On the rates of the arguments, directly.
     pub now: [L; MAX_ACTIVE],
-    /// On their second derivatives at the start, by the state.
-    pub second: [L; MAX_ACTIVE],
+    /// On how they turn at the start.
+    pub turn: [[L; 2]; MAX_ACTIVE],
     /// On the watched forms.
     pub watched: [L; MAX_WATCHED],
 }
@@ -83,7 +83,7 @@ pub struct Form<L, const N: usize> {
     pub channels: [L; MAX_ACTIVE],
 }
 
-/// A channel and what its argument does.
+/// A channel and what its argument does. Rates are those over a sample: what it rises by if they last.
 #[derive(Clone, Copy, Debug)]
 pub struct Carried<L, const N: usize> {
     /// Response of the state at the end to the coefficients of the cubic.
@@ -96,10 +96,12 @@ pub struct Carried<L, const N: usize> {
     pub rate_end: [[L; SHAPES]; MAX_ACTIVE],
     /// Rate of the argument at any instant.
     pub rate: Form<L, N>,
-    /// Second derivative at the start but for the rates of inputs and channels.
-    pub second: Form<L, N>,
+    /// How it turns at the start: half its second derivative over a sample.
+    pub turn: StepForm<L, N>,
     /// Its law.
     pub law: Law<L>,
+    /// What its normal load rises by in a sample, over the rate of its input.
+    pub ramp: L,
 }
 
 /// A guard, over the torques of the carried channels: `limit(u) - |form|` where both signs are bounded,
@@ -137,29 +139,38 @@ impl<T: Number, const N: usize> Operators<T, N> {
         slot: usize,
         (network, mode): (&Network<T>, &Mode<T>),
         (active, moments): (&[usize], &[[[T; N]; SHAPES]]),
-        (argument, law): ([T; N], Law<T>),
+        (argument, law, h): ([T; N], Law<T>, f64),
     ) {
-        let now = over_basis::<T, F, N>(network, mode, &argument);
+        let now = over_basis::<T, F, N>((network, mode), &argument, h);
         let mut rate = [T::zero_(); N];
         rate[..network.states()].copy_from_slice(&now[..network.states()]);
-        let second = over_basis::<T, F, N>(network, mode, &rate);
+        let second = over_basis::<T, F, N>((network, mode), &rate, 0.5 * h);
         for drive in &mut self.drives {
-            let [held, ramp] = &drive.step;
+            let ([held, ramp], input) = (&drive.step, network.first_input() + drive.input);
             drive.argument[slot] =
                 [dot::<T, F, N>(&argument, held), dot::<T, F, N>(&argument, ramp)];
-            drive.now[slot] = now[network.first_input() + drive.input];
-            drive.second[slot] = second[network.first_input() + drive.input];
+            drive.now[slot] = now[input];
+            drive.turn[slot] = [second[input], now[input] * (0.5 * h)];
         }
         let argument_end = self.at_end::<F>(&argument, moments);
         let rate_end = over_moments::<T, F, N>(&rate, moments);
+        let rate = Form::over(network, (active, &self.signs), &now);
+        let Form { state, constant, channels } =
+            Form::over(network, (active, &self.signs), &second);
+        let mut turn = StepForm { state, constant, ..StepForm::idle() };
+        for other in 0..MAX_ACTIVE {
+            turn.cubics[other][0] = channels[other];
+            turn.cubics[other][1] = rate.channels[other] * 0.5;
+        }
         self.channels.push(Carried {
             moments: moments[slot],
             argument,
             argument_end,
             rate_end,
-            rate: Form::over(network, (active, &self.signs), &now),
-            second: Form::over(network, (active, &self.signs), &second),
+            rate,
+            turn,
             law,
+            ramp: law.normal.gain * h,
         });
     }
 
@@ -250,7 +261,7 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
                 *to = c * laws[slot].sign;
             }
             let responses = &responses[..active.len()];
-            let carried = (argument, laws[slot]);
+            let carried = (argument, laws[slot], h);
             operators.carry::<F>(slot, (network, mode), (active, responses), carried);
         }
         // Inner loops exist for 0, 1, 2 and 4 channels.
@@ -323,7 +334,7 @@ impl<L: Lane, const N: usize> Drive<L, N> {
             step: [[none; N]; 2],
             argument: [[none; 2]; MAX_ACTIVE],
             now: [none; MAX_ACTIVE],
-            second: [none; MAX_ACTIVE],
+            turn: [[none; 2]; MAX_ACTIVE],
             watched: [none; MAX_WATCHED],
         }
     }
@@ -339,8 +350,9 @@ impl<L: Lane, const N: usize> Carried<L, N> {
             argument_end: StepForm::idle(),
             rate_end: [[none; SHAPES]; MAX_ACTIVE],
             rate: Form::idle(),
-            second: Form::idle(),
+            turn: StepForm::idle(),
             law: Law::idle(),
+            ramp: none,
         }
     }
 }
@@ -386,12 +398,12 @@ impl<L: Copy, const N: usize> Operators<L, N> {
     }
 }
 
-/// A form over the states, differentiated: over the basis.
+/// A form over the states, differentiated and scaled: over the basis.
 #[inline(always)]
 fn over_basis<T: Number, const F: bool, const N: usize>(
-    network: &Network<T>,
-    mode: &Mode<T>,
+    (network, mode): (&Network<T>, &Mode<T>),
     row: &[T; N],
+    scale: f64,
 ) -> Vec<T> {
     let mut out = vec![T::zero_(); network.basis()];
     for i in 0..network.states() {
@@ -399,6 +411,9 @@ fn over_basis<T: Number, const F: bool, const N: usize>(
         for j in 0..rates.len() {
             out[j] = row[i].fma::<F>(rates[j], out[j]);
         }
+    }
+    for entry in &mut out {
+        *entry *= scale;
     }
     out
 }

@@ -113,14 +113,14 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
             let joining = waiting & those_at(members, segment);
             if joining != 0 {
                 let sample = source.read(segment, &mut room);
-                front.join::<F, _>(operators, (joining, &regime.x), (sample, h));
+                front.join::<F, _>(operators, (joining, &regime.x), sample);
                 abreast |= joining;
                 waiting &= !joining;
                 stretch.begin(joining);
             }
             let until = next(members, waiting).min(end);
             if abreast == 0 || stretch.count == BLOCK {
-                record.passed(regime, active, &trail, &stretch);
+                record.passed(regime, active, trail.samples(), &stretch);
                 segment = if abreast == 0 { until } else { segment };
                 stretch = Stretch::from(segment);
                 continue;
@@ -150,7 +150,7 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
         if segment == last {
             stretch.add(1, abreast);
         }
-        record.passed(regime, active, &trail, &stretch);
+        record.passed(regime, active, trail.samples(), &stretch);
         *columns = trail.into_columns();
         abreast
     }
@@ -170,12 +170,12 @@ impl<const N: usize, const A: usize> Front<N, A> {
         &mut self,
         operators: &Operators<Lanes, N>,
         (runs, x): (u32, &[Lanes]),
-        (sample, h): (&Sample<U>, f64),
+        sample: &Sample<U>,
     ) {
         for (to, &from) in self.x.iter_mut().zip(x) {
             *to = to.with(runs, from);
         }
-        let fresh: [_; A] = Carry::start::<F, N, A, _>(operators, (sample, h), &self.x);
+        let fresh: [_; A] = Carry::start::<F, N, A, _>(operators, sample, &self.x);
         let first = operators.guards::<_, F, A>(sample, (&self.x, &fresh));
         for a in 0..A {
             self.carry[a] = self.carry[a].with(runs, &fresh[a]);

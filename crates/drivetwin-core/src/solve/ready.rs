@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub(super) enum AnySize<T> {
     /// Up to 4.
     Four(Arc<Operators<T, 4>>),
-    /// Up to 8.
+    /// Up to 8; of one run only.
     Eight(Arc<Operators<T, 8>>),
     /// Up to 12; of plain numbers only.
     Twelve(Arc<Operators<T, 12>>),
@@ -24,12 +24,17 @@ pub(super) enum AnySize<T> {
 
 /// Most states of a network that is marched.
 const MAX_STATES: usize = 24;
-/// The same with derivatives or for several runs side by side, where the gain no longer pays for the code.
-const MAX_COMPACT: usize = 8;
 
-/// Whether a number is but a value of one run.
-const fn is_plain<T: Lane>() -> bool {
-    !T::DERIVATIVES && T::RUNS == 1
+/// The same of networks of a number: with derivatives, or for several runs side by side, which are drivelines
+/// of two clutches, the gain does not pay for the code.
+const fn max_states<T: Lane>() -> usize {
+    if T::RUNS > 1 {
+        4
+    } else if T::DERIVATIVES {
+        8
+    } else {
+        MAX_STATES
+    }
 }
 
 /// Whether a network is of the kind that passes samples by exact operators.
@@ -37,7 +42,7 @@ pub fn can_march<T: Number>(network: &Network<T>) -> bool {
     let smooth = |channel: &Channel<T>| {
         matches!(channel.law, channel::Law::Friction { .. } | channel::Law::Quadratic(_))
     };
-    network.states() <= if is_plain::<T>() { MAX_STATES } else { MAX_COMPACT }
+    network.states() <= max_states::<T>()
         && network.prescribed.is_empty()
         && network.mechanism.inputs.len() <= MAX_INPUTS
         && network.channels.iter().all(smooth)
@@ -86,13 +91,13 @@ impl<T: Number> Regime<'_, T> {
         let laws = active.iter().map(|&j| Law::of(&self.network.channels[j], self.cells[j]));
         let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| match self.network.states() {
             0..=4 => self.build::<4>(active, &laws, h).map(|o| AnySize::Four(Arc::new(o))),
-            5..=MAX_COMPACT => {
+            5..=8 if T::RUNS == 1 => {
                 self.build::<8>(active, &laws, h).map(|o| AnySize::Eight(Arc::new(o)))
             }
-            9..=12 if is_plain::<T>() => {
+            9..=12 if max_states::<T>() == MAX_STATES => {
                 self.build::<12>(active, &laws, h).map(|o| AnySize::Twelve(Arc::new(o)))
             }
-            13..=MAX_STATES if is_plain::<T>() => {
+            13..=MAX_STATES if max_states::<T>() == MAX_STATES => {
                 self.build::<MAX_STATES>(active, &laws, h).map(|o| AnySize::Many(Arc::new(o)))
             }
             _ => None,

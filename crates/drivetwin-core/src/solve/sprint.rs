@@ -6,12 +6,11 @@
 use super::inputs::Inputs;
 use super::integrator::Integrator;
 use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Room, Source, Trail, march, room};
+use super::march::{BLOCK, Carry, Room, Samples, Source, Trail, march, room};
 use super::operators::Operators;
 use super::ready::{AnySize, Ready};
 use crate::network::smooth::Sample;
-use crate::number::{Lane, Real};
-use std::borrow::Borrow;
+use crate::number::Real;
 
 /// Takes samples that were passed in one mode.
 pub trait Sink<T: Real> {
@@ -20,27 +19,9 @@ pub trait Sink<T: Real> {
         &mut self,
         run: &Integrator<'_, T>,
         active: &[usize],
-        samples: &impl Samples<T>,
+        samples: Samples<'_, T>,
         range: (usize, usize),
     );
-}
-
-/// States and torques of the active channels at the start of samples, at least of those passed.
-pub trait Samples<T> {
-    /// State `i`.
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>>;
-
-    /// Torque of the active channel number `slot`.
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>>;
-}
-
-impl<T: Lane, const N: usize> Samples<T> for Trail<T, N> {
-    fn states(&self, i: usize) -> impl Iterator<Item: Borrow<T>> {
-        self.states(i).iter()
-    }
-    fn torques(&self, slot: usize) -> impl Iterator<Item: Borrow<T>> {
-        self.torques(slot).iter()
-    }
 }
 
 /// Samples that a run without derivatives passes before it looks at their guards.
@@ -142,7 +123,7 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Sprint<'_, '_, T, S, N
         let n = run.regime.x.len();
         let mut x = [T::zero_(); N];
         x[..n].copy_from_slice(&run.regime.x);
-        let mut carry: [Carry<T>; A] = Carry::start::<F, N, A, _>(operators, (first, h), &x);
+        let mut carry: [Carry<T>; A] = Carry::start::<F, N, A, _>(operators, first, &x);
         let mut guards = operators.guards::<_, F, A>(first, (&x, &carry));
         let mut trail = Trail::in_columns(std::mem::take(&mut run.trail), A);
         let mut whole = true;
@@ -156,7 +137,7 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Sprint<'_, '_, T, S, N
             } else {
                 march::<U, T, F, N, A, AHEAD>(operators, (source, h), samples, at, to)
             };
-            sink.passed(run, active, &trail, (run.segment, passed));
+            sink.passed(run, active, trail.samples(), (run.segment, passed));
             run.segment += passed;
             count -= passed;
             if fallen != 0 {
@@ -168,7 +149,7 @@ impl<T: Real, S: Sink<T>, const N: usize, const A: usize> Sprint<'_, '_, T, S, N
         run.regime.t = T::of(run.inputs.knot(run.segment));
         if run.segment == run.inputs.segments() {
             trail.put(operators, 0, (&x, &carry));
-            sink.passed(run, active, &trail, (run.segment, 1));
+            sink.passed(run, active, trail.samples(), (run.segment, 1));
             run.segment -= 1;
         }
         run.trail = trail.into_columns();

@@ -4,7 +4,7 @@
 use super::lanes::{Task, dispatch};
 use super::march::Carry;
 use super::operators::{Carried, Form, MAX_ACTIVE, Operators, SHAPES};
-use crate::network::smooth::{Law, Sample};
+use crate::network::smooth::{Line, Sample};
 use crate::number::{Factor, Lane, SMALL, Values};
 
 /// Largest cubic part of a channel over a sample, relative to the largest of all.
@@ -28,10 +28,10 @@ struct Sampling<L: Lane, const N: usize, const A: usize> {
     rate: [L; A],
     /// The part of these rates that comes from the inputs.
     direct: [L; A],
-    /// Second derivatives of the arguments at the start, without channels and state, and by the state.
-    second: [L; A],
+    /// How the arguments turn at the start, without channels and state, and by the state.
+    turn: [L; A],
     turning: [L; A],
-    /// Normal loads at the start and their rates.
+    /// Normal loads at the start and what they rise by.
     normal: [[L; 2]; A],
     /// The torques by what is known at the start.
     cubics: [[L; START]; A],
@@ -55,7 +55,7 @@ pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize
         argument: [none; A],
         rate: [none; A],
         direct: [none; A],
-        second: [none; A],
+        turn: [none; A],
         turning: [none; A],
         normal: [[none; 2]; A],
         cubics: [[none; START]; A],
@@ -63,9 +63,9 @@ pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize
         guard: none.values(),
     };
     sampling.know::<F, U>(op, channels, (sample, h), x);
-    let about = sampling.foresee::<F>(channels, carry, h);
-    sampling.predict::<F>(op, channels, (carry, &about), h);
-    sampling.correct::<F>(op, channels, carry, h);
+    let about = sampling.foresee::<F>(channels, carry);
+    sampling.predict::<F>(op, channels, (carry, &about));
+    sampling.correct::<F>(op, channels, carry);
     *x = sampling.end;
     sampling.guard
 }
@@ -85,8 +85,10 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let c = &channels[a];
             s.argument[a] = c.argument_end.constant;
             s.direct[a] = c.rate.constant;
-            s.second[a] = c.second.constant;
-            s.normal[a] = c.law.normal.line::<F, U>(sample);
+            s.turn[a] = c.turn.constant;
+            let Line { input, .. } = c.law.normal;
+            let rise = sample[input][1].product(c.ramp);
+            s.normal[a] = [c.law.normal.start::<F, U>(sample), rise];
         }
         for drive in &op.drives {
             let [u, du] = sample[drive.input];
@@ -99,7 +101,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                     s.argument[a] = pair::<L, U, F>(&drive.argument[a], (u, du), s.argument[a]);
                 }
                 s.direct[a] = u_end.onto::<F>(drive.now[a], s.direct[a]);
-                s.second[a] = u.onto::<F>(drive.second[a], du.onto::<F>(drive.now[a], s.second[a]));
+                s.turn[a] = pair::<L, U, F>(&drive.turn[a], (u, du), s.turn[a]);
             }
         }
         for j in 0..op.columns() {
@@ -114,7 +116,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             }
         }
         for a in 0..A {
-            s.turning[a] = over_state::<L, F, N>(op, &channels[a].second.state, x);
+            s.turning[a] = over_state::<L, F, N>(op, &channels[a].turn.state, x);
         }
     }
 
@@ -125,43 +127,33 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         &mut self,
         channels: &[Carried<L, N>; A],
         carry: &mut [Carry<L>; A],
-        h: f64,
     ) -> [[L; 2]; A] {
         let mut about = [[L::all(0.0); 2]; A];
-        let (mut faded, mut rise) = ([L::all(0.0); A], [L::all(0.0); A]);
+        let mut faded = [L::all(0.0); A];
         for a in 0..A {
             let v = &carry[a].value;
             self.size = self.size.larger(v.value.values().magnitude());
-            rise[a] = v.by_argument.fma::<F>(carry[a].rate, v.by_normal * self.normal[a][1]);
+            let drift = v.by_normal * self.normal[a][1];
             self.cubics[a][0] = v.value;
-            self.cubics[a][1] = rise[a].times(h);
+            self.cubics[a][1] = v.by_argument.fma::<F>(carry[a].rate, drift);
         }
         let mut farthest = L::Values::all(0.0);
         for a in 0..A {
-            let mut second = self.second[a];
-            for b in 0..A {
-                second = channels[a].second.channels[b].fma::<F>(self.cubics[b][0], second);
-            }
-            for b in 0..A {
-                second = channels[a].rate.channels[b].fma::<F>(rise[b], second);
-            }
-            let second = second + self.turning[a];
-            let (v, ds) = (&carry[a].value, carry[a].rate);
-            let mixed = v.mixed * self.normal[a][1];
-            let turn = v.bend.fma::<F>(ds, mixed + mixed);
-            let half = 0.5 * h * h;
-            let turned = turn * ds.times(half);
-            self.cubics[a][2] = v.by_argument.times(half).fma::<F>(second, turned);
+            let turn = over_cubics::<L, F, A, 0, 2>(
+                &channels[a].turn.cubics,
+                &self.cubics.map(|[value, slope, _]| [value, slope]),
+                self.turn[a],
+            );
+            let turn = turn + self.turning[a];
+            let (v, rate) = (&carry[a].value, carry[a].rate);
+            let bent = v.bend.fma::<F>(rate, v.mixed * self.normal[a][1]) * rate;
+            self.cubics[a][2] = v.by_argument.fma::<F>(turn, bent);
             if L::DERIVATIVES {
                 continue;
             }
-            // The second derivative comes late: all else is summed up before it.
-            let (straight, bend) = (ds.times(2.0 * h) + carry[a].argument, 2.0 * h * h);
-            let Law { rate, .. } = channels[a].law;
-            let decay = (carry[a].near - straight) * rate;
             about[a] = [carry[a].near, carry[a].stiction];
-            carry[a].near = second.fma_times::<F>(bend, straight);
-            let decay = rate.times(-bend).fma::<F>(second, decay);
+            carry[a].near = turn.fma_times::<F>(4.0, rate + rate + carry[a].argument);
+            let decay = (about[a][0] - carry[a].near) * channels[a].law.rate;
             farthest = farthest.larger(decay.values().magnitude());
             faded[a] = carry[a].stiction.grown::<F>(decay);
         }
@@ -185,13 +177,12 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
         (carry, about): (&mut [Carry<L>; A], &[[L; 2]; A]),
-        h: f64,
     ) {
         add_moments::<L, F, N, A, 0, START>(op, &self.cubics, &mut self.end);
         for a in 0..A {
             let Carried { argument, argument_end, rate, law, .. } = &channels[a];
             let [near, stiction] = about[a];
-            let normal = self.normal[a][1].times(h) + self.normal[a][0];
+            let normal = self.normal[a][1] + self.normal[a][0];
             self.rate[a] = over_state::<L, F, N>(op, &rate.state, &self.end);
             if L::DERIVATIVES {
                 // Few products, by way of the state and at the argument itself, where they count for more
@@ -220,16 +211,15 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         op: &Operators<L, N>,
         channels: &[Carried<L, N>; A],
         carry: &mut [Carry<L>; A],
-        h: f64,
     ) {
         let mut missing = [[L::all(0.0); END]; A];
         for a in 0..A {
             let (v, [a0, a1, a2]) = (&carry[a].value, self.cubics[a]);
             let known = self.rate[a] + self.direct[a];
-            let ds = over_channels::<L, F, N, A>(&channels[a].rate, carry, known);
-            let drift = (v.by_normal * self.normal[a][1]).times(h);
+            let rate = over_channels::<L, F, N, A>(&channels[a].rate, carry, known);
+            let drift = v.by_normal * self.normal[a][1];
             let value = v.value - (a0 + a1 + a2);
-            missing[a] = [value, v.by_argument.times(h).fma::<F>(ds, drift - (a1 + a2 + a2))];
+            missing[a] = [value, v.by_argument.fma::<F>(rate, drift - (a1 + a2 + a2))];
         }
         add_moments::<L, F, N, A, START, END>(op, &missing, &mut self.end);
         let size = self.size + L::Values::all(1.0);
@@ -248,7 +238,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let guard = size.times(MAX_CUBIC) - cubic;
             self.guard = self.guard.negative_with(guard).negative_with(close);
             carry[a].value = corrected;
-            early[a] = carry[a].rate.values().times(h / 3.0) + carry[a].argument.values();
+            early[a] = carry[a].rate.values().times(1.0 / 3.0) + carry[a].argument.values();
             carry[a].argument = self.argument[a] + ds;
         }
         for a in 0..A {
@@ -257,7 +247,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             carry[a].rate = over_channels::<L, F, N, A>(rate, carry, known);
             // Between its ends the argument stays within these (Bernstein's form of the cubic).
             let (early, end) = (early[a], carry[a].argument.values());
-            let late = end - carry[a].rate.values().times(h / 3.0);
+            let late = end - carry[a].rate.values().times(1.0 / 3.0);
             let above = early.smaller(late).smaller(end) - law.from.values();
             let below = law.to.values() - early.larger(late).larger(end);
             self.guard = self.guard.negative_with(above).negative_with(below);
