@@ -3,7 +3,9 @@
 
 mod common;
 
-use common::{clutch, compile, constant, gear, grid, inertia, simulate, start, torque};
+use common::{
+    clutch, compile, constant, gear, grid, inertia, simulate, simulate_fast, start, torque,
+};
 use drivetwin_core::model::elements::{Clutch, Element};
 use drivetwin_core::simulate::Output;
 use drivetwin_core::solve::{EventKind, Status};
@@ -75,6 +77,28 @@ fn redundant_locks_let_go_together_when_their_sum_is_exceeded() {
 }
 
 /// Engine and vehicle joined by two clutches of ratios 1 and 2 (two gears at once).
+#[test]
+fn a_brake_that_has_grown_stronger_takes_over_from_one_that_fades() {
+    let network = compile(two_brakes());
+    let signals = [
+        constant("T", 50.0, 1.0),
+        ("P A", vec![0.0, 1.0], vec![-20.0, 80.0]),
+        ("P B", vec![0.0, 1.0], vec![80.0, 5.0]),
+    ];
+    let outputs = [friction_torque("A"), friction_torque("B"), speed("shaft")];
+    let run =
+        simulate(&network, &signals, &start(&[("shaft", 0.0)], &[]), &grid(1.0, 101), &outputs);
+    // Their capacities 80 - 75 t and 100 t - 20 are 60 together at least: enough for 50 at any time.
+    assert!(run.events.iter().all(|e| e.kind != EventKind::BreakAway), "{:?}", run.events);
+    for (k, t) in run.time.iter().enumerate() {
+        let [one, two] = [run.columns[0][k], run.columns[1][k]];
+        assert!((one + two - 50.0).abs() < 1e-9, "{one} + {two} at {t} s");
+        assert!(one.abs() < (100.0 * t - 20.0).max(0.0) + 1e-9, "{one} at {t} s");
+        assert!(two.abs() < 80.0 - 75.0 * t + 1e-9, "{two} at {t} s");
+        assert!(run.columns[2][k].abs() < 1e-12);
+    }
+}
+
 fn two_gears() -> Vec<Element<f64>> {
     vec![
         inertia("engine", 1.0),
@@ -149,6 +173,33 @@ fn a_load_that_only_touches_the_capacity_does_not_break_away() {
     let run = simulate(&network, &signals, &rest, &grid(1.0, 11), &[speed("shaft")]);
     assert_eq!(run.status, Status::Completed);
     assert!(run.columns[0].iter().all(|w| w.abs() < 1e-12), "{:?}", run.columns[0]);
+}
+
+#[test]
+fn capacities_that_pass_through_nothing_together_leave_the_lock_as_it_is() {
+    let network = compile(vec![
+        inertia("a", 3.508),
+        inertia("b", 0.561),
+        inertia("c", 1.559),
+        torque("a", "T"),
+        Element::Clutch(Clutch { peak: 1.322, ..clutch("held", "b", "c") }),
+        Element::Clutch(clutch("slipping", "b", "a")),
+    ]);
+    let through = |values: [f64; 5]| (vec![0.0, 0.25, 0.5, 0.75, 1.0], values.to_vec());
+    let ((t, drive), (_, held), (_, slipping)) = (
+        through([0.0, 0.0, 41.0, 0.0, 0.0]),
+        through([50.0, 50.0, 0.0, 62.7, 0.0]),
+        through([0.0, 62.9, 0.0, 94.3, 0.0]),
+    );
+    let signals =
+        [("T", t.clone(), drive), ("P held", t.clone(), held), ("P slipping", t, slipping)];
+    // The lock passes on 1.559 / 2.12 of the slipping torque, at most 0.84 of what it can hold.
+    let start = start(&[("a", -38.5), ("b", 0.0), ("c", 0.0)], &[]);
+    let slip = [Output::Slip("held".into())];
+    let run = simulate_fast(&network, &signals, &start, &grid(1.0, 501), &slip);
+    assert_eq!(run.status, Status::Completed);
+    assert!(run.events.iter().all(|e| e.kind != EventKind::BreakAway), "{:?}", run.events);
+    assert!(run.columns[0].iter().all(|slip| slip.abs() < 1e-9));
 }
 
 #[test]

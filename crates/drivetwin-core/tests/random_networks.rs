@@ -20,6 +20,8 @@ use proptest::prelude::*;
 const NODES: [&str; 5] = ["a", "b", "c", "d", "ground"];
 const SECONDS: f64 = 1.0;
 const SAMPLES: usize = 41;
+/// Enough for operators to pay.
+const FINE_SAMPLES: usize = 501;
 
 /// One random friction element with its pressure [N·m of capacity over μ].
 #[derive(Clone, Debug)]
@@ -178,7 +180,12 @@ fn renamed(mut element: Element<f64>, name: Name) -> Element<f64> {
     element
 }
 
-fn simulate(case: &Case) -> Option<Trajectory<f64>> {
+/// The run of a case over so many points: slips and torques of its clutches.
+fn simulate(
+    case: &Case,
+    points: usize,
+    (settings, audit): (Settings, bool),
+) -> Option<Trajectory<f64>> {
     let network = compile_or_refuse(elements(case))?;
     let times: Vec<f64> = (0..5).map(|i| SECONDS * i as f64 / 4.0).collect();
     let names: Vec<String> = (0..case.clutches.len()).map(|i| format!("P clutch {i}")).collect();
@@ -196,8 +203,8 @@ fn simulate(case: &Case) -> Option<Trajectory<f64>> {
         speeds: (0..4).map(|i| (NODES[i].to_owned(), case.speeds[i])).collect(),
         ..Start::default()
     };
-    let grid = common::grid(SECONDS, SAMPLES);
-    run(&network, &signals, &start, &grid, &outputs, (Settings::default(), true)).ok()
+    let grid = common::grid(SECONDS, points);
+    run(&network, &signals, &start, &grid, &outputs, (settings, audit)).ok()
 }
 
 fn interpolated(values: &[f64], t: f64) -> f64 {
@@ -243,8 +250,26 @@ proptest! {
 
     #[test]
     fn every_run_ends_and_obeys_the_friction_laws(case in case()) {
-        if let Some(trajectory) = simulate(&case) {
+        if let Some(trajectory) = simulate(&case, SAMPLES, (Settings::default(), true)) {
             check(&case, &trajectory);
+        }
+    }
+
+    #[test]
+    fn passing_samples_by_operators_changes_a_run_but_little(case in case()) {
+        let run = |settings| simulate(&case, FINE_SAMPLES, (settings, false));
+        let both = run(Settings::default()).zip(run(Settings::exact()));
+        let Some((fast, exact)) = both.filter(|(a, b)| {
+            a.status == Status::Completed && b.status == Status::Completed
+        }) else {
+            return Ok(());
+        };
+        for i in 0..case.clutches.len() {
+            let (fast, exact) = (&fast.columns[2 * i], &exact.columns[2 * i]);
+            let largest = exact.iter().fold(1.0, |largest: f64, slip| largest.max(slip.abs()));
+            for (k, (a, b)) in fast.iter().zip(exact).enumerate() {
+                prop_assert!((a - b).abs() < 1e-4 * largest, "clutch {i}, sample {k}: {a}, {b}");
+            }
         }
     }
 }

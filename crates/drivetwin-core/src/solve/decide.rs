@@ -21,6 +21,8 @@ pub(super) struct Assignment {
 
 /// What counts as zero in a sum, relative to the size of its terms.
 const ROUND_OFF: f64 = 1e-10;
+/// Part of their capacity that elements must have left where a split of torques is to last.
+const ROOM: f64 = 1e-6;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
 const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
 /// How far ahead a decision looks, s.
@@ -46,6 +48,9 @@ impl<T: Number> Regime<'_, T> {
     pub(super) fn decide(&mut self, overloaded: Option<(Row, f64)>) -> Result<(), Status> {
         self.look_ahead();
         let candidates = self.at_zero_speed();
+        if overloaded.is_some() && self.share_anew(&candidates)? {
+            return Ok(());
+        }
         let mut trial = self.assignment();
         for &row in &candidates {
             // An overload asks for more: what is at its capacity already stays there.
@@ -74,6 +79,49 @@ impl<T: Number> Regime<'_, T> {
                 Fault::Reversed(i) => trial.reverse_power(i),
             }
         }
+    }
+
+    /// Where elements stay at their capacity while others hold the same speeds: split the torques anew if that
+    /// leaves room to all that hold, and say so. A capacity that has grown since would have these work
+    /// against each other.
+    fn share_anew(&mut self, candidates: &[Row]) -> Result<bool, Status> {
+        let mut trial = self.assignment();
+        if !candidates.iter().any(|&row| trial.is_shared(row)) {
+            return Ok(false);
+        }
+        candidates.iter().for_each(|&row| trial.rest(row));
+        for _ in 0..=candidates.len() {
+            let mode = self.mode(self.key_of(&trial))?;
+            let basis = self.basis_now(&trial, candidates);
+            match self.fault(&trial, candidates, (&mode, &basis)) {
+                None if self.has_room(&mode, &basis) => {
+                    self.adopt(trial, candidates, mode);
+                    return Ok(true);
+                }
+                Some(Fault::Overloaded(row @ Row::Friction(_), sign)) => {
+                    self.give_way(&mut trial, row, sign);
+                }
+                _ => return Ok(false),
+            }
+            if candidates.iter().any(|&row| trial.direction(row).is_some()) {
+                return Ok(false);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Whether every element at rest carries less than its capacity.
+    fn has_room(&self, mode: &Mode<T>, basis: &[T]) -> bool {
+        let capacities = self.capacities();
+        mode.stuck.iter().enumerate().all(|(i, &row)| {
+            let Row::Friction(j) = row else { return true };
+            let torque = form(mode.stuck_torque.row(i), basis).re();
+            let capacity = capacities[j].re() * (1.0 - ROOM);
+            let one_way = self.network.frictions[j].one_way;
+            torque.decide_with(capacity, |torque, capacity| {
+                -torque <= capacity && (one_way || torque <= capacity)
+            })
+        })
     }
 
     /// Try every assignment of the candidates in a fixed order; the first without fault holds.
@@ -369,9 +417,14 @@ impl Assignment {
     /// Whether a row at zero speed carries all it can.
     fn is_at_capacity(&self, row: Row) -> bool {
         match row {
-            Row::Friction(j) => matches!(self.rows[j], RowState::Saturated { .. }),
+            Row::Friction(_) => self.is_shared(row),
             Row::Gear(i) => matches!(self.gears[i], GearState::Rolling { .. }),
         }
+    }
+
+    /// Whether a friction element at zero speed carries all it can and others hold the rest.
+    fn is_shared(&self, row: Row) -> bool {
+        matches!(row, Row::Friction(j) if matches!(self.rows[j], RowState::Saturated { .. }))
     }
 
     fn reverse_power(&mut self, i: usize) {

@@ -152,6 +152,7 @@ impl Formation<'_> {
     /// Carry out the event at which most runs are; the others part.
     fn change(&mut self) {
         let open = self.open();
+        each(open).for_each(|run| self.move_to_knot(run));
         let same = |run: usize| {
             let standing = self.members[run].standing;
             (self.those(|member| member.standing == standing), standing)
@@ -159,20 +160,22 @@ impl Formation<'_> {
         let Some((runs, standing)) = each(open).map(same).reduce(most) else { return };
         self.part(open & !runs);
         match standing {
-            Standing::Event(cause) => {
-                for run in each(runs) {
-                    let member = &mut self.members[run];
-                    let t = &mut self.regime.t.0[run];
-                    if let Some(next) = member.inputs.just_before(member.segment, *t) {
-                        (member.segment, *t) = (next, member.inputs.knot(next));
-                    }
-                }
-                self.decide(runs, |regime| regime.change(cause));
-            }
+            Standing::Event(cause) => self.decide(runs, |regime| regime.change(cause)),
             _ => {
                 each(runs).for_each(|run| self.members[run].segment += 1);
                 self.decide(runs, |regime| regime.refresh());
             }
+        }
+    }
+
+    /// Let an event within round-off of a knot happen there.
+    fn move_to_knot(&mut self, run: usize) {
+        let (member, t) = (&mut self.members[run], &mut self.regime.t.0[run]);
+        if let Standing::Event(cause) = member.standing
+            && let Some(next) = member.inputs.just_before(member.segment, *t)
+        {
+            (member.segment, *t) = (next, member.inputs.knot(next));
+            member.standing = Standing::Event(cause.at_knot());
         }
     }
 

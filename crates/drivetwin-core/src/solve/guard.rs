@@ -15,12 +15,24 @@ pub enum Cause {
     Pressed(usize),
     /// The torque of a row at rest leaves its bounds; its sign.
     Overload(Row, f64),
+    /// The same within round-off of a knot of the inputs, which may end there.
+    OverloadAtKnot(Row),
     /// Power through a rolling gear changes its direction.
     PowerReversal(usize),
     /// A channel enters another cell.
     Border(usize, Cell),
     /// Events at one instant did not come to an end; everything is decided anew a moment later.
     Stalled,
+}
+
+impl Cause {
+    /// The same, found to happen at a knot: what holds from there on decides.
+    pub fn at_knot(self) -> Self {
+        match self {
+            Self::Overload(row, _) => Self::OverloadAtKnot(row),
+            other => other,
+        }
+    }
 }
 
 /// The earliest fall within `h` [s], refined so that the time carries derivatives, and whether it

@@ -41,7 +41,8 @@ impl<'a, T: Real> Signal<'a, T> {
 #[derive(Clone, Debug)]
 pub struct Inputs<T> {
     knots: Vec<f64>,
-    /// Value at the start of a segment and rate within it, segments × inputs; unused for sines.
+    /// Value at the start of a segment and rate within it, segments × inputs; unused for sines. At least one
+    /// of each segment, which constant loads refer to where there are no inputs.
     lines: Vec<[f64; 2]>,
     /// Derivatives of the delays: numbers of value zero.
     shifts: Vec<T>,
@@ -100,10 +101,11 @@ impl<T: Real> Inputs<T> {
         }
         let inner = inner_times(signals, grid, (start, end));
         let knots = merge_knots(&inner, &jumps, (start, end));
-        let mut lines = vec![[0.0; 2]; (knots.len() - 1) * signals.len()];
+        let width = signals.len().max(1);
+        let mut lines = vec![[0.0; 2]; (knots.len() - 1) * width];
         for (input, (_, signal)) in signals.iter().enumerate() {
             let Signal::Samples { times, values, delay } = *signal else { continue };
-            let to = lines[input..].iter_mut().step_by(signals.len());
+            let to = lines[input..].iter_mut().step_by(width);
             fill(to, (&knots, jumps.is_empty()), (times, values, delay.re()));
         }
         Ok(Self::of_lines(knots, lines, (shifts, sines)))
@@ -116,7 +118,7 @@ impl<T: Real> Inputs<T> {
     ) -> Self {
         let equal = equal_lengths(&knots);
         let usual = usual_lengths(&knots, &equal);
-        let extremes = extremes(&knots, &lines, shifts.len());
+        let extremes = extremes(&knots, &lines, shifts.len().max(1));
         Self { knots, lines, shifts, sines, equal, usual, extremes }
     }
 
@@ -129,7 +131,7 @@ impl<T: Real> Inputs<T> {
             return self;
         }
         let mut knots = Vec::with_capacity(count + 1);
-        let mut lines = Vec::with_capacity(count * self.sines.len());
+        let mut lines = Vec::with_capacity(count * self.width());
         for (i, &parts) in parts.iter().enumerate() {
             let (from, to) = self.span(i);
             for part in 0..parts {
@@ -211,9 +213,16 @@ impl<T: Real> Inputs<T> {
         (found == grid.len()).then_some(points)
     }
 
-    /// Value at the start of segment `i` and rate within it, of every input, without derivatives.
+    /// Value at the start of segment `i` and rate within it, of every input, without derivatives; zero where
+    /// there are no inputs.
     pub fn lines(&self, i: usize) -> &[[f64; 2]] {
-        &self.lines[i * self.sines.len()..(i + 1) * self.sines.len()]
+        &self.lines[i * self.width()..(i + 1) * self.width()]
+    }
+
+    /// Number of lines of a segment.
+    #[inline(always)]
+    fn width(&self) -> usize {
+        self.sines.len().max(1)
     }
 
     /// Whether derivatives jump at knots: a signal that comes later by a parameter is shifted along another
@@ -225,12 +234,9 @@ impl<T: Real> Inputs<T> {
     /// Bounds of an input over `count` segments from `first` on, without derivatives; zero where there
     /// are no inputs.
     pub fn bounds(&self, input: usize, (first, count): (usize, usize)) -> [f64; 2] {
-        if self.sines.is_empty() {
-            return [0.0; 2];
-        }
         let stretches = first / STRETCH..=(first + count.max(1) - 1) / STRETCH;
         stretches.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], stretch| {
-            let [least, largest] = self.extremes[stretch * self.sines.len() + input];
+            let [least, largest] = self.extremes[stretch * self.width() + input];
             [low.min(least), high.max(largest)]
         })
     }
@@ -293,7 +299,7 @@ fn usual_lengths(knots: &[f64], equal: &[u32]) -> Vec<f64> {
 fn extremes(knots: &[f64], lines: &[[f64; 2]], inputs: usize) -> Vec<[f64; 2]> {
     let mut all = Vec::with_capacity(knots.len().div_ceil(STRETCH) * inputs);
     let mut knots = knots.windows(2);
-    for stretch in lines.chunks(STRETCH * inputs.max(1)) {
+    for stretch in lines.chunks(STRETCH * inputs) {
         let from = all.len();
         all.resize(from + inputs, [f64::INFINITY, f64::NEG_INFINITY]);
         for (segment, span) in stretch.chunks_exact(inputs).zip(&mut knots) {

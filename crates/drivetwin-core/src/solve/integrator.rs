@@ -161,11 +161,12 @@ impl<'a, T: Real> Integrator<'a, T> {
 
     /// Carry out what the last event caused.
     fn change_mode(&mut self) -> Result<(), Status> {
-        let Some(cause) = self.pending.take() else { return Ok(()) };
+        let Some(mut cause) = self.pending.take() else { return Ok(()) };
         let time = self.regime.t.re();
         if let Some(next) = self.inputs.just_before(self.segment, time) {
             self.regime.t += self.inputs.knot(next) - time;
             self.segment = next;
+            cause = cause.at_knot();
         }
         self.take_inputs();
         self.regime.change(cause)

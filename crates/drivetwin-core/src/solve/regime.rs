@@ -157,7 +157,7 @@ impl<'a, T: Number> Regime<'a, T> {
     /// Name of the element that an event is about.
     pub(super) fn culprit(&self, cause: Cause) -> String {
         let row = match cause {
-            Cause::AtRest(row) | Cause::Overload(row, _) => row,
+            Cause::AtRest(row) | Cause::Overload(row, _) | Cause::OverloadAtKnot(row) => row,
             Cause::Pressed(j) => Row::Friction(j),
             Cause::PowerReversal(i) => Row::Gear(i),
             Cause::Border(channel, _) if channel < self.rows.len() => Row::Friction(channel),

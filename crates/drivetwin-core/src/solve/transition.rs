@@ -22,13 +22,19 @@ impl<T: Number> Regime<'_, T> {
                 self.press(j, !self.pressed[j]);
                 self.decide(None)
             }
-            Cause::Overload(Row::Friction(j), _) if self.is_about_to_vent(j) => {
+            Cause::Overload(Row::Friction(j), _) | Cause::OverloadAtKnot(Row::Friction(j))
+                if self.is_about_to_vent(j) =>
+            {
                 self.press(j, false);
                 self.decide(None)
             }
             Cause::Overload(row, sign) => {
                 self.bring_to_rest(&[]);
                 self.decide(Some((row, sign)))
+            }
+            Cause::OverloadAtKnot(_) => {
+                self.bring_to_rest(&[]);
+                self.decide(None)
             }
             Cause::PowerReversal(i) => {
                 if let GearState::Rolling { backward, .. } = &mut self.gears[i] {
