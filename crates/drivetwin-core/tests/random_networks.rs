@@ -259,16 +259,16 @@ proptest! {
     fn passing_samples_by_operators_changes_a_run_but_little(case in case()) {
         let run = |settings| simulate(&case, FINE_SAMPLES, (settings, false));
         let both = run(Settings::default()).zip(run(Settings::exact()));
-        let Some((fast, exact)) = both.filter(|(a, b)| {
-            a.status == Status::Completed && b.status == Status::Completed
-        }) else {
+        let completed = |run: &Trajectory<f64>| run.status == Status::Completed;
+        let Some((fast, exact)) = both.filter(|(a, b)| completed(a) && completed(b)) else {
             return Ok(());
         };
         for i in 0..case.clutches.len() {
             let (fast, exact) = (&fast.columns[2 * i], &exact.columns[2 * i]);
             let largest = exact.iter().fold(1.0, |largest: f64, slip| largest.max(slip.abs()));
             for (k, (a, b)) in fast.iter().zip(exact).enumerate() {
-                prop_assert!((a - b).abs() < 1e-4 * largest, "clutch {i}, sample {k}: {a}, {b}");
+                // Torques of redundant locks are split anew at every sample, which may let one go early.
+                prop_assert!((a - b).abs() < 1e-2 * largest, "clutch {i}, sample {k}: {a}, {b}");
             }
         }
     }

@@ -21,7 +21,7 @@ pub(super) struct Assignment {
 
 /// What counts as zero in a sum, relative to the size of its terms.
 const ROUND_OFF: f64 = 1e-10;
-/// Part of their capacity that elements must have left where a split of torques is to last.
+/// Part of their torques that elements must have left up to their bounds where a split is to last.
 const ROOM: f64 = 1e-6;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
 const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
@@ -110,17 +110,14 @@ impl<T: Number> Regime<'_, T> {
         Ok(false)
     }
 
-    /// Whether every element at rest carries less than its capacity.
+    /// Whether everything at rest carries less than its bounds allow.
     fn has_room(&self, mode: &Mode<T>, basis: &[T]) -> bool {
         let capacities = self.capacities();
         mode.stuck.iter().enumerate().all(|(i, &row)| {
-            let Row::Friction(j) = row else { return true };
             let torque = form(mode.stuck_torque.row(i), basis).re();
-            let capacity = capacities[j].re() * (1.0 - ROOM);
-            let one_way = self.network.frictions[j].one_way;
-            torque.decide_with(capacity, |torque, capacity| {
-                -torque <= capacity && (one_way || torque <= capacity)
-            })
+            let (low, high) = self.bounds(row, &capacities, (mode, basis));
+            let room = (torque - low).smaller(high - torque);
+            room.decide_with(torque, |room, torque| room > ROOM * torque.abs())
         })
     }
 
@@ -265,15 +262,7 @@ impl<T: Number> Regime<'_, T> {
         let mut worst: Option<(T::Values, Fault)> = None;
         for (i, &row) in mode.stuck.iter().enumerate() {
             let torque = form(mode.stuck_torque.row(i), basis).re();
-            let (low, high) = match row {
-                Row::Friction(j) if self.network.frictions[j].one_way => {
-                    (-capacities[j].re(), T::Values::of(f64::INFINITY))
-                }
-                Row::Friction(j) => (-capacities[j].re(), capacities[j].re()),
-                Row::Gear(g) => {
-                    self.gear_bounds(g, form(mode.gear_torque(self.network).row(g), basis).re())
-                }
-            };
+            let (low, high) = self.bounds(row, &capacities, (mode, basis));
             let above = torque.decide_with(high, |torque, high| torque > high);
             let (excess, size, sign) = if above {
                 (torque - high, high.magnitude(), 1.0)
@@ -295,6 +284,24 @@ impl<T: Number> Regime<'_, T> {
             }
         }
         worst.map(|(_, fault)| fault)
+    }
+
+    /// Bounds of the torque of a row at rest.
+    fn bounds(
+        &self,
+        row: Row,
+        capacities: &[T],
+        (mode, basis): (&Mode<T>, &[T]),
+    ) -> (T::Values, T::Values) {
+        match row {
+            Row::Friction(j) if self.network.frictions[j].one_way => {
+                (-capacities[j].re(), T::Values::of(f64::INFINITY))
+            }
+            Row::Friction(j) => (-capacities[j].re(), capacities[j].re()),
+            Row::Gear(g) => {
+                self.gear_bounds(g, form(mode.gear_torque(self.network).row(g), basis).re())
+            }
+        }
     }
 
     /// What a row at rest may accelerate by round-off; more is forced on it by prescribed speeds.
