@@ -121,22 +121,31 @@ impl<T: Number> Regime<'_, T> {
         })
     }
 
-    /// Try every assignment of the candidates in a fixed order; the first without fault holds.
+    /// Try every assignment of the candidates in a fixed order, those first in which fewer friction elements
+    /// move off: what can hold holds. The first without fault it is.
     fn decide_exhaustively(&mut self, candidates: &[Row]) -> Result<(), Status> {
         let gears = self.gears.len();
         let choices = 3usize.pow(candidates.len().min(MAX_EXHAUSTIVE) as u32) << gears.min(4);
         let feasible = candidates.len() <= MAX_EXHAUSTIVE && gears <= 4;
-        'choices: for choice in 0..if feasible { choices } else { 0 } {
+        let places = || candidates.iter().enumerate();
+        let digit = |choice: usize, place: usize| (choice >> gears) / 3usize.pow(place as u32) % 3;
+        let moving = |choice: &usize| {
+            let moves = |&(place, row): &(usize, &Row)| {
+                matches!(row, Row::Friction(_)) && digit(*choice, place) > 0
+            };
+            places().filter(moves).count()
+        };
+        let mut all: Vec<usize> = (0..if feasible { choices } else { 0 }).collect();
+        all.sort_by_key(moving);
+        'choices: for choice in all {
             let mut trial = self.assignment();
-            let mut digits = choice >> gears;
-            for &row in candidates {
-                match digits % 3 {
+            for (place, &row) in places() {
+                match digit(choice, place) {
                     1 if self.blocks_forward(row) => continue 'choices,
                     0 => trial.rest(row),
                     1 => trial.move_off(row, 1.0),
                     _ => trial.move_off(row, -1.0),
                 }
-                digits /= 3;
             }
             (0..gears).filter(|i| choice >> i & 1 == 1).for_each(|i| trial.reverse_power(i));
             let Ok(mode) = self.mode(self.key_of(&trial)) else { continue };
