@@ -136,7 +136,7 @@ impl<T: Number> Regime<'_, T> {
             places().filter(moves).count()
         };
         let mut all: Vec<usize> = (0..if feasible { choices } else { 0 }).collect();
-        all.sort_by_key(moving);
+        all.sort_by_cached_key(moving);
         'choices: for choice in all {
             let mut trial = self.assignment();
             for (place, &row) in places() {
