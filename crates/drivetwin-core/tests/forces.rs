@@ -4,7 +4,7 @@
 mod common;
 
 use common::{
-    clutch, compile, constant, grid, inertia, load, shaft, simulate, simulate_fast, start, torque,
+    clutch, compile, constant, grid, inertia, load, shaft, simulate, simulate_by, start, torque,
 };
 use drivetwin_core::model::Driveline;
 use drivetwin_core::model::FrictionLaw;
@@ -44,7 +44,8 @@ fn rolling_resistance_stops_a_wheel_and_holds_it() {
 fn without_inputs_fine_samples_are_passed_up_to_rest_and_at_rest() {
     let network = compile(vec![inertia("wheel", 2.0), load("wheel", 3.0, 10.0, 0.0)]);
     let start = start(&[("wheel", 6.5)], &[]);
-    let run = simulate_fast(&network, &[], &start, &grid(2.0, 2001), &[speed("wheel")]);
+    let how = (Settings::default(), false);
+    let run = simulate_by(how, &network, &[], &start, &grid(2.0, 2001), &[speed("wheel")]);
     assert_eq!(run.status, Status::Completed);
     assert!((run.events[0].time - 1.0).abs() < 1e-12);
     for (t, w) in run.time.iter().zip(&run.columns[0]) {

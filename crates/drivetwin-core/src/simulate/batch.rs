@@ -194,8 +194,7 @@ impl Work<'_> {
     fn do_all(&self, jobs: &mut [Job<'_>]) {
         let mut open: Vec<&mut Job<'_>> = jobs.iter_mut().collect();
         for _ in 0..ATTEMPTS {
-            let groups = open.par_chunks_mut(WIDTH);
-            groups.for_each_init(Vec::new, |spare, group| self.do_together(group, spare));
+            open.par_chunks_mut(WIDTH).for_each(|group| self.do_together(group));
             open.retain(|job| job.outcome.is_none());
         }
         open.par_iter_mut().for_each(|job| self.do_alone(job));
@@ -219,8 +218,8 @@ impl Work<'_> {
         (job.outcome, job.events) = (Some(Outcome::Ran(run.status)), run.events);
     }
 
-    /// Do those of a group that go together with its first; `spare` is working space.
-    fn do_together(&self, group: &mut [&mut Job<'_>], spare: &mut Vec<f64>) {
+    /// Do those of a group that go together with its first.
+    fn do_together(&self, group: &mut [&mut Job<'_>]) {
         let runs: Vec<usize> = group.iter().map(|job| job.run).collect();
         let (plan, locked) = (self.plan(runs[0]), &self.sets.start(runs[0]).locked);
         // Fewer are done as fast alone.
@@ -238,6 +237,7 @@ impl Work<'_> {
         let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
         let (known, how) = (Known::of(&network), (plan.settings, alike & !parting));
         let columns = plan.targets.len() * plan.grid.len();
+        let mut spare = Vec::new();
         let values: Vec<&mut [f64]> = match self.keep {
             Keep::Columns => group.iter_mut().map(|job| &mut *job.values).collect(),
             _ => {
@@ -250,7 +250,7 @@ impl Work<'_> {
         let events = run_together(known, &inputs, how, (x, &locked), &mut recorder);
         for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
             let Some(events) = events else { continue };
-            if !matches!(self.keep, Keep::Columns) {
+            if !spare.is_empty() {
                 self.keep.reduce(&spare[place * columns..][..columns], plan.grid.len(), job.values);
             }
             (job.outcome, job.events) = (Some(Outcome::Ran(Status::Completed)), events);

@@ -85,10 +85,10 @@ impl<T: Number> Regime<'_, T> {
     /// leaves room to all that hold, and say so. A capacity that has grown since would have these work
     /// against each other.
     fn share_anew(&mut self, candidates: &[Row]) -> Result<bool, Status> {
-        let mut trial = self.assignment();
-        if !candidates.iter().any(|&row| trial.is_shared(row)) {
+        if !self.rows.iter().any(RowState::is_saturated) {
             return Ok(false);
         }
+        let mut trial = self.assignment();
         candidates.iter().for_each(|&row| trial.rest(row));
         for _ in 0..=candidates.len() {
             let mode = self.mode(self.key_of(&trial))?;
@@ -433,14 +433,9 @@ impl Assignment {
     /// Whether a row at zero speed carries all it can.
     fn is_at_capacity(&self, row: Row) -> bool {
         match row {
-            Row::Friction(_) => self.is_shared(row),
+            Row::Friction(j) => self.rows[j].is_saturated(),
             Row::Gear(i) => matches!(self.gears[i], GearState::Rolling { .. }),
         }
-    }
-
-    /// Whether a friction element at zero speed carries all it can and others hold the rest.
-    fn is_shared(&self, row: Row) -> bool {
-        matches!(row, Row::Friction(j) if matches!(self.rows[j], RowState::Saturated { .. }))
     }
 
     fn reverse_power(&mut self, i: usize) {

@@ -44,7 +44,8 @@ pub struct Operators<L, const N: usize> {
     pub loads: Vec<Line<L>>,
 }
 
-/// Effect of one input; pairs are those of its value at the start and of its rate [1/s].
+/// Effect of one input; pairs are those of its value at the start and of its rate, per second. On rates and turns
+/// of the arguments as in [`Carried`].
 #[derive(Clone, Copy, Debug)]
 pub struct Drive<L, const N: usize> {
     /// Its index.

@@ -22,11 +22,11 @@ pub(super) enum AnySize<T> {
     Many(Arc<Operators<T, MAX_STATES>>),
 }
 
-/// Most states of a network that is marched.
+/// Most states of a network of plain numbers that is marched.
 const MAX_STATES: usize = 24;
 
-/// The same of networks of a number: with derivatives, or for several runs side by side, which are drivelines
-/// of two clutches, the gain does not pay for the code.
+/// Most states of a network over `T` that is marched. With derivatives the gain with more does not pay for the
+/// code, and several runs side by side are drivelines of two clutches.
 const fn max_states<T: Lane>() -> usize {
     if T::RUNS > 1 {
         4
@@ -125,13 +125,12 @@ impl<T: Number> Regime<'_, T> {
 
     /// Whether the present mode has only what a sprint covers.
     fn is_simple(&self) -> bool {
-        let saturated = |row: &RowState| matches!(row, RowState::Saturated { .. });
         self.network.prescribed.is_empty()
             && self.network.mechanism.inputs.len() <= MAX_INPUTS
             && !self.mode.redundant
             && !self.blocked.contains(&true)
             && !self.released.contains(&true)
-            && !self.rows.iter().any(saturated)
+            && !self.rows.iter().any(RowState::is_saturated)
             && self.gears.iter().all(|gear| *gear != GearState::Held)
     }
 

@@ -30,6 +30,13 @@ pub enum RowState {
     },
 }
 
+impl RowState {
+    /// Whether it carries all it can at zero speed while others hold the rest.
+    pub(super) fn is_saturated(&self) -> bool {
+        matches!(self, Self::Saturated { .. })
+    }
+}
+
 /// What happened at an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {

@@ -4,7 +4,7 @@
 use super::lanes::{Task, dispatch};
 use super::march::Carry;
 use super::operators::{Carried, Form, MAX_ACTIVE, Operators, SHAPES};
-use crate::network::smooth::{Line, Sample};
+use crate::network::smooth::Sample;
 use crate::number::{Factor, Lane, SMALL, Values};
 
 /// Largest cubic part of a channel over a sample, relative to the largest of all.
@@ -86,8 +86,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             s.argument[a] = c.argument_end.constant;
             s.direct[a] = c.rate.constant;
             s.turn[a] = c.turn.constant;
-            let Line { input, .. } = c.law.normal;
-            let rise = sample[input][1].product(c.ramp);
+            let rise = sample[c.law.normal.input][1].product(c.ramp);
             s.normal[a] = [c.law.normal.start::<F, U>(sample), rise];
         }
         for drive in &op.drives {

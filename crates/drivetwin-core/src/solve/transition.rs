@@ -111,8 +111,8 @@ impl<T: Number> Regime<'_, T> {
     /// Whether one of the locks carries its full capacity, or their split follows the capacities: they are
     /// then decided anew at every sample; accelerations do not depend on the split.
     pub(super) fn is_split(&self) -> bool {
-        let saturated = |row: &RowState| matches!(row, RowState::Saturated { .. });
-        self.mode.redundant || self.rows.iter().any(saturated) || self.blocked.contains(&true)
+        let saturated = self.rows.iter().any(RowState::is_saturated);
+        self.mode.redundant || saturated || self.blocked.contains(&true)
     }
 
     /// Give an element a normal load or take it away.

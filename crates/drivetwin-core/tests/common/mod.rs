@@ -84,18 +84,8 @@ pub fn simulate(
     simulate_by((Settings::default(), true), network, signals, start, grid, outputs)
 }
 
-/// The same without the audit: samples are passed by operators.
-pub fn simulate_fast(
-    network: &Network<f64>,
-    signals: &[Signal],
-    start: &Start<f64>,
-    grid: &[f64],
-    outputs: &[Output],
-) -> Trajectory<f64> {
-    simulate_by((Settings::default(), false), network, signals, start, grid, outputs)
-}
-
-fn simulate_by(
+/// The same by other settings, audited or not; only without the audit samples are passed by operators.
+pub fn simulate_by(
     options: (Settings, bool),
     network: &Network<f64>,
     signals: &[Signal],
