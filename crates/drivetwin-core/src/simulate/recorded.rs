@@ -37,11 +37,31 @@ impl<T: Real> Recorded<T> {
         self.values[output].len()
     }
 
-    /// The values that a block has summed up, out of it.
+    /// Add a multiple of the picked ones of samples to an output that ends with those of `block`.
+    #[inline(always)]
+    pub fn add<const F: bool>(
+        &mut self,
+        (output, block): (usize, &mut Block<T>),
+        samples: (impl Iterator<Item: Borrow<T>>, Picked),
+        factor: T,
+    ) {
+        let values = &mut self.values[output];
+        let count = samples.1.count();
+        let first = block.count == 0;
+        block.count = count;
+        values.resize(values.len() + if first { count } else { 0 }, 0.0);
+        let at = values.len() - count;
+        if first {
+            block.sum::<F, true>(&mut values[at..], samples, factor);
+        } else {
+            block.sum::<F, false>(&mut values[at..], samples, factor);
+        }
+    }
+
+    /// The derivatives that a block has summed up, out of it.
     #[inline(always)]
     pub fn take(&mut self, output: usize, block: &mut Block<T>) {
         let count = std::mem::take(&mut block.count);
-        self.values[output].extend_from_slice(&block.values[..count]);
         self.slopes[output].extend_from_slice(&block.slopes[..count]);
     }
 
@@ -107,45 +127,31 @@ impl Picked {
     }
 }
 
-/// Values with derivatives of one output over the samples of a block, while its terms are summed up.
+/// Derivatives of one output over the samples of a block, while its terms are summed up.
 #[derive(Clone, Debug)]
 pub(super) struct Block<T: Real> {
     /// Number of samples; none before the first term.
     count: usize,
-    values: [f64; BLOCK],
     slopes: Vec<T::Slopes>,
 }
 
 impl<T: Real> Block<T> {
     /// Without terms.
     pub fn new() -> Self {
-        Self { count: 0, values: [0.0; BLOCK], slopes: vec![T::zero_().slopes(); BLOCK] }
+        Self { count: 0, slopes: vec![T::zero_().slopes(); BLOCK] }
     }
 
-    /// Add a multiple of the picked ones of samples.
-    #[inline(always)]
-    pub fn add<const F: bool>(
-        &mut self,
-        (samples, picked): (impl Iterator<Item: Borrow<T>>, Picked),
-        factor: T,
-    ) {
-        if self.count == 0 {
-            self.sum::<F, true>((samples, picked), factor);
-        } else {
-            self.sum::<F, false>((samples, picked), factor);
-        }
-        self.count = picked.count();
-    }
-
-    /// The same; `FIRST` where there is nothing yet.
+    /// Add a multiple of the picked ones of samples to the derivatives and to `values`; `FIRST` where there is
+    /// nothing yet.
     #[inline(always)]
     fn sum<const F: bool, const FIRST: bool>(
         &mut self,
+        values: &mut [f64],
         (mut samples, mut picked): (impl Iterator<Item: Borrow<T>>, Picked),
         factor: T,
     ) {
         if !T::DERIVATIVES && picked.are_all() {
-            for (value, sample) in self.values[..picked.count()].iter_mut().zip(samples) {
+            for (value, sample) in values.iter_mut().zip(samples) {
                 let term = sample.borrow().re() * factor.re();
                 *value = if FIRST { term } else { *value + term };
             }
@@ -156,7 +162,7 @@ impl<T: Real> Block<T> {
         // gather what is a vector already.
         while let Some(sample) = picked.gap().and_then(|gap| samples.nth(gap)) {
             let (sample, slopes) = (sample.borrow(), &mut self.slopes[at]);
-            let (value, sum) = (&mut self.values[at], T::sloped(*slopes));
+            let (value, sum) = (&mut values[at], T::sloped(*slopes));
             *value = sample.re() * factor.re() + if FIRST { 0.0 } else { *value };
             *slopes = sample.fma::<F>(factor, if FIRST { T::zero_() } else { sum }).slopes();
             at += 1;
@@ -177,8 +183,8 @@ mod tests {
         recorded.push(0, numbers[0]);
         recorded.push(0, numbers[1]);
         let mut block = Block::new();
-        block.add::<false>((numbers.iter(), picked), Dual::of(-2.0));
-        block.add::<false>((ones.iter(), picked), Dual::new(0.0, [0.0, 10.0]));
+        recorded.add::<false>((1, &mut block), (numbers.iter(), picked), Dual::of(-2.0));
+        recorded.add::<false>((1, &mut block), (ones.iter(), picked), Dual::new(0.0, [0.0, 10.0]));
         recorded.take(1, &mut block);
         let (values, slopes) = recorded.finish();
         assert_eq!((&values[0][..2], &values[1][..2]), (&[5.0, 7.0][..], &[-10.0, -14.0][..]));
@@ -192,7 +198,7 @@ mod tests {
         let numbers = [1.0, 2.0, 3.0, 4.0].map(|re| Dual::new(re, [10.0 * re]));
         let picked = Picked::of(&[0.1, 0.3, 0.9], &[0.0, 0.1, 0.2, 0.3]);
         let (mut recorded, mut block) = (Recorded::new(1, 2), Block::new());
-        block.add::<false>((numbers.iter(), picked), Dual::of(1.0));
+        recorded.add::<false>((0, &mut block), (numbers.iter(), picked), Dual::of(1.0));
         recorded.take(0, &mut block);
         assert_eq!(recorded.finish(), (vec![vec![2.0, 4.0]], vec![vec![[20.0], [40.0]]]));
     }

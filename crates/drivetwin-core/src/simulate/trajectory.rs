@@ -230,7 +230,7 @@ impl<T: Real> Task for Passed<'_, '_, T> {
         for (output, column) in self.columns.iter().enumerate() {
             let from = self.recorded.length(output);
             for &(position, factor) in &*passing_terms(column, &self.run.regime) {
-                self.add_to_block::<F>(position, factor);
+                self.add::<F>(output, position, factor);
             }
             self.recorded.take(output, self.block);
             self.recorded.fill(output, from + count);
@@ -239,21 +239,26 @@ impl<T: Real> Task for Passed<'_, '_, T> {
 }
 
 impl<T: Real> Passed<'_, '_, T> {
-    /// Add a multiple of an entry of the basis to the block.
+    /// Add a multiple of an entry of the basis to an output.
     #[inline(always)]
-    fn add_to_block<const F: bool>(&mut self, position: usize, factor: T) {
-        let (block, picked) = (&mut *self.block, self.picked);
+    fn add<const F: bool>(&mut self, output: usize, position: usize, factor: T) {
+        let (recorded, picked) = (&mut *self.recorded, self.picked);
+        let to = (output, &mut *self.block);
         match Entry::at(position, self.run.regime.network, self.active) {
-            Entry::State(i) => block.add::<F>((self.samples.states[i].iter(), picked), factor),
+            Entry::State(i) => {
+                recorded.add::<F>(to, (self.samples.states[i].iter(), picked), factor);
+            }
             Entry::Input(i) => {
                 let input = |k| self.run.input_at(self.first + k, i);
-                block.add::<F>(((0..picked.span()).map(input), picked), factor);
+                recorded.add::<F>(to, ((0..picked.span()).map(input), picked), factor);
             }
-            Entry::One => block.add::<F>((std::iter::repeat(T::of(1.0)), picked), factor),
+            Entry::One => recorded.add::<F>(to, (std::iter::repeat(T::of(1.0)), picked), factor),
             Entry::Torque(slot) => {
-                block.add::<F>((self.samples.torques[slot].iter(), picked), factor);
+                recorded.add::<F>(to, (self.samples.torques[slot].iter(), picked), factor);
             }
-            Entry::Nothing => block.add::<F>((std::iter::repeat(T::zero_()), picked), factor),
+            Entry::Nothing => {
+                recorded.add::<F>(to, (std::iter::repeat(T::zero_()), picked), factor);
+            }
         }
     }
 }
