@@ -25,23 +25,24 @@ pub struct Line<L> {
     pub offset: L,
 }
 
-/// `τ = N(u) · μ(m)`, `μ(m) = c0 + c1 m + c2 m² + excess · exp(-rate m)` over `m = sign · s` between `from`
-/// and `to`: a friction torque over the slip, or `c2 · s|s|` with N = 1. The channel is `φ = sign · τ`.
+/// `τ = N(u) · μ(m)`, `μ(m) = c0 + c1 m + c2 m² + excess · e^-m` over `m = sign · unit · s` between `from`
+/// and `to`: a friction torque over the slip, counted in Stribeck speeds, or `c2 · s|s|` with N = 1. The
+/// channel is `φ = sign · τ`.
 #[derive(Clone, Copy, Debug)]
 pub struct Law<L> {
     /// Direction of motion.
     pub sign: L,
+    /// What the argument counts per rad/s, s/rad.
+    pub unit: L,
     /// N over its input.
     pub normal: Line<L>,
     /// Coefficients of μ, the highest last.
     pub polynomial: [L; 3],
     /// Stiction above the polynomial at rest.
     pub excess: L,
-    /// Its decay over the slip, s/rad.
-    pub rate: L,
-    /// Least `m` of this branch, rad/s.
+    /// Least `m` of this branch.
     pub from: L,
-    /// Largest `m` of this branch, rad/s.
+    /// Largest `m` of this branch.
     pub to: L,
 }
 
@@ -60,16 +61,19 @@ pub struct Value<L> {
     pub mixed: L,
 }
 
+/// Unit of an argument without stiction: nothing is far in it.
+const COARSE: f64 = 1.0 / 1024.0;
+
 impl<L: Lane> Law<L> {
     /// No torque, whatever the argument.
     pub fn idle() -> Self {
         let zero = L::all(0.0);
         Self {
             sign: L::all(1.0),
+            unit: L::all(COARSE),
             normal: Line { input: 0, gain: zero, offset: zero },
             polynomial: [zero; 3],
             excess: zero,
-            rate: zero,
             from: L::all(f64::NEG_INFINITY),
             to: L::all(f64::INFINITY),
         }
@@ -85,22 +89,23 @@ impl<T: Number> Law<T> {
         let plain = Self { sign: T::of(sign), normal, from: zero, ..Self::idle() };
         match &channel.law {
             channel::Law::Quadratic(coefficient) => {
-                Some(Self { polynomial: [zero, zero, *coefficient], ..plain })
+                Some(Self { polynomial: [zero, zero, *coefficient * COARSE.powi(-2)], ..plain })
             }
             channel::Law::Friction { mu, normal, .. } => {
                 let plain = Self { normal: line_of(normal), ..plain };
                 Some(match mu {
                     FrictionLaw::Stribeck(law) => Self {
-                        polynomial: [law.mu_c, law.mu_v, zero],
+                        unit: law.v_s.recip(),
+                        polynomial: [law.mu_c, law.mu_v * law.v_s, zero],
                         excess: law.mu_s - law.mu_c,
-                        rate: law.v_s.recip(),
                         ..plain
                     },
                     FrictionLaw::Table(table) => {
                         let (piece, (from, to)) = table.piece(piece);
                         let level = piece.value - piece.slope * piece.from;
-                        let polynomial = [level, piece.slope, zero];
-                        Self { polynomial, from: T::of(from), to: T::of(to), ..plain }
+                        let polynomial = [level, piece.slope * COARSE.recip(), zero];
+                        let [from, to] = [from, to].map(|end| T::of(end * COARSE));
+                        Self { polynomial, from, to, ..plain }
                     }
                 })
             }
@@ -121,20 +126,19 @@ impl<L: Lane> Law<L> {
     /// What stiction adds to μ.
     #[inline(always)]
     pub fn stiction<const F: bool>(&self, m: L) -> L {
-        self.excess * (-(self.rate * m)).exponential::<F>()
+        self.excess * (-m).exponential::<F>()
     }
 
     /// μ and its derivatives at argument `m`.
     #[inline(always)]
     pub fn about<const F: bool>(&self, m: L, stiction: L) -> Friction<L> {
         let [c0, c1, c2] = self.polynomial;
-        let faded = self.rate * stiction;
-        let bend = self.rate.times(0.5) * faded;
+        let line = c2.fma::<F>(m, c1);
         Friction {
-            mu: c2.fma::<F>(m, c1).fma::<F>(m, c0) + stiction,
-            slope: (c2 + c2).fma::<F>(m, c1) - faded,
-            bend: c2 + bend,
-            cubic: self.rate.times(-1.0 / 3.0) * bend,
+            mu: line.fma::<F>(m, c0) + stiction,
+            slope: c2.fma::<F>(m, line) - stiction,
+            bend: stiction.fma_times::<F>(0.5, c2),
+            cubic: stiction.times(-1.0 / 6.0),
         }
     }
 }

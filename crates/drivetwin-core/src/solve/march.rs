@@ -153,13 +153,13 @@ pub fn march<
     op: &Operators<L, N>,
     (source, h): (&S, f64),
     (first, count): (usize, usize),
-    (state, carry, guards): (&mut [L; N], &mut [Carry<L>; A], &mut Guards<L::Values>),
+    (state, carried, guards): (&mut [L; N], &mut [Carry<L>; A], &mut Guards<L::Values>),
     (trail, at, live): (&mut Trail<L, N>, usize, u32),
 ) -> (usize, u32) {
     let mut room = room();
     let mut ends = [[<S::Input as Lane>::Values::all(0.0); W]; MAX_INPUTS];
     // Of its own, for the processor's registers.
-    let mut x = *state;
+    let (mut x, mut carry) = (*state, *carried);
     let mut outcome = (count, 0);
     // A loop: the body of `all` would be compiled apart, for the least of all processors.
     let mut loaded = true;
@@ -167,18 +167,18 @@ pub fn march<
         loaded &= load.stays_positive::<F>(source.bounds(load.input, (first, count)));
     }
     let looks = !loaded || !op.watched.is_empty();
-    trail.put(op, at, (&x, carry));
+    trail.put(op, at, (&x, &carry));
     'samples: for from in (0..count).step_by(W) {
         let some = W.min(count - from);
         let mut fallen = [L::Values::all(0.0); W];
         for (k, fallen) in fallen.iter_mut().enumerate().take(some) {
             let u = source.read(first + from + k, &mut room);
             if S::Input::DERIVATIVES {
-                *carry = Carry::start::<F, N, A, _>(op, u, &x);
-                trail.put(op, at + from + k, (&x, carry));
+                carry = Carry::start::<F, N, A, _>(op, u, &x);
+                trail.put(op, at + from + k, (&x, &carry));
             }
-            *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, carry));
-            trail.put(op, at + from + k + 1, (&x, carry));
+            *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, &mut carry));
+            trail.put(op, at + from + k + 1, (&x, &carry));
             if looks {
                 for (ends, [start, rate]) in ends.iter_mut().zip(u) {
                     ends[k] = rate.values().times(h) + start.values();
@@ -194,7 +194,7 @@ pub fn march<
             }
         }
     }
-    *state = x;
+    (*state, *carried) = (x, carry);
     // What has grown beyond all bounds is left to the expansion, which says so.
     let sum = x.iter().fold(L::Values::all(0.0), |sum, x| x.values().magnitude() + sum);
     match (outcome.1, sum.unbounded() & live) {

@@ -4,7 +4,7 @@
 //! In one mode `x' = A x + B u + c + E φ`. Over a sample the inputs are linear and a channel φ is a
 //! cubic, the sum of [`SHAPES`] with the coefficients a, so that the state at the end, the argument of
 //! every channel there and its rate are linear in x, u, u', a. Channels count in their direction of
-//! motion: `τ = sign · φ` over `m = sign · s`.
+//! motion: `τ = sign · φ` over `m = sign · unit · s`.
 
 use super::integrals::{apply, dot, integrals, moments, unrolled};
 use super::lanes::{Task, dispatch};
@@ -89,7 +89,7 @@ pub struct Form<L, const N: usize> {
 pub struct Carried<L, const N: usize> {
     /// Response of the state at the end to the coefficients of the cubic.
     pub moments: [[L; N]; SHAPES],
-    /// Argument `m = sign · s` at any instant, over the state.
+    /// Argument `m` at any instant, over the state.
     pub argument: [L; N],
     /// Argument at the end.
     pub argument_end: StepForm<L, N>,
@@ -259,7 +259,7 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
         for (slot, &j) in active.iter().enumerate() {
             let mut argument = [T::zero_(); N];
             for (to, &c) in argument.iter_mut().zip(&network.channels[j].arguments[0]) {
-                *to = c * laws[slot].sign;
+                *to = c * laws[slot].sign * laws[slot].unit;
             }
             let responses = &responses[..active.len()];
             let carried = (argument, laws[slot], h);

@@ -9,7 +9,7 @@ use crate::number::{Factor, Lane, SMALL, Values};
 
 /// Largest cubic part of a channel over a sample, relative to the largest of all.
 const MAX_CUBIC: f64 = 2e-4;
-/// Largest distance over which stiction is moved by its series, relative to its decay.
+/// Largest distance over which stiction is moved by its series.
 const MAX_MOVE: f64 = 0.05;
 /// Largest change of a channel by the correction, likewise.
 const MAX_CORRECTION: f64 = 1e-6;
@@ -65,7 +65,7 @@ pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize
     sampling.know::<F, U>(op, channels, (sample, h), x);
     let about = sampling.foresee::<F>(channels, carry);
     sampling.predict::<F>(op, channels, (carry, &about));
-    sampling.correct::<F>(op, channels, carry);
+    sampling.correct::<F>(channels, carry);
     *x = sampling.end;
     sampling.guard
 }
@@ -152,7 +152,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             }
             about[a] = [carry[a].near, carry[a].stiction];
             carry[a].near = turn.fma_times::<F>(4.0, rate + rate + carry[a].argument);
-            let decay = (about[a][0] - carry[a].near) * channels[a].law.rate;
+            let decay = about[a][0] - carry[a].near;
             farthest = farthest.larger(decay.values().magnitude());
             faded[a] = carry[a].stiction.grown::<F>(decay);
         }
@@ -177,7 +177,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         channels: &[Carried<L, N>; A],
         (carry, about): (&mut [Carry<L>; A], &[[L; 2]; A]),
     ) {
-        add_moments::<L, F, N, A, 0, START>(op, &self.cubics, &mut self.end);
+        add_moments::<L, F, N, A, 0, START>(channels, &self.cubics, &mut self.end);
         for a in 0..A {
             let Carried { argument, argument_end, rate, law, .. } = &channels[a];
             let [near, stiction] = about[a];
@@ -197,20 +197,14 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             self.argument[a] = near + distance;
             let friction = law.about::<F>(near, stiction);
             carry[a].value = friction.at::<F>(distance, normal);
-            let moved = law.rate * distance;
-            let guard = L::Values::all(MAX_MOVE) - moved.values().magnitude();
+            let guard = L::Values::all(MAX_MOVE) - distance.values().magnitude();
             self.guard = self.guard.negative_with(guard);
         }
     }
 
     /// The cubics through the predicted end, the end they lead to, and the channels there.
     #[inline(always)]
-    fn correct<const F: bool>(
-        &mut self,
-        op: &Operators<L, N>,
-        channels: &[Carried<L, N>; A],
-        carry: &mut [Carry<L>; A],
-    ) {
+    fn correct<const F: bool>(&mut self, channels: &[Carried<L, N>; A], carry: &mut [Carry<L>; A]) {
         let mut missing = [[L::all(0.0); END]; A];
         for a in 0..A {
             let (v, [a0, a1, a2]) = (&carry[a].value, self.cubics[a]);
@@ -220,7 +214,7 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let value = v.value - (a0 + a1 + a2);
             missing[a] = [value, v.by_argument.fma::<F>(rate, drift - (a1 + a2 + a2))];
         }
-        add_moments::<L, F, N, A, START, END>(op, &missing, &mut self.end);
+        add_moments::<L, F, N, A, START, END>(channels, &missing, &mut self.end);
         let size = self.size + L::Values::all(1.0);
         let mut early = [L::Values::all(0.0); A];
         for a in 0..A {
@@ -302,14 +296,14 @@ fn add_moments<
     const FROM: usize,
     const COUNT: usize,
 >(
-    op: &Operators<L, N>,
+    channels: &[Carried<L, N>; A],
     cubics: &[[L; COUNT]; A],
     end: &mut [L; N],
 ) {
     for k in 0..COUNT {
         for a in 0..A {
             for i in 0..N {
-                end[i] = op.channels[a].moments[FROM + k][i].fma::<F>(cubics[a][k], end[i]);
+                end[i] = channels[a].moments[FROM + k][i].fma::<F>(cubics[a][k], end[i]);
             }
         }
     }
