@@ -90,6 +90,9 @@ impl Task for Passed<'_, '_, '_, '_> {
         let numbers = stretch.first..stretch.first + stretch.count;
         let block = &mut block[..stretch.count];
         let points = &points[numbers.clone()];
+        if points.iter().all(|&point| point == NO_POINT) {
+            return;
+        }
         for (output, column) in columns.iter().enumerate() {
             let mut begun = false;
             for &(position, factor) in &*passing_terms(column, regime) {

@@ -9,8 +9,11 @@ use super::start::State;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::{Number, Real, together};
-use crate::solve::{Event, EventKind, Inputs, Known, Lanes, Status, WIDTH, bits, run_together};
+use crate::solve::{
+    Event, EventKind, Inputs, Known, Lanes, NO_POINT, Status, WIDTH, bits, run_together,
+};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// What is kept of every run.
 #[derive(Clone, Copy, Debug)]
@@ -236,16 +239,16 @@ impl Work<'_> {
         let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &self.plan(run).inputs).collect();
         let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
         let (known, how) = (Known::of(&network), (plan.settings, alike & !parting));
-        let columns = plan.targets.len() * plan.grid.len();
+        let (points, count) = self.keep.recorded(points, plan.grid.len());
+        let columns = plan.targets.len() * count;
         let mut spare = Vec::new();
-        let values: Vec<&mut [f64]> = match self.keep {
-            Keep::Columns => group.iter_mut().map(|job| &mut *job.values).collect(),
-            _ => {
-                spare.resize(runs.len() * columns, 0.0);
-                spare.chunks_exact_mut(columns.max(1)).collect()
-            }
+        let values: Vec<&mut [f64]> = if let Keep::Misfit(_) = self.keep {
+            spare.resize(runs.len() * columns, 0.0);
+            spare.chunks_exact_mut(columns.max(1)).collect()
+        } else {
+            group.iter_mut().map(|job| &mut *job.values).collect()
         };
-        let shared = (all, (points, plan.grid.len()));
+        let shared = (all, (&*points, count));
         let mut recorder = abreast::Recorder::new(&network, &plan.targets, shared, values);
         let events = run_together(known, &inputs, how, (x, &locked), &mut recorder);
         for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
@@ -264,6 +267,17 @@ impl Keep<'_> {
         match self {
             Self::Columns => outputs * points,
             Self::Last | Self::Misfit(_) => outputs,
+        }
+    }
+
+    /// The points of a grid that have to be recorded, as at every knot, and their number.
+    fn recorded(self, points: &[usize], count: usize) -> (Cow<'_, [usize]>, usize) {
+        match self {
+            Self::Columns | Self::Misfit(_) => (Cow::Borrowed(points), count),
+            Self::Last => {
+                let only = |&point: &usize| if point == count - 1 { 0 } else { NO_POINT };
+                (points.iter().map(only).collect(), 1)
+            }
         }
     }
 
