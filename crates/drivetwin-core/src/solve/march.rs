@@ -170,7 +170,7 @@ pub fn march<
     trail.put(op, at, (&x, &carry));
     'samples: for from in (0..count).step_by(W) {
         let some = W.min(count - from);
-        let mut fallen = [L::Values::all(0.0); W];
+        let (mut fallen, mut left) = ([L::Values::all(0.0); W], [L::Values::all(0.0); W]);
         for (k, fallen) in fallen.iter_mut().enumerate().take(some) {
             let u = source.read(first + from + k, &mut room);
             if S::Input::DERIVATIVES {
@@ -179,13 +179,19 @@ pub fn march<
             }
             *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, &mut carry));
             trail.put(op, at + from + k + 1, (&x, &carry));
-            if looks {
-                for (ends, [start, rate]) in ends.iter_mut().zip(u) {
-                    ends[k] = rate.values().times(h) + start.values();
+            let end = |[start, rate]: [S::Input; 2]| rate.values().times(h) + start.values();
+            if W == 1 {
+                left[k] = op.leaves::<_, F, A>(guards, (|i| end(u[i]), !loaded), (&x, &carry));
+            } else if looks {
+                for (ends, &line) in ends.iter_mut().zip(u) {
+                    ends[k] = end(line);
                 }
             }
         }
-        let left = op.left::<_, F, A, W>(guards, (&ends, !loaded), (trail, at + from, some));
+        if W > 1 {
+            let to = (&*trail, at + from, some);
+            left = op.left::<_, F, A, W>(guards, (&ends, !loaded), to);
+        }
         for k in 0..some {
             let fallen = fallen[k].negative_with(left[k]);
             if fallen.any_negative() && fallen.negative() & live != 0 {
@@ -204,10 +210,32 @@ pub fn march<
 }
 
 impl<L: Lane, const N: usize> Operators<L, N> {
-    /// Negative where a watched form may leave its limits within one of `some` samples, or a normal load
-    /// falls at its end where `loads` are looked at; `guards` are moved on to the last of them.
+    /// Negative where a watched form may leave its limits within the sample that ends with these inputs,
+    /// states and channels, or a normal load falls there where `loads` are looked at; `guards` are moved on.
     ///
     /// Apart from what falls in the step: sums over a loop that start from nothing stay in vectors.
+    #[inline(always)]
+    fn leaves<V: Factor<L::Values>, const F: bool, const A: usize>(
+        &self,
+        guards: &mut Guards<L::Values>,
+        (input, loads): (impl Fn(usize) -> V, bool),
+        at: (&[L; N], &[Carry<L>; A]),
+    ) -> L::Values {
+        let mut left = [L::Values::all(0.0)];
+        for (place, before) in guards.iter_mut().enumerate().take(self.watched.len()) {
+            let after = self.guard::<V, F, A>(place, &input, at);
+            self.falls(place, (before, &after.map(|value| [value])), &mut left);
+            *before = after;
+        }
+        if loads {
+            for load in &self.loads {
+                load.falls::<_, F, 1>(&[input(load.input)], &mut left);
+            }
+        }
+        left[0]
+    }
+
+    /// The same of `some` samples together, by what the trail has of them.
     #[inline(always)]
     fn left<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
         &self,
@@ -238,24 +266,23 @@ impl<L: Lane, const N: usize> Operators<L, N> {
     ) -> Guards<L::Values> {
         let mut guards = idle_guards();
         for (place, guard) in guards.iter_mut().enumerate().take(self.watched.len()) {
-            *guard = self.guard::<U, F, A>(place, sample, at);
+            *guard = self.guard::<_, F, A>(place, |input| sample[input][0].values(), at);
         }
         guards
     }
 
-    /// Limit and value of a watched form at the start of a segment.
+    /// Limit and value of a watched form at one instant, by the values of inputs there.
     #[inline(always)]
-    fn guard<U: Factor<L, Values: Factor<L::Values>>, const F: bool, const A: usize>(
+    fn guard<V: Factor<L::Values>, const F: bool, const A: usize>(
         &self,
         place: usize,
-        sample: &Sample<U>,
+        input: impl Fn(usize) -> V,
         (x, carry): (&[L; N], &[Carry<L>; A]),
     ) -> [L::Values; 2] {
         let Watched { form, limit, .. } = &self.watched[place];
         let mut torque = form.constant.values();
         for drive in &self.drives {
-            let u = sample[drive.input][0].values();
-            torque = u.onto::<F>(drive.watched[place].values(), torque);
+            torque = input(drive.input).onto::<F>(drive.watched[place].values(), torque);
         }
         for i in 0..self.columns() {
             torque = form.state[i].values().fma::<F>(x[i].values(), torque);
@@ -264,7 +291,7 @@ impl<L: Lane, const N: usize> Operators<L, N> {
             let carried = self.channels[a].torque(&carry[a]).values();
             torque = form.channels[a].values().fma::<F>(carried, torque);
         }
-        [limit.start::<F, U>(sample).values(), torque]
+        [input(limit.input).onto::<F>(limit.gain.values(), limit.offset.values()), torque]
     }
 
     /// The same at the end of `W` samples from `from` on.
