@@ -145,9 +145,11 @@ fn add(
     samples: impl Iterator<Item: Borrow<Lanes>>,
     (factor, begun): (Lanes, bool),
 ) {
-    for (sum, sample) in block.iter_mut().zip(samples) {
-        // Hidden, the compiler does not take several samples at once, and gather what is a vector already.
-        let term = *black_box(sample.borrow()) * factor;
-        *sum = if begun { *sum + term } else { term };
+    // Hidden, the compiler does not take several samples at once, and gather what is a vector already.
+    let pairs = block.iter_mut().zip(samples);
+    if begun {
+        pairs.for_each(|(sum, sample)| *sum = *sum + *black_box(sample.borrow()) * factor);
+    } else {
+        pairs.for_each(|(sum, sample)| *sum = *black_box(sample.borrow()) * factor);
     }
 }
