@@ -21,8 +21,6 @@ pub(super) struct Assignment {
 
 /// What counts as zero in a sum, relative to the size of its terms.
 const ROUND_OFF: f64 = 1e-10;
-/// Part of their torques that elements must have left up to their bounds where a split is to last.
-const ROOM: f64 = 1e-6;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
 const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
 /// How far ahead a decision looks, s.
@@ -48,9 +46,6 @@ impl<T: Number> Regime<'_, T> {
     pub(super) fn decide(&mut self, overloaded: Option<(Row, f64)>) -> Result<(), Status> {
         self.look_ahead();
         let candidates = self.at_zero_speed();
-        if overloaded.is_some() && self.share_anew(&candidates)? {
-            return Ok(());
-        }
         let mut trial = self.assignment();
         for &row in &candidates {
             // An overload asks for more: what is at its capacity already stays there.
@@ -59,14 +54,18 @@ impl<T: Number> Regime<'_, T> {
             }
         }
         if let Some((row, sign)) = overloaded {
-            self.give_way(&mut trial, row, sign);
+            self.give_way(&mut trial, (row, sign), &candidates);
         }
         let mut visited: Vec<Assignment> = Vec::new();
         loop {
             let mode = self.mode(self.key_of(&trial))?;
             let basis = self.basis_now(&trial, &candidates);
             let Some(fault) = self.fault(&trial, &candidates, (&mode, &basis)) else {
-                self.adopt(trial, &candidates, mode);
+                if !self.lets_go(&trial, &candidates)
+                    || self.decide_exhaustively(&candidates).is_err()
+                {
+                    self.adopt(trial, &candidates, mode);
+                }
                 return Ok(());
             };
             if visited.contains(&trial) || visited.len() > MAX_TRIALS {
@@ -74,51 +73,22 @@ impl<T: Number> Regime<'_, T> {
             }
             visited.push(trial.clone());
             match fault {
-                Fault::Overloaded(row, sign) => self.give_way(&mut trial, row, sign),
-                Fault::Returning(row) => trial.rest(row),
+                Fault::Overloaded(row, sign) => {
+                    self.give_way(&mut trial, (row, sign), &candidates);
+                }
+                Fault::Returning(row) => {
+                    trial.rest(row);
+                    self.tell_slipping_from_held(&mut trial, &candidates);
+                }
                 Fault::Reversed(i) => trial.reverse_power(i),
             }
         }
     }
 
-    /// Where elements stay at their capacity while others hold the same speeds: split the torques anew if that
-    /// leaves room to all that hold, and say so. A capacity that has grown since would have these work
-    /// against each other.
-    fn share_anew(&mut self, candidates: &[Row]) -> Result<bool, Status> {
-        if !self.rows.iter().any(RowState::is_saturated) {
-            return Ok(false);
-        }
-        let mut trial = self.assignment();
-        candidates.iter().for_each(|&row| trial.rest(row));
-        for _ in 0..=candidates.len() {
-            let mode = self.mode(self.key_of(&trial))?;
-            let basis = self.basis_now(&trial, candidates);
-            match self.fault(&trial, candidates, (&mode, &basis)) {
-                None if self.has_room(&mode, &basis) => {
-                    self.adopt(trial, candidates, mode);
-                    return Ok(true);
-                }
-                Some(Fault::Overloaded(row @ Row::Friction(_), sign)) => {
-                    self.give_way(&mut trial, row, sign);
-                }
-                _ => return Ok(false),
-            }
-            if candidates.iter().any(|&row| trial.direction(row).is_some()) {
-                return Ok(false);
-            }
-        }
-        Ok(false)
-    }
-
-    /// Whether everything at rest carries less than its bounds allow.
-    fn has_room(&self, mode: &Mode<T>, basis: &[T]) -> bool {
-        let capacities = self.capacities();
-        mode.stuck.iter().enumerate().all(|(i, &row)| {
-            let torque = form(mode.stuck_torque.row(i), basis).re();
-            let (low, high) = self.bounds(row, &capacities, (mode, basis));
-            let room = (torque - low).smaller(high - torque);
-            room.decide_with(torque, |room, torque| room > ROOM * torque.abs())
-        })
+    /// Whether a trial lets something go of elements that hold the same speeds. Torques that have been taken
+    /// to their bounds one by one need not be those with which everything holds.
+    fn lets_go(&self, trial: &Assignment, candidates: &[Row]) -> bool {
+        trial.moving_off(candidates).0 > 0 && self.rank(candidates) < candidates.len()
     }
 
     /// Try every assignment of the candidates in a fixed order, those first in which fewer friction elements
@@ -127,27 +97,12 @@ impl<T: Number> Regime<'_, T> {
         let gears = self.gears.len();
         let choices = 3usize.pow(candidates.len().min(MAX_EXHAUSTIVE) as u32) << gears.min(4);
         let feasible = candidates.len() <= MAX_EXHAUSTIVE && gears <= 4;
-        let places = || candidates.iter().enumerate();
-        let digit = |choice: usize, place: usize| (choice >> gears) / 3usize.pow(place as u32) % 3;
-        let moving = |choice: &usize| {
-            let moves = |&(place, row): &(usize, &Row)| {
-                matches!(row, Row::Friction(_)) && digit(*choice, place) > 0
-            };
-            places().filter(moves).count()
-        };
         let mut all: Vec<usize> = (0..if feasible { choices } else { 0 }).collect();
-        all.sort_by_cached_key(moving);
-        'choices: for choice in all {
-            let mut trial = self.assignment();
-            for (place, &row) in places() {
-                match digit(choice, place) {
-                    1 if self.blocks_forward(row) => continue 'choices,
-                    0 => trial.rest(row),
-                    1 => trial.move_off(row, 1.0),
-                    _ => trial.move_off(row, -1.0),
-                }
-            }
-            (0..gears).filter(|i| choice >> i & 1 == 1).for_each(|i| trial.reverse_power(i));
+        all.sort_by_cached_key(|&choice| {
+            self.choice(choice, candidates).map(|trial| trial.moving_off(candidates))
+        });
+        for choice in all {
+            let Some(trial) = self.choice(choice, candidates) else { continue };
             let Ok(mode) = self.mode(self.key_of(&trial)) else { continue };
             let basis = self.basis_now(&trial, candidates);
             if self.fault(&trial, candidates, (&mode, &basis)).is_none() {
@@ -157,6 +112,25 @@ impl<T: Number> Regime<'_, T> {
         }
         let element = candidates.first().map_or("a gear", |&row| self.network.element_of(row));
         Err(Status::Undecidable { time: self.time(), element: element.to_owned() })
+    }
+
+    /// An assignment by its number: whether power flows back through every lossy gear, and whether every
+    /// candidate rests, moves off forwards or backwards. Nothing where one cannot.
+    fn choice(&self, number: usize, candidates: &[Row]) -> Option<Assignment> {
+        let (mut trial, gears) = (self.assignment(), self.gears.len());
+        let mut digits = number >> gears;
+        for &row in candidates {
+            match digits % 3 {
+                1 if self.blocks_forward(row) => return None,
+                0 => trial.rest(row),
+                1 => trial.move_off(row, 1.0),
+                _ => trial.move_off(row, -1.0),
+            }
+            digits /= 3;
+        }
+        (0..gears).filter(|i| number >> i & 1 == 1).for_each(|i| trial.reverse_power(i));
+        self.tell_slipping_from_held(&mut trial, candidates);
+        Some(trial)
     }
 
     /// Inputs and state a moment from now, as the present mode would have them: where torques and
@@ -352,19 +326,22 @@ impl<T: Number> Regime<'_, T> {
         (sum, scale)
     }
 
-    /// An overloaded row moves off, unless others hold the same speed: then a friction element
-    /// stays at its capacity and they carry the rest. Elements at their capacity slip with the last
-    /// that held.
-    fn give_way(&self, trial: &mut Assignment, row: Row, sign: f64) {
-        match row {
-            Row::Friction(j) => trial.rows[j] = RowState::Saturated { sign },
-            Row::Gear(_) => trial.move_off(row, sign),
-        }
-        for j in 0..trial.rows.len() {
-            if let RowState::Saturated { sign } = trial.rows[j]
-                && !self.held_by_others(trial, Row::Friction(j))
+    /// An overloaded row moves off, or stays at its capacity where others hold its speed.
+    fn give_way(&self, trial: &mut Assignment, (row, sign): (Row, f64), candidates: &[Row]) {
+        trial.move_off(row, sign);
+        self.tell_slipping_from_held(trial, candidates);
+    }
+
+    /// Of the friction elements at zero speed that carry all they can, those slip that nothing at rest
+    /// holds; the others stay at their capacity.
+    fn tell_slipping_from_held(&self, trial: &mut Assignment, candidates: &[Row]) {
+        use RowState::{Saturated, Slipping};
+        for &row in candidates {
+            if let Row::Friction(j) = row
+                && let Slipping { sign } | Saturated { sign } = trial.rows[j]
             {
-                trial.rows[j] = RowState::Slipping { sign };
+                let held = self.held_by_others(trial, row);
+                trial.rows[j] = if held { Saturated { sign } } else { Slipping { sign } };
             }
         }
     }
@@ -372,16 +349,18 @@ impl<T: Number> Regime<'_, T> {
     /// Whether what is at rest keeps a row that is not from moving.
     fn held_by_others(&self, trial: &Assignment, row: Row) -> bool {
         let mut stuck = self.key_of(trial).rows();
-        let rank = |rows: &[Row]| {
-            let mut speeds = Matrix::zeros(rows.len(), self.network.speeds());
-            for (i, &row) in rows.iter().enumerate() {
-                speeds.row_mut(i).copy_from_slice(self.network.slip_of(row));
-            }
-            independent_rows(&speeds).len()
-        };
-        let alone = rank(&stuck);
+        let alone = self.rank(&stuck);
         stuck.push(row);
-        rank(&stuck) == alone
+        self.rank(&stuck) == alone
+    }
+
+    /// Number of independent speeds of rows.
+    fn rank(&self, rows: &[Row]) -> usize {
+        let mut speeds = Matrix::zeros(rows.len(), self.network.speeds());
+        for (i, &row) in rows.iter().enumerate() {
+            speeds.row_mut(i).copy_from_slice(self.network.slip_of(row));
+        }
+        independent_rows(&speeds).len()
     }
 
     /// Make a trial the state of the run.
@@ -436,6 +415,13 @@ impl Assignment {
             Row::Friction(j) => self.rows[j].is_saturated(),
             Row::Gear(i) => matches!(self.gears[i], GearState::Rolling { .. }),
         }
+    }
+
+    /// How many of the friction elements move off, and how many do not rest.
+    fn moving_off(&self, candidates: &[Row]) -> (usize, usize) {
+        let rows = || candidates.iter().filter(|row| matches!(row, Row::Friction(_)));
+        let moving = rows().filter(|&&row| self.direction(row).is_some()).count();
+        (moving, moving + rows().filter(|&&row| self.is_at_capacity(row)).count())
     }
 
     fn reverse_power(&mut self, i: usize) {
