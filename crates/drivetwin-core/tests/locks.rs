@@ -4,9 +4,10 @@
 mod common;
 
 use common::{
-    clutch, compile, constant, gear, grid, inertia, simulate, simulate_by, start, torque,
+    clutch, compile, constant, gear, grid, inertia, shaft, simulate, simulate_by, start, torque,
 };
-use drivetwin_core::model::elements::{Clutch, Element};
+use drivetwin_core::model::elements::{Clutch, Element, Gear, GearLoss};
+use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::simulate::Output;
 use drivetwin_core::solve::{EventKind, Settings, Status};
 
@@ -158,6 +159,35 @@ fn both_elements_hold_at_standstill() {
     // Engine: d + r = 30; vehicle: d + 2 r = 0.
     assert!((run.columns[1][5] - 60.0).abs() < 1e-9);
     assert!((run.columns[2][5] + 30.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_twisted_shaft_between_locked_members_drives_no_power_through_a_lossy_gear() {
+    // Two clutches hold against the shaft; all of it and the gear coast together.
+    let signals = [constant("P A", 60.0, 1.0), constant("P B", 80.0, 1.0)];
+    for i in 1..60 {
+        let (w, i) = (30.0, f64::from(i));
+        let ratio = 3.0 * i.sin();
+        let Element::Gear(plain) = gear("left", "far", ratio) else { unreachable!() };
+        let loss = GearLoss {
+            eta_backward: Some(0.3),
+            ..GearLoss::by_efficiency(LossLaw::Dissipative, 0.8)
+        };
+        let network = compile(vec![
+            inertia("left", 1.1 + i.cos()),
+            inertia("right", 2.4),
+            inertia("far", 0.3),
+            shaft("left", "right", 1950.0, 17.0),
+            Element::Clutch(clutch("A", "right", "left")),
+            Element::Clutch(clutch("B", "right", "left")),
+            Element::Gear(Gear { loss: Some(loss), ..plain }),
+        ]);
+        let mut coasting = start(&[("left", w), ("right", w), ("far", w / ratio)], &["A", "B"]);
+        coasting.twists = vec![("shaft left right".to_owned(), 1e-3 * i)];
+        let run = simulate(&network, &signals, &coasting, &grid(1.0, 11), &[speed("left")]);
+        assert_eq!(run.status, Status::Completed, "case {i}");
+        assert!(run.columns[0].iter().all(|left| (left - w).abs() < 1e-9), "case {i}");
+    }
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub(super) struct Assignment {
 }
 
 /// What counts as zero in a sum, relative to the size of its terms.
-const ROUND_OFF: f64 = 1e-10;
+pub(super) const ROUND_OFF: f64 = 1e-10;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
 const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
 /// How far ahead a decision looks, s.
@@ -309,6 +309,9 @@ impl<T: Number> Regime<'_, T> {
             return false;
         }
         let (torque, scale) = sum_and_scale(mode.gear_torque(self.network).row(i), basis);
+        // Torques that elements at rest balance leave round-off behind, but no term of this sum.
+        let held = (0..mode.stuck.len()).map(|i| form(mode.stuck_torque.row(i), basis).re());
+        let scale = held.fold(scale, |scale, torque| scale + torque.magnitude());
         let excess = torque * sign - loss.threshold().re();
         excess.decide_with(scale, |excess, scale| {
             excess.abs() > ROUND_OFF * scale && (excess < 0.0) != backward

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Guards: polynomials that must stay positive while a mode holds, and the earliest that falls.
 
+use super::decide::ROUND_OFF;
 use super::first_fall::{first_fall, stay_positive};
 use super::regime::{Regime, RowState};
 use crate::network::{Cell, GearState, Row};
@@ -133,7 +134,8 @@ fn gear_guards<T: Number>(
         GearState::Rolling { sign, backward } => {
             let mut power = scaled(&torque, T::of(sign));
             power[0] -= gear.loss.threshold();
-            let power = if backward { scaled(&power, T::of(-1.0)) } else { power };
+            let mut power = if backward { scaled(&power, T::of(-1.0)) } else { power };
+            power[0] += balanced(regime) * ROUND_OFF;
             consider(power, Cause::PowerReversal(i));
             if regime.blocked[i] {
                 return;
@@ -170,6 +172,12 @@ fn holding_torque<T: Number>(regime: &Regime<'_, T>, row: Row) -> Series<T> {
     let position = regime.mode.stuck.iter().position(|&s| s == row);
     let position = position.expect("what is at rest belongs to the mode");
     regime.expansion.form(regime.network, regime.mode.stuck_torque.row(position))
+}
+
+/// Sum of the torques that elements at rest hold [N·m]: what they balance leaves round-off in others.
+fn balanced<T: Number>(regime: &Regime<'_, T>) -> T {
+    let held = regime.mode.stuck.iter().map(|&row| holding_torque(regime, row)[0].re());
+    T::lifted(held.fold(T::Values::zero_(), |sum, torque| sum + torque.magnitude()))
 }
 
 /// Slip in its direction. What is released at this instant starts from exact zero, and where static
