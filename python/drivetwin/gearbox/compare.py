@@ -86,7 +86,7 @@ def whole_gearbox(reduction: Reduction, maneuver: Maneuver) -> WholeGearbox:
     torque, pressures = signals(reduction, maneuver)
     dogs = [name for name in reduction.common if name in gearbox.dogs]
     elements = [*network_elements(gearbox, dogs), *_surroundings(reduction, maneuver)]
-    names = {e["name"] for e in elements if e["type"] == "clutch"}
+    names = [e["name"] for e in elements if e["type"] == "clutch"]
     zero = Signal(torque.time, np.zeros_like(torque.time))
     inputs = {ENGINE_TORQUE: torque} | {name: pressures.get(name, zero) for name in names}
     output, wheel, twist = _start(reduction, maneuver, reduction.M12)

@@ -148,7 +148,7 @@ fn add(
     // Hidden, the compiler does not take several samples at once, and gather what is a vector already.
     let pairs = block.iter_mut().zip(samples);
     if begun {
-        pairs.for_each(|(sum, sample)| *sum = *sum + *black_box(sample.borrow()) * factor);
+        pairs.for_each(|(sum, sample)| *sum += *black_box(sample.borrow()) * factor);
     } else {
         pairs.for_each(|(sum, sample)| *sum = *black_box(sample.borrow()) * factor);
     }

@@ -161,11 +161,7 @@ pub fn march<
     // Of its own, for the processor's registers.
     let (mut x, mut carry) = (*state, *carried);
     let mut outcome = (count, 0);
-    // A loop: the body of `all` would be compiled apart, for the least of all processors.
-    let mut loaded = true;
-    for load in &op.loads {
-        loaded &= load.stays_positive::<F>(source.bounds(load.input, (first, count)));
-    }
+    let loaded = op.stays_loaded::<S, F>(source, (first, count));
     let looks = !loaded || !op.watched.is_empty();
     trail.put(op, at, (&x, &carry));
     'samples: for from in (0..count).step_by(W) {
@@ -183,9 +179,7 @@ pub fn march<
             if W == 1 {
                 left[k] = op.leaves::<_, F, A>(guards, (|i| end(u[i]), !loaded), (&x, &carry));
             } else if looks {
-                for (ends, &line) in ends.iter_mut().zip(u) {
-                    ends[k] = end(line);
-                }
+                ends.iter_mut().zip(u).for_each(|(ends, &line)| ends[k] = end(line));
             }
         }
         if W > 1 {
@@ -210,6 +204,21 @@ pub fn march<
 }
 
 impl<L: Lane, const N: usize> Operators<L, N> {
+    /// Whether every normal load stays above zero over samples, in all runs.
+    #[inline(always)]
+    fn stays_loaded<S: Source<L>, const F: bool>(
+        &self,
+        source: &S,
+        samples: (usize, usize),
+    ) -> bool {
+        // A loop: the body of `all` would be compiled apart, for the least of all processors.
+        let mut loaded = true;
+        for load in &self.loads {
+            loaded &= load.stays_positive::<F>(source.bounds(load.input, samples));
+        }
+        loaded
+    }
+
     /// Negative where a watched form may leave its limits within the sample that ends with these inputs,
     /// states and channels, or a normal load falls there where `loads` are looked at; `guards` are moved on.
     ///
