@@ -21,6 +21,8 @@ pub(super) struct Assignment {
 
 /// What counts as zero in a sum, relative to the size of its terms.
 pub(super) const ROUND_OFF: f64 = 1e-10;
+/// Part of their torques that elements must have left up to their bounds where holding is to last.
+const ROOM: f64 = 1e-9;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
 const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
 /// How far ahead a decision looks, s.
@@ -61,15 +63,23 @@ impl<T: Number> Regime<'_, T> {
             let mode = self.mode(self.key_of(&trial))?;
             let basis = self.basis_now(&trial, &candidates);
             let Some(fault) = self.fault(&trial, &candidates, (&mode, &basis)) else {
-                if !self.lets_go(&trial, &candidates)
-                    || self.decide_exhaustively(&candidates).is_err()
+                let moving = trial.moving_off(&candidates).0;
+                if moving == 0
+                    || self.rank(&candidates) == candidates.len()
+                    || !self.decide_exhaustively(&candidates, Some(moving))
                 {
                     self.adopt(trial, &candidates, mode);
                 }
                 return Ok(());
             };
             if visited.contains(&trial) || visited.len() > MAX_TRIALS {
-                return self.decide_exhaustively(&candidates);
+                if self.decide_exhaustively(&candidates, None) {
+                    return Ok(());
+                }
+                let element = candidates.first();
+                let element = element.map_or("a gear", |&row| self.network.element_of(row));
+                let element = element.to_owned();
+                return Err(Status::Undecidable { time: self.time(), element });
             }
             visited.push(trial.clone());
             match fault {
@@ -85,15 +95,12 @@ impl<T: Number> Regime<'_, T> {
         }
     }
 
-    /// Whether a trial lets something go of elements that hold the same speeds. Torques that have been taken
-    /// to their bounds one by one need not be those with which everything holds.
-    fn lets_go(&self, trial: &Assignment, candidates: &[Row]) -> bool {
-        trial.moving_off(candidates).0 > 0 && self.rank(candidates) < candidates.len()
-    }
-
     /// Try every assignment of the candidates in a fixed order, those first in which fewer friction elements
-    /// move off: what can hold holds. The first without fault it is.
-    fn decide_exhaustively(&mut self, candidates: &[Row]) -> Result<(), Status> {
+    /// move off: what can hold holds. Adopts the first without fault, if there is one.
+    ///
+    /// Torques that have been taken to their bounds one by one need not be those with which everything
+    /// holds: with `moving`, only assignments count that let fewer than so many go, and that last.
+    fn decide_exhaustively(&mut self, candidates: &[Row], moving: Option<usize>) -> bool {
         let gears = self.gears.len();
         let choices = 3usize.pow(candidates.len().min(MAX_EXHAUSTIVE) as u32) << gears.min(4);
         let feasible = candidates.len() <= MAX_EXHAUSTIVE && gears <= 4;
@@ -103,15 +110,29 @@ impl<T: Number> Regime<'_, T> {
         });
         for choice in all {
             let Some(trial) = self.choice(choice, candidates) else { continue };
+            if moving.is_some_and(|most| trial.moving_off(candidates).0 >= most) {
+                break;
+            }
             let Ok(mode) = self.mode(self.key_of(&trial)) else { continue };
             let basis = self.basis_now(&trial, candidates);
-            if self.fault(&trial, candidates, (&mode, &basis)).is_none() {
+            let lasts = |regime: &Self| moving.is_none() || regime.has_room(&mode, &basis);
+            if self.fault(&trial, candidates, (&mode, &basis)).is_none() && lasts(self) {
                 self.adopt(trial, candidates, mode);
-                return Ok(());
+                return true;
             }
         }
-        let element = candidates.first().map_or("a gear", |&row| self.network.element_of(row));
-        Err(Status::Undecidable { time: self.time(), element: element.to_owned() })
+        false
+    }
+
+    /// Whether everything at rest carries less than its bounds allow.
+    fn has_room(&self, mode: &Mode<T>, basis: &[T]) -> bool {
+        let capacities = self.capacities();
+        mode.stuck.iter().enumerate().all(|(i, &row)| {
+            let torque = form(mode.stuck_torque.row(i), basis).re();
+            let (low, high) = self.bounds(row, &capacities, (mode, basis));
+            let room = (torque - low).smaller(high - torque);
+            room.decide_with(torque, |room, torque| room > ROOM * torque.abs())
+        })
     }
 
     /// An assignment by its number: whether power flows back through every lossy gear, and whether every
