@@ -21,6 +21,8 @@ pub(super) struct Assignment {
 
 /// What counts as zero in a sum, relative to the size of its terms.
 pub(super) const ROUND_OFF: f64 = 1e-10;
+/// Excess over a bound that is round-off, relative to the terms of all torques that are held.
+const NOTHING: f64 = 1e-14;
 /// Part of their torques that elements must have left up to their bounds where holding is to last.
 const ROOM: f64 = 1e-9;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
@@ -263,9 +265,12 @@ impl<T: Number> Regime<'_, T> {
     /// The row at rest that exceeds its bounds most, relative to their size.
     fn overload(&self, mode: &Mode<T>, basis: &[T]) -> Option<Fault> {
         let capacities = self.capacities();
+        let rows = || (0..mode.stuck.len()).map(|i| mode.stuck_torque.row(i));
+        let sizes = rows().map(|row| sum_and_scale(row, basis).1);
+        let nothing = sizes.fold(T::Values::zero_(), |sum, size| sum + size) * NOTHING;
         let mut worst: Option<(T::Values, Fault)> = None;
-        for (i, &row) in mode.stuck.iter().enumerate() {
-            let torque = form(mode.stuck_torque.row(i), basis).re();
+        for (&row, terms) in mode.stuck.iter().zip(rows()) {
+            let torque = form(terms, basis).re();
             let (low, high) = self.bounds(row, &capacities, (mode, basis));
             let above = torque.decide_with(high, |torque, high| torque > high);
             let (excess, size, sign) = if above {
@@ -276,7 +281,9 @@ impl<T: Number> Regime<'_, T> {
             let size = size.larger(torque.magnitude() * 1e-9).larger(T::Values::of(1e-12));
             let relative = excess / size;
             let least = worst.as_ref().map_or(T::Values::of(1e-12), |worst| worst.0);
-            if relative.decide_with(least, |relative, least| relative > least.max(1e-12)) {
+            let counts = excess.decide_with(nothing, |excess, nothing| excess > nothing);
+            if counts && relative.decide_with(least, |relative, least| relative > least.max(1e-12))
+            {
                 worst = Some((relative, Fault::Overloaded(row, sign)));
             }
             if worst.is_none() && !self.network.prescribed.is_empty() {
