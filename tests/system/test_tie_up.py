@@ -111,6 +111,20 @@ def test_a_tied_up_gearbox_holds_up_to_its_limit_load(name: str, seed: int) -> N
     assert np.abs(moved[:, -1]).max() > 1.0
 
 
+@pytest.mark.parametrize("name", BOXES)
+def test_round_numbers_that_make_torques_meet_their_bounds_together_do_no_harm(name: str) -> None:
+    rng, box = np.random.default_rng(2), load_gearbox(name)
+    clutches = [each["name"] for each in elements_of(box) if each["type"] == "clutch"]
+    for case in range(60):
+        levels = rng.choice([5.0, 10.0, 20.0, 200.0], len(clutches))
+        capacities = dict(zip(clutches, map(float, levels), strict=True))
+        way = float(rng.choice([-1.0, 1.0]))
+        run = loaded(box, capacities, 0.0, 2.0 * way * limit_load(box, capacities, 0.0, way))
+        assert run.status == "completed", f"case {case}"
+        first = next(event.time for event in run.events if event.kind == "break_away")
+        assert first == pytest.approx(0.5, abs=1e-6), f"case {case}"
+
+
 def under_any_pressures(name: str, rng: np.random.Generator) -> WholeGearbox:
     """A shift from its start on, with torque and pressures that have nothing to do with it."""
     box = load_gearbox(name)

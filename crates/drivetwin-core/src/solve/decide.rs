@@ -22,7 +22,7 @@ pub(super) struct Assignment {
 /// What counts as zero in a sum, relative to the size of its terms.
 pub(super) const ROUND_OFF: f64 = 1e-10;
 /// Excess over a bound that is round-off, relative to the terms of all torques that are held.
-const NOTHING: f64 = 1e-14;
+pub(super) const NOTHING: f64 = 1e-14;
 /// Part of their torques that elements must have left up to their bounds where holding is to last.
 const ROOM: f64 = 1e-9;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.

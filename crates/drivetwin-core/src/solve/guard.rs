@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Guards: polynomials that must stay positive while a mode holds, and the earliest that falls.
 
-use super::decide::ROUND_OFF;
+use super::decide::{NOTHING, ROUND_OFF};
 use super::first_fall::{first_fall, stay_positive};
 use super::regime::{Regime, RowState};
 use crate::network::{Cell, GearState, Row};
@@ -110,7 +110,8 @@ fn friction_guards<T: Number>(
         RowState::Stuck => {
             let torque = holding_torque(regime, Row::Friction(j));
             let capacity = row.law.at(T::zero_()) * row.peak;
-            let cap = scaled(&normal, if pressed { capacity } else { T::zero_() });
+            let mut cap = scaled(&normal, if pressed { capacity } else { T::zero_() });
+            cap[0] += balanced(regime) * NOTHING;
             consider(combined(&cap, &torque, 1.0), Cause::Overload(Row::Friction(j), -1.0));
             if !row.one_way {
                 consider(combined(&cap, &torque, -1.0), Cause::Overload(Row::Friction(j), 1.0));
