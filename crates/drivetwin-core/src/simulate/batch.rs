@@ -6,6 +6,7 @@ use super::dual_clutch::DualClutchStart;
 use super::run::{Plan, SimulateError};
 use super::sensitivity::SensitivityError;
 use super::start::State;
+use super::threads::on_threads;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::{Number, Real, together};
@@ -67,10 +68,7 @@ pub fn dual_clutch_batch(
     let count = if scenarios.is_empty() { 0 } else { sets.count() };
     let size = plans.first().map_or(0, |plan| keep.size(plan.targets.len(), plan.grid.len()));
     let work = Work { sets, plans, keep };
-    Ok(match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(|| work.result(count, size)),
-        Err(_) => work.result(count, size),
-    })
+    Ok(on_threads(threads, || work.result(count, size)))
 }
 
 /// Refuse names that are no parameters.

@@ -5,6 +5,7 @@ use super::batch::{Batch, Keep, Outcome, Sets, check_names, last_lock};
 use super::dual_clutch::DualClutchStart;
 use super::run::{Plan, SimulateError};
 use super::sensitivity::{LANES, Sampled, SensitivityError, delayed, variables};
+use super::threads::on_threads;
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
@@ -63,11 +64,7 @@ pub fn dual_clutch_batch_sensitivities(
         passes.collect()
     };
     let all = || (0..sets.count()).into_par_iter().map(run).collect();
-    let passes: Vec<Result<Vec<Kept>, SimulateError>> =
-        match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-            Ok(pool) => pool.install(all),
-            Err(_) => all(),
-        };
+    let passes: Vec<Result<Vec<Kept>, SimulateError>> = on_threads(threads, all);
     Ok(gathered(passes, keep.size(outputs.len(), grid.len()), by.len()))
 }
 

@@ -11,6 +11,7 @@ mod recorded;
 mod run;
 mod sensitivity;
 mod start;
+mod threads;
 mod trajectory;
 
 pub use audit::EnergyAudit;
