@@ -29,7 +29,8 @@ pub(super) fn on_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Sen
 fn pool(asked: usize) -> Option<Arc<ThreadPool>> {
     let process = process::id();
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(kept) = kept.as_ref().filter(|kept| (kept.process, kept.asked) == (process, asked)) {
+    if let Some(kept) = kept.as_ref().filter(|kept| (kept.process, kept.asked) == (process, asked))
+    {
         return Some(kept.pool.clone());
     }
     let pool = Arc::new(ThreadPoolBuilder::new().num_threads(asked).build().ok()?);

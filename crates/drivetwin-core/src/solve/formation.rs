@@ -331,6 +331,10 @@ pub fn bits(answers: impl Iterator<Item = bool>) -> u32 {
 }
 
 /// Numbers of the runs in a set of bits.
-pub(super) fn each(runs: u32) -> impl Iterator<Item = usize> {
-    (0..WIDTH).filter(move |run| runs >> run & 1 == 1)
+pub(super) fn each(mut runs: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let run = (runs != 0).then(|| runs.trailing_zeros() as usize);
+        runs &= runs.wrapping_sub(1);
+        run
+    })
 }

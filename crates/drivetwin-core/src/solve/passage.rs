@@ -99,7 +99,8 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
         let Self { passage, operators, record } = self;
         let Passage { regime, members, active, h, columns } = passage;
         let mut waiting = ahead(members);
-        let mut segment = next(members, waiting);
+        let places = places(members);
+        let mut segment = next(&places, waiting);
         let (last, end) = {
             let inputs = members[0].inputs;
             (inputs.segments(), segment + inputs.equal_from(segment))
@@ -110,7 +111,7 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
             Front { x: [Lanes::zero_(); N], carry: [Carry::idle(); A], guards: idle_guards() };
         let (mut abreast, mut room) = (0, room());
         while segment < end {
-            let joining = waiting & those_at(members, segment);
+            let joining = waiting & those_at(&places, segment);
             if joining != 0 {
                 let sample = source.read(segment, &mut room);
                 front.join::<F, _>(operators, (joining, &regime.x), sample);
@@ -118,7 +119,7 @@ impl<R: Record, const N: usize, const A: usize> Pass<'_, '_, '_, R, N, A> {
                 waiting &= !joining;
                 stretch.begin(joining);
             }
-            let until = next(members, waiting).min(end);
+            let until = next(&places, waiting).min(end);
             if abreast == 0 || stretch.count == BLOCK {
                 record.passed(regime, active, trail.samples(), &stretch);
                 segment = if abreast == 0 { until } else { segment };
@@ -205,14 +206,19 @@ fn ahead(members: &[Member<'_>]) -> u32 {
     bits(members.iter().map(|member| member.standing == Standing::Ahead))
 }
 
+/// Segments of the runs, side by side.
+fn places(members: &[Member<'_>]) -> [usize; WIDTH] {
+    std::array::from_fn(|run| members.get(run).map_or(usize::MAX, |member| member.segment))
+}
+
 /// Runs at a segment, as bits.
-fn those_at(members: &[Member<'_>], segment: usize) -> u32 {
-    bits(members.iter().map(|member| member.segment == segment))
+fn those_at(places: &[usize; WIDTH], segment: usize) -> u32 {
+    bits(places.iter().map(|&place| place == segment))
 }
 
 /// The first segment at which one of these runs stands.
-fn next(members: &[Member<'_>], runs: u32) -> usize {
-    each(runs).map(|run| members[run].segment).min().unwrap_or(usize::MAX)
+fn next(places: &[usize; WIDTH], runs: u32) -> usize {
+    each(runs).map(|run| places[run]).min().unwrap_or(usize::MAX)
 }
 
 /// The inputs of every run.

@@ -10,9 +10,9 @@ use crate::number::{Factor, Lane, SMALL, Values};
 /// Largest cubic part of a channel over a sample, relative to the largest of all.
 const MAX_CUBIC: f64 = 2e-4;
 /// Largest distance over which stiction is moved by its series.
-const MAX_MOVE: f64 = 0.05;
+const MAX_MOVE: f64 = 0.03;
 /// Largest change of a channel by the correction, likewise.
-const MAX_CORRECTION: f64 = 1e-6;
+const MAX_CORRECTION: f64 = 1e-5;
 
 /// Number of shapes that value, rate and second derivative at the start give.
 const START: usize = 3;
@@ -202,37 +202,46 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         }
     }
 
-    /// The cubics through the predicted end, the end they lead to, and the channels there.
+    /// The cubics through the predicted end, the channels where these lead to, the end that follows from
+    /// the torques there, and the channels at it.
     #[inline(always)]
     fn correct<const F: bool>(&mut self, channels: &[Carried<L, N>; A], carry: &mut [Carry<L>; A]) {
         let mut missing = [[L::all(0.0); END]; A];
+        let mut raised = [L::all(0.0); A];
         for a in 0..A {
             let (v, [a0, a1, a2]) = (&carry[a].value, self.cubics[a]);
             let known = self.rate[a] + self.direct[a];
             let rate = over_channels::<L, F, N, A>(&channels[a].rate, carry, known);
             let drift = v.by_normal * self.normal[a][1];
-            let value = v.value - (a0 + a1 + a2);
-            missing[a] = [value, v.by_argument.fma::<F>(rate, drift - (a1 + a2 + a2))];
+            raised[a] = a0 + a1 + a2;
+            missing[a] =
+                [v.value - raised[a], v.by_argument.fma::<F>(rate, drift - (a1 + a2 + a2))];
+        }
+        let size = self.size + L::Values::all(1.0);
+        for a in 0..A {
+            let (form, none) = (&channels[a].argument_end.cubics, L::all(0.0));
+            let ds = over_cubics::<L, F, A, START, END>(form, &missing, none);
+            let corrected = carry[a].value.moved::<F>(ds);
+            let correction = (corrected.value - carry[a].value.value).values().magnitude();
+            let close = size.times(MAX_CORRECTION) - correction;
+            self.guard = self.guard.negative_with(close);
+            carry[a].value = corrected;
+        }
+        for a in 0..A {
+            missing[a][0] = carry[a].value.value - raised[a];
         }
         add_moments::<L, F, N, A, START, END>(channels, &missing, &mut self.end);
-        let size = self.size + L::Values::all(1.0);
         let mut early = [L::Values::all(0.0); A];
         for a in 0..A {
             let Carried { argument_end, rate_end, .. } = &channels[a];
-            let none = L::all(0.0);
-            let ds = over_cubics::<L, F, A, START, END>(&argument_end.cubics, &missing, none);
-            let rate = self.rate[a];
+            let (argument, rate) = (self.argument[a], self.rate[a]);
             self.rate[a] = over_cubics::<L, F, A, START, END>(rate_end, &missing, rate);
-            let corrected = carry[a].value.moved::<F>(ds);
-            let correction = (corrected.value - carry[a].value.value).values().magnitude();
             let [value, slope] = missing[a];
             let cubic = (slope - (value + value)).values().magnitude();
-            let close = size.times(MAX_CORRECTION) - correction;
-            let guard = size.times(MAX_CUBIC) - cubic;
-            self.guard = self.guard.negative_with(guard).negative_with(close);
-            carry[a].value = corrected;
+            self.guard = self.guard.negative_with(size.times(MAX_CUBIC) - cubic);
             early[a] = carry[a].rate.values().times(1.0 / 3.0) + carry[a].argument.values();
-            carry[a].argument = self.argument[a] + ds;
+            carry[a].argument =
+                over_cubics::<L, F, A, START, END>(&argument_end.cubics, &missing, argument);
         }
         for a in 0..A {
             let Carried { rate, law, .. } = &channels[a];
