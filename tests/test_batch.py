@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import multiprocessing
 from collections.abc import Mapping
 
 import numpy as np
@@ -117,6 +118,20 @@ def test_order_threads_and_company_do_not_matter(
     mixed = simulate_batch(MODEL, [scenario()], TIME, part, threads=threads)
     np.testing.assert_array_equal(mixed.values, whole.values[chosen])
     np.testing.assert_array_equal(mixed.last_lock, whole.last_lock[chosen])
+
+
+def last_locks() -> FloatArray:
+    """Of a batch on two threads."""
+    return simulate_batch(MODEL, [scenario()], TIME, sets(11), threads=2).last_lock
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own() -> None:
+    here = last_locks()
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        there = pool.apply_async(last_locks).get(timeout=60)
+    np.testing.assert_array_equal(there, here)
 
 
 def jumping(of: Scenario, at: float) -> Scenario:

@@ -7,6 +7,7 @@ The program is not part of this repository; it is compiled where it lies beside 
 from __future__ import annotations
 
 import ctypes
+import os
 import subprocess
 import time
 from pathlib import Path
@@ -36,6 +37,8 @@ class Library:
             check=True,
             capture_output=True,
         )
+        # Its threads wait without spinning, which would take the processor from the other programs.
+        os.environ.setdefault("OMP_WAIT_POLICY", "passive")
         self._library = ctypes.CDLL(str(self.path))
 
     def seconds(self, of: Problem, given: Inputs, substeps: int, repeats: int) -> Sample:

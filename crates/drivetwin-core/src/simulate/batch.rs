@@ -6,14 +6,13 @@ use super::dual_clutch::DualClutchStart;
 use super::run::{Plan, SimulateError};
 use super::sensitivity::SensitivityError;
 use super::start::State;
-use super::threads::on_threads;
+use super::threads::share_out;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::{Number, Real, together};
 use crate::solve::{
     Event, EventKind, Inputs, Known, Lanes, NO_POINT, Status, WIDTH, bits, run_together,
 };
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// What is kept of every run.
@@ -67,8 +66,8 @@ pub fn dual_clutch_batch(
     let sets = Sets { model, starts, parameters, sets };
     let count = if scenarios.is_empty() { 0 } else { sets.count() };
     let size = plans.first().map_or(0, |plan| keep.size(plan.targets.len(), plan.grid.len()));
-    let work = Work { sets, plans, keep };
-    Ok(on_threads(threads, || work.result(count, size)))
+    let work = Work { sets, plans, keep, threads };
+    Ok(work.result(count, size))
 }
 
 /// Refuse names that are no parameters.
@@ -161,6 +160,7 @@ struct Work<'w> {
     sets: Sets<'w>,
     plans: Vec<&'w Plan<f64>>,
     keep: Keep<'w>,
+    threads: usize,
 }
 
 impl Work<'_> {
@@ -170,8 +170,7 @@ impl Work<'_> {
 
     /// Do so many runs, of each of which `size` numbers are kept.
     fn result(&self, count: usize, size: usize) -> Batch {
-        // Cleared by all threads.
-        let mut values: Vec<f64> = rayon::iter::repeat_n(0.0, count * size).collect();
+        let mut values = vec![0.0; count * size];
         let mut rest = &mut values[..];
         let job = |run| {
             let (values, others) = std::mem::take(&mut rest).split_at_mut(size);
@@ -195,10 +194,10 @@ impl Work<'_> {
     fn do_all(&self, jobs: &mut [Job<'_>]) {
         let mut open: Vec<&mut Job<'_>> = jobs.iter_mut().collect();
         for _ in 0..ATTEMPTS {
-            open.par_chunks_mut(WIDTH).for_each(|group| self.do_together(group));
+            share_out(self.threads, open.chunks_mut(WIDTH), |group| self.do_together(group));
             open.retain(|job| job.outcome.is_none());
         }
-        open.par_iter_mut().for_each(|job| self.do_alone(job));
+        share_out(self.threads, open.iter_mut(), |job| self.do_alone(job));
     }
 
     fn do_alone(&self, job: &mut Job<'_>) {

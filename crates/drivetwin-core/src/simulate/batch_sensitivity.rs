@@ -5,13 +5,12 @@ use super::batch::{Batch, Keep, Outcome, Sets, check_names, last_lock};
 use super::dual_clutch::DualClutchStart;
 use super::run::{Plan, SimulateError};
 use super::sensitivity::{LANES, Sampled, SensitivityError, delayed, variables};
-use super::threads::on_threads;
+use super::threads::share_out;
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::Dual;
 use crate::solve::{Settings, Status};
-use rayon::prelude::*;
 
 /// A number with its derivatives by the parameters of one pass.
 type Derived = Dual<LANES>;
@@ -63,8 +62,10 @@ pub fn dual_clutch_batch_sensitivities(
         });
         passes.collect()
     };
-    let all = || (0..sets.count()).into_par_iter().map(run).collect();
-    let passes: Vec<Result<Vec<Kept>, SimulateError>> = on_threads(threads, all);
+    let mut passes = Vec::new();
+    passes.resize_with(sets.count(), || None);
+    share_out(threads, passes.iter_mut().enumerate(), |(i, pass)| *pass = Some(run(i)));
+    let passes = passes.into_iter().map(|pass| pass.expect("every run is done")).collect();
     Ok(gathered(passes, keep.size(outputs.len(), grid.len()), by.len()))
 }
 

@@ -218,9 +218,11 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                 [v.value - raised[a], v.by_argument.fma::<F>(rate, drift - (a1 + a2 + a2))];
         }
         let size = self.size + L::Values::all(1.0);
+        let mut reached = self.argument;
         for a in 0..A {
             let (form, none) = (&channels[a].argument_end.cubics, L::all(0.0));
             let ds = over_cubics::<L, F, A, START, END>(form, &missing, none);
+            reached[a] = reached[a] + ds;
             let corrected = carry[a].value.moved::<F>(ds);
             let correction = (corrected.value - carry[a].value.value).values().magnitude();
             let close = size.times(MAX_CORRECTION) - correction;
@@ -242,6 +244,8 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             early[a] = carry[a].rate.values().times(1.0 / 3.0) + carry[a].argument.values();
             carry[a].argument =
                 over_cubics::<L, F, A, START, END>(&argument_end.cubics, &missing, argument);
+            let (v, left) = (&mut carry[a].value, carry[a].argument - reached[a]);
+            v.value = v.by_argument.fma::<F>(left, v.value);
         }
         for a in 0..A {
             let Carried { rate, law, .. } = &channels[a];
