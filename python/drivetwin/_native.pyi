@@ -31,7 +31,7 @@ _Scenario = tuple[
     Sequence[tuple[str, _Array, _Array, float]],
     tuple[float, float, float, float, Sequence[str]],
 ]
-_Kept = tuple[_Array, NDArray[np.uint32], _Array, list[tuple[int, str]]]
+_Ends = tuple[NDArray[np.uint32], _Array, list[tuple[int, str]]]
 
 def simulate(
     model: str,
@@ -59,8 +59,8 @@ def simulate_batch(
     sets: tuple[Sequence[str], _Array],
     grid: _Array,
     wanted: tuple[_Array, str],
-    options: tuple[str, int],
-) -> _Kept: ...
+    into: tuple[tuple[str, int], _Array],
+) -> _Ends: ...
 def batch_sensitivities(
     model: str,
     scenarios: Sequence[_Scenario],
@@ -68,7 +68,7 @@ def batch_sensitivities(
     grid: tuple[_Array, Sequence[str]],
     wanted: tuple[_Array, str],
     options: tuple[str, int],
-) -> tuple[_Kept, _Array, _Array, list[tuple[int, str]]]: ...
+) -> tuple[_Ends, tuple[_Array, _Array, _Array, list[tuple[int, str]]]]: ...
 def simulate_network(
     driveline: str,
     outputs: str,

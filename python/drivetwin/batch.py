@@ -96,18 +96,19 @@ def simulate_batch(
     Raises InputError for unknown names, differing lengths or an inconsistent description.
     """
     asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
+    values = np.empty(asked.shape)
     try:
-        kept = _native.simulate_batch(
+        ends = _native.simulate_batch(
             as_json(model),
             asked.scenarios,
             asked.sets,
             asked.time,
             asked.wanted,
-            (asked.outputs, threads),
+            ((asked.outputs, threads), values.reshape(-1)),
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
-    return asked.batch(kept)
+    return _batch(values, ends)
 
 
 def batch_sensitivities(
@@ -131,7 +132,7 @@ def batch_sensitivities(
         raise InputError("nothing to differentiate by", "name a parameter, or use simulate_batch")
     asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
     try:
-        kept, derivatives, last_lock, grazing = _native.batch_sensitivities(
+        ends, (values, derivatives, last_lock, grazing) = _native.batch_sensitivities(
             as_json(model),
             asked.scenarios,
             asked.sets,
@@ -143,7 +144,7 @@ def batch_sensitivities(
         raise InputError(str(error), "correct the model, its inputs or the names") from error
     shape = (asked.shape[0], len(by), *asked.shape[1:])
     return BatchSensitivities(
-        asked.batch(kept),
+        _batch(values.reshape(asked.shape), ends),
         tuple(by),
         derivatives.reshape(shape),
         last_lock.reshape(shape[:2]),
@@ -194,11 +195,12 @@ class _Asked:
             shape if keep is Keep.COLUMNS else shape[:2],
         )
 
-    def batch(
-        self, kept: tuple[FloatArray, NDArray[np.uint32], FloatArray, list[tuple[int, str]]]
-    ) -> Batch:
-        values, events, last_lock, failed = kept
-        return Batch(values.reshape(self.shape), events, last_lock, dict(failed))
+
+def _batch(
+    values: FloatArray, ends: tuple[NDArray[np.uint32], FloatArray, list[tuple[int, str]]]
+) -> Batch:
+    events, last_lock, failed = ends
+    return Batch(values, events, last_lock, dict(failed))
 
 
 def _runs(sets: Mapping[str, FloatArray], scenarios: Sequence[Scenario]) -> int:

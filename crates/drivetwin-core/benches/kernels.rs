@@ -73,7 +73,8 @@ fn kernels(criterion: &mut Criterion) {
     let sets: Vec<f64> = (0..64).map(|i| 0.80 + 0.001 * f64::from(i)).collect();
     criterion.bench_function("64 runs, one thread", |b| {
         let sets = (&["eta"][..], &sets[..]);
-        b.iter(|| dual_clutch_batch(&model, black_box(&scenarios), sets, (Keep::Last, 1)));
+        let (how, mut ends) = ((Keep::Last, 1), vec![0.0; sets.1.len()]);
+        b.iter(|| dual_clutch_batch(&model, black_box(&scenarios), sets, how, &mut ends));
     });
 }
 

@@ -14,22 +14,50 @@ use drivetwin_core::simulate::{
 };
 use drivetwin_core::solve::{Settings, Signal, Status, WIDTH};
 use proptest::prelude::*;
+use std::ops::Deref;
+
+/// A batch with what is kept of it.
+struct Kept {
+    values: Vec<f64>,
+    batch: Batch,
+}
+
+impl Deref for Kept {
+    type Target = Batch;
+
+    fn deref(&self) -> &Batch {
+        &self.batch
+    }
+}
+
+/// So many numbers of every run under several sets of the named parameters, in one scenario, on one thread.
+fn columns_of(
+    model: &DualClutch<f64>,
+    plan: Plan<f64>,
+    (names, sets): (&[&str], &[f64]),
+    size: usize,
+) -> Kept {
+    let mut values = vec![f64::INFINITY; sets.len() / names.len() * size];
+    let (scenarios, how) = ([(plan, second_gear())], (Keep::Columns, 1));
+    let batch = dual_clutch_batch(model, &scenarios, (names, sets), how, &mut values);
+    Kept { values, batch: batch.expect("names") }
+}
 
 /// Shaft torque of the paper's shift under several sets of the named parameters, one thread.
-fn shifts_of(names: &[&str], sets: &[f64], settings: Settings) -> Batch {
+fn shifts_of(names: &[&str], sets: &[f64], settings: Settings) -> Kept {
     let model = paper_driveline::<f64>(LossLaw::Paper);
     let network = Network::compile(&model.driveline()).expect("a driveline");
     let columns = upshift(1.0);
     let signals: Vec<(&str, Signal<'_, f64>)> =
         columns.iter().map(|(name, t, v)| (*name, Signal::samples(t, v))).collect();
     let outputs = &dual_clutch_outputs(&model)[4..5];
-    let plan = Plan::new(&network, &signals, &columns[0].1, outputs, (settings, false));
-    let scenarios = [(plan.expect("a plan"), second_gear())];
-    dual_clutch_batch(&model, &scenarios, (names, sets), (Keep::Columns, 1)).expect("names")
+    let grid = &columns[0].1;
+    let plan = Plan::new(&network, &signals, grid, outputs, (settings, false)).expect("a plan");
+    columns_of(&model, plan, (names, sets), grid.len())
 }
 
 /// The same under several efficiencies.
-fn shifts(eta: &[f64], settings: Settings) -> Batch {
+fn shifts(eta: &[f64], settings: Settings) -> Kept {
     shifts_of(&["eta"], eta, settings)
 }
 
@@ -165,8 +193,7 @@ fn jumps_between_samples_are_met_together_and_alone() {
     let run = |settings, eta: &[f64]| {
         let plan =
             Plan::new(&network, &signals, &grid, outputs, (settings, false)).expect("a plan");
-        let scenarios = [(plan, second_gear())];
-        dual_clutch_batch(&model, &scenarios, (&["eta"], eta), (Keep::Columns, 1)).expect("names")
+        columns_of(&model, plan, (&["eta"], eta), grid.len())
     };
     let eta = efficiencies(WIDTH);
     let (fast, exact) = (run(Settings::default(), &eta), run(Settings::exact(), &eta));
@@ -197,10 +224,9 @@ fn a_coarse_grid_is_met_at_its_points() {
     let run = |every: usize| {
         let grid: Vec<f64> = columns[0].1.iter().copied().step_by(every).collect();
         let plan = Plan::new(&network, &signals, &grid, outputs, (Settings::default(), false));
-        let scenarios = [(plan.expect("a plan"), second_gear())];
-        let eta = efficiencies(WIDTH);
-        let batch = dual_clutch_batch(&model, &scenarios, (&["eta"], &eta), (Keep::Columns, 1));
-        (batch.expect("names").values, grid.len())
+        let (plan, size) = (plan.expect("a plan"), outputs.len() * grid.len());
+        let batch = columns_of(&model, plan, (&["eta"], &efficiencies(WIDTH)), size);
+        (batch.values, grid.len())
     };
     let (fine, points) = run(1);
     for every in [2, 3, 50, 300] {

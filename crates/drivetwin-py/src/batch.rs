@@ -7,7 +7,7 @@ use drivetwin_core::simulate::{
     Batch, Keep, Outcome, Output, Plan, Sampled, dual_clutch_batch, dual_clutch_batch_sensitivities,
 };
 use drivetwin_core::solve::{Settings, Signal, Status};
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -17,19 +17,18 @@ type Scenario<'py> = (Vec<Delayed<'py>>, Start);
 type Wanted<'py> = (PyReadonlyArray2<'py, f64>, String);
 /// Outputs as a JSON list, threads (0: all).
 type Options = (String, usize);
-/// Flat values, numbers of events, times of the last lock [s], failed runs and why.
-type Kept<'py> = (
+/// Numbers of events, times of the last lock [s], failed runs and why.
+type Ends<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>, Vec<(usize, String)>);
+
+/// Flat values, flat derivatives, derivatives of the last locks, runs with a grazing event and why.
+type Derived<'py> = (
     Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
     Vec<(usize, String)>,
 );
 
-/// Kept, flat derivatives, derivatives of the last locks, runs with a grazing event and why.
-type Derived<'py> =
-    (Kept<'py>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Vec<(usize, String)>);
-
-/// Simulate a driveline given as JSON under many parameter sets or in many scenarios.
+/// Simulate a driveline given as JSON under many parameter sets or in many scenarios, into flat `values`.
 #[pyfunction]
 pub fn simulate_batch<'py>(
     py: Python<'py>,
@@ -38,9 +37,10 @@ pub fn simulate_batch<'py>(
     sets: (Vec<String>, PyReadonlyArray2<'py, f64>),
     grid: PyReadonlyArray1<'py, f64>,
     wanted: Wanted<'py>,
-    options: Options,
-) -> PyResult<Kept<'py>> {
+    into: (Options, PyReadwriteArray1<'py, f64>),
+) -> PyResult<Ends<'py>> {
     let model = model_of(model)?;
+    let (options, mut values) = into;
     let (outputs, threads) = (outputs_of(&options.0)?, options.1);
     let network = Network::compile(&model.driveline()).map_err(|e| refused(&e))?;
     let grid = grid.as_slice()?;
@@ -56,10 +56,11 @@ pub fn simulate_batch<'py>(
     let (names, sets) = (names_of(&sets.0), sets.1.as_slice()?);
     let measured = rows_of(&wanted.0);
     let keep = keep_of(&wanted.1, &measured)?;
+    let values = values.as_slice_mut()?;
     let batch = py
-        .detach(|| dual_clutch_batch(&model, &plans, (&names, sets), (keep, threads)))
+        .detach(|| dual_clutch_batch(&model, &plans, (&names, sets), (keep, threads), values))
         .map_err(|e| refused(&e))?;
-    Ok(kept(py, batch))
+    Ok(ends(py, batch))
 }
 
 /// The same with derivatives by the named parameters, at least one.
@@ -72,7 +73,7 @@ pub fn batch_sensitivities<'py>(
     grid: (PyReadonlyArray1<'py, f64>, Vec<String>),
     wanted: Wanted<'py>,
     options: Options,
-) -> PyResult<Derived<'py>> {
+) -> PyResult<(Ends<'py>, Derived<'py>)> {
     let model = model_of(model)?;
     let (outputs, threads) = (outputs_of(&options.0)?, options.1);
     let (grid, by) = (grid.0.as_slice()?, names_of(&grid.1));
@@ -91,12 +92,9 @@ pub fn batch_sensitivities<'py>(
     let grazing = grazing
         .map(|(i, time, element)| (*i, format!("{element} grazes its event at {time:.9} s")));
     let grazing = grazing.collect();
-    Ok((
-        kept(py, batch),
-        PyArray1::from_vec(py, derivatives.kept),
-        PyArray1::from_vec(py, derivatives.last_lock),
-        grazing,
-    ))
+    let [values, kept, last_lock] = [derivatives.values, derivatives.kept, derivatives.last_lock]
+        .map(|numbers| PyArray1::from_vec(py, numbers));
+    Ok((ends(py, batch), (values, kept, last_lock, grazing)))
 }
 
 fn refused(error: &dyn std::fmt::Display) -> PyErr {
@@ -133,17 +131,12 @@ fn keep_of<'m>(name: &str, measured: &'m [Vec<f64>]) -> PyResult<Keep<'m>> {
     }
 }
 
-fn kept(py: Python<'_>, batch: Batch) -> Kept<'_> {
+fn ends(py: Python<'_>, batch: Batch) -> Ends<'_> {
     let failed = batch.outcomes.iter().enumerate().filter_map(|(i, outcome)| match outcome {
         Outcome::Ran(Status::Completed) => None,
         Outcome::Ran(status) => Some((i, status.to_string())),
         Outcome::Refused(error) => Some((i, error.to_string())),
     });
     let failed = failed.collect();
-    (
-        PyArray1::from_vec(py, batch.values),
-        PyArray1::from_vec(py, batch.events),
-        PyArray1::from_vec(py, batch.last_lock),
-        failed,
-    )
+    (PyArray1::from_vec(py, batch.events), PyArray1::from_vec(py, batch.last_lock), failed)
 }

@@ -36,11 +36,9 @@ pub enum Outcome {
     Refused(SimulateError),
 }
 
-/// Result of a batch, in the order of the runs.
-#[derive(Clone, Debug)]
+/// What has become of the runs of a batch, in their order.
+#[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// What was kept; NaN for runs that failed.
-    pub values: Vec<f64>,
     /// How each run ended.
     pub outcomes: Vec<Outcome>,
     /// Number of events of each run.
@@ -52,11 +50,19 @@ pub struct Batch {
 /// Simulate a dual-clutch driveline under `sets` of the named parameters (runs × parameters), in one
 /// scenario or in one for every run: `scenarios` are plans and starts, run i takes that of its number or
 /// the only one. Names are those of [`DualClutch::parameter_mut`] and, after `start.`, of the start.
+///
+/// What is kept of each run ([`Keep::size`] numbers) goes into `values`, the memory of the caller, whatever
+/// stands there; NaN for runs that failed.
+///
+/// # Panics
+///
+/// If `values` is not as long as what is kept of all runs.
 pub fn dual_clutch_batch(
     model: &DualClutch<f64>,
     scenarios: &[(Plan<f64>, DualClutchStart<f64>)],
     (parameters, sets): (&[&str], &[f64]),
     (keep, threads): (Keep<'_>, usize),
+    values: &mut [f64],
 ) -> Result<Batch, SensitivityError> {
     if let Some((_, start)) = scenarios.first() {
         check_names(model, start, (parameters, sets))?;
@@ -67,7 +73,8 @@ pub fn dual_clutch_batch(
     let count = if scenarios.is_empty() { 0 } else { sets.count() };
     let size = plans.first().map_or(0, |plan| keep.size(plan.targets.len(), plan.grid.len()));
     let work = Work { sets, plans, keep, threads };
-    Ok(work.result(count, size))
+    assert_eq!(values.len(), count * size, "places for what is kept");
+    Ok(work.result((count, size), values))
 }
 
 /// Refuse names that are no parameters.
@@ -169,9 +176,8 @@ impl Work<'_> {
     }
 
     /// Do so many runs, of each of which `size` numbers are kept.
-    fn result(&self, count: usize, size: usize) -> Batch {
-        let mut values = vec![0.0; count * size];
-        let mut rest = &mut values[..];
+    fn result(&self, (count, size): (usize, usize), values: &mut [f64]) -> Batch {
+        let mut rest = values;
         let job = |run| {
             let (values, others) = std::mem::take(&mut rest).split_at_mut(size);
             rest = others;
@@ -179,12 +185,11 @@ impl Work<'_> {
         };
         let mut jobs: Vec<Job<'_>> = (0..count).map(job).collect();
         self.do_all(&mut jobs);
-        let ends: Vec<_> = jobs.into_iter().map(|job| (job.outcome, job.events)).collect();
-        let mut result = Batch { values, outcomes: vec![], events: vec![], last_lock: vec![] };
-        for (outcome, events) in ends {
-            result.outcomes.push(outcome.expect("every job is done in the end"));
-            result.events.push(events.len() as u32);
-            result.last_lock.push(last_lock(&events).unwrap_or(f64::NAN));
+        let mut result = Batch::default();
+        for job in jobs {
+            result.outcomes.push(job.outcome.expect("every job is done in the end"));
+            result.events.push(job.events.len() as u32);
+            result.last_lock.push(last_lock(&job.events).unwrap_or(f64::NAN));
         }
         result
     }
@@ -260,7 +265,7 @@ impl Work<'_> {
 
 impl Keep<'_> {
     /// Numbers kept of a run with so many outputs and points.
-    pub(super) fn size(self, outputs: usize, points: usize) -> usize {
+    pub fn size(self, outputs: usize, points: usize) -> usize {
         match self {
             Self::Columns => outputs * points,
             Self::Last | Self::Misfit(_) => outputs,

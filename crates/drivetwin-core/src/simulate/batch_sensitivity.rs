@@ -18,10 +18,12 @@ type Derived = Dual<LANES>;
 /// Inputs and start of a run.
 pub type Stated<'a> = (Vec<Sampled<'a>>, DualClutchStart<f64>);
 
-/// Derivatives of a batch, NaN for runs that failed.
+/// What is kept of a batch with its derivatives, NaN for runs that failed.
 #[derive(Clone, Debug)]
 pub struct BatchDerivatives {
-    /// Of what was kept: runs × parameters × kept.
+    /// What was kept: runs × kept.
+    pub values: Vec<f64>,
+    /// Derivatives of it: runs × parameters × kept.
     pub kept: Vec<f64>,
     /// Of the time of the last lock: runs × parameters.
     pub last_lock: Vec<f64>,
@@ -121,8 +123,9 @@ fn gathered(
     size: usize,
     parameters: usize,
 ) -> (Batch, BatchDerivatives) {
-    let mut batch = Batch { values: vec![], outcomes: vec![], events: vec![], last_lock: vec![] };
+    let mut batch = Batch::default();
     let mut derivatives = BatchDerivatives {
+        values: vec![],
         kept: vec![f64::NAN; runs.len() * parameters * size],
         last_lock: vec![f64::NAN; runs.len() * parameters],
         grazing: vec![],
@@ -131,7 +134,7 @@ fn gathered(
         let passes = match passes {
             Ok(passes) => passes,
             Err(error) => {
-                batch.values.resize((i + 1) * size, f64::NAN);
+                derivatives.values.resize((i + 1) * size, f64::NAN);
                 batch.outcomes.push(Outcome::Refused(error));
                 batch.events.push(0);
                 batch.last_lock.push(f64::NAN);
@@ -146,7 +149,7 @@ fn gathered(
             derivatives.last_lock[row] = pass.last_lock.eps[lane];
         }
         let Some(first) = passes.into_iter().next() else { continue };
-        batch.values.extend(first.values);
+        derivatives.values.extend(first.values);
         batch.outcomes.push(Outcome::Ran(first.status));
         batch.events.push(first.events);
         batch.last_lock.push(first.last_lock.re);
