@@ -1,17 +1,29 @@
 // SPDX-License-Identifier: MIT
 //! Work that is shared out among threads.
 
-use std::sync::{Mutex, PoisonError};
-use std::thread;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::{process, thread};
+
+/// Threads that wait for the next work, with the memory that they have come to.
+struct Helpers {
+    /// A process forked off another has the threads of that no longer.
+    process: u32,
+    count: usize,
+    pool: Arc<ThreadPool>,
+}
+
+static HELPERS: Mutex<Vec<Helpers>> = Mutex::new(Vec::new());
 
 /// Do `work` to every item, on so many threads at most (0: as many as there are processors). The calling
 /// one is among them: it stays where it runs, and the scheduler sees at once that the others belong
-/// elsewhere, which it would take milliseconds to find out of threads that are woken.
+/// elsewhere, which it would take milliseconds to find out of threads that are all woken.
 pub(super) fn share_out<I>(threads: usize, items: I, work: impl Fn(I::Item) + Sync)
 where
     I: ExactSizeIterator + Send,
 {
-    let others = number(threads).min(items.len()).saturating_sub(1);
+    let threads = number(threads);
+    let others = threads.min(items.len()).saturating_sub(1);
     let items = Mutex::new(items);
     let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
     let take = || {
@@ -19,17 +31,31 @@ where
             work(item);
         }
     };
-    thread::scope(|scope| {
-        for _ in 0..others {
-            // Those that cannot be had are done without.
-            let _ = thread::Builder::new().spawn_scoped(scope, take);
-        }
-        take();
-    });
+    // Helpers that cannot be had are done without.
+    match (others > 0).then(|| helpers(threads - 1)).flatten() {
+        Some(pool) => pool.in_place_scope(|scope| {
+            (0..others).for_each(|_| scope.spawn(|_| take()));
+            take();
+        }),
+        None => take(),
+    }
 }
 
 fn number(threads: usize) -> usize {
     if threads == 0 { thread::available_parallelism().map_or(1, usize::from) } else { threads }
+}
+
+/// So many threads, of old or new. Those of another process stay in the list: to end them would mean to wait
+/// for them.
+fn helpers(count: usize) -> Option<Arc<ThreadPool>> {
+    let process = process::id();
+    let mut all = HELPERS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(one) = all.iter().find(|one| (one.process, one.count) == (process, count)) {
+        return Some(one.pool.clone());
+    }
+    let pool = Arc::new(ThreadPoolBuilder::new().num_threads(count).build().ok()?);
+    all.push(Helpers { process, count, pool: pool.clone() });
+    Some(pool)
 }
 
 #[cfg(test)]
