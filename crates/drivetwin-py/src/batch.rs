@@ -19,7 +19,6 @@ type Wanted<'py> = (PyReadonlyArray2<'py, f64>, String);
 type Options = (String, usize);
 /// Numbers of events, times of the last lock [s], failed runs and why.
 type Ends<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>, Vec<(usize, String)>);
-
 /// Flat values, flat derivatives, derivatives of the last locks, runs with a grazing event and why.
 type Derived<'py> = (
     Bound<'py, PyArray1<f64>>,

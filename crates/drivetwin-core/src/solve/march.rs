@@ -5,9 +5,9 @@
 //! ends. Its argument at the end is predicted with the second derivative of φ at the start, which
 //! leaves an error of fourth order; the cubic through the predicted end corrects it, the law is moved
 //! to the corrected argument by its own derivatives, and the state at the end follows from the torque
-//! that it gives there. One exponential a sample and channel, grown
-//! from the last a sample ahead, at about the argument that it is needed at, so that nothing waits for it;
-//! with derivatives, where products count for more, at the predicted argument itself.
+//! that it gives there. One exponential a sample and channel, grown from the last a sample ahead, at about
+//! the argument that it is needed at, so that nothing waits for it; with derivatives, where products count
+//! for more, at the predicted argument itself.
 
 use super::operators::{Carried, MAX_WATCHED, Operators, Watched};
 use super::step::{over_channels, step};
