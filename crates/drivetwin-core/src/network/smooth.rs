@@ -138,6 +138,7 @@ impl<L: Lane> Law<L> {
             mu: line.fma::<F>(m, c0) + stiction,
             slope: c2.fma::<F>(m, line) - stiction,
             bend: stiction.fma_times::<F>(0.5, c2),
+            cubic: stiction.times(-1.0 / 6.0),
         }
     }
 }
@@ -148,19 +149,22 @@ pub struct Friction<L> {
     mu: L,
     slope: L,
     bend: L,
+    cubic: L,
 }
 
 impl<L: Lane> Friction<L> {
     /// The torque where the argument is larger by a small `dm`, at normal load `normal`.
     #[inline(always)]
     pub fn at<const F: bool>(&self, dm: L, normal: L) -> Value<L> {
-        let bent = self.bend * dm;
-        let mu = bent.fma::<F>(dm, self.slope.fma::<F>(dm, self.mu));
-        let slope = self.slope + (bent + bent);
+        // Low and high powers apart, for a shorter chain of dependent products.
+        let (low, high) = (self.slope.fma::<F>(dm, self.mu), self.cubic.fma::<F>(dm, self.bend));
+        let mu = high.fma::<F>(dm * dm, low);
+        let (twice, thrice) = (self.bend + self.bend, self.cubic.times(3.0));
+        let slope = thrice.fma::<F>(dm, twice).fma::<F>(dm, self.slope);
         Value {
             value: normal * mu,
             by_argument: normal * slope,
-            bend: normal * self.bend,
+            bend: normal * thrice.fma::<F>(dm, self.bend),
             by_normal: mu,
             mixed: slope,
         }

@@ -10,9 +10,9 @@ use crate::number::{Factor, Lane, SMALL, Values};
 /// Largest cubic part of a channel over a sample, relative to the largest of all.
 const MAX_CUBIC: f64 = 2e-4;
 /// Largest distance over which stiction is moved by its series.
-const MAX_MOVE: f64 = 0.03;
+const MAX_MOVE: f64 = 0.05;
 /// Largest change of a channel by the correction, likewise.
-const MAX_CORRECTION: f64 = 1e-5;
+const MAX_CORRECTION: f64 = 3e-6;
 
 /// Number of shapes that value, rate and second derivative at the start give.
 const START: usize = 3;
