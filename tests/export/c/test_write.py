@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from drivetwin.driveline import FrictionTable
@@ -163,6 +163,8 @@ def test_any_name_becomes_one_string_literal(text: str) -> None:
 
 
 @given(st.text(max_size=30).filter(lambda text: text.isprintable()))
+@example("/*")
+@example("*/*")
 def test_any_name_of_a_twin_leaves_the_source_whole(text: str) -> None:
     source = twin_source(replace(paper_subject(), name=text, note=text))
     assert source.count("/*") == source.count("*/")

@@ -75,17 +75,17 @@ def write_c(subject: Subject, folder: Path) -> tuple[Path, ...]:
 
 
 def c_string(text: str) -> str:
-    """A C string literal; what is not printable ASCII becomes octal escapes of its UTF-8 bytes."""
+    """A C string literal; octal escapes stand for what is not printable ASCII, and for asterisks."""
 
     def literal(byte: int) -> str:
-        return chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f"\\{byte:03o}"
+        return chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?*' else f"\\{byte:03o}"
 
     return '"' + "".join(map(literal, text.encode())) + '"'
 
 
 def _comment(text: str) -> str:
-    """Text that cannot end a comment or break its line."""
-    return " ".join(text.replace("*/", "* /").split())
+    """Text that can neither begin nor end a comment, nor break its line."""
+    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
 
 
 def _initialiser(entry: Entry) -> str:
