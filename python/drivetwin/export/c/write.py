@@ -75,7 +75,7 @@ def write_c(subject: Subject, folder: Path) -> tuple[Path, ...]:
 
 
 def c_string(text: str) -> str:
-    """A C string literal; octal escapes stand for what is not printable ASCII, and for asterisks."""
+    """A C string literal; octal escapes stand for all but printable ASCII, and for asterisks."""
 
     def literal(byte: int) -> str:
         return chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?*' else f"\\{byte:03o}"
