@@ -6,12 +6,14 @@ mod dual;
 mod lane;
 mod pack;
 mod series;
+mod transpose;
 mod vote;
 
 pub use dual::Dual;
 pub use lane::{Factor, Lane, SMALL, Values};
 pub use pack::Pack;
 pub use series::{INVERSE, Series, TERMS, evaluate, product_term, slope};
+pub use transpose::{FOUR, transpose};
 pub use vote::together;
 
 use std::fmt::Debug;

@@ -20,6 +20,7 @@ pub const INVERSE: Series<f64> = {
 };
 
 /// Value of a series at `h` [s], by Horner's rule over its first `order + 1` coefficients.
+#[inline(always)]
 pub fn evaluate<T: Number>(series: &Series<T>, order: usize, h: T) -> T {
     let mut value = series[order];
     for k in (0..order).rev() {
@@ -29,6 +30,7 @@ pub fn evaluate<T: Number>(series: &Series<T>, order: usize, h: T) -> T {
 }
 
 /// Time derivative of a series at `h` [s].
+#[inline(always)]
 pub fn slope<T: Number>(series: &Series<T>, order: usize, h: T) -> T {
     let mut value = T::zero_();
     for k in (1..=order).rev() {

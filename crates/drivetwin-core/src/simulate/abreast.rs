@@ -3,12 +3,11 @@
 
 use super::trajectory::{Column, Entry, Target, passing_terms, value};
 use crate::network::Network;
-use crate::number::{Lane, Number};
+use crate::number::{FOUR, Lane, Number, transpose};
 use crate::solve::{
     BLOCK, Inputs, Lanes, NO_POINT, Record, Regime, Samples, Stretch, Task, WIDTH, dispatch,
 };
-use std::borrow::Borrow;
-use std::hint::black_box;
+use smallvec::SmallVec;
 
 /// Fills columns while runs advance, each at its own samples.
 pub(super) struct Recorder<'p, 'v> {
@@ -19,9 +18,9 @@ pub(super) struct Recorder<'p, 'v> {
     columns: Vec<Column<Lanes>>,
     /// Of every run, outputs × points.
     values: Vec<&'v mut [f64]>,
-    /// Working space: the basis at an instant, and one output over a block of samples.
+    /// Working space: the basis at an instant, and one output over a block of samples, of every run.
     basis: Vec<Lanes>,
-    block: Vec<Lanes>,
+    block: Block,
 }
 
 impl<'p, 'v> Recorder<'p, 'v> {
@@ -34,7 +33,7 @@ impl<'p, 'v> Recorder<'p, 'v> {
         values: Vec<&'v mut [f64]>,
     ) -> Self {
         let columns = targets.iter().map(|&target| Column::of(network, target)).collect();
-        let (basis, block) = (Vec::new(), vec![Lanes::zero_(); BLOCK + 1]);
+        let (basis, block) = (Vec::new(), [[0.0; BLOCK + FOUR]; WIDTH]);
         Self { inputs, points, columns, values, basis, block }
     }
 }
@@ -85,71 +84,102 @@ impl Task for Passed<'_, '_, '_, '_> {
     #[inline(always)]
     fn run<const F: bool>(self) {
         let Self { recorder, regime, active, samples, stretch } = self;
-        let Recorder { inputs, points: (points, per_output), columns, values, block, .. } =
-            recorder;
-        let numbers = stretch.first..stretch.first + stretch.count;
-        let block = &mut block[..stretch.count];
-        let points = &points[numbers.clone()];
+        let Recorder { inputs, points, columns, values, block, .. } = recorder;
+        let (points, per_output) = (&points.0[stretch.first..][..stretch.count], points.1);
         if points.iter().all(|&point| point == NO_POINT) {
             return;
         }
         for (output, column) in columns.iter().enumerate() {
-            let mut begun = false;
-            for &(position, factor) in &*passing_terms(column, regime) {
-                let how = (factor, begun);
-                match Entry::at(position, regime.network, active) {
-                    Entry::State(i) => add(block, samples.states[i].iter(), how),
-                    Entry::Input(i) => {
-                        let at = |knot| Lanes::gathered(|run| inputs[run].at_knot(knot, i));
-                        add(block, numbers.clone().map(at), how);
-                    }
-                    Entry::One => add(block, std::iter::repeat(Lanes::all(1.0)), how),
-                    Entry::Torque(slot) => add(block, samples.torques[slot].iter(), how),
-                    Entry::Nothing => add(block, std::iter::repeat(Lanes::zero_()), how),
-                }
-                begun = true;
+            let terms = &*passing_terms(column, regime);
+            let entry = |position| Entry::at(position, regime.network, active);
+            let given: Vec<Vec<Lanes>> = terms
+                .iter()
+                .filter_map(|&(position, _)| other_entry(entry(position), inputs, stretch))
+                .collect();
+            let mut given = given.iter();
+            let mut sum: Terms<'_> = SmallVec::new();
+            for &(position, factor) in terms {
+                let samples = match entry(position) {
+                    Entry::State(i) => &samples.states[i],
+                    Entry::Torque(slot) => &samples.torques[slot],
+                    _ => &**given.next().expect("what is neither is given"),
+                };
+                sum.push((samples, factor));
             }
-            if !begun {
-                block.fill(Lanes::zero_());
-            }
+            transpose(
+                #[inline(always)]
+                |at| total(&sum, at),
+                (block, stretch.count),
+            );
             for (run, values) in values.iter_mut().enumerate() {
                 let (from, to) = stretch.spans[run];
-                let values = &mut values[output * *per_output..][..*per_output];
-                hand_out((&block[from..to], run), &points[from..to], values);
+                let values = &mut values[output * per_output..][..per_output];
+                hand_out(&block[run % WIDTH][from..to], &points[from..to], values);
             }
         }
     }
+}
+
+/// One output over a block of samples, of every run.
+type Block = [[f64; BLOCK + FOUR]; WIDTH];
+
+/// What an output is a sum of: entries of the basis over samples, in whole fours, and factors.
+type Terms<'s> = SmallVec<[(&'s [Lanes], Lanes); 8]>;
+
+/// An entry of the basis over a stretch, in whole fours, unless it is a state or a torque.
+fn other_entry(
+    entry: Entry,
+    inputs: &[&Inputs<f64>; WIDTH],
+    &Stretch { first, count, .. }: &Stretch,
+) -> Option<Vec<Lanes>> {
+    let fours = count.next_multiple_of(FOUR);
+    match entry {
+        Entry::State(_) | Entry::Torque(_) => None,
+        Entry::Input(i) => {
+            let at = |knot| Lanes::gathered(|run| inputs[run].at_knot(knot, i));
+            let mut values: Vec<Lanes> = (first..first + count).map(at).collect();
+            values.resize(fours, Lanes::zero_());
+            Some(values)
+        }
+        Entry::One => Some(vec![Lanes::all(1.0); fours]),
+        Entry::Nothing => Some(vec![Lanes::zero_(); fours]),
+    }
+}
+
+/// Sum of terms at four samples.
+#[inline(always)]
+fn total(terms: &Terms<'_>, at: usize) -> [Lanes; FOUR] {
+    let Some((&(samples, factor), others)) = terms.split_first() else {
+        return [Lanes::zero_(); FOUR];
+    };
+    let mut sums = *four(samples, at);
+    for sum in &mut sums {
+        *sum *= factor;
+    }
+    for &(samples, factor) in others {
+        for (sum, &sample) in sums.iter_mut().zip(four(samples, at)) {
+            *sum += sample * factor;
+        }
+    }
+    sums
+}
+
+#[inline(always)]
+fn four(samples: &[Lanes], at: usize) -> &[Lanes; FOUR] {
+    samples[at..].first_chunk().expect("entries in whole fours")
 }
 
 /// Give one run its values at the points of the grid.
 #[inline(always)]
-fn hand_out((block, run): (&[Lanes], usize), points: &[usize], values: &mut [f64]) {
+fn hand_out(samples: &[f64], points: &[usize], values: &mut [f64]) {
     let [Some(&first), Some(&last)] = [points.first(), points.last()] else { return };
     if first != NO_POINT && last != NO_POINT && last - first == points.len() - 1 {
-        for (to, from) in values[first..=last].iter_mut().zip(block) {
-            *to = from.0[run % WIDTH];
-        }
+        values[first..=last].copy_from_slice(samples);
         return;
     }
-    for (from, &point) in block.iter().zip(points) {
+    for (&sample, &point) in samples.iter().zip(points) {
         if let Some(to) = values.get_mut(point) {
-            *to = from.0[run % WIDTH];
+            *to = sample;
         }
-    }
-}
-
-/// Add a multiple of samples to a block, or begin it with that.
-#[inline(always)]
-fn add(
-    block: &mut [Lanes],
-    samples: impl Iterator<Item: Borrow<Lanes>>,
-    (factor, begun): (Lanes, bool),
-) {
-    // Hidden, the compiler does not take several samples at once, and gather what is a vector already.
-    let pairs = block.iter_mut().zip(samples);
-    if begun {
-        pairs.for_each(|(sum, sample)| *sum += *black_box(sample.borrow()) * factor);
-    } else {
-        pairs.for_each(|(sum, sample)| *sum = *black_box(sample.borrow()) * factor);
     }
 }

@@ -17,8 +17,6 @@ pub struct Expansion<T> {
     pub inputs: Vec<Series<T>>,
     /// Highest coefficient that is filled in, with zeros for runs whose series ends before.
     pub order: usize,
-    /// Runs whose series ends with each order, as bits.
-    ended: [u32; TERMS],
     /// One coefficient of the whole basis.
     basis: Vec<T>,
     /// 1 over the scale of each state, without derivatives.
@@ -42,7 +40,6 @@ impl<T: Number> Expansion<T> {
             channels: vec![ChannelSeries::default(); network.channels.len()],
             inputs: vec![[T::zero_(); TERMS]; network.mechanism.inputs.len()],
             order: 0,
-            ended: [0; TERMS],
             basis: Vec::with_capacity(network.basis()),
             scales: vec![T::zero_(); network.states()],
         }
@@ -87,7 +84,8 @@ impl<T: Number> Expansion<T> {
         let mut sizes = [T::Values::of(f64::INFINITY); TERMS];
         let mut power = T::Values::of(1.0);
         let mut growing = runs;
-        self.ended = [0; TERMS];
+        // Runs whose series ends with each order, as bits.
+        let mut ended = [0; TERMS];
         for k in 0..last {
             self.channel_terms(network, cells, k);
             // Of lines only two coefficients are left to enter, and the zeros after them.
@@ -99,27 +97,22 @@ impl<T: Number> Expansion<T> {
             sizes[k + 1] = power * if curved { size.larger(self.input_size(k + 1)) } else { size };
             if accuracy.order.is_none() {
                 let recent = largest(&sizes[(k + 2).saturating_sub(window)..k + 2]);
-                self.ended[k + 1] = recent.those(|size| size <= accuracy.tolerance) & growing;
-                growing &= !self.ended[k + 1];
+                ended[k + 1] = recent.those(|size| size <= accuracy.tolerance) & growing;
+                growing &= !ended[k + 1];
             }
             if growing == 0 {
-                self.finish(network, cells, k + 1);
+                self.finish(network, cells, (k + 1, &ended));
                 return h;
             }
         }
-        self.ended[last] |= growing;
-        self.finish(network, cells, last);
+        ended[last] |= growing;
+        self.finish(network, cells, (last, &ended));
         if accuracy.order.is_some() {
             return h;
         }
         let excess = largest(&sizes[TERMS - window..]) / accuracy.tolerance;
         let shorter = |run| (0.8 * excess.of_run(run).powf(-1.0 / last as f64)).min(1.0);
         h.with(growing, h * T::Values::gathered(shorter))
-    }
-
-    /// Highest coefficient of one run.
-    pub fn order_of(&self, run: usize) -> usize {
-        self.ended.iter().position(|ended| ended >> run & 1 == 1).unwrap_or(self.order)
     }
 
     /// Highest coefficient of the inputs: lines have one, sines all.
@@ -159,12 +152,17 @@ impl<T: Number> Expansion<T> {
     }
 
     #[inline(always)]
-    fn finish(&mut self, network: &Network<T>, cells: &[Cell], order: usize) {
+    fn finish(
+        &mut self,
+        network: &Network<T>,
+        cells: &[Cell],
+        (order, ended): (usize, &[u32; TERMS]),
+    ) {
         self.channel_terms(network, cells, order);
         self.order = order;
         let mut done = 0;
         for k in 1..order {
-            done |= self.ended[k];
+            done |= ended[k];
             if done != 0 {
                 self.end_before(k + 1, done);
             }

@@ -1,113 +1,169 @@
 // SPDX-License-Identifier: MIT
 //! The first instant at which a guard polynomial falls below zero.
 
-use crate::number::{Real, Series, TERMS, Values, evaluate, slope};
+use crate::number::{Lane, Number, Series, Values, evaluate, slope};
 
-/// Coefficients with the real parts of a guard, for the search.
-type Polynomial = [f64; TERMS];
+/// Relative to the size of a guard what counts as zero at the start.
+const NEGLIGIBLE: f64 = 1e-13;
+/// How often a step is halved to tell falls apart.
+const MAX_DEPTH: usize = 50;
 
-/// First time in [0, h] from which the guard `Σ c_k t^k` is negative, or `None`.
+/// First times in [0, h] from which the guards `Σ c_k t^k` of the runs `runs`, as bits, are negative, with the
+/// runs for which there is one.
 ///
 /// A guard that starts at zero (to round-off) and rises is left alone until it falls again, which is
 /// how an element that has just changed its mode starts. Excursions inside the step are found too:
 /// the search rests on bounds of the polynomial, not on samples.
-pub fn first_fall<T: Real>(guard: &Series<T>, order: usize, h: f64) -> Option<f64> {
-    let mut reach = 0.0;
-    let mut power = 1.0;
+#[inline(always)]
+pub fn first_fall<T: Number>(
+    guard: &Series<T>,
+    order: usize,
+    (mut runs, h): (u32, T::Values),
+) -> (u32, T::Values) {
+    let none = T::Values::zero_();
+    let (mut reach, mut power) = (none, T::Values::of(1.0));
     for c in &guard[1..=order] {
         power *= h;
-        reach += c.re().abs() * power;
+        reach += c.re().magnitude() * power;
     }
     let start = guard[0].re();
-    if start > reach {
-        return None;
+    runs &= !(start - reach).those(|left| left > 0.0);
+    if runs == 0 {
+        return (0, none);
     }
-    let mut c: Polynomial = [0.0; TERMS];
-    for (target, source) in c.iter_mut().zip(&guard[..=order]) {
-        *target = source.re();
+    let mut c = guard.map(|c| c.re());
+    let negligible = (start.magnitude() + reach) * NEGLIGIBLE;
+    let at_zero = runs & !(start - negligible).those(|above| above > 0.0);
+    let mut at_once = 0;
+    if at_zero != 0 {
+        let (falling, rising) = lift_off(&mut c, order, (at_zero, h), negligible);
+        (at_once, runs) = (falling, runs & !at_zero | rising);
     }
-    let negligible = 1e-13 * (start.abs() + reach);
-    let mut order = order;
-    if start <= negligible {
-        let leading = (1..=order).find(|&k| c[k].abs() * h.powi(k as i32) > negligible)?;
-        if c[leading] < 0.0 {
-            return Some(0.0);
-        }
-        c.copy_within(leading..=order, 0);
-        order -= leading;
-    }
-    search(&c, order, 0.0, h, 0)
+    let (fallen, time) = search(&c, order, (runs, none, h), 0);
+    (fallen | at_once, time.with(at_once, none))
 }
 
-/// Runs whose guard stays positive over [0, h] as its coefficients tell at once, as bits.
-pub fn stay_positive<V: Values>(guard: &Series<V>, order: usize, h: V) -> u32 {
-    let (mut reach, mut power) = (V::zero_(), V::of(1.0));
-    for &c in &guard[1..=order] {
+/// What the guards of the runs `at_zero`, as bits, do that start at zero, to what is negligible within `h` [s].
+/// Returns those that fall below, and those that rise: as a power of time times a polynomial, which they
+/// become. The others rest.
+#[inline(always)]
+fn lift_off<V: Values>(
+    c: &mut Series<V>,
+    order: usize,
+    (at_zero, h): (u32, V),
+    negligible: V,
+) -> (u32, u32) {
+    let (mut falling, mut rising, mut power) = (0, 0, V::of(1.0));
+    for k in 1..=order {
         power *= h;
-        reach += c.magnitude() * power;
+        let counts = (c[k].magnitude() * power - negligible).those(|size| size > 0.0);
+        let begin = at_zero & counts & !falling & !rising;
+        let below = begin & c[k].those(|leading| leading < 0.0);
+        let above = begin & !below;
+        if above != 0 {
+            for i in 0..=order {
+                let later = if i + k <= order { c[i + k] } else { V::zero_() };
+                c[i] = c[i].with(above, later);
+            }
+        }
+        falling |= below;
+        rising |= above;
+        if at_zero & !falling & !rising == 0 {
+            break;
+        }
     }
-    (guard[0] - reach).those(|left| left > 0.0)
+    (falling, rising)
 }
 
-/// First root of a polynomial that is positive at `from`.
-fn search(c: &Polynomial, order: usize, from: f64, to: f64, depth: usize) -> Option<f64> {
-    let (middle, radius) = (0.5 * (from + to), 0.5 * (to - from));
+/// First roots within spans of the polynomials of some runs, as bits, that are positive at the start.
+#[inline(always)]
+fn search<V: Values>(
+    c: &Series<V>,
+    order: usize,
+    (runs, from, to): (u32, V, V),
+    depth: usize,
+) -> (u32, V) {
+    let (middle, radius) = ((from + to) * 0.5, (to - from) * 0.5);
     let d = shifted(c, order, middle);
-    let mut swing = 0.0;
-    let mut bend = 0.0;
+    let (mut swing, mut bend) = (V::zero_(), V::zero_());
     for k in (1..=order).rev() {
-        swing = (swing + d[k].abs()) * radius;
+        swing = (swing + d[k].magnitude()) * radius;
         if k > 1 {
-            bend = bend * radius + d[k].abs() * k as f64;
+            bend = bend * radius + d[k].magnitude() * k as f64;
         }
     }
-    if d[0] > swing {
-        return None;
+    let open = runs & !(d[0] - swing).those(|left| left > 0.0);
+    if open == 0 {
+        return (0, to);
     }
-    if order >= 1 && -d[1] > bend * radius {
-        return (evaluate(c, order, to) < 0.0).then(|| bisect(c, order, from, to));
+    let below = evaluate(c, order, to).those(|end| end < 0.0);
+    let falling = open & (-d[1] - bend * radius).those(|fall| fall > 0.0);
+    let mut fallen = falling & below;
+    let mut time = if fallen == 0 { to } else { root(c, order, (fallen, from, to)) };
+    let rest = open & !falling;
+    if rest != 0 {
+        let inside = (middle - from).those(|left| left > 0.0) & (to - middle).those(|l| l > 0.0);
+        let halved = if depth == MAX_DEPTH { 0 } else { rest & inside };
+        let (late, at) = in_halves(c, order, (halved, from, to), depth + 1);
+        let now = rest & !halved & below;
+        time = time.with(late, at).with(now, from);
+        fallen |= late | now;
     }
-    if depth == 50 || middle <= from || middle >= to {
-        return (evaluate(c, order, to) < 0.0).then_some(from);
-    }
-    search(c, order, from, middle, depth + 1).or_else(|| {
-        if evaluate(c, order, middle) < 0.0 {
-            Some(middle)
-        } else {
-            search(c, order, middle, to, depth + 1)
-        }
-    })
+    (fallen, time)
 }
 
-/// Root of a polynomial that falls through zero once in the bracket: Newton kept inside it.
-fn bisect(c: &Polynomial, order: usize, mut from: f64, mut to: f64) -> f64 {
-    let mut t = 0.5 * (from + to);
+/// [`search`] in one half after the other.
+#[cold]
+#[inline(never)]
+fn in_halves<V: Values>(
+    c: &Series<V>,
+    order: usize,
+    (runs, from, to): (u32, V, V),
+    depth: usize,
+) -> (u32, V) {
+    if runs == 0 {
+        return (0, to);
+    }
+    let middle = (from + to) * 0.5;
+    let (early, time) = search(c, order, (runs, from, middle), depth);
+    let there = runs & !early & evaluate(c, order, middle).those(|value| value < 0.0);
+    let rest = runs & !early & !there;
+    let (late, at) = search(c, order, (rest, middle, to), depth);
+    (early | there | late, time.with(there, middle).with(late, at))
+}
+
+/// Roots of polynomials that fall through zero once in their brackets: Newton kept inside them.
+#[inline(always)]
+fn root<V: Values>(c: &Series<V>, order: usize, (mut runs, mut from, mut to): (u32, V, V)) -> V {
+    let mut t = (from + to) * 0.5;
     for _ in 0..100 {
         let value = evaluate(c, order, t);
-        if value == 0.0 {
-            return t;
-        }
-        if value > 0.0 {
-            from = t
-        } else {
-            to = t
-        }
+        runs &= !value.those(|value| value == 0.0);
+        let above = value.those(|value| value > 0.0);
+        from = from.with(runs & above, t);
+        to = to.with(runs & !above, t);
         let newton = t - value / slope(c, order, t);
-        let next = if newton > from && newton < to { newton } else { 0.5 * (from + to) };
-        if next == t || to - from <= f64::EPSILON * to.abs() {
-            return next;
+        let inside = (newton - from).those(|left| left > 0.0) & (to - newton).those(|l| l > 0.0);
+        let next = ((from + to) * 0.5).with(inside, newton);
+        let narrow = (to - from - to.magnitude() * f64::EPSILON).those(|left| left <= 0.0);
+        let done = (next - t).those(|step| step == 0.0) | narrow;
+        t = t.with(runs, next);
+        runs &= !done;
+        if runs == 0 {
+            break;
         }
-        t = next;
     }
     t
 }
 
 /// Coefficients about `at` instead of 0 (Taylor shift by repeated synthetic division).
-fn shifted(c: &Polynomial, order: usize, at: f64) -> Polynomial {
+#[inline(always)]
+fn shifted<V: Values>(c: &Series<V>, order: usize, at: V) -> Series<V> {
     let mut d = *c;
     for i in 0..order {
         for k in (i..order).rev() {
-            d[k] += at * d[k + 1];
+            let higher = d[k + 1];
+            d[k] += at * higher;
         }
     }
     d
@@ -116,11 +172,14 @@ fn shifted(c: &Polynomial, order: usize, at: f64) -> Polynomial {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::number::{Pack, TERMS};
+    use proptest::prelude::*;
 
     fn fall(coefficients: &[f64], h: f64) -> Option<f64> {
         let mut series = [0.0; TERMS];
         series[..coefficients.len()].copy_from_slice(coefficients);
-        first_fall(&series, coefficients.len() - 1, h)
+        let (fallen, time) = first_fall(&series, coefficients.len() - 1, (1, h));
+        (fallen == 1).then_some(time)
     }
 
     #[test]
@@ -157,5 +216,41 @@ mod tests {
     #[test]
     fn a_guard_that_is_zero_throughout_never_falls() {
         assert_eq!(fall(&[0.0, 0.0, 0.0], 1.0), None);
+    }
+
+    /// Guards of several runs, some of which start at zero: small whole coefficients, so that roots fall
+    /// together and leading ones vanish.
+    fn guards() -> impl Strategy<Value = Series<Pack<8>>> {
+        let coefficients = prop::collection::vec(-4_i8..=4, 8 * 6);
+        coefficients.prop_map(|c| {
+            std::array::from_fn(|k| {
+                Pack::gathered(|run| c.get(k * 8 + run).map_or(0.0, |&c| f64::from(c)))
+            })
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn runs_side_by_side_fall_as_each_alone(guards in guards(), runs in 0_u32..256, h in 0.1..4.0) {
+            let (fallen, time) = first_fall(&guards, 5, (runs, Pack::of(h)));
+            prop_assert_eq!(fallen & !runs, 0);
+            for run in (0..8).filter(|run| runs >> run & 1 == 1) {
+                let (falls, at) = first_fall(&guards.map(|c| c.of_run(run)), 5, (1, h));
+                prop_assert_eq!(falls, fallen >> run & 1);
+                prop_assert!(falls == 0 || at.to_bits() == time.of_run(run).to_bits());
+            }
+        }
+
+        #[test]
+        fn no_guard_is_negative_before_it_falls(guards in guards(), h in 0.1..4.0) {
+            let guard = guards.map(|c| c.of_run(0));
+            prop_assume!(guard[0] >= 0.0);
+            let value = |t: f64| evaluate(&guard, 5, t);
+            let (falls, at) = first_fall(&guard, 5, (1, h));
+            let until = if falls == 1 { at } else { h };
+            for part in 1..100 {
+                prop_assert!(value(until * f64::from(part) / 100.0) > -1e-9);
+            }
+        }
     }
 }

@@ -11,6 +11,7 @@ use super::inputs::Inputs;
 use super::integrator::Settings;
 use super::known::Known;
 use super::march::{Column, Samples};
+use super::operators::MAX_ACTIVE;
 use super::passage::{Passage, Stretch};
 use super::progress::{Progress, is_lost};
 use super::ready::{AnySize, can_march};
@@ -109,7 +110,7 @@ pub fn run_together<'a>(
     };
     let members = inputs.iter().enumerate().map(member).collect();
     let own_inputs = vec![[0.0; TERMS]; regime.ahead.len()];
-    let columns = Vec::new();
+    let columns = Vec::with_capacity(regime.x.len() + MAX_ACTIVE);
     let mut all = Formation { regime, settings, members, events, columns, own_inputs };
     all.part(parting);
     all.decide(all.open(), |regime| regime.take_up(locked));

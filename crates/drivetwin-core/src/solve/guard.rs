@@ -2,10 +2,12 @@
 //! Guards: polynomials that must stay positive while a mode holds, and the earliest that falls.
 
 use super::decide::{NOTHING, ROUND_OFF};
-use super::first_fall::{first_fall, stay_positive};
+use super::first_fall::first_fall;
+use super::formation::each;
+use super::lanes::{Task, dispatch};
 use super::regime::{Regime, RowState};
 use crate::network::{Cell, GearState, Row};
-use crate::number::{Number, Pack, Real, Series, TERMS, Values, evaluate, slope};
+use crate::number::{Lane, Number, Pack, Real, Series, TERMS, Values, evaluate, slope};
 
 /// What happens when a guard falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,9 +44,8 @@ pub fn earliest<T: Real>(regime: &Regime<'_, T>, h: f64) -> Option<(T, Cause, bo
     let mut best: Option<(f64, Series<T>, Cause)> = None;
     all_guards(regime, &mut |series: Series<T>, cause: Cause| {
         let horizon = best.as_ref().map_or(h, |b| b.0);
-        if let Some(t) = first_fall(&series, regime.expansion.order, horizon)
-            && best.as_ref().is_none_or(|b| t < b.0)
-        {
+        let (falls, t) = first_fall(&series, regime.expansion.order, (1, horizon));
+        if falls == 1 && best.as_ref().is_none_or(|b| t < b.0) {
             best = Some((t, series, cause));
         }
     });
@@ -59,20 +60,31 @@ pub fn earliest_of_each<const K: usize>(
     regime: &Regime<'_, Pack<K>>,
     (runs, h): (u32, Pack<K>),
 ) -> [Option<(f64, Cause)>; K] {
-    let mut best = [None; K];
+    let (mut causes, mut fallen, mut earliest) = ([None; K], 0, h);
     all_guards(regime, &mut |series: Series<Pack<K>>, cause: Cause| {
-        let near = runs & !stay_positive(&series, regime.expansion.order, h);
-        for run in (0..K).filter(|run| near >> run & 1 == 1) {
-            let horizon = best[run].map_or(h.0[run], |(t, _)| t);
-            let own = series.map(|c| c.0[run]);
-            if let Some(t) = first_fall(&own, regime.expansion.order_of(run), horizon)
-                && best[run].is_none_or(|(before, _)| t < before)
-            {
-                best[run] = Some((t, cause));
-            }
-        }
+        let guard = (&series, regime.expansion.order);
+        let (falls, t) = dispatch(FirstFall { guard, span: (runs, earliest) });
+        let earlier = falls & (!fallen | (earliest - t).those(|left| left > 0.0));
+        each(earlier).for_each(|run| causes[run] = Some(cause));
+        earliest = earliest.with(earlier, t);
+        fallen |= earlier;
     });
-    best
+    std::array::from_fn(|run| causes[run].map(|cause| (earliest.0[run], cause)))
+}
+
+/// [`first_fall`], to be dispatched.
+struct FirstFall<'s, T: Number> {
+    guard: (&'s Series<T>, usize),
+    span: (u32, T::Values),
+}
+
+impl<T: Number> Task for FirstFall<'_, T> {
+    type Output = (u32, T::Values);
+
+    #[inline(always)]
+    fn run<const F: bool>(self) -> Self::Output {
+        first_fall(self.guard.0, self.guard.1, self.span)
+    }
 }
 
 /// Hand on every guard with what its fall causes.

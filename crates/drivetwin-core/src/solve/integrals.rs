@@ -3,6 +3,7 @@
 //! operators are made of.
 //!
 //! Plain loops throughout: the body of a closure would be compiled apart, for the least of all processors.
+//! Matrices are written in place: of several runs side by side they are large, and copied where returned.
 
 use super::operators::SHAPES;
 use crate::number::{Lane, Number, Values};
@@ -10,8 +11,11 @@ use crate::number::{Lane, Number, Values};
 /// A square matrix by rows.
 type Square<T, const N: usize> = [[T; N]; N];
 
+/// [`integrals`], S_0 first.
+pub type Integrals<T, const N: usize> = [Square<T, N>; CUBIC + 1];
+
 /// Powers of time that a force is integrated with.
-const CUBIC: usize = 4;
+pub const CUBIC: usize = 4;
 /// What may be left of the series, relative to its first term; generous, as A is badly scaled.
 const REMAINDER: f64 = 1e-24;
 /// Most terms of the series.
@@ -20,20 +24,19 @@ const MAX_SERIES: usize = 40;
 /// Coefficients of the series of the operators but for its first factor, and their number. Those that a run
 /// does not need are zero.
 #[inline(always)]
-fn coefficients<T: Number>(h: f64, reach: T) -> ([T::Values; MAX_SERIES + 2], usize) {
-    let none = T::Values::zero_();
-    let (mut all, mut left) = ([none; MAX_SERIES + 2], T::Values::of(1.0));
+fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], (h, reach): (f64, T)) -> usize {
+    let mut left = T::Values::of(1.0);
     all[0] = left;
     let mut ended = 0;
     for i in 1..MAX_SERIES {
         left *= reach.re() / i as f64;
         ended |= left.those(|left| left < REMAINDER);
         if ended == T::RUNS {
-            return (all, i);
+            return i;
         }
-        all[i] = (all[i - 1] * h / (i + CUBIC) as f64).with(ended, none);
+        all[i] = (all[i - 1] * h / (i + CUBIC) as f64).with(ended, T::Values::zero_());
     }
-    (all, MAX_SERIES)
+    MAX_SERIES
 }
 
 /// `S_k = Σ_i A^i h^(i+k) / (i+k)!` for k = 0 .. CUBIC: S_0 is the transition matrix, and
@@ -43,24 +46,26 @@ fn coefficients<T: Number>(h: f64, reach: T) -> ([T::Values; MAX_SERIES + 2], us
 pub fn integrals<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
     (h, reach): (f64, T),
-) -> [Square<T, N>; CUBIC + 1] {
-    let mut all = [[[T::zero_(); N]; N]; CUBIC + 1];
-    let (coefficients, terms) = coefficients(h, reach);
-    let sum = polynomial::<T, F, N>(a, &coefficients[..terms.next_multiple_of(3)]);
+    all: &mut Integrals<T, N>,
+) {
+    let mut series = [T::Values::zero_(); MAX_SERIES + 2];
+    let terms = coefficients::<T>(&mut series, (h, reach));
     let mut weights = [1.0; CUBIC + 1];
     for k in 1..=CUBIC {
         weights[k] = weights[k - 1] * h / k as f64;
     }
+    let sum = &mut all[CUBIC];
+    polynomial::<T, F, N>(a, &series[..terms.next_multiple_of(3)], sum);
     for i in 0..N {
         for j in 0..unrolled::<T, N>() {
-            all[CUBIC][i][j] = sum[i][j] * weights[CUBIC];
+            sum[i][j] *= weights[CUBIC];
         }
     }
     for k in (0..CUBIC).rev() {
-        all[k] = multiply::<T, F, N>((a, 1.0), &all[k + 1]);
-        add_to_diagonal(&mut all[k], T::of(weights[k]));
+        let (lower, higher) = all.split_at_mut(k + 1);
+        multiply::<T, F, N>(a, &higher[0], &mut lower[k]);
+        add_to_diagonal(&mut lower[k], T::of(weights[k]));
     }
-    all
 }
 
 /// `Σ c_i A^i` over whole threes of coefficients, by Horner's rule over the cube: less than half as many
@@ -69,23 +74,23 @@ pub fn integrals<T: Number, const F: bool, const N: usize>(
 fn polynomial<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
     coefficients: &[T::Values],
-) -> Square<T, N> {
-    let square = multiply::<T, F, N>((a, 1.0), a);
-    let cube = multiply::<T, F, N>((a, 1.0), &square);
-    let mut sum = [[T::zero_(); N]; N];
+    sum: &mut Square<T, N>,
+) {
+    let [mut square, mut cube, mut product] = [[[T::zero_(); N]; N]; 3];
+    multiply::<T, F, N>(a, a, &mut square);
+    multiply::<T, F, N>(a, &square, &mut cube);
     for at in (0..coefficients.len()).step_by(3).rev() {
         if at + 3 < coefficients.len() {
-            sum = multiply::<T, F, N>((&cube, 1.0), &sum);
+            multiply::<T, F, N>(&cube, sum, &mut product);
         }
         for i in 0..N {
             for j in 0..unrolled::<T, N>() {
-                let low = a[i][j].fma_values::<F>(coefficients[at + 1], sum[i][j]);
+                let low = a[i][j].fma_values::<F>(coefficients[at + 1], product[i][j]);
                 sum[i][j] = square[i][j].fma_values::<F>(coefficients[at + 2], low);
             }
         }
-        add_to_diagonal(&mut sum, T::lifted(coefficients[at]));
+        add_to_diagonal(sum, T::lifted(coefficients[at]));
     }
-    sum
 }
 
 #[inline(always)]
@@ -95,23 +100,22 @@ fn add_to_diagonal<T: Number, const N: usize>(a: &mut Square<T, N>, value: T) {
     }
 }
 
-/// Product of a scaled matrix with another.
+/// Product of two matrices, in place of what is in `out`.
 #[inline(always)]
 fn multiply<T: Number, const F: bool, const N: usize>(
-    (a, scale): (&Square<T, N>, f64),
+    a: &Square<T, N>,
     b: &Square<T, N>,
-) -> Square<T, N> {
-    let mut out = [[T::zero_(); N]; N];
+    out: &mut Square<T, N>,
+) {
     for i in 0..N {
         for j in 0..N {
             let mut sum = T::zero_();
             for k in 0..unrolled::<T, N>() {
                 sum = a[i][k].fma::<F>(b[k][j], sum);
             }
-            out[i][j] = sum * scale;
+            out[i][j] = sum;
         }
     }
-    out
 }
 
 /// A matrix times a vector.
@@ -144,7 +148,7 @@ pub fn unrolled<T: Number, const N: usize>() -> usize {
 /// Response of the state at the end to a force `e` times each of the [`SHAPES`].
 #[inline(always)]
 pub fn moments<T: Number, const F: bool, const N: usize>(
-    s: &[Square<T, N>; CUBIC + 1],
+    s: &Integrals<T, N>,
     force: &[T; N],
     h: f64,
 ) -> [[T; N]; SHAPES] {

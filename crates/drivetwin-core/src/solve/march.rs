@@ -12,7 +12,7 @@
 use super::operators::{Carried, MAX_WATCHED, Operators, Watched};
 use super::step::{over_channels, step};
 use crate::network::smooth::{Line, MAX_INPUTS, Sample, Value};
-use crate::number::{Factor, Lane, Values};
+use crate::number::{FOUR, Factor, Lane, Values};
 
 /// Samples that are passed before they are handed on.
 pub const BLOCK: usize = 64;
@@ -71,8 +71,8 @@ pub fn idle_guards<V: Values>() -> Guards<V> {
 /// each as a column over the samples: first the states.
 pub struct Trail<L, const N: usize>(Vec<Column<L>>);
 
-/// One value at every sample.
-pub type Column<L> = [L; BLOCK + 1];
+/// One value at every sample, in whole fours.
+pub type Column<L> = [L; BLOCK + FOUR];
 
 /// States and torques of the active channels at the start of samples, at least of those passed.
 #[derive(Clone, Copy, Debug)]
@@ -87,7 +87,7 @@ impl<L: Lane, const N: usize> Trail<L, N> {
     /// For so many carried channels, in columns of old.
     pub fn in_columns(mut columns: Vec<Column<L>>, channels: usize) -> Self {
         if columns.len() < N + channels {
-            columns.resize(N + channels, [L::all(0.0); BLOCK + 1]);
+            columns.resize(N + channels, [L::all(0.0); BLOCK + FOUR]);
         }
         Self(columns)
     }

@@ -6,11 +6,12 @@
 //! every channel there and its rate are linear in x, u, u', a. Channels count in their direction of
 //! motion: `τ = sign · φ` over `m = sign · unit · s`.
 
-use super::integrals::{apply, dot, integrals, moments, unrolled};
+use super::integrals::{CUBIC, apply, dot, integrals, moments, unrolled};
 use super::lanes::{Task, dispatch};
 use crate::network::smooth::{Law, Line};
 use crate::network::{Mode, Network};
 use crate::number::{Lane, Number, Values};
+use smallvec::SmallVec;
 
 /// What a channel's cubic over a sample is a sum of, with `t` from 0 to 1 over it: 1, t, t², and Hermite's
 /// `3t² - 2t³` and `t³ - t²`, which raise the value and the slope at its end and nothing else.
@@ -232,8 +233,11 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
         for i in 0..n {
             a[i][..n].copy_from_slice(&mode.derivative.row(i)[..n]);
         }
-        let s = integrals::<T, F, N>(&a, (h, reach));
+        let mut s = [[[T::zero_(); N]; N]; CUBIC + 1];
+        integrals::<T, F, N>(&a, (h, reach), &mut s);
         let mut operators = Operators::empty(n, reach);
+        operators.drives.reserve_exact(network.mechanism.inputs.len());
+        operators.channels.reserve_exact(active.len());
         for i in 0..N {
             for j in 0..unrolled::<T, N>() {
                 operators.transition[j][i] = s[0][i][j];
@@ -247,23 +251,22 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
                 operators.drives.push(Drive::new(input, step));
             }
         }
-        let mut responses = [[[T::zero_(); N]; SHAPES]; MAX_ACTIVE];
+        let mut responses: SmallVec<[[[T; N]; SHAPES]; 2]> = SmallVec::new();
         for (slot, &j) in active.iter().enumerate() {
             operators.signs[slot] = laws[slot].sign;
             let mut force = forcing(mode, network.first_channel() + j);
             for i in 0..unrolled::<T, N>() {
                 force[i] *= laws[slot].sign;
             }
-            responses[slot] = moments::<T, F, N>(&s, &force, h);
+            responses.push(moments::<T, F, N>(&s, &force, h));
         }
         for (slot, &j) in active.iter().enumerate() {
             let mut argument = [T::zero_(); N];
             for (to, &c) in argument.iter_mut().zip(&network.channels[j].arguments[0]) {
                 *to = c * laws[slot].sign * laws[slot].unit;
             }
-            let responses = &responses[..active.len()];
             let carried = (argument, laws[slot], h);
-            operators.carry::<F>(slot, (network, mode), (active, responses), carried);
+            operators.carry::<F>(slot, (network, mode), (active, &responses), carried);
         }
         // Inner loops exist for 0, 1, 2 and 4 channels.
         if operators.channels.len() == 3 {
