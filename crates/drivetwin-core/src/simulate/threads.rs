@@ -2,7 +2,7 @@
 //! Work that is shared out among threads.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use std::{process, thread};
 
 /// Threads that wait for the next work, with the memory that they have come to.
@@ -46,14 +46,19 @@ fn number(threads: usize) -> usize {
 }
 
 /// So many threads, of old or new. Those of another process stay in the list: to end them would mean to wait
-/// for them.
+/// for them. Nor is the list waited for: another thread may have had it when it forked this process off.
 fn helpers(count: usize) -> Option<Arc<ThreadPool>> {
+    let new = || ThreadPoolBuilder::new().num_threads(count).build().ok().map(Arc::new);
+    let mut all = match HELPERS.try_lock() {
+        Ok(all) => all,
+        Err(TryLockError::Poisoned(fault)) => fault.into_inner(),
+        Err(TryLockError::WouldBlock) => return new(),
+    };
     let process = process::id();
-    let mut all = HELPERS.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(one) = all.iter().find(|one| (one.process, one.count) == (process, count)) {
         return Some(one.pool.clone());
     }
-    let pool = Arc::new(ThreadPoolBuilder::new().num_threads(count).build().ok()?);
+    let pool = new()?;
     all.push(Helpers { process, count, pool: pool.clone() });
     Some(pool)
 }
@@ -72,6 +77,14 @@ mod tests {
             assert_eq!(items, [1; 100]);
         }
         share_out(3, std::iter::empty(), |(): ()| unreachable!("nothing to do"));
+    }
+
+    #[test]
+    fn a_list_that_is_never_given_back_is_done_without() {
+        let _kept = HELPERS.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut items = [0; 100];
+        share_out(3, items.iter_mut(), |item| *item += 1);
+        assert_eq!(items, [1; 100]);
     }
 
     #[test]
