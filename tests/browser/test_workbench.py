@@ -268,6 +268,20 @@ def test_the_keyboard_reaches_every_view(shown: Page) -> None:
     assert tuple(seen) == VIEWS
 
 
+_BUSY_CLICKS = """ids => ids.forEach((id) => {
+  const begin = Date.now();
+  while (Date.now() < begin + 5);
+  document.getElementById(id).click();
+})"""
+"""Clicks, 5 ms apart, on a page that is busy until after the last."""
+
+
+def test_of_clicks_in_a_row_the_last_one_counts(shown: Page) -> None:
+    for names in (("channels", "model"), ("export", "log"), ("model", "channels", "gearbox")):
+        shown.evaluate(_BUSY_CLICKS, [f"nav-{name}" for name in names])
+        expect(shown.locator(f"#view-{names[-1]}")).to_be_visible()
+
+
 @pytest.fixture
 def refusing(context: BrowserContext, bench: Bench) -> Page:
     """The workbench in a page whose console tells of refused requests, as browsers do."""

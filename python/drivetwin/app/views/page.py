@@ -58,13 +58,15 @@ _INDEX = """<!DOCTYPE html>
   <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}</head>
   <body>{%app_entry%}<footer hidden>{%config%}{%scripts%}{%renderer%}</footer></body>
 </html>"""
-_SWITCH = """(...args) => {
+_SWITCH = """(...clicked) => {
   const names = NAMES;
-  const id = (dash_clientside.callback_context.triggered_id || "nav-FIRST").slice(4);
+  const times = clicked.map((time) => time ?? -1);
+  const id = names[times.indexOf(Math.max(...times))];
   setTimeout(() => window.dispatchEvent(new Event("resize")), 0);
   const current = names.map((name) => (name === id ? "page" : "false"));
   return [...names.map((name) => name !== id), ...current];
 }"""
+"""By the times of the last clicks: of several that a busy page answers together the last one counts."""
 
 
 def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
@@ -121,12 +123,12 @@ def _layout() -> Component:
 
 
 def _switch_views(app: Dash) -> None:
-    script = _SWITCH.replace("NAMES", str(list(VIEWS))).replace("FIRST", _FIRST)
+    script = _SWITCH.replace("NAMES", str(list(VIEWS)))
     app.clientside_callback(  # type: ignore[no-untyped-call]
         script,
         *(Output(f"view-{name}", "hidden") for name in VIEWS),
         *(Output(f"nav-{name}", "aria-current") for name in VIEWS),
-        *(Input(f"nav-{name}", "n_clicks") for name in VIEWS),
+        *(Input(f"nav-{name}", "n_clicks_timestamp") for name in VIEWS),
     )
 
 
