@@ -66,7 +66,7 @@ _SWITCH = """(...clicked) => {
   const current = names.map((name) => (name === id ? "page" : "false"));
   return [...names.map((name) => name !== id), ...current];
 }"""
-"""By the times of the last clicks: of several that a busy page answers together the last one counts."""
+"""By the times of clicks: of several that a busy page answers together the last one counts."""
 
 
 def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
