@@ -5,7 +5,7 @@
 mod common;
 
 use common::{clutch, compile, inertia, shaft, start, torque};
-use drivetwin_core::model::elements::{Clutch, Element};
+use drivetwin_core::model::elements::{Clutch, Element, OneWayClutch};
 use drivetwin_core::model::{FrictionLaw, Stribeck};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{Output, Start, Trajectory, run};
@@ -171,6 +171,35 @@ fn an_excursion_within_one_sample_breaks_away() {
         assert!(run.events[0].time < 4.0 * h);
     }
     assert!((runs[0].events[0].time - runs[1].events[0].time).abs() < 1e-7);
+}
+
+/// A freewheel that is taken along for an eighth of a sample, at the crest of a swing far from standstill: at the
+/// samples its slip is small and neither rises nor falls.
+#[test]
+fn a_touch_within_one_sample_takes_a_freewheel_along() {
+    let (stiffness, member, crest) = (8.0e3, 2.0, 20.0);
+    let omega = (stiffness / member * (1.0 + member / 1e6_f64)).sqrt();
+    let h = 0.5 / omega;
+    let time = samples(h, 40);
+    let (a, b) = ("b".into(), "c".into());
+    let elements = vec![
+        inertia("a", 1e6),
+        inertia("b", member),
+        inertia("c", 1e6),
+        shaft("a", "b", stiffness, 0.0),
+        Element::OneWayClutch(OneWayClutch { name: "F".into(), a, b, clutch: None }),
+    ];
+    let phase = -3.5 * omega * h;
+    let speeds = [("a", 0.0), ("b", crest * phase.cos()), ("c", 0.9995 * crest)];
+    let mut begin = start(&speeds, &[]);
+    begin.twists = vec![("shaft a b".into(), -crest / omega * phase.sin())];
+    let runs = both(&compile(elements), &time, &[], &begin, &Output::Speed("b".into()));
+    for run in &runs {
+        assert_eq!(run.events[0].kind, EventKind::Lock, "{:?}", run.events);
+        assert!((3.0 * h..3.5 * h).contains(&run.events[0].time));
+    }
+    assert!((runs[0].events[0].time - runs[1].events[0].time).abs() < 1e-7);
+    assert!(worst(&runs) < 1e-4);
 }
 
 /// Samples far apart beside a stiff shaft, and chains of many masses: both are passed by exact operators

@@ -9,10 +9,14 @@ use pulp::{cast, x86::V3};
 pub const FOUR: usize = 4;
 
 /// Rows of several runs by fours, as columns of each run: `rows` gives four from a row on, and as many are
-/// asked for as cover the first `count` places of `columns`.
+/// asked for as cover the first `count` places of `columns`, which have room for whole fours of them.
 ///
 /// Compilers make gathers of plain loops over these, several times as slow: vectors are shuffled here where
 /// there are such.
+///
+/// # Panics
+///
+/// If a column ends within a four that is asked for, or runs are not by fours.
 #[inline(always)]
 pub fn transpose<const K: usize, const N: usize>(
     rows: impl Fn(usize) -> [Pack<K>; FOUR],

@@ -73,13 +73,13 @@ pub fn earliest_of_each<const K: usize>(
 }
 
 /// [`first_fall`], to be dispatched.
-struct FirstFall<'s, T: Number> {
-    guard: (&'s Series<T>, usize),
-    span: (u32, T::Values),
+struct FirstFall<'s, const K: usize> {
+    guard: (&'s Series<Pack<K>>, usize),
+    span: (u32, Pack<K>),
 }
 
-impl<T: Number> Task for FirstFall<'_, T> {
-    type Output = (u32, T::Values);
+impl<const K: usize> Task for FirstFall<'_, K> {
+    type Output = (u32, Pack<K>);
 
     #[inline(always)]
     fn run<const F: bool>(self) -> Self::Output {

@@ -9,9 +9,10 @@
 //! the argument that it is needed at, so that nothing waits for it; with derivatives, where products count
 //! for more, at the predicted argument itself.
 
-use super::operators::{Carried, MAX_WATCHED, Operators, Watched};
+use super::operators::{Carried, Operators};
 use super::step::{over_channels, step};
-use crate::network::smooth::{Line, MAX_INPUTS, Sample, Value};
+use super::watch::Guards;
+use crate::network::smooth::{MAX_INPUTS, Sample, Value};
 use crate::number::{FOUR, Factor, Lane, Values};
 
 /// Samples that are passed before they are handed on.
@@ -57,14 +58,6 @@ pub struct Carry<L> {
     pub near: L,
     /// Stiction there.
     pub stiction: L,
-}
-
-/// Limits and values of the watched forms at the start of a sample.
-pub type Guards<V> = [[V; 2]; MAX_WATCHED];
-
-/// Of what is not watched.
-pub fn idle_guards<V: Values>() -> Guards<V> {
-    [[V::all(1.0), V::all(0.0)]; MAX_WATCHED]
 }
 
 /// States and torques of the carried channels at the start of passed samples, and at the end of the last,
@@ -133,9 +126,6 @@ impl<L: Lane, const N: usize> Trail<L, N> {
     }
 }
 
-/// Inputs at the ends of `W` samples.
-type Ends<V, const W: usize> = [[V; W]; MAX_INPUTS];
-
 /// Pass up to `count` samples from segment `first`, which stand in the trail from place `at` on. Returns how
 /// many were passed and, as bits, the runs of which a guard could have fallen within the next one. Only the
 /// runs `live`, as bits, count.
@@ -201,208 +191,6 @@ pub fn march<
     match (outcome.1, sum.unbounded() & live) {
         (0, unbounded) if unbounded != 0 => (count.saturating_sub(1), unbounded),
         _ => outcome,
-    }
-}
-
-impl<L: Lane, const N: usize> Operators<L, N> {
-    /// Whether every normal load stays above zero over samples, in all runs.
-    #[inline(always)]
-    fn stays_loaded<S: Source<L>, const F: bool>(
-        &self,
-        source: &S,
-        samples: (usize, usize),
-    ) -> bool {
-        // A loop: the body of `all` would be compiled apart, for the least of all processors.
-        let mut loaded = true;
-        for load in &self.loads {
-            loaded &= load.stays_positive::<F>(source.bounds(load.input, samples));
-        }
-        loaded
-    }
-
-    /// Negative where a watched form may leave its limits within the sample that ends with these inputs,
-    /// states and channels, or a normal load falls there where `loads` are looked at; `guards` are moved on.
-    ///
-    /// Apart from what falls in the step: sums over a loop that start from nothing stay in vectors.
-    #[inline(always)]
-    fn leaves<V: Factor<L::Values>, const F: bool, const A: usize>(
-        &self,
-        guards: &mut Guards<L::Values>,
-        (input, loads): (impl Fn(usize) -> V, bool),
-        at: (&[L; N], &[Carry<L>; A]),
-    ) -> L::Values {
-        let mut left = [L::Values::all(0.0)];
-        for (place, before) in guards.iter_mut().enumerate().take(self.watched.len()) {
-            let after = self.guard::<V, F, A>(place, &input, at);
-            self.falls(place, (before, &after.map(|value| [value])), &mut left);
-            *before = after;
-        }
-        if loads {
-            for load in &self.loads {
-                load.falls::<_, F, 1>(&[input(load.input)], &mut left);
-            }
-        }
-        left[0]
-    }
-
-    /// The same of `some` samples together, by what the trail has of them.
-    #[inline(always)]
-    fn left<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
-        &self,
-        guards: &mut Guards<L::Values>,
-        (ends, loads): (&Ends<V, W>, bool),
-        (trail, from, some): (&Trail<L, N>, usize, usize),
-    ) -> [L::Values; W] {
-        let mut left = [L::Values::all(0.0); W];
-        for (place, before) in guards.iter_mut().enumerate().take(self.watched.len()) {
-            let after = self.guards_after::<_, F, A, W>(place, ends, (trail, from));
-            self.falls(place, (before, &after), &mut left);
-            *before = after.map(|values| values[some - 1]);
-        }
-        if loads {
-            for load in &self.loads {
-                load.falls::<_, F, W>(&ends[load.input % MAX_INPUTS], &mut left);
-            }
-        }
-        left
-    }
-
-    /// All guards at the start of a segment.
-    #[inline(always)]
-    pub fn guards<U: Factor<L, Values: Factor<L::Values>>, const F: bool, const A: usize>(
-        &self,
-        sample: &Sample<U>,
-        at: (&[L; N], &[Carry<L>; A]),
-    ) -> Guards<L::Values> {
-        let mut guards = idle_guards();
-        for (place, guard) in guards.iter_mut().enumerate().take(self.watched.len()) {
-            *guard = self.guard::<_, F, A>(place, |input| sample[input][0].values(), at);
-        }
-        guards
-    }
-
-    /// Limit and value of a watched form at one instant, by the values of inputs there.
-    #[inline(always)]
-    fn guard<V: Factor<L::Values>, const F: bool, const A: usize>(
-        &self,
-        place: usize,
-        input: impl Fn(usize) -> V,
-        (x, carry): (&[L; N], &[Carry<L>; A]),
-    ) -> [L::Values; 2] {
-        let Watched { form, limit, .. } = &self.watched[place];
-        let mut torque = form.constant.values();
-        for drive in &self.drives {
-            torque = input(drive.input).onto::<F>(drive.watched[place].values(), torque);
-        }
-        for i in 0..self.columns() {
-            torque = form.state[i].values().fma::<F>(x[i].values(), torque);
-        }
-        for a in 0..A {
-            let carried = self.channels[a].torque(&carry[a]).values();
-            torque = form.channels[a].values().fma::<F>(carried, torque);
-        }
-        [input(limit.input).onto::<F>(limit.gain.values(), limit.offset.values()), torque]
-    }
-
-    /// The same at the end of `W` samples from `from` on.
-    #[inline(always)]
-    fn guards_after<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
-        &self,
-        place: usize,
-        ends: &Ends<V, W>,
-        (trail, from): (&Trail<L, N>, usize),
-    ) -> [[L::Values; W]; 2] {
-        let Watched { form, limit, .. } = &self.watched[place];
-        let of_input = |input: usize| &ends[input % MAX_INPUTS];
-        let mut torque = [form.constant.values(); W];
-        for drive in &self.drives {
-            add::<L, V, F, W>(&mut torque, drive.watched[place], of_input(drive.input));
-        }
-        for i in 0..self.columns() {
-            let column: &[L; W] = after(trail.states(i), from);
-            for k in 0..W {
-                torque[k] = form.state[i].values().fma::<F>(column[k].values(), torque[k]);
-            }
-        }
-        for a in 0..A {
-            let column: &[L; W] = after(trail.torques(a), from);
-            for k in 0..W {
-                torque[k] = form.channels[a].values().fma::<F>(column[k].values(), torque[k]);
-            }
-        }
-        let mut limits = [limit.offset.values(); W];
-        add::<L, V, F, W>(&mut limits, limit.gain, of_input(limit.input));
-        [limits, torque]
-    }
-
-    /// Make negative where a watched form may leave its limits within a sample, by these before and after
-    /// each.
-    #[inline(always)]
-    fn falls<const W: usize>(
-        &self,
-        place: usize,
-        (before, after): (&[L::Values; 2], &[[L::Values; W]; 2]),
-        fallen: &mut [L::Values; W],
-    ) {
-        let side = self.watched[place].side.values();
-        let [mut limit, mut value] = *before;
-        for k in 0..W {
-            let (limit_after, value_after) = (after[0][k], after[1][k]);
-            let rise = (value_after - value).magnitude();
-            let size = value.magnitude().larger(value_after.magnitude());
-            let bow = self.bow[0].values() * rise + self.bow[1].values() * size;
-            let falls = |limit: L::Values, value: L::Values| {
-                let left = limit - bow;
-                (left - side * value).negative_with(left + value)
-            };
-            let fell = falls(limit, value).negative_with(falls(limit_after, value_after));
-            fallen[k] = fallen[k].negative_with(fell);
-            (limit, value) = (limit_after, value_after);
-        }
-    }
-}
-
-/// The samples after those from `from` on.
-#[inline(always)]
-fn after<L, const W: usize>(column: &Column<L>, from: usize) -> &[L; W] {
-    column[from + 1..].first_chunk().expect("stretches that divide a block")
-}
-
-/// Add multiples of inputs.
-#[inline(always)]
-fn add<L: Lane, V: Factor<L::Values>, const F: bool, const W: usize>(
-    sums: &mut [L::Values; W],
-    factor: L,
-    inputs: &[V; W],
-) {
-    for k in 0..W {
-        sums[k] = inputs[k].onto::<F>(factor.values(), sums[k]);
-    }
-}
-
-impl<L: Lane> Line<L> {
-    /// Whether the line stays above zero in all runs while its input stays within bounds.
-    #[inline(always)]
-    fn stays_positive<const F: bool>(&self, [low, high]: [L::Values; 2]) -> bool {
-        let (gain, offset) = (self.gain.values(), self.offset.values());
-        // Above zero where its negative is below.
-        let below = |u| (-gain.fma::<F>(u, offset)).negative();
-        below(low) & below(high) == L::Values::all(-1.0).negative()
-    }
-
-    /// Make negative where the line falls below zero at the end of a sample.
-    #[inline(always)]
-    fn falls<V: Factor<L::Values>, const F: bool, const W: usize>(
-        &self,
-        ends: &[V; W],
-        fallen: &mut [L::Values; W],
-    ) {
-        // A load of -0 is none that has fallen.
-        let none = L::Values::all(0.0);
-        for k in 0..W {
-            let load = ends[k].onto::<F>(self.gain.values(), self.offset.values()) + none;
-            fallen[k] = fallen[k].negative_with(load);
-        }
     }
 }
 

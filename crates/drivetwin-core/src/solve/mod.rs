@@ -26,6 +26,7 @@ mod sprint;
 mod status;
 mod step;
 mod transition;
+mod watch;
 
 pub use expansion::Expansion;
 pub use formation::{Lanes, Record, WIDTH, bits, run_together};

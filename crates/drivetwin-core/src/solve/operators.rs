@@ -26,7 +26,7 @@ pub const MAX_WATCHED: usize = 12;
 pub struct Operators<L, const N: usize> {
     /// Number of states.
     pub states: usize,
-    /// What a watched form may deviate from its chord within a sample, relative to its rise and to its
+    /// What a watched torque may deviate from its chord within a sample, relative to its rise and to its
     /// size.
     pub bow: [L; 2],
     /// Signs of the carried channels.
@@ -106,16 +106,28 @@ pub struct Carried<L, const N: usize> {
     pub ramp: L,
 }
 
-/// A guard, over the torques of the carried channels: `limit(u) - |form|` where both signs are bounded,
-/// else `limit(u) + form`.
+/// A guard, over the torques of the carried channels.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<L, const N: usize> {
-    /// Torque or speed.
+    /// A torque, or what a speed rises by in a third of a sample at its rate.
     pub form: Form<L, N>,
-    /// Its limit, over an input.
-    pub limit: Line<L>,
-    /// 1 where both signs are bounded, else -1.
-    pub side: L,
+    /// What must hold.
+    pub bound: Bound<L, N>,
+}
+
+/// What must hold of a watched form.
+#[derive(Clone, Copy, Debug)]
+pub enum Bound<L, const N: usize> {
+    /// A torque stays within a limit over an input: `limit(u) - |form|` where both signs are bounded and
+    /// `side` is 1, else `limit(u) + form` and it is -1.
+    Within {
+        /// The limit.
+        limit: Line<L>,
+        /// Which signs are bounded.
+        side: L,
+    },
+    /// A speed over the states stays above zero.
+    Above([L; N]),
 }
 
 /// Largest `ρ(A) h` for which a cubic follows a slipping element.
@@ -188,22 +200,42 @@ impl<T: Number, const N: usize> Operators<T, N> {
         form
     }
 
-    /// Watch a form over the basis (x, u, 1, φ): see [`Watched`].
-    pub fn watch(
+    /// Watch a torque over the basis (x, u, 1, φ), bounded in both signs or only the negative one.
+    pub fn watch_torque(
         &mut self,
         network: &Network<T>,
         active: &[usize],
         row: &[T],
         (limit, both): (Line<T>, bool),
     ) {
+        let side = T::of(if both { 1.0 } else { -1.0 });
+        self.watch(network, active, row, Bound::Within { limit, side });
+    }
+
+    /// Watch a speed over the states, which must stay above zero, over samples of length `h` [s].
+    pub fn watch_speed(
+        &mut self,
+        (network, mode): (&Network<T>, &Mode<T>),
+        active: &[usize],
+        row: &[T],
+        h: f64,
+    ) {
+        let mut speed = [T::zero_(); N];
+        for (to, &c) in speed.iter_mut().zip(row).take(network.states()) {
+            *to = c;
+        }
+        let third = over_basis::<T, false, N>((network, mode), &speed, h / 3.0);
+        self.watch(network, active, &third, Bound::Above(speed));
+    }
+
+    fn watch(&mut self, network: &Network<T>, active: &[usize], row: &[T], bound: Bound<T, N>) {
         let place = self.watched.len();
         for drive in &mut self.drives {
             drive.watched[place] =
                 row.get(network.first_input() + drive.input).map_or(T::zero_(), |&c| c);
         }
         let form = Form::over(network, (active, &[T::of(1.0); MAX_ACTIVE]), row);
-        let side = T::of(if both { 1.0 } else { -1.0 });
-        self.watched.push(Watched { form, limit, side });
+        self.watched.push(Watched { form, bound });
     }
 }
 

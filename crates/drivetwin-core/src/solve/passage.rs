@@ -5,10 +5,11 @@
 use super::formation::{Lanes, Member, Record, Standing, WIDTH, bits, each};
 use super::inputs::Inputs;
 use super::lanes::{Task, dispatch};
-use super::march::{BLOCK, Carry, Column, Guards, Room, Source, Trail, idle_guards, march, room};
+use super::march::{BLOCK, Carry, Column, Room, Source, Trail, march, room};
 use super::operators::Operators;
 use super::regime::Regime;
 use super::sprint::Lines;
+use super::watch::{Guards, idle_guards};
 use crate::network::smooth::Sample;
 use crate::number::{Factor, Lane, Number, Pack};
 

@@ -142,12 +142,16 @@ impl<T: Number> Regime<'_, T> {
         h: f64,
     ) -> Option<Operators<T, N>> {
         let mut operators = Operators::build(self.network, &self.mode, (active, laws), h)?;
-        self.watch_frictions(active, &mut operators);
-        self.watch_gears(active, &mut operators);
+        self.watch_frictions((active, h), &mut operators);
+        self.watch_gears((active, h), &mut operators);
         (operators.watched.len() <= MAX_WATCHED).then_some(operators)
     }
 
-    fn watch_frictions<const N: usize>(&self, active: &[usize], operators: &mut Operators<T, N>) {
+    fn watch_frictions<const N: usize>(
+        &self,
+        (active, h): (&[usize], f64),
+        operators: &mut Operators<T, N>,
+    ) {
         for (j, row) in self.network.frictions.iter().enumerate() {
             let side = if self.pressed[j] { 1.0 } else { -1.0 };
             let load = line_of(&row.normal);
@@ -163,19 +167,22 @@ impl<T: Number> Regime<'_, T> {
                     let position = position.expect("a stuck element belongs to the mode");
                     let torque = self.mode.stuck_torque.row(position);
                     let limit = load.map(|v| v * mu);
-                    operators.watch(self.network, active, torque, (limit, !row.one_way));
+                    operators.watch_torque(self.network, active, torque, (limit, !row.one_way));
                 }
                 RowState::Slipping { sign } if !active.contains(&j) => {
                     let speed: Vec<T> = row.slip.iter().map(|&c| c * sign).collect();
-                    let limit = load.map(|_| T::zero_());
-                    operators.watch(self.network, active, &speed, (limit, false));
+                    operators.watch_speed((self.network, &self.mode), active, &speed, h);
                 }
                 _ => {}
             }
         }
     }
 
-    fn watch_gears<const N: usize>(&self, active: &[usize], operators: &mut Operators<T, N>) {
+    fn watch_gears<const N: usize>(
+        &self,
+        (active, h): (&[usize], f64),
+        operators: &mut Operators<T, N>,
+    ) {
         for (i, gear) in self.network.losses.iter().enumerate() {
             let GearState::Rolling { sign, backward } = self.gears[i] else { continue };
             if !gear.loss.is_directional() {
@@ -185,9 +192,9 @@ impl<T: Number> Regime<'_, T> {
             let scaled = |row: &[T], by: f64| row.iter().map(|&c| c * by).collect::<Vec<T>>();
             let power = scaled(self.mode.gear_torque(self.network).row(i), sign * side);
             let limit = constant(-gear.loss.threshold() * side);
-            operators.watch(self.network, active, &power, (limit, false));
+            operators.watch_torque(self.network, active, &power, (limit, false));
             let speed = scaled(&gear.speed, sign);
-            operators.watch(self.network, active, &speed, (constant(T::zero_()), false));
+            operators.watch_speed((self.network, &self.mode), active, &speed, h);
         }
     }
 }

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: MIT
+//! What must hold while samples are passed: torques within their limits, speeds above zero, loads above zero.
+
+use super::march::{Carry, Column, Source, Trail};
+use super::operators::{Bound, MAX_WATCHED, Operators, Watched};
+use crate::network::smooth::{Line, MAX_INPUTS, Sample};
+use crate::number::{Factor, Lane, Values};
+
+/// Of the watched forms at the start of a sample, what torques are off their limits by or what speeds are,
+/// and what the forms are.
+pub type Guards<V> = [[V; 2]; MAX_WATCHED];
+
+/// Of what is not watched.
+pub fn idle_guards<V: Values>() -> Guards<V> {
+    [[V::all(1.0), V::all(0.0)]; MAX_WATCHED]
+}
+
+/// Inputs at the ends of `W` samples.
+type Ends<V, const W: usize> = [[V; W]; MAX_INPUTS];
+
+impl<L: Lane, const N: usize> Operators<L, N> {
+    /// Whether every normal load stays above zero over samples, in all runs.
+    #[inline(always)]
+    pub fn stays_loaded<S: Source<L>, const F: bool>(
+        &self,
+        source: &S,
+        samples: (usize, usize),
+    ) -> bool {
+        // A loop: the body of `all` would be compiled apart, for the least of all processors.
+        let mut loaded = true;
+        for load in &self.loads {
+            loaded &= load.stays_positive::<F>(source.bounds(load.input, samples));
+        }
+        loaded
+    }
+
+    /// Negative where a watched form may leave its limits within the sample that ends with these inputs,
+    /// states and channels, or a normal load falls there where `loads` are looked at; `guards` are moved on.
+    ///
+    /// Apart from what falls in the step: sums over a loop that start from nothing stay in vectors.
+    #[inline(always)]
+    pub fn leaves<V: Factor<L::Values>, const F: bool, const A: usize>(
+        &self,
+        guards: &mut Guards<L::Values>,
+        (input, loads): (impl Fn(usize) -> V, bool),
+        at: (&[L; N], &[Carry<L>; A]),
+    ) -> L::Values {
+        let mut left = [L::Values::all(0.0)];
+        for (place, before) in guards.iter_mut().enumerate().take(self.watched.len()) {
+            let after = self.guard::<V, F, A>(place, &input, at);
+            self.falls::<F, _>(place, (before, &after.map(|value| [value])), &mut left);
+            *before = after;
+        }
+        if loads {
+            for load in &self.loads {
+                load.falls::<_, F, 1>(&[input(load.input)], &mut left);
+            }
+        }
+        left[0]
+    }
+
+    /// The same of `some` samples together, by what the trail has of them.
+    #[inline(always)]
+    pub fn left<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
+        &self,
+        guards: &mut Guards<L::Values>,
+        (ends, loads): (&Ends<V, W>, bool),
+        (trail, from, some): (&Trail<L, N>, usize, usize),
+    ) -> [L::Values; W] {
+        let mut left = [L::Values::all(0.0); W];
+        for (place, before) in guards.iter_mut().enumerate().take(self.watched.len()) {
+            let after = self.guards_after::<_, F, A, W>(place, ends, (trail, from));
+            self.falls::<F, _>(place, (before, &after), &mut left);
+            *before = after.map(|values| values[some - 1]);
+        }
+        if loads {
+            for load in &self.loads {
+                load.falls::<_, F, W>(&ends[load.input % MAX_INPUTS], &mut left);
+            }
+        }
+        left
+    }
+
+    /// All guards at the start of a segment.
+    #[inline(always)]
+    pub fn guards<U: Factor<L, Values: Factor<L::Values>>, const F: bool, const A: usize>(
+        &self,
+        sample: &Sample<U>,
+        at: (&[L; N], &[Carry<L>; A]),
+    ) -> Guards<L::Values> {
+        let mut guards = idle_guards();
+        for (place, guard) in guards.iter_mut().enumerate().take(self.watched.len()) {
+            *guard = self.guard::<_, F, A>(place, |input| sample[input][0].values(), at);
+        }
+        guards
+    }
+
+    /// Margin or speed, and value, of a watched form at one instant, by the values of inputs there.
+    #[inline(always)]
+    fn guard<V: Factor<L::Values>, const F: bool, const A: usize>(
+        &self,
+        place: usize,
+        input: impl Fn(usize) -> V,
+        (x, carry): (&[L; N], &[Carry<L>; A]),
+    ) -> [L::Values; 2] {
+        let Watched { form, bound } = &self.watched[place];
+        let mut value = form.constant.values();
+        for drive in &self.drives {
+            value = input(drive.input).onto::<F>(drive.watched[place].values(), value);
+        }
+        for i in 0..self.columns() {
+            value = form.state[i].values().fma::<F>(x[i].values(), value);
+        }
+        for a in 0..A {
+            let carried = self.channels[a].torque(&carry[a]).values();
+            value = form.channels[a].values().fma::<F>(carried, value);
+        }
+        match bound {
+            Bound::Within { limit, side } => {
+                let Line { input: of, gain, offset } = limit;
+                let limit = input(*of).onto::<F>(gain.values(), offset.values());
+                [margin::<L, F>(*side, limit, value), value]
+            }
+            Bound::Above(row) => {
+                let mut speed = L::Values::all(0.0);
+                for i in 0..self.columns() {
+                    speed = row[i].values().fma::<F>(x[i].values(), speed);
+                }
+                [speed, value]
+            }
+        }
+    }
+
+    /// The same at the end of `W` samples from `from` on.
+    #[inline(always)]
+    fn guards_after<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
+        &self,
+        place: usize,
+        ends: &Ends<V, W>,
+        (trail, from): (&Trail<L, N>, usize),
+    ) -> [[L::Values; W]; 2] {
+        let Watched { form, bound } = &self.watched[place];
+        let of_input = |input: usize| &ends[input % MAX_INPUTS];
+        let mut values = [form.constant.values(); W];
+        for drive in &self.drives {
+            add::<L, V, F, W>(&mut values, drive.watched[place], of_input(drive.input));
+        }
+        self.add_states::<F, W>(&mut values, &form.state, (trail, from));
+        for a in 0..A {
+            let column: &[L; W] = after(trail.torques(a), from);
+            for k in 0..W {
+                values[k] = form.channels[a].values().fma::<F>(column[k].values(), values[k]);
+            }
+        }
+        match bound {
+            Bound::Within { limit, side } => {
+                let mut margins = [limit.offset.values(); W];
+                add::<L, V, F, W>(&mut margins, limit.gain, of_input(limit.input));
+                for k in 0..W {
+                    margins[k] = margin::<L, F>(*side, margins[k], values[k]);
+                }
+                [margins, values]
+            }
+            Bound::Above(row) => {
+                let mut speeds = [L::Values::all(0.0); W];
+                self.add_states::<F, W>(&mut speeds, row, (trail, from));
+                [speeds, values]
+            }
+        }
+    }
+
+    /// Add a form over the states at the end of samples.
+    #[inline(always)]
+    fn add_states<const F: bool, const W: usize>(
+        &self,
+        sums: &mut [L::Values; W],
+        row: &[L; N],
+        (trail, from): (&Trail<L, N>, usize),
+    ) {
+        for i in 0..self.columns() {
+            let column: &[L; W] = after(trail.states(i), from);
+            for k in 0..W {
+                sums[k] = row[i].values().fma::<F>(column[k].values(), sums[k]);
+            }
+        }
+    }
+
+    /// Make negative where a watched form may leave its limits within a sample, by these before and after
+    /// each.
+    ///
+    /// A torque that swings within limits in both signs is no smaller than its swing where it comes near one.
+    /// Of a speed near zero that says nothing: it stays above the least corner of the cubic through its
+    /// values and rates (Bernstein's form), to fourth order.
+    #[inline(always)]
+    fn falls<const F: bool, const W: usize>(
+        &self,
+        place: usize,
+        (before, after): (&[L::Values; 2], &[[L::Values; W]; 2]),
+        fallen: &mut [L::Values; W],
+    ) {
+        let [mut margin, mut value] = *before;
+        for k in 0..W {
+            let (margin_after, value_after) = (after[0][k], after[1][k]);
+            let left = if let Bound::Within { .. } = self.watched[place].bound {
+                let rise = (value_after - value).magnitude();
+                let size = value.magnitude().larger(value_after.magnitude());
+                let bow = self.bow[0].values().fma::<F>(rise, self.bow[1].values() * size);
+                margin.smaller(margin_after) - bow
+            } else {
+                let corners = (margin + value).smaller(margin_after - value_after);
+                corners.smaller(margin).smaller(margin_after)
+            };
+            fallen[k] = fallen[k].negative_with(left);
+            (margin, value) = (margin_after, value_after);
+        }
+    }
+}
+
+/// The samples after those from `from` on.
+#[inline(always)]
+fn after<L, const W: usize>(column: &Column<L>, from: usize) -> &[L; W] {
+    column[from + 1..].first_chunk().expect("stretches that divide a block")
+}
+
+/// Add multiples of inputs.
+#[inline(always)]
+fn add<L: Lane, V: Factor<L::Values>, const F: bool, const W: usize>(
+    sums: &mut [L::Values; W],
+    factor: L,
+    inputs: &[V; W],
+) {
+    for k in 0..W {
+        sums[k] = inputs[k].onto::<F>(factor.values(), sums[k]);
+    }
+}
+
+/// What a torque is off its limit by: see [`Bound::Within`].
+#[inline(always)]
+fn margin<L: Lane, const F: bool>(side: L, limit: L::Values, torque: L::Values) -> L::Values {
+    (limit + torque).smaller(side.values().fma::<F>(-torque, limit))
+}
+
+impl<L: Lane> Line<L> {
+    /// Whether the line stays above zero in all runs while its input stays within bounds.
+    #[inline(always)]
+    fn stays_positive<const F: bool>(&self, [low, high]: [L::Values; 2]) -> bool {
+        let (gain, offset) = (self.gain.values(), self.offset.values());
+        // Above zero where its negative is below.
+        let below = |u| (-gain.fma::<F>(u, offset)).negative();
+        below(low) & below(high) == L::Values::all(-1.0).negative()
+    }
+
+    /// Make negative where the line falls below zero at the end of a sample.
+    #[inline(always)]
+    fn falls<V: Factor<L::Values>, const F: bool, const W: usize>(
+        &self,
+        ends: &[V; W],
+        fallen: &mut [L::Values; W],
+    ) {
+        // A load of -0 is none that has fallen.
+        let none = L::Values::all(0.0);
+        for k in 0..W {
+            let load = ends[k].onto::<F>(self.gain.values(), self.offset.values()) + none;
+            fallen[k] = fallen[k].negative_with(load);
+        }
+    }
+}
