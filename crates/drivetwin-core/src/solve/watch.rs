@@ -188,8 +188,10 @@ impl<L: Lane, const N: usize> Operators<L, N> {
     /// Make negative where a watched form may leave its limits within a sample, by these before and after
     /// each.
     ///
-    /// A torque that swings within limits in both signs is no smaller than its swing where it comes near one.
-    /// Of a speed near zero that says nothing: it stays above the least corner of the cubic through its
+    /// A torque that swings within limits in both signs is no smaller than its swing where it comes near one;
+    /// one that is bounded in one sign only (a freewheel's, power through a gear) is taken to be like that,
+    /// which it need not be: its release at the crest of a swing within one sample can be passed by.
+    /// Of a speed near zero its size says nothing: it stays above the least corner of the cubic through its
     /// values and rates (Bernstein's form), to fourth order.
     #[inline(always)]
     fn falls<const F: bool, const W: usize>(
