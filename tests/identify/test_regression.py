@@ -64,6 +64,22 @@ def test_a_direction_without_information_is_refused() -> None:
         line(np.zeros(N), np.zeros(N), 1e-6)
 
 
+def test_where_no_part_of_a_step_helps_the_search_stays_where_it_is() -> None:
+    """y + θ² has its least value at 0, and near there steps that aim at -y/(2θ), far beyond."""
+    unit = Quadrature(csr_array(identity(N)))
+
+    def terms(theta: FloatArray) -> list[Term]:
+        return [
+            Term(ONE, 1.0, unit, ONE, {}),
+            Term(ONE, 0.0, unit, theta[0] ** 2 * ONE, {0: (2.0 * theta[0] * ONE, unit)}),
+        ]
+
+    fit = solve(terms, np.array([1e-3]), Prior.independent(1, {}))
+    assert fit.theta[0] == 1e-3
+    assert fit.residual == pytest.approx(1.0 + fit.theta[0] ** 2)
+    assert fit.q == pytest.approx(N * (1.0 + fit.theta[0] ** 2) ** 2)
+
+
 def test_banded_factor_solves_as_the_dense_one() -> None:
     rng = np.random.default_rng(0)
     a = np.tril(np.triu(rng.standard_normal((30, 30)), -3))

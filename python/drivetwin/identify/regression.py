@@ -226,8 +226,8 @@ def solve(
 ) -> Fit:
     """Minimise Q(θ) from `start` (p,) by Gauss-Newton; stop at `tolerance` standard errors.
 
-    A step that does not lower Q is halved. Raises IdentificationError where the equations leave a
-    direction of θ undetermined.
+    A step that raises Q is halved; where no halving helps, the search ends at the point before it.
+    Raises IdentificationError where the equations leave a direction of θ undetermined.
     """
     theta = np.asarray(start, dtype=float).copy()
     point = _evaluate(assemble(theta), theta.size)
@@ -240,6 +240,8 @@ def solve(
             if trial.q + prior.cost(theta + step) <= cost * (1.0 + 1e-9):
                 break
             step = 0.5 * step
+        else:
+            break
         theta, point = theta + step, trial
         if float(np.sqrt(step @ hessian @ step)) < tolerance:
             break
