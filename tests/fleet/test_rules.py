@@ -104,7 +104,16 @@ def test_dates_are_seconds_since_1970(moment: datetime) -> None:
     assert field_value("date", moment.isoformat()) == pytest.approx(since, abs=1e-3)
 
 
-@pytest.mark.parametrize(("field", "text"), [("odometer_km", "12 km"), ("date", "yesterday")])
+@pytest.mark.parametrize(
+    ("field", "text"),
+    [
+        ("odometer_km", "12 km"),
+        ("odometer_km", "nan"),
+        ("odometer_km", "-inf"),
+        ("odometer_km", "1e999"),
+        ("date", "yesterday"),
+    ],
+)
 def test_a_text_that_is_no_field_is_told(field: str, text: str) -> None:
     with pytest.raises(RulesError, match=text):
         field_value(field, text)

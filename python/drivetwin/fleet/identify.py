@@ -77,7 +77,10 @@ def _artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
 
 
 def _means(task: Task, mapping: Path | None) -> Iterator[Row]:
-    """Mean of each channel that is a field of the log, in the file's unit."""
+    """Mean of each channel that is a field of the log, in the file's unit.
+
+    Of a channel without any value there is none: a warning says so. Raises MissingChannelError.
+    """
     if not task.recipe.means:
         return
     options = ReadOptions() if mapping is None else read_mapping(mapping).options
@@ -92,8 +95,13 @@ def _means(task: Task, mapping: Path | None) -> Iterator[Row]:
                 )
             column = names.index(channel)
             values = recording.load(column).values
-            mean = float(np.mean(values[np.isfinite(values)]))
-            yield Row(RowKind.FIELD, field, mean, si_unit=recording.columns[column].unit or "")
+            known = values[np.isfinite(values)]
+            if not known.size:
+                text = f"channel {channel!r} holds no value, so the log has no field {field!r}"
+                yield Row(RowKind.WARNING, "", reason=text)
+                continue
+            unit = recording.columns[column].unit or ""
+            yield Row(RowKind.FIELD, field, float(np.mean(known)), si_unit=unit)
 
 
 def shift_rows(found: FoundShifts) -> list[ShiftRow]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -128,14 +129,17 @@ def is_date(field: str) -> bool:
 
 
 def field_value(field: str, text: str) -> float:
-    """A field's text as a number; a date in seconds since 1970. Raises RulesError."""
+    """A field's text as a finite number; a date in seconds since 1970. Raises RulesError."""
     try:
-        if not is_date(field):
-            return float(text)
-        moment = datetime.fromisoformat(text)
-        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+        if is_date(field):
+            moment = datetime.fromisoformat(text)
+            return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+        number = float(text)
+        if not math.isfinite(number):
+            raise ValueError(text)
+        return number
     except ValueError:
-        kind = "date (ISO, such as 2025-03-31)" if is_date(field) else "number"
+        kind = "date (ISO, such as 2025-03-31)" if is_date(field) else "finite number"
         raise RulesError(
             f"field {field!r}: {text!r} is no {kind}",
             f"correct [fields.{field}] of the rules, or the list",

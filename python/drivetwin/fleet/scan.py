@@ -22,7 +22,7 @@ from drivetwin.logs.formats import open_recording
 from drivetwin.logs.profile import read_mapping
 from drivetwin.results.version import program_version
 
-ROWS_FORMAT = 1
+ROWS_FORMAT = 2
 """Counts up when the same identification leaves other rows."""
 
 _READERS = 4

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""One log of a fleet: the rows that it leaves beside those of its identification."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli.synth import write_run
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.fleet.identify import identify_log
+from drivetwin.fleet.rows import Row, RowKind
+from drivetwin.fleet.task import Recipe, Task
+from drivetwin.identify.method import Method
+from drivetwin.results.version import program_version
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log with a column `TOil` that says 80 and 90 degC in turn, and an empty one, `TGear`."""
+    path = tmp_path_factory.mktemp("fleet") / "bench.csv"
+    write_run(path, run(paper_steps(), seed=1))
+    head, units, *lines = path.read_text().splitlines()
+    filled = [f"{line},{80 + 10 * (k % 2)}," for k, line in enumerate(lines[: len(lines) // 2 * 2])]
+    path.write_text("\n".join([f"{head},TOil,TGear", f"{units},degC,degC", *filled]) + "\n")
+    return path
+
+
+def _rows(log: Path, *means: tuple[str, str]) -> list[Row]:
+    recipe = Recipe(
+        str(log.with_suffix(".card.toml")), None, Method.PAPER, (), program_version(), means
+    )
+    content = hashlib.sha256(log.read_bytes()).hexdigest()
+    task = Task("0123", str(log), content, recipe, str(log.with_suffix(".parquet")))
+    return list(identify_log(task).rows)
+
+
+def test_a_channel_without_values_leaves_no_field_and_says_so(log: Path) -> None:
+    rows = _rows(log, ("oil_degC", "TOil"), ("gear_degC", "TGear"))
+    (oil,) = [row for row in rows if row.kind is RowKind.FIELD]
+    assert (oil.name, oil.value, oil.si_unit) == ("oil_degC", 85.0, "degC")
+    (told,) = [row.reason for row in rows if "TGear" in row.reason]
+    assert "no field 'gear_degC'" in told
+    assert any(row.kind is RowKind.PARAMETER for row in rows)
