@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from drivetwin.driveline import (
+    ORDERS,
     Accuracy,
     DualClutch,
     FrictionTable,
@@ -177,6 +178,33 @@ def test_a_fixed_order_is_less_exact() -> None:
     exact = simulate(paper_model(), torque, pressures, start, time)
     rough = simulate(paper_model(), torque, pressures, start, time, accuracy=coarse)
     assert 1e-9 < np.abs(exact.shaft_torque - rough.shaft_torque).max() < 50.0
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        *(({"order": order}, "an integer from 1 to 14") for order in (-1, 0, 15)),
+        *(
+            ({"tolerance": tolerance}, "a finite positive number")
+            for tolerance in (0.0, -1e-9, float("nan"), float("inf"))
+        ),
+        *(({"max_step": step}, "a positive time") for step in (0.0, -1.0, float("nan"))),
+    ],
+)
+def test_impossible_accuracies_are_refused_with_what_is_allowed(
+    given: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=f"{next(iter(given))} is .*\n.*{message}"):
+        Accuracy(**given)
+
+
+@pytest.mark.parametrize("order", [ORDERS[0], ORDERS[-1]])
+def test_the_orders_allowed_are_those_of_the_core(order: int) -> None:
+    torque, pressures, start = held_second_gear(0.01)
+    time, accuracy = np.linspace(0.0, 0.01, 3), Accuracy(order=order, max_step=1e-4)
+    assert simulate(paper_model(), torque, pressures, start, time, accuracy=accuracy).status == (
+        "completed"
+    )
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ The physics itself stands in the Rust core; these classes only describe and carr
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -19,6 +20,9 @@ from drivetwin.errors import InputError
 
 FloatArray = NDArray[np.float64]
 LossLaw = Literal["paper", "dissipative"]
+
+ORDERS = range(1, 15)
+"""Fixed orders of integration; a step of the core holds no more than 15 Taylor coefficients."""
 
 
 @dataclass(frozen=True)
@@ -142,15 +146,28 @@ class Accuracy:
     By default samples without events are passed by exact operators, slipping torques being cubics
     in time: an error of a few 1e-3 N·m on 1 ms samples. `exact` integrates to round-off instead, as
     does an energy audit. `tolerance` is the truncation error allowed per step relative to the
-    states (1e-10 at least unless `exact`, for networks that operators pass), `max_step` [s] the
-    longest step, `order` a fixed order in place of one that follows the tolerance (it implies
-    `exact`).
+    states (1e-10 at least unless `exact`, for networks that operators pass), finite and positive;
+    `max_step` [s] the longest step, positive, inf for no limit; `order` a fixed order from 1 to 14
+    in place of one that follows the tolerance (it implies `exact`). Raises InputError for other
+    numbers.
     """
 
     exact: bool = False
     tolerance: float = 1e-12
     max_step: float = float("inf")
     order: int | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < math.inf:
+            fault, remedy = f"tolerance is {self.tolerance!r}", "give a finite positive number"
+        elif not self.max_step > 0.0:
+            fault, remedy = f"max_step is {self.max_step!r}", "give a positive time [s], or inf"
+        elif self.order is not None and self.order not in ORDERS:
+            fault = f"order is {self.order!r}"
+            remedy = f"give an integer from {ORDERS[0]} to {ORDERS[-1]}, or None"
+        else:
+            return
+        raise InputError(f"accuracy: {fault}", remedy)
 
     @property
     def sprint(self) -> bool:
