@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import RulesError
-from drivetwin.fleet.rules import field_value, read_rules, rule_for
+from drivetwin.fleet.rows import schema
+from drivetwin.fleet.rules import FILE_COLUMNS, field_value, read_rules, rule_for
 from drivetwin.fleet.sources import Source
 from tests.fleet.toys import ROOT
 
@@ -90,6 +91,14 @@ def test_no_rule_is_told(rules_file: Path) -> None:
 def test_faults_of_a_rules_file_are_told(rules_file: Path, text: str, says: str) -> None:
     rules_file.write_text(text)
     with pytest.raises(RulesError, match=says):
+        read_rules(rules_file)
+
+
+@pytest.mark.parametrize("name", ["Value", "OIL", *FILE_COLUMNS, *schema().names])
+def test_no_field_has_the_name_of_a_column(rules_file: Path, name: str) -> None:
+    fields = f'[fields.oil]\ncolumn = "a"\n[fields.{name}]\ncolumn = "b"'
+    rules_file.write_text(f"[[rules]]\nskip = true\n{fields}")
+    with pytest.raises(RulesError, match=f"a column '{name}' already"):
         read_rules(rules_file)
 
 

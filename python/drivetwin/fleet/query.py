@@ -14,7 +14,7 @@ from drivetwin.errors import QueryError
 from drivetwin.fleet.index import Index
 from drivetwin.fleet.readings import moment
 from drivetwin.fleet.rows import RowKind, schema
-from drivetwin.fleet.rules import is_date
+from drivetwin.fleet.rules import FILE_COLUMNS, is_date
 from drivetwin.fleet.store import Store
 from drivetwin.logs.extras import require
 
@@ -72,7 +72,8 @@ def _make_tables(database: Any, store: Store) -> None:
         )
 
 
-_NO = "SELECT path, log, rule, unit FROM files WHERE 0"
+_FILES = f"SELECT {', '.join(FILE_COLUMNS)}"
+_NO = f"{_FILES} FROM files WHERE 0"
 
 
 def _table(index: Index, sql: str) -> Any:
@@ -86,10 +87,8 @@ def _table(index: Index, sql: str) -> Any:
 def _files(index: Index) -> list[dict[str, Any]]:
     """One row for each file, with its fields as columns; a field may be absent."""
     found = [
-        {"path": path, "log": log, "rule": rule, "unit": unit, **_readings(fields)}
-        for path, log, rule, unit, fields in index.select(
-            "SELECT path, log, rule, unit, fields FROM files ORDER BY path"
-        )
+        {**dict(zip(FILE_COLUMNS, known, strict=True)), **_readings(fields)}
+        for *known, fields in index.select(f"{_FILES}, fields FROM files ORDER BY path")
     ]
     columns = dict.fromkeys(name for row in found for name in row)
     return [{name: row.get(name) for name in columns} for row in found]

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cache
 from typing import Any
@@ -55,6 +55,10 @@ class Row:
     at: float | None = None
     free_value: float | None = None
     free_std: float | None = None
+
+
+ROW_COLUMNS = ("log", *(field.name for field in fields(Row)))
+"""Columns of a part: the key of the log's row in the index, then those of a Row."""
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,16 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from drivetwin.errors import RulesError, Where
+from drivetwin.fleet.rows import ROW_COLUMNS
 from drivetwin.fleet.sources import Source
 from drivetwin.tomlfile import StrictModel, raise_faults, read_toml, schema_faults
 
 UNIT = "unit"
+FILE_COLUMNS = ("path", "log", "rule", UNIT)
+"""What a question in SQL finds of a file, beside its fields."""
 
 
 def _one_group(pattern: str) -> str:
@@ -88,6 +91,17 @@ class RulesFile(StrictModel):
     mu_slip_rad_s: float = Field(default=50.0, gt=0)
     rules: list[RuleTable] = Field(min_length=1)
     fields: dict[str, FieldTable] = Field(default_factory=dict)
+
+    @field_validator("fields")
+    @classmethod
+    def _names_of_their_own(cls, fields: dict[str, FieldTable]) -> dict[str, FieldTable]:
+        """Fields become columns beside those of files and rows; SQL knows no case."""
+        taken = {*FILE_COLUMNS, *ROW_COLUMNS}
+        for name in fields:
+            if name.casefold() in taken:
+                raise ValueError(f"there is a column {name!r} already; give another name")
+            taken.add(name.casefold())
+        return fields
 
     def unit_of(self, source: Source) -> str:
         """Id of the unit: the list's column `unit`, else the pattern's find, else the folder."""
