@@ -69,3 +69,11 @@ def test_a_list_that_cannot_be_read_is_told(folder: Path, content: bytes | None)
         listed.write_bytes(content)
     with pytest.raises(InputError, match="the list cannot be read"):
         Sources([], listed).count()
+
+
+@pytest.mark.parametrize("line", ["T2", "T2,"])
+def test_a_line_of_a_list_without_a_path_is_told(folder: Path, line: str) -> None:
+    listed = folder / "list.csv"
+    listed.write_text(f"unit,path\nT1,b/2.csv\n\n{line}\n")
+    with pytest.raises(InputError, match="line 4 names no path"):
+        Sources([], listed).count()

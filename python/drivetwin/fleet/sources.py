@@ -92,7 +92,14 @@ def _from_list(path: Path) -> Iterator[Source]:
                     if line.strip():
                         yield Source((path.parent / line.strip()).absolute())
                 return
-            for row in csv.DictReader(file, columns):
+            rows = csv.DictReader(file, columns)
+            for row in rows:
+                if not row[_PATH]:
+                    raise InputError(
+                        f"line {rows.line_num + 1} names no path",
+                        f"give all {len(columns)} columns of the first line in every line",
+                        Where(file=str(path)),
+                    )
                 told = {k: v for k, v in row.items() if k and v and k != _PATH}
                 yield Source((path.parent / row[_PATH]).absolute(), told)
     except (OSError, UnicodeDecodeError, csv.Error) as fault:
