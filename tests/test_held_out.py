@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.held_out import HeldOut, Outcome, apart, hold_out
+from drivetwin.held_out import HeldOut, Outcome, hold_out
 from drivetwin.identify.result import Identification
 from drivetwin.logs.shiftlog import ShiftLog
 from tests.identify.asked import by_the_paper
@@ -88,20 +88,3 @@ def test_a_law_of_another_element_is_said_and_not_judged() -> None:
     (one,) = hold_out(found, card(), log.log, log.shifts.shifts, 1)
     assert one.outcome is Outcome.NOT_JUDGED
     assert "friction law of B9 stands in for it" in one.notes[0]
-
-
-def test_shifts_apart_share_no_sample() -> None:
-    first = pair()[0].shifts.shifts[0]
-    end = first.after[1]
-    second = replace(
-        first,
-        before=first.after,
-        torque_phase=(end, end + 0.1),
-        inertia_phase=(end + 0.1, end + 0.4),
-        after=(end + 0.4, end + 1.0),
-        lockup_time=end + 0.4,
-    )
-    one, other = apart((first, second))
-    assert one.after[1] == other.before[0] == pytest.approx(0.5 * (first.after[0] + end))
-    assert one.before == first.before
-    assert other.after == second.after

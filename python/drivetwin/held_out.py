@@ -11,7 +11,6 @@ from pathlib import Path
 from drivetwin.errors import DrivetwinError, IdentificationError, Where
 from drivetwin.identify.inputs import signals_of
 from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.priors import divided
 from drivetwin.identify.result import Estimate, Identification, Verdict
 from drivetwin.identify.several.fit import of_one_log
 from drivetwin.identify.several.predict import Bound, Expected, expected
@@ -79,15 +78,6 @@ class HeldOut:
     def name(self) -> str:
         """The shift and its log in words."""
         return f"{Path(self.source).name}, shift {self.shift.start_gear}→{self.shift.end_gear}"
-
-
-def apart(shifts: Sequence[Shift]) -> tuple[Shift, ...]:
-    """The shifts of one log with the gears between them divided, so that they share no sample."""
-    spans = divided(shifts)
-    return tuple(
-        replace(one, before=(start, one.before[1]), after=(one.after[0], end))
-        for one, (start, end) in zip(shifts, spans, strict=True)
-    )
 
 
 def hold_out(

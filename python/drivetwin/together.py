@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from drivetwin.errors import InputError, Where
-from drivetwin.held_out import HeldOut, apart, hold_out
+from drivetwin.held_out import HeldOut, hold_out
 from drivetwin.identify.method import DEFAULT_METHOD, Method
 from drivetwin.identify.pipeline import identify
 from drivetwin.identify.result import Identification
 from drivetwin.identify.several.fit import Several, identify_several, of_one_log
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.progress import part
+from drivetwin.shifts.divided import apart
 from drivetwin.shifts.find import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin import Twin

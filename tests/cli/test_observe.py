@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from drivetwin.cli import main
+from drivetwin.cli.observe import observed_channels
 from drivetwin.logs.formats import open_recording
-from drivetwin.observer.kind import Observer
+from drivetwin.observer.observed import Band, Observation, Observer
 from tests.observer.conftest import Bench, bench
+from tests.shifts.test_divided import CHAIN
 
 __all__ = ["bench"]
 
@@ -45,3 +47,18 @@ def test_json_and_figure(bench: Bench, tmp_path: Path, capsys: pytest.CaptureFix
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
     assert shift["torques"]["output_torque"]["highest"] > 4000.0
     assert "95 % low" in page.read_text(encoding="utf-8")
+
+
+def test_time_increases_from_shift_to_shift() -> None:
+    """The gear between two shifts is observed with both of them."""
+    found = []
+    for level, shift in enumerate(CHAIN):
+        time = np.arange(shift.before[0], shift.after[1] + 0.25, 0.5)
+        band = Band(np.full(time.size, float(level)), np.ones(time.size))
+        found.append(Observation(shift, Observer.SMOOTHER, time, band, {"B2": band}))
+    channels = {channel.name: channel for channel in observed_channels(found)}
+    assert set(channels) == {"output_torque", "output_torque_std", "torque.B2", "torque.B2_std"}
+    for channel in channels.values():
+        assert (np.diff(channel.time) > 0.0).all()
+    torque = channels["torque.B2"]
+    assert np.array_equal(torque.values, np.searchsorted([5.0, 10.0], torque.time, side="right"))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.errors import FileFormatError
+from drivetwin.errors import FileFormatError, TimeError
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.logs.write import log_channels, write_log
@@ -71,6 +71,17 @@ def test_a_recorded_log_is_the_same_in_every_format(tmp_path: Path, suffix: str)
     for role, channel in first.channels.items():
         assert np.array_equal(again[role].time, channel.time)
         assert again[role].values == pytest.approx(channel.values, rel=1e-14, abs=1e-9)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_time_that_does_not_increase_is_refused(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"log{suffix}"
+    for stamps in ([0.0, 1.0, 0.5, 2.0], [0.0, 1.0, 1.0, 2.0], [0.0, 1.0, np.nan, 2.0]):
+        twice = RawChannel("te", "Nm", np.array(stamps), np.arange(4.0))
+        with pytest.raises(TimeError) as caught:
+            write_log(path, [twice])
+        assert caught.value.where.channel == "te"
+    assert not path.exists()
 
 
 def test_what_a_format_cannot_hold_is_refused(tmp_path: Path) -> None:

@@ -90,16 +90,21 @@ def _write(path: Path, found: Sequence[Observation]) -> None:
 
 
 def observed_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
-    """Each torque with its standard deviation, N·m, one shift after the other."""
+    """Each torque with its standard deviation, N·m, one shift after the other.
+
+    A gear that is held between two shifts is divided in its middle: time increases throughout.
+    """
     import numpy as np
 
     from drivetwin.logs.raw import RawChannel
+    from drivetwin.shifts.divided import own_samples
 
+    own = own_samples([one.shift for one in found], [one.time for one in found])
     parts: dict[str, list[tuple[Any, Any]]] = {}
-    for one in found:
+    for one, kept in zip(found, own, strict=True):
         for name, band in one.bands.items():
-            parts.setdefault(name, []).append((one.time, band.value))
-            parts.setdefault(f"{name}_std", []).append((one.time, band.std))
+            parts.setdefault(name, []).append((one.time[kept], band.value[kept]))
+            parts.setdefault(f"{name}_std", []).append((one.time[kept], band.std[kept]))
     return tuple(
         RawChannel(
             name,

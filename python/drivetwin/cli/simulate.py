@@ -94,6 +94,8 @@ def _edited(twin: Twin, parameters: Path) -> Twin:
 
     update = updated(twin, read_parameters(parameters))
     typer.echo(f"{parameters.name} changes {', '.join(update.changed) or 'nothing'}", err=True)
+    if update.idle:
+        typer.echo(f"no simulation depends on {', '.join(update.idle)}", err=True)
     if update.unknown:
         typer.echo(f"not of this twin: {', '.join(update.unknown)}", err=True)
     return update.twin
@@ -113,12 +115,21 @@ def _document(run: Validation) -> dict[str, object]:
 
 
 def traces_text(runs: Sequence[Validation]) -> str:
-    """CSV with a unit row: time and the simulated signals, SI, one shift after the other."""
+    """CSV with a unit row: time and the simulated signals, SI, one shift after the other.
+
+    A gear that is held between two shifts is divided in its middle: time increases throughout.
+    """
+    import numpy as np
+
+    from drivetwin.shifts.divided import own_samples
+
+    own = own_samples([run.shift for run in runs], [run.trajectory.time for run in runs])
     names = ["time", *_SI]
     lines = [",".join(names), ",".join(["s", *_SI.values()])]
-    for run in runs:
+    for run, kept in zip(runs, own, strict=True):
         motion = run.trajectory
         input_speed = motion.engine_speed / run.model.i_in
         columns = (motion.time, motion.shaft_torque, input_speed, motion.output_speed)
-        lines += [",".join(f"{value:.12g}" for value in row) for row in zip(*columns, strict=True)]
+        rows = np.column_stack(columns)[kept].tolist()
+        lines += [",".join(f"{value:.12g}" for value in row) for row in rows]
     return "\n".join(lines) + "\n"

@@ -103,7 +103,7 @@ def check_channel(channel: Channel, file: str) -> Checked:
     """
     where = Where(file=file, channel=channel.source_name)
     warnings: list[str] = []
-    _check_order(channel.time, where)
+    check_order(channel.time, where)
     _check_count(channel, channel.time.size, where)
     _check_rate(channel, where)
     warnings += _gaps(channel)
@@ -216,8 +216,11 @@ def _without(channel: Channel, damage: Damage | None, warnings: list[str]) -> Ch
     return replace(channel, time=channel.time[keep], values=channel.values[keep])
 
 
-def _check_order(time: FloatArray, where: Where) -> None:
-    """Refuse stamps that are missing, repeated or run backward: which of them is wrong is open."""
+def check_order(time: FloatArray, where: Where) -> None:
+    """Refuse `time` (n,) [s] with stamps that are missing, repeated or run backward by a TimeError.
+
+    Which of them is wrong is open.
+    """
     if not np.isfinite(time).all():
         index = int(np.isfinite(time).argmin())
         raise TimeError(f"sample {index} has no time stamp", "remove or repair it", where)

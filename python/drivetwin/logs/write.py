@@ -19,6 +19,7 @@ from drivetwin.logs.extras import require
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.shiftlog import Channel, FloatArray, ShiftLog
 from drivetwin.logs.units import Unit, lookup
+from drivetwin.logs.validate import check_order
 
 _TIME = "time"
 
@@ -32,7 +33,8 @@ def write_log(path: Path, channels: Sequence[RawChannel]) -> None:
     """Write channels in the format of the suffix: .csv, .mf4, .mat or .parquet.
 
     An existing file is replaced. Raises FileFormatError for another suffix or for names that repeat
-    or cannot stand in the format, MissingExtraError without the library of the format.
+    or cannot stand in the format, TimeError where time does not increase, MissingExtraError without
+    the library of the format.
     """
     writer = _WRITERS.get(path.suffix.casefold())
     where = Where(file=str(path))
@@ -42,6 +44,8 @@ def write_log(path: Path, channels: Sequence[RawChannel]) -> None:
     names = [channel.name for channel in channels]
     if len(set(names)) < len(names) or _TIME in names:
         raise FileFormatError("names repeat, or one is 'time'", "rename the channels", where)
+    for channel in channels:
+        check_order(channel.time, Where(file=str(path), channel=channel.name))
     writer(path, channels)
 
 

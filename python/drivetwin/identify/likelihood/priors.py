@@ -8,7 +8,7 @@ those of the linear friction fit.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby, pairwise
+from itertools import groupby
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from drivetwin.identify.momentum import DELAY_STD_MAX, MomentumSettings, roundin
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
 from drivetwin.parameters import SPECS
-from drivetwin.shifts.shift import Shift
+from drivetwin.shifts.divided import divided
 from drivetwin.vehicle.spec import PriorValue
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
@@ -158,22 +158,10 @@ def shows_age(torque: Sampled) -> bool:
 def spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
     """Span [s] of the log that each shift accounts for; no sample is counted twice.
 
-    A gear between two shifts is divided in its middle: each run then starts in a gear that is
-    surely held, and ends before the next shift's pressures act. Each log stands by itself.
+    A gear between two shifts is divided in its middle. Each log stands by itself.
     """
     groups = groupby(signals, key=lambda s: s.log)
     return tuple(span for _, group in groups for span in divided([s.shift for s in group]))
-
-
-def divided(shifts: Sequence[Shift]) -> tuple[Span, ...]:
-    """The span [s] that each shift of one log accounts for, as in `spans`."""
-    middles = [0.5 * (max(a.after[0], b.before[0]) + b.before[1]) for a, b in pairwise(shifts)]
-    starts = [shifts[0].before[0], *middles]
-    ends = [*middles, shifts[-1].after[1]]
-    return tuple(
-        (max(start, one.before[0]), min(end, one.after[1]))
-        for start, end, one in zip(starts, ends, shifts, strict=True)
-    )
 
 
 def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
