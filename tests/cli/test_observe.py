@@ -21,7 +21,12 @@ __all__ = ["bench"]
 
 @pytest.mark.parametrize(
     ("suffix", "by", "rmse"),
-    [(".csv", Observer.SIMULATION, 80.0), (".parquet", Observer.SMOOTHER, 20.0)],
+    [
+        (".csv", Observer.SIMULATION, 80.0),
+        (".parquet", Observer.SMOOTHER, 20.0),
+        (".mf4", Observer.SIMULATION, 80.0),
+        (".mat", Observer.SIMULATION, 80.0),
+    ],
 )
 def test_writes_torques_with_their_deviation(
     bench: Bench, tmp_path: Path, suffix: str, by: Observer, rmse: float
@@ -31,9 +36,9 @@ def test_writes_torques_with_their_deviation(
     assert main(["observe", twin, log, "--by", by, "-o", str(file)]) == 0
     with open_recording(file) as recording:
         columns = {c.name: recording.load(k) for k, c in enumerate(recording.columns)}
-    assert set(columns) == {
-        name + end for name in ("output_torque", "torque.B2", "torque.B3") for end in ("", "_std")
-    }
+    dot = "_" if suffix == ".mat" else "."
+    names = ("output_torque", f"torque{dot}B2", f"torque{dot}B3")
+    assert set(columns) == {name + end for name in names for end in ("", "_std")}
     torque = columns["output_torque"]
     exact = np.interp(torque.time, bench.motion.time, bench.motion.shaft_torque)
     assert np.sqrt(np.mean((torque.values - exact) ** 2)) < rmse

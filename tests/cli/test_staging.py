@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli.staging import staged
+from drivetwin.errors import FileFormatError, Where
 
 
 def test_files_appear_together_in_a_new_folder(tmp_path: Path) -> None:
@@ -21,6 +22,19 @@ def test_files_appear_together_in_a_new_folder(tmp_path: Path) -> None:
         "two.txt": "2",
     }
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def test_an_error_names_the_file_where_it_was_to_stand(tmp_path: Path) -> None:
+    def fail(named: Path) -> None:
+        with staged(tmp_path) as beside:
+            raise FileFormatError("no", "do", Where(file=str(beside / named), channel="x"))
+
+    with pytest.raises(FileFormatError) as caught:
+        fail(Path("one.mat"))
+    assert caught.value.where == Where(file=str(tmp_path / "one.mat"), channel="x")
+    with pytest.raises(FileFormatError) as caught:
+        fail(Path("/elsewhere/log.csv"))
+    assert caught.value.where.file == str(Path("/elsewhere/log.csv"))
 
 
 @pytest.mark.parametrize("stop", [ValueError, KeyboardInterrupt])

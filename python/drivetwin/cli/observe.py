@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -83,10 +84,14 @@ def observe(
 
 def _write(path: Path, found: Sequence[Observation]) -> None:
     from drivetwin.cli.staging import staged
+    from drivetwin.export.parameters.spelling import flat_name
     from drivetwin.logs.write import write_log
 
+    channels = observed_channels(found)
+    if path.suffix.casefold() == ".mat":
+        channels = tuple(replace(one, name=flat_name(one.name)) for one in channels)
     with staged(path.parent) as folder:
-        write_log(folder / path.name, observed_channels(found))
+        write_log(folder / path.name, channels)
 
 
 def observed_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:

@@ -8,9 +8,10 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
-from drivetwin.errors import InputError
+from drivetwin.errors import DrivetwinError, InputError
 
 
 def refuse_alike(files: Sequence[Path], remedy: str) -> None:
@@ -28,7 +29,7 @@ def staged(folder: Path) -> Iterator[Path]:
     """Yield an empty folder to write into; its files move to `folder` when the block succeeds.
 
     When the block fails or is interrupted, `folder` is as it was: not made, nothing added or
-    replaced. Raises OSError.
+    replaced. An error about a file in the empty folder names it in `folder`. Raises OSError.
     """
     existing = next(path for path in (folder, *folder.parents) if path.exists())
     beside = Path(tempfile.mkdtemp(dir=existing, prefix=".drivetwin-"))
@@ -37,5 +38,10 @@ def staged(folder: Path) -> Iterator[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         for file in sorted(beside.iterdir()):
             file.replace(folder / file.name)
+    except DrivetwinError as error:
+        file = Path(error.where.file or "")
+        if file.is_relative_to(beside):
+            error.where = replace(error.where, file=str(folder / file.relative_to(beside)))
+        raise
     finally:
         shutil.rmtree(beside, ignore_errors=True)
