@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.errors import InputError, MissingParameterError, ResultFileError
-from drivetwin.identify.result import LoadLaw
+from drivetwin.identify.result import Estimate, LoadLaw, Verdict
 from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.parameters import OVER_ETA
 from drivetwin.twin import Twin
@@ -59,6 +59,9 @@ def test_without_a_torque_scale_the_model_is_over_eta_and_its_motion_the_same(tw
         told[name] = replace(one, value=None)
         told[name + OVER_ETA] = replace(one, id=name + OVER_ETA, value=one.value / eta)
     told["eta"] = replace(told["eta"], value=None)
+    told["drum.B3_over_eta"] = replace(
+        told["k_o_over_eta"], id="drum.B3_over_eta", value=0.05 / eta
+    )
     curve = twin.friction["B3"]
     law = {k: v if k == "v_s" else v / eta for k, v in (curve.stribeck or {}).items()}
     partial = replace(twin, parameters=told, friction={"B3": replace(curve, stribeck=law)})
@@ -66,6 +69,8 @@ def test_without_a_torque_scale_the_model_is_over_eta_and_its_motion_the_same(tw
     whole, ratio = twin.dual_clutch(SHIFT), partial.dual_clutch(SHIFT)
     for name in ("J_out", "J_v", "k_o", "c_o"):
         assert getattr(ratio, name) == pytest.approx(getattr(whole, name) / eta)
+    drums = [one.elements[1].drum_inertia for one in (whole, ratio)]
+    assert drums[1] == pytest.approx(drums[0] / eta)
     assert pytest.approx(whole.J1) == ratio.J1
     scaled = partial.dual_clutch(SHIFT, overrides={"eta": eta})
     assert scaled.k_o == pytest.approx(whole.k_o)
@@ -102,6 +107,38 @@ def test_identified_fill_pressure_goes_before_the_cards(twin: Twin) -> None:
     offgoing, oncoming = twin.dual_clutch(SHIFT).elements
     assert (offgoing.P0, oncoming.P0) == (8e4, 8.2e4)
     assert twin.dual_clutch(SHIFT, overrides={"P0.B3": 9e4}).elements[1].P0 == 9e4
+
+
+def test_identified_drum_goes_before_the_cards(twin: Twin, tmp_path: Path) -> None:
+    assert [one.drum_inertia for one in twin.dual_clutch(SHIFT).elements] == [0.0, 0.05]
+    drum = Estimate("drum.B3", 0.07, 0.01, Verdict.IDENTIFIED, "likelihood")
+    told = replace(twin, parameters={**twin.parameters, "drum.B3": drum})
+    told.save(tmp_path / "twin.toml")
+    for one in (told, Twin.load(tmp_path / "twin.toml")):
+        assert one.dual_clutch(SHIFT).elements[1].drum_inertia == 0.07
+        assert one.elements["B3"].drum == 0.05
+        other = one.dual_clutch(SHIFT, overrides={"drum.B3": 5.0})
+        assert other.elements[1].drum_inertia == 5.0
+
+
+def test_every_override_acts(twin: Twin) -> None:
+    model = twin.dual_clutch(SHIFT)
+    for name in twin.model_ids(SHIFT):
+        assert twin.dual_clutch(SHIFT, overrides={name: 0.5}) != model, name
+
+
+@pytest.mark.parametrize(
+    "name", ["Jout", "te_delay", "f_d_3", "J_prime_4", "P0.C4", "k_o_over_eta"]
+)
+def test_an_override_without_effect_is_refused_with_those_that_act(twin: Twin, name: str) -> None:
+    with pytest.raises(InputError, match=f"does not depend on {name}") as caught:
+        twin.dual_clutch(SHIFT, overrides={"J_out": 3.0, name: 3.0})
+    assert "J_prime_2, J_prime_3, P0.B2, P0.B3, drum.B2, drum.B3" in caught.value.remedy
+
+
+def test_one_inertia_of_a_shift_may_be_overridden(twin: Twin) -> None:
+    with pytest.raises(InputError, match="one of J_prime_2 and J_prime_3"):
+        twin.dual_clutch(SHIFT, overrides={"J_prime_2": 17.0, "J_prime_3": 18.0})
 
 
 def test_missing_parameter_is_named_with_its_reason(twin: Twin) -> None:

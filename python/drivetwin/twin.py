@@ -27,12 +27,20 @@ from drivetwin.identify.result import (
     Identification,
     LoadLaw,
     Method,
+    Verdict,
 )
 from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.shift import Shift
 from drivetwin.shown import Shown
 from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue, VehicleCard
+
+COMMON = ("eta", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+"""Parameters that every model of a twin needs, besides a J′."""
+OF_ELEMENT = ("P0", "drum")
+"""Stems of the parameters of a shift element that stand for its design value where told."""
+SIMULATED = (*COMMON, "J_prime", *OF_ELEMENT, "te_delay")
+"""Stems of the parameters that a simulation depends on; the others follow from them."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +53,10 @@ class TwinGear:
 
 @dataclass(frozen=True)
 class TwinElement:
-    """Design data of one shift element: ratios of eq. 15, gain [m^3], P0 [Pa], drum [kg m^2]."""
+    """Design data of one shift element: ratios of eq. 15, gain [m^3], P0 [Pa], drum [kg m^2].
+
+    `P0` and `drum` are what the card says; parameters of the same name go before them.
+    """
 
     kind: ElementKind
     i_c: float
@@ -53,11 +64,11 @@ class TwinElement:
     gain: float
     P0: float
     peak: float
-    drum_inertia: float
+    drum: float
 
     def spec(self, name: str) -> ElementSpec:
         """The same as on a vehicle card, all of it taken as known."""
-        P0, drum = PriorValue(self.P0), PriorValue(self.drum_inertia)
+        P0, drum = PriorValue(self.P0), PriorValue(self.drum)
         return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
 
 
@@ -127,18 +138,19 @@ class Twin(Shown):
         """Model for the simulation of one shift (eqs. 2-9).
 
         Only Je = J1·η + J2e is identifiable: J′ = Je + Jo′/i_g² gives it, and it is carried as
-        J2e = 0, J1 = Je/η. `overrides` sets parameters by id, in place of identified ones.
+        J2e = 0, J1 = Je/η. `overrides` sets parameters by id, in place of identified ones: any of
+        `model_ids`, of the two J′ one.
         A twin that knows quantities over η only (`over_eta`) is simulated with the η of the
         overrides, else with η = 1: the speeds are the same, all torques are then over η.
         Raises MissingParameterError naming every parameter that neither source gives, and
-        InputError for a gear or element the twin does not know.
+        InputError for a gear or element the twin does not know and for an override without effect.
         """
         given = dict(overrides or {})
+        self._refuse_idle(shift, given)
         gear = self._inertia_gear(shift, given)
         inertia_id = f"J_prime_{gear}"
-        needed = ("eta", inertia_id, "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
         scale = given.get("eta", 1.0) if self.over_eta else 1.0
-        values = self._values(needed, given, scale)
+        values = self._values((*COMMON, inertia_id), given, scale)
         J_e = values[inertia_id] - values["J_out"] / self.gear(gear).ratio ** 2
         return DualClutch(
             J1=J_e / values["eta"],
@@ -160,6 +172,13 @@ class Twin(Shown):
                 )
             ),
         )
+
+    def model_ids(self, shift: Shift) -> tuple[str, ...]:
+        """Ids of the parameters that the model of a shift is made from."""
+        inertias = (f"J_prime_{gear}" for gear in (shift.start_gear, shift.end_gear))
+        elements = (shift.offgoing, shift.oncoming)
+        own = (f"{stem}.{element}" for stem in OF_ELEMENT for element in elements)
+        return (*COMMON, *inertias, *own)
 
     def card(self) -> VehicleCard:
         """The vehicle card, as far as it takes to read another log and find its shifts."""
@@ -210,32 +229,47 @@ class Twin(Shown):
         estimate = self.parameters.get(parameter_id)
         return None if estimate is None else estimate.value
 
+    def _refuse_idle(self, shift: Shift, given: Mapping[str, float]) -> None:
+        """Raise InputError for what the model of a shift does not depend on."""
+        ids = self.model_ids(shift)
+        label = f"the model of shift {shift.start_gear}-{shift.end_gear}"
+        if idle := [name for name in given if name not in ids]:
+            raise InputError(
+                f"{label} does not depend on {', '.join(idle)}", f"override {', '.join(ids)}"
+            )
+        inertias = [name for name in given if name.startswith("J_prime_")]
+        if len(inertias) > 1:
+            raise InputError(
+                f"{label} takes one of {' and '.join(inertias)}, from which the other follows",
+                "override one of them",
+            )
+
     def _inertia_gear(self, shift: Shift, given: Mapping[str, float]) -> str:
-        """Gear whose J′ carries the engine-side inertia: overridden, else told most narrowly."""
+        """Gear whose J′ carries the engine-side inertia: overridden, else stated without an
+        interval, else told most narrowly."""
 
         def rank(gear: str) -> float:
             if f"J_prime_{gear}" in given:
-                return -1.0
+                return -2.0
             ending = OVER_ETA if self.over_eta else ""
             estimate = self.parameters.get(f"J_prime_{gear}{ending}")
             if estimate is None or estimate.value is None:
                 return np.inf
-            return estimate.std_total / estimate.value if estimate.std_total is not None else 1e9
+            if estimate.std_total is None:
+                return -1.0 if estimate.verdict is Verdict.DESIGN else 1e9
+            return estimate.std_total / estimate.value
 
         return min((shift.start_gear, shift.end_gear), key=rank)
 
     def _values(
         self, ids: tuple[str, ...], given: Mapping[str, float], scale: float
     ) -> dict[str, float]:
-        """Values of `ids`: given, told, or told over η and brought to `scale`."""
+        """Values of `ids`, all of which a model needs."""
         values, missing = {"eta": scale} if self.over_eta else {}, []
         for parameter_id in ids:
-            value = given.get(parameter_id, self._known(parameter_id))
-            ratio = self._known(parameter_id + OVER_ETA) if self.over_eta else None
-            if value is None and ratio is not None:
-                value = scale * ratio
+            value = self._value(parameter_id, given, scale)
             if value is not None:
-                values[parameter_id] = float(value)
+                values[parameter_id] = value
             elif parameter_id not in values:
                 missing.append(f"{parameter_id} ({self._why_unknown(parameter_id)})")
         if missing:
@@ -245,6 +279,14 @@ class Twin(Shown):
                 Where(file=self.name),
             )
         return values
+
+    def _value(self, parameter_id: str, given: Mapping[str, float], scale: float) -> float | None:
+        """Value of one parameter: given, told, or told over η and brought to `scale`."""
+        value = given.get(parameter_id, self._known(parameter_id))
+        ratio = self._known(parameter_id + OVER_ETA) if self.over_eta else None
+        if value is None and ratio is not None:
+            value = scale * ratio
+        return None if value is None else float(value)
 
     def _why_unknown(self, parameter_id: str) -> str:
         estimate = self.parameters.get(parameter_id)
@@ -269,15 +311,16 @@ class Twin(Shown):
                 "identify from a log where one of them slips under load",
                 Where(file=self.name),
             )
+        P0, drum = (self._value(f"{stem}.{name}", given, scale) for stem in OF_ELEMENT)
         return ShiftElement(
             name=name,
             i_c=design.i_c,
             i_out=design.i_out,
             gain=design.gain,
-            P0=given.get(f"P0.{name}", self.value(f"P0.{name}", design.P0)),
+            P0=design.P0 if P0 is None else P0,
             friction=friction_law(curve, scale),
             peak=design.peak,
-            drum_inertia=design.drum_inertia,
+            drum_inertia=design.drum if drum is None else drum,
         )
 
 

@@ -147,13 +147,16 @@ def test_an_edited_parameter_file_drives_the_simulation(
     plain = traces([str(twin), str(log)], tmp_path / "plain.csv")
     assert (traces(given, tmp_path / "same.csv") == plain).all()
     lines = exported.read_text("ascii").splitlines()
-    place = lines.index("FESTWERT k_o") + 4
-    assert lines[place].startswith("  WERT ")
-    lines[place] = "  WERT 90000.0"
+    for name, value in (("k_o", 9e4), ("f_d_3", 5.0)):
+        place = lines.index(f"FESTWERT {name}") + 4
+        assert lines[place].startswith("  WERT ")
+        lines[place] = f"  WERT {value}"
     exported.write_text("\n".join(lines), "ascii")
     capsys.readouterr()
     softer = traces(given, tmp_path / "softer.csv")
-    assert "twin.dcm changes k_o" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "twin.dcm changes k_o\n" in told
+    assert "no simulation depends on f_d_3\n" in told
     assert np.abs(softer[:, 1] - plain[:, 1]).max() > 50.0
 
 

@@ -85,7 +85,11 @@ def model_of(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClut
 
     Raises MissingParameterError where the log could not tell a parameter and nothing replaces it.
     """
-    overrides = {name: v for name, v in changes.items() if not name.startswith(FRICTION)}
+    overrides = {
+        name: value
+        for name, value in changes.items()
+        if name != "te_delay" and not name.startswith(FRICTION)
+    }
     model = twin.dual_clutch(shift, overrides=overrides)
     elements = tuple(
         _scaled(element, changes.get(FRICTION + element.name, 1.0)) for element in model.elements

@@ -32,7 +32,9 @@ class Uncertain:
 
     def model(self, values: FloatArray) -> DualClutch:
         """The model at other `values` (p,) of the parameters."""
-        return self.twin.dual_clutch(self.shift, overrides=self.named(values))
+        named = self.named(values)
+        own = {name: named[name] for name in self.ids if name != "te_delay"}
+        return self.twin.dual_clutch(self.shift, overrides=own)
 
     def named(self, values: FloatArray) -> Mapping[str, float]:
         """The same values by id."""

@@ -51,7 +51,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
             gear.name: TwinGear(card.ratio(gear.name), card.element_of(gear.name))
             for gear in card.gears
         },
-        elements={name: _element(card, name, found) for name in card.elements},
+        elements={name: _element(card, name) for name in card.elements},
         J_prime_range=card.J_prime_range,
         J_vehicle_range=card.J_vehicle_range,
         parameters=parameters,
@@ -69,13 +69,12 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
     )
 
 
-def _element(card: VehicleCard, name: str, found: Identification) -> TwinElement:
-    """Design data of an element, its drum as the log tells it where it does."""
+def _element(card: VehicleCard, name: str) -> TwinElement:
+    """Design data of an element."""
     spec = card.elements[name]
     i_c, i_out = card.clutch_ratios(name)
-    told = found.estimates.get(f"drum.{name}")
-    drum = spec.drum_inertia.value if told is None or told.value is None else told.value
-    return TwinElement(spec.kind, i_c, i_out, spec.gain, spec.P0.value, spec.peak, drum)
+    P0, drum = spec.P0.value, spec.drum_inertia.value
+    return TwinElement(spec.kind, i_c, i_out, spec.gain, P0, spec.peak, drum)
 
 
 def _borrowed_friction(found: Identification) -> list[str]:
@@ -145,7 +144,7 @@ def _element_record(element: TwinElement) -> ElementRecord:
         gain_m3=element.gain,
         P0_Pa=element.P0,
         peak=element.peak,
-        drum_inertia_kgm2=element.drum_inertia,
+        drum_inertia_kgm2=element.drum,
     )
 
 
@@ -168,7 +167,7 @@ def twin_from_file(content: TwinFile) -> Twin:
                 gain=one.gain_m3,
                 P0=one.P0_Pa,
                 peak=one.peak,
-                drum_inertia=one.drum_inertia_kgm2,
+                drum=one.drum_inertia_kgm2,
             )
             for name, one in gearbox.elements.items()
         },

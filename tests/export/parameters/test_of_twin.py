@@ -12,6 +12,8 @@ from drivetwin.converter import Converter
 from drivetwin.driveline import Stribeck
 from drivetwin.export.parameters.content import Curve, Scalar
 from drivetwin.export.parameters.of_twin import converter_curves, parameters_of
+from drivetwin.identify.result import Estimate, Verdict
+from drivetwin.parameters import OVER_ETA
 from tests.export.parameters.sample import twin
 from tests.report.sample import STRIBECK
 
@@ -41,6 +43,19 @@ def test_an_identified_value_goes_before_the_design_value() -> None:
     assert isinstance(design, Scalar)
     assert (design.value, design.unit) == (8e4, "Pa")
     assert "design value" in design.text
+
+
+@pytest.mark.parametrize(("ending", "value"), [("", 0.07), (OVER_ETA, 0.08)])
+def test_an_identified_drum_stands_once(ending: str, value: float) -> None:
+    name, given = f"drum.B3{ending}", twin()
+    assert [one.value for one in parameters_of(given).scalars if "drum" in one.name] == [0.0, 0.05]
+    told = Estimate(name, value, 0.01, Verdict.IDENTIFIED, "likelihood")
+    content = parameters_of(replace(given, parameters={**given.parameters, name: told}))
+    drums = {one.name: one for one in content.scalars if "drum" in one.name}
+    assert set(drums) == {"drum.B2", name}
+    assert drums[name].value == value
+    assert "identified" in drums[name].text
+    assert "design value" in drums["drum.B2"].text
 
 
 def test_the_curve_gives_the_law_of_the_simulation() -> None:

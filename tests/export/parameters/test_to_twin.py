@@ -14,7 +14,7 @@ from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
 from drivetwin.export.parameters.of_twin import parameters_of
 from drivetwin.export.parameters.to_twin import updated
-from drivetwin.identify.result import LoadLaw, Verdict
+from drivetwin.identify.result import Estimate, LoadLaw, Verdict
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT
 
@@ -33,7 +33,7 @@ def _edited(**values: float) -> ParameterSet:
 def test_a_file_as_it_was_exported_changes_nothing(kind: ParameterFormat) -> None:
     codec, given = CODECS[kind], twin()
     update = updated(given, codec.parse(codec.text(parameters_of(given)), "file"))
-    assert update.changed == update.unknown == ()
+    assert update.changed == update.idle == update.unknown == ()
     assert update.twin == given
 
 
@@ -51,6 +51,25 @@ def test_edited_values_reach_the_simulation(kind: ParameterFormat) -> None:
     assert update.twin.parameters["k_o"].verdict is Verdict.DESIGN
     assert update.twin.covariance is not None
     assert updated(twin(), _edited(eta=0.9)).twin.covariance is None
+
+
+@pytest.mark.parametrize("told", [False, True])
+def test_every_name_that_is_told_as_changed_acts(told: bool) -> None:
+    given = replace(twin(), load_law=LoadLaw(aero=7.0, std=0.5, mean_speed=14.0))
+    if told:
+        drum = Estimate("drum.B3", 0.07, 0.01, Verdict.IDENTIFIED, "likelihood")
+        given = replace(given, parameters={**given.parameters, "drum.B3": drum})
+    changed: list[str] = []
+    for one in parameters_of(given).scalars:
+        file = ParameterSet("t", (replace(one, value=1.5 * one.value + 0.1),))
+        update = updated(given, file)
+        changed += update.changed
+        acts = update.twin.dual_clutch(SHIFT) != given.dual_clutch(SHIFT)
+        # The gears' ratios find the shifts of a log as well.
+        assert acts == bool(update.changed) or one.name == "ratio_3", one.name
+        assert update.twin == given if update.idle else update.changed == (one.name,)
+    assert set(changed) >= {"J_prime_2", "J_prime_3", "drum.B2", "drum.B3", "load.mean_speed"}
+    assert not {"f_d_3", "zeta_3"} & set(changed)
 
 
 def test_an_edited_curve_becomes_the_law() -> None:
@@ -76,7 +95,7 @@ def test_what_the_log_could_not_tell_may_be_given_and_other_names_are_told() -> 
     given = ParameterSet("t", (Scalar("te_delay", 0.01, "s"), Scalar("wheel_colour", 3.0)))
     update = updated(twin(), given)
     assert update.changed == ("te_delay",)
-    assert update.unknown == ("wheel_colour",)
+    assert (update.idle, update.unknown) == ((), ("wheel_colour",))
     assert update.twin.value("te_delay", 0.0) == 0.01
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.spelling import one_line
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import OVER_ETA, spec_of
 from drivetwin.twin import friction_law
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ DESIGN_FIELDS = {
     "gain": ("m^3", "friction surfaces x de-rating x area x effective radius (eq. 5)"),
     "P0": ("Pa", "pressure at which the clutch fill ends"),
     "peak": ("1", "static over kinetic capacity at zero slip"),
-    "drum_inertia": ("kg*m^2", "inertia that turns with the slip"),
+    "drum": ("kg*m^2", "inertia that turns with the slip"),
 }
 """Fields of a shift element that the card knows: unit and meaning."""
 LAW_FIELDS = {
@@ -118,10 +118,10 @@ def _elements(twin: Twin) -> Iterator[Scalar]:
 
 
 def _design(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
+    told = {one.id for one in twin.parameters.values() if one.value is not None}
     for field, (unit, text) in DESIGN_FIELDS.items():
         key = f"{field}.{name}"
-        told = twin.parameters.get(key)
-        if told is None or told.value is None:
+        if not told & {key, key + OVER_ETA}:
             yield Scalar(key, getattr(element, field), unit, f"{text}; design value")
 
 

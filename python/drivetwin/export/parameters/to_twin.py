@@ -14,6 +14,7 @@ from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, param
 from drivetwin.export.parameters.spelling import dotted_name, flat_name
 from drivetwin.identify.result import Estimate, FrictionCurve, Verdict
 from drivetwin.parameters import spec_of
+from drivetwin.twin import SIMULATED
 
 if TYPE_CHECKING:
     from drivetwin.twin import Twin
@@ -23,10 +24,15 @@ METHOD = "parameter file"
 
 @dataclass(frozen=True)
 class Update:
-    """The twin with the values of a file; names that changed, and names that it does not know."""
+    """The twin with the values of a file.
+
+    `changed` names what differed, `idle` what differed and no simulation depends on, so that it
+    stays the twin's own; `unknown` what the twin does not know.
+    """
 
     twin: Twin
     changed: tuple[str, ...]
+    idle: tuple[str, ...]
     unknown: tuple[str, ...]
 
 
@@ -40,12 +46,16 @@ def updated(twin: Twin, parameters: ParameterSet) -> Update:
     spelled = _spellings(twin, own)
     values = {one.name: one for one in own.entries}
     changed: dict[str, Scalar | Curve] = {}
-    unknown = []
+    idle, unknown = [], []
     for entry in parameters.entries:
         name = spelled.get(entry.name)
         if name is None:
             unknown.append(entry.name)
-        elif not _same(values.get(name), entry):
+        elif _same(values.get(name), entry):
+            continue
+        elif name in twin.parameters and spec_of(name).stem not in SIMULATED:
+            idle.append(name)
+        else:
             changed[name] = entry
     made = twin
     for name, entry in changed.items():
@@ -56,7 +66,7 @@ def updated(twin: Twin, parameters: ParameterSet) -> Update:
         )
     if any(name in twin.covariance_ids for name in changed):
         made = replace(made, covariance_ids=(), covariance=None)
-    return Update(made, tuple(changed), tuple(unknown))
+    return Update(made, tuple(changed), tuple(idle), tuple(unknown))
 
 
 def _spellings(twin: Twin, own: ParameterSet) -> dict[str, str]:
@@ -93,7 +103,6 @@ def _with(twin: Twin, name: str, value: float) -> Twin:
         changes = {field: value}
         design = replace(twin.elements[element], **changes)
         return replace(twin, elements={**twin.elements, element: design})
-    spec_of(name)
     told = Estimate(name, value, None, Verdict.DESIGN, METHOD, reason="given by a parameter file")
     return replace(twin, parameters={**twin.parameters, name: told})
 
