@@ -77,7 +77,8 @@ _REFUSED = {
     "1/(3.6·r_w) for km/h and unit = 'rad/s'": "km/h kmh kph m/s mph",
     "milli- or megapascal may be meant": "mPa mpa MPA",
     "bar absolute holds the ambient pressure: give unit = 'bar' and offset = -1.013": "bara "
-    "bar(a) bar_a psia",
+    "bar(a) bar_a",
+    "psi absolute holds the ambient pressure: give unit = 'psi' and offset = -14.7": "psia",
 }
 """Spellings that are known but cannot be taken as they stand, by the reason."""
 
