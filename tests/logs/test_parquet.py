@@ -67,6 +67,18 @@ def test_null_is_no_sample_and_nan_is_a_missing_number(tmp_path: Path) -> None:
     assert np.array_equal(channel.values, [1.0, np.nan, 4.0], equal_nan=True)
 
 
+def test_columns_of_one_name_are_told_apart_by_place(tmp_path: Path) -> None:
+    struct = pa.array([{"b": 0.0}] * 4)
+    columns = [struct, pa.array(T), *(pa.array([value] * 4) for value in (1.0, 2.0, 3.0))]
+    path = tmp_path / "log.parquet"
+    made = pa.table(columns, names=["a", "t", "a.b [Nm]", "a.b", "a.b [Nm]"])
+    pq.write_table(made.replace_schema_metadata({"units": json.dumps({"t": "s"})}), path)
+    with open_recording(path) as recording:
+        assert [one.name for one in recording.columns] == ["a", "a.b", "a.b", "a.b"]
+        values = [recording.load(index).values[0] for index in range(1, 4)]
+    assert values == [1.0, 2.0, 3.0]
+
+
 def test_time_stamps_count_from_the_first(tmp_path: Path) -> None:
     stamps = np.datetime64("2024-05-03T12:00:00") + np.array([0, 500, 1000], "timedelta64[ms]")
     raw = read(tmp_path, table(timestamp=pa.array(stamps), x=[1.0, 2.0, 3.0]))

@@ -97,14 +97,20 @@ class ParquetRecording:
         if not (numeric or pa.types.is_boolean(kind) or pa.types.is_decimal(kind)):
             raise DamagedChannelError(f"it holds {kind}, not numbers", "map another column", where)
         with foreign_parser(_KIND, self._path):
-            # fields are picked by place: names may repeat
-            data = self._table.read(columns=[self._leaf(field)]).column(0)
+            data = self._values(field)
             present = np.asarray(pc.is_valid(data).to_numpy(zero_copy_only=False), np.bool_)
             floats = pc.cast(data, pa.float64(), safe=False)
             return np.asarray(floats.to_numpy(zero_copy_only=False), np.float64), present
 
-    def _leaf(self, field: int) -> str:
-        return str(self._table.schema_arrow.field(field).name)
+    def _values(self, field: int) -> Any:
+        """One column, picked by place among all of its name: names may repeat.
+
+        By `a.b` a struct `a` with a field `b` is read as well.
+        """
+        names = self._table.schema_arrow.names
+        read = self._table.read(columns=[names[field]])
+        alike = read.schema.get_all_field_indices(names[field])
+        return read.column(alike[names[:field].count(names[field])])
 
     def _stamps(self, field: int, column: Column, asserted: str | None) -> FloatArray:
         import pyarrow as pa
@@ -112,7 +118,7 @@ class ParquetRecording:
         where = Where(file=str(self._path), channel=column.name)
         kind = self._table.schema_arrow.field(field).type
         if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-            data = self._table.read(columns=[self._leaf(field)]).column(0)
+            data = self._values(field)
             stamps = np.asarray(data.to_numpy(zero_copy_only=False))
             if np.isnat(stamps).any():
                 raise TimeError("a row has no time stamp", "remove the row", where)
