@@ -89,6 +89,16 @@ def test_a_part_that_cannot_be_written_stops_all(cell: Cell, tmp_path: Path) -> 
     assert "cannot write" in reply.what
 
 
+def test_a_log_whose_drive_fails_stops_nobody_and_is_no_bad_log(cell: Cell, tmp_path: Path) -> None:
+    task = _task(tmp_path, "one unread")
+    reply = cell.run(task)
+    assert isinstance(reply, Finished)
+    assert (reply.outcome.state, reply.outcome.error) == (State.QUARANTINED, "OSError")
+    assert "Input/output error" in reply.outcome.what
+    assert "--retry" in reply.outcome.remedy
+    assert not Path(task.part).exists()
+
+
 def test_another_version_is_not_mixed_in(cell: Cell, tmp_path: Path) -> None:
     task = _task(tmp_path, "one")
     other = replace(task, recipe=replace(task.recipe, version="0.0.0+other"))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,9 @@ import pytest
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.errors import StoreError
 from drivetwin.fleet.identify import identify_log
-from drivetwin.fleet.rows import Row, RowKind
+from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.task import Recipe, Task
 from drivetwin.identify.method import Method
 from drivetwin.results.version import program_version
@@ -29,19 +31,25 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def _rows(log: Path, *means: tuple[str, str]) -> list[Row]:
+def _task(log: Path, *means: tuple[str, str]) -> Task:
     recipe = Recipe(
         str(log.with_suffix(".card.toml")), None, Method.PAPER, (), program_version(), means
     )
     content = hashlib.sha256(log.read_bytes()).hexdigest()
-    task = Task("0123", str(log), content, recipe, str(log.with_suffix(".parquet")))
-    return list(identify_log(task).rows)
+    return Task("0123", str(log), content, recipe, str(log.with_suffix(".parquet")))
 
 
 def test_a_channel_without_values_leaves_no_field_and_says_so(log: Path) -> None:
-    rows = _rows(log, ("oil_degC", "TOil"), ("gear_degC", "TGear"))
+    rows = identify_log(_task(log, ("oil_degC", "TOil"), ("gear_degC", "TGear"))).rows
     (oil,) = [row for row in rows if row.kind is RowKind.FIELD]
     assert (oil.name, oil.value, oil.si_unit) == ("oil_degC", 85.0, "degC")
     (told,) = [row.reason for row in rows if "TGear" in row.reason]
     assert "no field 'gear_degC'" in told
     assert any(row.kind is RowKind.PARAMETER for row in rows)
+
+
+def test_what_cannot_be_written_besides_is_the_stores_fault(log: Path) -> None:
+    task, below_a_file = _task(log), str(log / "x")
+    for asked in (replace(task, report=below_a_file), replace(task, traces=below_a_file)):
+        with pytest.raises(StoreError, match="a worker cannot write"):
+            identify_log(asked)

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
 """The function that takes the place of identification where only the fleet is tested.
 
-What a file says is what happens to it: `bad`, `hang`, `eat`, `die`, `slow`, or `environment`, which
-counts the settings of memory as words, or nothing of the kind.
+What a file says is what happens to it: `bad`, `hang`, `eat`, `die`, `slow`, `unread`, or
+`environment`, which counts the settings of memory as words, or nothing of the kind.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import time
@@ -34,6 +35,8 @@ def toy(task: Task) -> Found:
         raise AssertionError(f"{len(held)} pieces of memory were to be had")
     if "environment" in words:
         words += [name for name in os.environ if name.startswith("MALLOC_")]
+    if "unread" in words:
+        raise OSError(errno.EIO, os.strerror(errno.EIO), task.path)
     if "bad" in words:
         raise FileFormatError("it says that it is bad", "make it a good one")
     name = f"P0.{words[0]}"

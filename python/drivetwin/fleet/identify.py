@@ -13,6 +13,7 @@ import numpy as np
 
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.fleet.free import free_friction
+from drivetwin.fleet.parts import writing
 from drivetwin.fleet.rows import MU, Found, Row, RowKind
 from drivetwin.fleet.task import Recipe, ShiftRow, Task
 from drivetwin.identify.pipeline import identify
@@ -38,7 +39,11 @@ _CARDS = 64
 
 
 def identify_log(task: Task) -> Found:
-    """Identify one log. Raises the typed errors of each stage for a log that cannot be used."""
+    """Identify one log, and write what is wanted besides its rows.
+
+    Raises the typed errors of each stage for a log that cannot be used, StoreError where the report
+    or the traces cannot be written, OSError where the drive fails that the log is on.
+    """
     recipe = task.recipe
     card = _card(recipe)
     mapping = None if recipe.channels is None else Path(recipe.channels)
@@ -65,15 +70,17 @@ def _card(recipe: Recipe) -> VehicleCard:
 
 
 def _artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
-    """Write the report and the traces that are wanted besides."""
+    """Write the report and the traces that are wanted besides. Raises StoreError."""
     if task.report is not None:
         from drivetwin.fleet.pages import save_single
 
-        save_single(Path(task.report), found, log)
+        with writing():
+            save_single(Path(task.report), found, log)
     if task.traces is not None:
         from drivetwin.fleet.pages import save_traces
 
-        save_traces(Path(task.traces), found)
+        with writing():
+            save_traces(Path(task.traces), found)
 
 
 def _means(task: Task, mapping: Path | None) -> Iterator[Row]:

@@ -11,13 +11,14 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from drivetwin.errors import StoreError, Where
 from drivetwin.fleet.rows import Row, RowKind, schema, table
-from drivetwin.fleet.task import Outcome
+from drivetwin.fleet.task import GO_ON, Outcome
 from drivetwin.results.atomic import write_bytes
 
 INBOX, ROWS = "inbox", "rows"
@@ -40,6 +41,16 @@ def write_part(path: Path, log: str, outcome: Outcome, rows: Sequence[Row]) -> N
         {_OUTCOME: json.dumps(outcome.tree(), sort_keys=True)}
     )
     write_bytes(path, _bytes(made))
+
+
+@contextmanager
+def writing() -> Iterator[None]:
+    """What a worker cannot write, as a StoreError: no log is to blame, and the run stops."""
+    try:
+        yield
+    except OSError as fault:
+        what = f"a worker cannot write: {fault.strerror or fault} ({fault.filename})"
+        raise StoreError(what, GO_ON) from None
 
 
 def read_outcome(path: Path) -> Outcome | None:

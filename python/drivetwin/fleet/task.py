@@ -25,7 +25,7 @@ class State(StrEnum):
     BAD = "bad"
     """The log itself cannot be used; trying again would end the same way."""
     QUARANTINED = "quarantined"
-    """It hung, ate memory, or killed its worker again and again."""
+    """It hung, ate memory, killed its worker again and again, or its drive failed."""
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,10 @@ from queue import SimpleQueue
 from time import perf_counter
 from typing import Any
 
-from drivetwin.errors import DrivetwinError
-from drivetwin.fleet.parts import write_part
+from drivetwin.errors import DrivetwinError, StoreError
+from drivetwin.fleet.parts import write_part, writing
 from drivetwin.fleet.rows import Found
-from drivetwin.fleet.task import GO_ON, Outcome, State, Task, memory_exceeded
+from drivetwin.fleet.task import Outcome, State, Task, memory_exceeded
 from drivetwin.results.version import program_version
 
 Work = Callable[[Task], Found]
@@ -43,23 +43,31 @@ def answer(work: Work, task: Task, memory: int) -> dict[str, Any]:
         outcome, rows = Outcome(State.DONE, tuple(found.shifts)), found.rows
     except MemoryError:
         return {"outcome": memory_exceeded(memory).tree(), "seconds": perf_counter() - started}
+    except StoreError as fault:
+        return {"stop": fault.what, "remedy": fault.remedy}
     except DrivetwinError as error:
         outcome, rows = _bad(error), ()
     except OSError as fault:
-        return _unwritable(fault)
+        return {"outcome": _unread(fault).tree(), "seconds": perf_counter() - started}
     except Exception as fault:
         # Whatever a log brings about must not end the run; it is named and the others go on.
         outcome, rows = _unexpected(fault), ()
     try:
-        write_part(Path(task.part), task.log, outcome, rows)
-    except OSError as fault:
-        return _unwritable(fault)
+        with writing():
+            write_part(Path(task.part), task.log, outcome, rows)
+    except StoreError as fault:
+        return {"stop": fault.what, "remedy": fault.remedy}
     return {"outcome": outcome.tree(), "seconds": perf_counter() - started}
 
 
-def _unwritable(fault: OSError) -> dict[str, Any]:
-    what = f"a worker cannot write: {fault.strerror or fault} ({fault.filename})"
-    return {"stop": what, "remedy": GO_ON}
+def _unread(fault: OSError) -> Outcome:
+    """What a drive did to a log: no part says so, for its content may be read another time."""
+    return Outcome(
+        State.QUARANTINED,
+        error=type(fault).__name__,
+        what=f"the system refused while it was worked on: {fault.strerror or fault}",
+        remedy="see whether the file can be read, then run again with --retry",
+    )
 
 
 def _bad(error: DrivetwinError) -> Outcome:
