@@ -103,6 +103,25 @@ def test_a_repeated_packet_is_taken_once() -> None:
     assert found.messages[0].payload == PAYLOAD
 
 
+@pytest.mark.parametrize("order", ["each twice", "the first two once more"])
+def test_frames_recorded_twice_count_once(order: str) -> None:
+    sent = [announce(PAYLOAD), *packets(PAYLOAD)]
+    if order == "each twice":
+        doubled = [one for frame in sent for one in (frame, frame)]
+        stamps = [0.05 * index + late for index in range(len(sent)) for late in (0.0, 2e-4)]
+    else:
+        doubled = [sent[0], sent[1], sent[0], sent[1], *sent[2:]]
+        stamps = [0.0, 4e-4, 6e-4, 8e-4, *(0.05 * index for index in range(1, len(sent) - 1))]
+    found = reassemble(table(doubled, stamps))
+    assert [one.payload for one in found.messages] == [PAYLOAD]
+    assert not found.faults
+
+
+def test_an_equal_message_a_while_later_is_another() -> None:
+    sent = [announce(PAYLOAD), *packets(PAYLOAD)]
+    assert len(reassemble(table([*sent, *sent])).messages) == 2
+
+
 @given(
     payloads=st.dictionaries(
         st.integers(0, 253), st.binary(min_size=9, max_size=60), min_size=1, max_size=5

@@ -54,11 +54,6 @@ class _Transfer:
     time: float
     parts: list[bytes] = field(default_factory=list)
 
-    def announced_again(self, group: int, length: int, time: float) -> bool:
-        """Whether this is the same announcement, told twice by a gateway or a logger."""
-        same = (self.group, self.length) == (group, length)
-        return same and not self.parts and time - self.time < REPEATED
-
 
 def reassemble(frames: Frames) -> Transport:
     """Put multi-packet messages together from all frames of a log."""
@@ -70,6 +65,8 @@ def reassemble(frames: Frames) -> Transport:
         key = (int(frames.bus[index]), int(senders[index]), int(receivers[index]))
         payload = frames.data[index, : frames.length[index]].tobytes()
         time = float(frames.time[index])
+        if assembly.repeated((*key, int(groups[index])), payload, time):
+            continue
         if groups[index] == _CONNECTION:
             assembly.connect(key, payload, time)
         else:
@@ -84,6 +81,16 @@ class _Assembly:
         self._open: dict[tuple[int, int, int], _Transfer] = {}
         self._messages: list[Assembled] = []
         self._faults: Counter[str] = Counter()
+        self._last: dict[tuple[int, int, int, int], tuple[bytes, float]] = {}
+
+    def repeated(self, place: tuple[int, int, int, int], payload: bytes, time: float) -> bool:
+        """Whether a frame is the last of its `place`, told twice by a gateway or a logger.
+
+        A `place` is (bus, sender, receiver, group).
+        """
+        before, since = self._last.get(place, (b"", -np.inf))
+        self._last[place] = (payload, time)
+        return payload == before and time - since < REPEATED
 
     def connect(self, key: tuple[int, int, int], payload: bytes, time: float) -> None:
         if len(payload) < 8:
@@ -97,9 +104,6 @@ class _Assembly:
             return  # clear to send, end of message: the receiver's part
         length = int.from_bytes(payload[1:3], "little")
         group = int.from_bytes(payload[5:8], "little")
-        begun = self._open.get(key)
-        if begun is not None and begun.announced_again(group, length, time):
-            return
         self._drop(key, "replaced by the next before its end")
         if not 8 < length <= _LONGEST or payload[3] != -(-length // _BYTES):
             self._faults["announced with an impossible length"] += 1
@@ -117,7 +121,7 @@ class _Assembly:
         expected = len(transfer.parts) + 1
         number = payload[0]
         if number == expected - 1 and number > 0 and payload[1:] == transfer.parts[-1]:
-            return  # repeated packet
+            return  # sent once more
         if number != expected:
             self._drop(key, "packet missing")
             return
