@@ -109,6 +109,20 @@ def test_a_log_that_cannot_be_opened_leaves_the_work_as_it_was(session: Session)
     assert session.work is work
 
 
+def test_what_cannot_be_read_lets_the_identification_run_on(session: Session) -> None:
+    _open(session)
+    session.identify([Method.PAPER])
+    with pytest.raises(InputError):
+        session.open(session.in_folder(CARD), session.in_folder(LOG))
+    with pytest.raises(InputError):
+        session.correct([Entry("input_speed", "furlong", False)])
+    finish(session)
+    assert list(session.work.results) == [Method.PAPER]
+    session.identify([Method.LIKELIHOOD])
+    _open(session)
+    assert session.job is None
+
+
 def test_nothing_is_done_before_a_log_is_open(session: Session) -> None:
     for action in (
         lambda: session.identify([Method.PAPER]),

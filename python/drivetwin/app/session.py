@@ -83,19 +83,23 @@ class Session:
     def open(self, log: Source, card: Source, mapping: Path | None = None) -> None:
         """Open a log with its card; what was done with the one before goes.
 
-        Raises the typed errors of the readers; the work stays as it was then.
+        Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
         with self.lock:
-            self.cancel()
             work = Work(log=log, card=card, mapping=mapping)
-            self._set(work.with_opened(self._read(work, {})))
+            work = work.with_opened(self._read(work, {}))
+            self.cancel()
+            self._set(work)
 
     def correct(self, entries: Sequence[Entry]) -> None:
-        """Read the log again with the mapping as corrected. Raises MappingError, UnitError."""
+        """Read the log again with the mapping as corrected; what was found before goes.
+
+        Raises MappingError, UnitError; the work stays as it was then, and goes on.
+        """
         with self.lock:
-            self.cancel()
             channels = corrected(self.work.require_opened().survey, entries)
             opened = self._read(self.work, channels)
+            self.cancel()
             self._set(replace(self.work, channels=channels).with_opened(opened))
 
     def move(self, index: int, changes: Mapping[Boundary, float]) -> None:
