@@ -51,9 +51,10 @@ def test_a_log_without_units_names_or_all_samples_is_described_not_refused(
 def test_the_written_mapping_is_read_back(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "map.toml"
+    path = tmp_path / "new" / "map.toml"
     arguments = [str(bench_files.log), "--vehicle", str(bench_files.card)]
     _inspect(capsys, *arguments, "--write-mapping", str(path))
+    assert list(path.parent.iterdir()) == [path]
     assert read_mapping(path).channels["pressure.B2"].source == "PrsBrk2"
     assert main(["shifts", *arguments, "--channels", str(path)]) == 0
 

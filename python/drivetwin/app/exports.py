@@ -98,10 +98,10 @@ def _record(work: Work, wanted: Record, scratch: Path) -> bytes:
             text: str = jobs.call(report_of, _evidence(work), log, limit=REPORT_LIMIT)
             return text.encode()
         case Record.MAPPING:
-            from drivetwin.logs.profile import write_mapping
+            from drivetwin.logs.profile import mapping_text
 
             survey = work.require_opened().survey
-            write_mapping(path, {**survey.mapping, **work.channels}, survey.options)
+            return mapping_text({**survey.mapping, **work.channels}, survey.options).encode()
     return _taken(path)
 
 

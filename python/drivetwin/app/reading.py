@@ -17,7 +17,7 @@ from drivetwin.app.jobs import Emit
 from drivetwin.errors import DrivetwinError, InputError
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.mapping import ChannelSpec, Mapped
-from drivetwin.logs.profile import read_mapping, write_mapping
+from drivetwin.logs.profile import mapping_text, read_mapping
 from drivetwin.logs.raw import ReadOptions
 from drivetwin.logs.read import read_log
 from drivetwin.logs.shiftlog import ShiftLog
@@ -117,5 +117,5 @@ def _labelled(labels: Mapping[Path, str]) -> Iterator[None]:
 
 
 def _written(path: Path, channels: Mapping[str, ChannelSpec], options: ReadOptions) -> Path:
-    write_mapping(path, channels, options)
+    path.write_text(mapping_text(channels, options), encoding="utf-8")
     return path

@@ -32,17 +32,16 @@ def inspect(
 ) -> None:
     """List the columns of a log: unit, rate, range, gaps, and the role each would play."""
     from drivetwin.logs.mapping import Mapped
-    from drivetwin.logs.profile import read_mapping
+    from drivetwin.logs.profile import mapping_text, read_mapping
     from drivetwin.logs.survey import survey
+    from drivetwin.results.atomic import write_text
     from drivetwin.vehicle.card import load_card
 
     card = None if vehicle is None else load_card(vehicle)
     stated = Mapped({}) if channels is None else read_mapping(channels)
     found = survey(log, card, stated)
     if write_mapping is not None:
-        from drivetwin.logs import profile
-
-        profile.write_mapping(write_mapping, found.mapping, found.options, found.unitless)
+        write_text(write_mapping, mapping_text(found.mapping, found.options, found.unitless))
     if as_json:
         print_json(found.document())
         return

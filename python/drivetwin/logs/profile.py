@@ -108,13 +108,12 @@ def read_mapping(path: Path) -> Mapped:
     return Mapped(channels, ReadOptions(TimeColumn(file.time.source, file.time.unit), bus))
 
 
-def write_mapping(
-    path: Path,
+def mapping_text(
     channels: Mapping[str, ChannelSpec],
     options: ReadOptions | None = None,
     unitless: Collection[str] = (),
-) -> None:
-    """Write `channels` (by role) as a mapping file to edit; an existing file is replaced.
+) -> str:
+    """Return `channels` (by role) as a mapping file to edit.
 
     `options` for the file as a whole stand before them, DBC files with their full path. Roles that
     are `unitless` in the log get a line for their unit to be filled in.
@@ -137,7 +136,7 @@ def write_mapping(
     if pressures:
         tables.add(PRESSURE.rstrip("."), pressures)
     document.add("channels", tables)
-    path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    return tomlkit.dumps(document)
 
 
 def _options(options: ReadOptions) -> dict[str, dict[str, object]]:
