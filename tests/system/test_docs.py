@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from drivetwin.cli.synth import ScenarioOption
+from drivetwin.dyno.names import ScenarioName
 from drivetwin.logs.profile import read_mapping
 from drivetwin.parameters import SPECS, ParameterSpec
 from drivetwin.vehicle.card import load_card
@@ -58,3 +61,18 @@ def test_no_other_parameter_is_documented() -> None:
     text = (REFERENCE / "result-files.md").read_text(encoding="utf-8")
     table = text.split("| id | symbol |")[1].split("\n\n")[0]
     assert len(re.findall(r"^\| `", table, re.MULTILINE)) == len(SPECS)
+
+
+def test_every_page_is_listed() -> None:
+    docs = ROOT / "docs"
+    listed = set(re.findall(r"\]\(([^)#]+)", (docs / "README.md").read_text(encoding="utf-8")))
+    pages = {page.relative_to(docs).as_posix() for page in docs.rglob("*.md")}
+    assert listed == pages - {"README.md"}
+
+
+def test_every_scenario_is_described() -> None:
+    (option,) = get_args(ScenarioOption)[1:]
+    described = re.findall(r"(\w+)(?=[\w, ]*:)", option.help)
+    page = (ROOT / "docs" / "howto" / "synthetic-log.md").read_text(encoding="utf-8")
+    assert set(described) == set(ScenarioName)
+    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == list(ScenarioName)
