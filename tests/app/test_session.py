@@ -163,3 +163,19 @@ def test_old_uploads_are_removed(session: Session) -> None:
         session.uploaded(keys[0])
     assert session.uploaded(keys[-1]).path.read_bytes() == b"x"
     assert len(list(session.scratch.iterdir())) == MOST_UPLOADS
+
+
+def test_uploads_that_are_open_stay_however_many_come_after(session: Session, place: Path) -> None:
+    keys = []
+    for name in (LOG, CARD):
+        with (place / name).open("rb") as stream:
+            keys.append(session.receive(stream, f"own_{name}", None, 10**8))
+    session.open(session.uploaded(keys[0]), session.uploaded(keys[1]))
+    for k in range(MOST_UPLOADS + 2):
+        session.receive(BytesIO(b"x"), f"{k}.csv", 1, 10)
+    assert len(session.uploads) == MOST_UPLOADS
+    name = session.save("own")
+    session.reopen(session.in_folder(name))
+    assert len(session.work.shifts) == 1
+    session.receive(BytesIO(b"x"), "last.csv", 1, 10)
+    assert keys[0] not in session.uploads

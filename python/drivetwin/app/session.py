@@ -31,7 +31,7 @@ from drivetwin.validate import Validation
 MOST_SESSIONS = 16
 """Sessions held; the one that was idle longest goes when another is opened."""
 MOST_UPLOADS = 8
-"""Uploads kept for one session; the oldest goes."""
+"""Uploads kept for one session; the oldest goes that is not open."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,10 @@ class Session:
         key = secrets.token_hex(8)
         upload = uploads.receive(stream, name, claimed, self.scratch / key, limit)
         with self.lock:
+            used = {one.path for one in (self.work.log, self.work.card) if one is not None}
             while len(self.uploads) >= MOST_UPLOADS:
-                oldest = self.uploads.pop(next(iter(self.uploads)))
-                oldest.path.unlink(missing_ok=True)
+                oldest = next(k for k, one in self.uploads.items() if one.path not in used)
+                self.uploads.pop(oldest).path.unlink(missing_ok=True)
             self.uploads[key] = upload
         return key
 
