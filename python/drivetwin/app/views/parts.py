@@ -11,6 +11,7 @@ import functools
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 import plotly.graph_objects as go
@@ -18,7 +19,7 @@ from dash import dcc, html, no_update, set_props
 from dash.development.base_component import Component
 
 from drivetwin.app.uploads import LIMITS
-from drivetwin.errors import DrivetwinError
+from drivetwin.errors import DrivetwinError, Where
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -76,14 +77,14 @@ def tell(text: str, *, fault: bool = False) -> None:
 
 
 def told(callback: Callable[P, R]) -> Callable[P, R]:
-    """A callback whose typed errors become the message of the page; it then changes nothing."""
+    """A callback whose faults become the message of the page; it then changes nothing."""
 
     @functools.wraps(callback)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             return callback(*args, **kwargs)
-        except DrivetwinError as error:
-            tell(str(error), fault=True)
+        except (DrivetwinError, OSError) as fault:
+            tell(_words(fault), fault=True)
             return cast(R, no_update)
 
     return guarded
@@ -96,10 +97,19 @@ def acted(callback: Callable[P, None]) -> Callable[P, None]:
     def guarded(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
             callback(*args, **kwargs)
-        except DrivetwinError as error:
-            tell(str(error), fault=True)
+        except (DrivetwinError, OSError) as fault:
+            tell(_words(fault), fault=True)
 
     return guarded
+
+
+def _words(fault: DrivetwinError | OSError) -> str:
+    """A typed error, or what the system refuses, as it is told; files by their names alone."""
+    if isinstance(fault, DrivetwinError):
+        return str(fault)
+    where = Where(file=None if fault.filename is None else Path(fault.filename).name)
+    remedy = "see whether the file is there, its permissions and the free space"
+    return str(DrivetwinError(fault.strerror or type(fault).__name__, remedy, where))
 
 
 def choice(
