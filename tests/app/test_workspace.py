@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import pickle
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -125,7 +127,9 @@ def test_a_changed_log_is_told(session: Session, saved: Path) -> None:
         session.reopen(session.in_folder(crafted.name))
 
 
-def test_uploads_are_kept_beside_the_workspace(place: Path, tmp_path: Path) -> None:
+@pytest.fixture
+def uploaded(place: Path, tmp_path: Path) -> Iterator[Session]:
+    """A session in an empty folder, with log and card uploaded and open."""
     sessions = Sessions(Folder.at(tmp_path))
     one = sessions.get(sessions.new())
     keys = []
@@ -133,11 +137,28 @@ def test_uploads_are_kept_beside_the_workspace(place: Path, tmp_path: Path) -> N
         with (place / name).open("rb") as stream:
             keys.append(one.receive(stream, name, None, 10**8))
     one.open(one.uploaded(keys[0]), one.uploaded(keys[1]))
-    name = one.save("kept")
-    other = sessions.get(sessions.new())
-    other.reopen(other.in_folder(name))
-    assert len(other.work.shifts) == 1
-    (tmp_path / LOG).write_text("another file")
-    with pytest.raises(RefusedError, match="another file has its name"):
-        one.save("again")
+    yield one
     sessions.close()
+
+
+def test_uploads_are_kept_beside_the_workspace(uploaded: Session, session: Session) -> None:
+    folder = uploaded.folder.root
+    name = uploaded.save("kept")
+    session.folder = uploaded.folder
+    session.reopen(session.in_folder(name))
+    assert len(session.work.shifts) == 1
+    (folder / LOG).write_text("another file")
+    with pytest.raises(RefusedError, match="another file has its name"):
+        uploaded.save("again")
+
+
+def test_an_upload_that_cannot_be_kept_leaves_nothing(
+    uploaded: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(path: Path, _: Path) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO), str(path))
+
+    monkeypatch.setattr(Path, "replace", refused)
+    with pytest.raises(OSError, match="Input/output"):
+        uploaded.save("kept")
+    assert not list(uploaded.folder.root.iterdir())

@@ -22,7 +22,7 @@ from drivetwin.identify.method import Method
 from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.logs.profile import ChannelTable
 from drivetwin.logs.roles import quantity_of
-from drivetwin.results.atomic import write_text
+from drivetwin.results.atomic import write_bytes, write_text
 from drivetwin.results.twin_build import file_of, twin_from_file
 from drivetwin.results.twin_file import TwinFile
 from drivetwin.results.version import program_version
@@ -86,7 +86,7 @@ def save(work: Work, path: Path, folder: Folder) -> None:
     """Write the workspace; the file appears whole or not at all.
 
     Uploaded files are kept beside it, so that it can be reopened. Raises InputError before a log is
-    open, RefusedError where another file has the name of an upload or of the workspace.
+    open, RefusedError where another file has the name of an upload or of the workspace, OSError.
     """
     work.require_opened()
     if path.exists() and not _is_workspace(path):
@@ -186,9 +186,7 @@ def _kept(source: Source | None, beside: Path, folder: Folder) -> FileEntry:
             Where(file=source.name),
         )
     if not target.exists():
-        part = target.with_name(f"{target.name}.partial")
-        part.write_bytes(source.path.read_bytes())
-        part.replace(target)
+        write_bytes(target, source.path.read_bytes())
     return FileEntry(path=folder.name_of(target), sha256=content)
 
 
