@@ -147,7 +147,7 @@ class Twin(Shown):
         """
         given = dict(overrides or {})
         self._refuse_idle(shift, given)
-        gear = self._inertia_gear(shift, given)
+        gear = self.inertia_gear(shift, given)
         inertia_id = f"J_prime_{gear}"
         scale = given.get("eta", 1.0) if self.over_eta else 1.0
         values = self._values((*COMMON, inertia_id), given, scale)
@@ -244,9 +244,10 @@ class Twin(Shown):
                 "override one of them",
             )
 
-    def _inertia_gear(self, shift: Shift, given: Mapping[str, float]) -> str:
-        """Gear whose J′ carries the engine-side inertia: overridden, else stated without an
-        interval, else told most narrowly."""
+    def inertia_gear(self, shift: Shift, overrides: Mapping[str, float] | None = None) -> str:
+        """Gear whose J′ carries the engine-side inertia in the model of a shift: overridden, else
+        stated without an interval, else told most narrowly for its size."""
+        given = overrides or {}
 
         def rank(gear: str) -> float:
             if f"J_prime_{gear}" in given:

@@ -40,6 +40,20 @@ def test_sliders_stand_where_the_log_said(identified: Session) -> None:
             assert one.value == pytest.approx(value * display_for(one.id).factor, abs=one.step)
 
 
+@pytest.mark.parametrize("untold", [None, 0.9])
+def test_the_inertia_slider_is_that_of_the_models_gear(
+    identified: Session, untold: float | None
+) -> None:
+    twin, shift = identified.work.require_twin(), identified.work.require_shift()
+    first, second = (twin.parameters[f"J_prime_{g}"] for g in (shift.start_gear, shift.end_gear))
+    large = replace(first, value=20.0, std_noise=1.0, std_systematic=None)
+    small = replace(second, value=10.0, std_noise=untold, std_systematic=None)
+    changed = replace(twin, parameters={**twin.parameters, large.id: large, small.id: small})
+    (told,) = [one.id for one in sliders_of(changed, shift) if one.id.startswith("J_prime")]
+    assert told == large.id
+    assert model_of(changed, shift, {told: 20.0}) == model_of(changed, shift, {})
+
+
 def test_sliders_at_rest_change_nothing(identified: Session) -> None:
     twin, shift = identified.work.require_twin(), identified.work.require_shift()
     sliders = sliders_of(twin, shift)

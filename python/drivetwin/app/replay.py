@@ -62,10 +62,11 @@ class Slider:
 
 def sliders_of(twin: Twin, shift: Shift) -> list[Slider]:
     """What the simulation of a shift can be told, as far as the log could tell it."""
-    names = ("eta", _told_inertia(twin, shift), "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+    inertia = f"J_prime_{twin.inertia_gear(shift)}"
+    names = ("eta", inertia, "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
     elements = (shift.offgoing, shift.oncoming)
     ids = (*names, "te_delay", *(f"P0.{element}" for element in elements))
-    told = [_slider(twin, name) for name in ids if name is not None]
+    told = [_slider(twin, name) for name in ids]
     laws = [
         Slider.over(FRICTION + element, f"μ {element}", "× identified", (0.5, 1.0, 1.5))
         for element in elements
@@ -148,17 +149,6 @@ def moved_curves(figure: go.Figure, present: Validation) -> dict[int, dict[str, 
 def _packed(values: FloatArray) -> dict[str, str]:
     """An array as plotly.js reads it without a number being spelled out."""
     return {"dtype": "f4", "bdata": base64.b64encode(values.astype("<f4").tobytes()).decode()}
-
-
-def _told_inertia(twin: Twin, shift: Shift) -> str | None:
-    """The J′ that the model is made from: of the two gears the one told more narrowly."""
-    told = [
-        (estimate.std_total or 0.0, name)
-        for gear in (shift.start_gear, shift.end_gear)
-        if (estimate := twin.parameters.get(name := f"J_prime_{gear}")) is not None
-        and estimate.value is not None
-    ]
-    return min(told)[1] if told else None
 
 
 def _slider(twin: Twin, name: str) -> Slider | None:
