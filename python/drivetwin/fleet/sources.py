@@ -12,11 +12,8 @@ from pathlib import Path
 
 from drivetwin.errors import InputError, Where
 from drivetwin.fleet.index import INDEX
+from drivetwin.logs.formats import SUFFIXES
 
-SUFFIXES = frozenset(
-    (".csv", ".txt", ".tsv", ".dat", ".mf4", ".mdf", ".mat", ".parquet", ".asc", ".blf", ".log")
-)
-"""What counts as a log in a folder; a file that is named by itself may be called anything."""
 _PATH = "path"
 
 

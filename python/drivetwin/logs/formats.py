@@ -17,6 +17,11 @@ from drivetwin.logs.raw import ReadOptions, Recording
 
 Opener = Callable[[Path, ReadOptions], AbstractContextManager[Recording]]
 
+SUFFIXES = frozenset(
+    (".csv", ".txt", ".tsv", ".dat", ".mf4", ".mdf", ".mat", ".parquet", ".asc", ".blf", ".log")
+)
+"""Endings by which a folder's logs are known; a file that is named by itself may have any."""
+
 _HEAD = 8192
 """Bytes from which a format is told."""
 

@@ -26,9 +26,9 @@ from drivetwin.app.views.parts import (
     upload_button,
 )
 from drivetwin.app.work import Source
+from drivetwin.logs.formats import SUFFIXES
 
-LOGS = (".csv", ".txt", ".dat", ".mf4", ".mdf", ".mat", ".parquet", ".blf", ".asc", ".log")
-CARDS = (".toml",)
+_CARDS = (".toml",)
 _UPLOADED = "uploaded: "
 _SHIFT_HEAD = ("shift", "kind", "elements", "starts", "locks")
 
@@ -114,7 +114,9 @@ def register(app: Dash, sessions: Sessions) -> None:
         session = sessions.get(key)
         work, folder = session.work, session.folder
         content = [] if work.opened is None else _content(work.opened)
-        names = [[html.Option(value=name) for name in folder.names(ends)] for ends in (LOGS, CARDS)]
+        names = [
+            [html.Option(value=name) for name in folder.names(ends)] for ends in (SUFFIXES, _CARDS)
+        ]
         return content, _shown(work.log), _shown(work.card), *names
 
 
