@@ -14,12 +14,12 @@ from drivetwin.driveline import (
     DualClutch,
     FloatArray,
     RoadLoad,
-    ShiftElement,
     Signal,
     State,
     Trajectory,
 )
 from drivetwin.gearbox import Gearbox, gear_statics, network_elements, reduce
+from drivetwin.gearbox.dual import shift_element
 from drivetwin.gearbox.reduction import ElementRatios
 from drivetwin.gearbox.spec import GROUND
 from drivetwin.network import Element, Output, Start, simulate
@@ -178,7 +178,7 @@ def form_of(plant: Plant, around: Surroundings) -> DualClutch:
         c_o=around.c_o,
         load=around.load,
         elements=tuple(
-            _element(box, each, _drum(box, each.element)) for each in plant.ratios.values()
+            shift_element(box, each, _drum(box, each.element)) for each in plant.ratios.values()
         ),
     )
 
@@ -192,17 +192,3 @@ def _drum(gearbox: Gearbox, element: str) -> float:
     member = gearbox.elements[element].a
     drum = gearbox.inertias.get(member, 0.0)
     return drum if _is_brake(gearbox, element) else 0.0
-
-
-def _element(gearbox: Gearbox, ratios: ElementRatios, drum: float) -> ShiftElement:
-    capacity = gearbox.capacity(ratios.element)
-    return ShiftElement(
-        name=ratios.element,
-        i_c=ratios.i_c,
-        i_out=ratios.i_out,
-        gain=capacity.gain,
-        P0=capacity.P0,
-        friction=capacity.friction,
-        peak=capacity.peak,
-        drum_inertia=drum,
-    )

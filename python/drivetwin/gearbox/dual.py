@@ -11,6 +11,7 @@ from drivetwin.gearbox.drive import Drive
 
 if TYPE_CHECKING:
     from drivetwin.gearbox.reduction import ElementRatios, Reduction
+    from drivetwin.gearbox.spec import Gearbox
 
 
 def dual_clutch(reduction: Reduction, drive: Drive, *, keep_coupling: bool) -> DualClutch:
@@ -32,14 +33,15 @@ def dual_clutch(reduction: Reduction, drive: Drive, *, keep_coupling: bool) -> D
         c_o=drive.c_o,
         load=RoadLoad(constant=drive.load),
         elements=(
-            _element(reduction, pair[0], drums[0]),
-            _element(reduction, pair[1], drums[1]),
+            shift_element(reduction.gearbox, pair[0], drums[0]),
+            shift_element(reduction.gearbox, pair[1], drums[1]),
         ),
     )
 
 
-def _element(reduction: Reduction, ratios: ElementRatios, drum: float) -> ShiftElement:
-    capacity = reduction.gearbox.capacity(ratios.element)
+def shift_element(gearbox: Gearbox, ratios: ElementRatios, drum: float) -> ShiftElement:
+    """Return a shift element of the form, with a drum of inertia `drum` [kg m^2]."""
+    capacity = gearbox.capacity(ratios.element)
     return ShiftElement(
         name=ratios.element,
         i_c=ratios.i_c,
