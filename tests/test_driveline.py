@@ -22,6 +22,7 @@ from drivetwin.driveline import (
     Signal,
     State,
     Stribeck,
+    in_series,
     sensitivities,
     simulate,
 )
@@ -86,6 +87,31 @@ def reference_case(name: str) -> tuple[DualClutch, Any, Any, State]:
     )
     speeds = (start["omega_e"], start["omega_out"], start["omega_w"])
     return model, case, rows, State(*speeds, start["twist"], ("B2",))
+
+
+@pytest.mark.parametrize("speed", [178.0, -178.0])
+def test_the_steady_torque_lasts(speed: float) -> None:
+    """From its twist both sides accelerate alike: nothing swings."""
+    model = replace(paper_model(), loss_law="dissipative", load=RoadLoad(9000.0, 3000.0))
+    model = replace(model, eta=1.0)  # whichever way the power flows
+    torque, pressures, _ = held_second_gear()
+    wheel = speed / model.ratio("B2") / model.i_f
+    carried = model.steady_torque(float(torque.values[0]), model.ratio("B2"), wheel)
+    start = State(speed, speed / model.ratio("B2"), wheel, carried / model.k_o, ("B2",))
+    run = simulate(model, torque, pressures, start, np.linspace(0.0, 0.2, 21))
+    assert run.shaft_torque == pytest.approx(carried, rel=1e-9)
+
+
+def test_the_sides_of_the_shaft_swing_at_their_inertia_in_series() -> None:
+    model = replace(paper_model(), c_o=0.0)
+    before, behind = model.sides(model.ratio("B2"))
+    assert (before, behind) == pytest.approx((20.3 * 0.85 * 1.91**2 + 0.9, 6056.0 / 5.38**2))
+    omega = np.sqrt(model.k_o / in_series(before, behind))
+    torque, pressures, start = held_second_gear()
+    steady = model.steady_torque(float(torque.values[0]), 1.91, start.wheel_speed)
+    time = np.array([0.0, np.pi / omega])
+    run = simulate(model, torque, pressures, replace(start, twist=1.1 * steady / model.k_o), time)
+    assert run.shaft_torque == pytest.approx([1.1 * steady, 0.9 * steady], rel=1e-9)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -115,6 +115,35 @@ class DualClutch:
     load: RoadLoad
     elements: tuple[ShiftElement, ...]
 
+    def ratio(self, element: str) -> float:
+        """Overall ratio ω_e/ω_out with the shift element called `element` locked."""
+        held = next(one for one in self.elements if one.name == element)
+        return self.i_in * held.i_c * held.i_out
+
+    def sides(self, ratio: float) -> tuple[float, float]:
+        """Inertias before and behind the output shaft, at the shaft [kg m^2], in a gear.
+
+        `ratio` is the overall one of the gear. The drums of open elements are left out.
+        """
+        before = (self.J1 * self.eta + self.J2e) * ratio**2 + self.J_out
+        return before, self.J_v / self.i_f**2
+
+    def steady_torque(self, engine_torque: float, ratio: float, wheel_speed: float) -> float:
+        """Torque of the output shaft [N m] at which both of its sides accelerate alike.
+
+        Eqs. 10 and 11 with equal accelerations, in the gear of overall ratio `ratio`, from the
+        engine's torque [N m] and the wheel's speed [rad/s] of either sign.
+        """
+        load = self.load.at(wheel_speed) / self.i_f
+        drive = self.eta * engine_torque * ratio
+        before, behind = self.sides(ratio)
+        return load + behind * (drive - load) / (before + behind)
+
+
+def in_series(one: float, other: float) -> float:
+    """Inertia [kg m^2] with which two swing against each other, 1/J = 1/J4 + 1/J5."""
+    return one * other / (one + other)
+
 
 @dataclass(frozen=True)
 class State:

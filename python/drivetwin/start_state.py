@@ -63,7 +63,7 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
     channel the shaft is taken to transmit the engine torque in steady state.
     Raises MissingChannelError where neither input nor output speed is there.
     """
-    ratio = _ratio(model, shift.offgoing)
+    ratio = model.ratio(shift.offgoing)
     torque = _local(log["output_torque"], time) if "output_torque" in log else None
     rate = torque.slope / model.k_o if torque is not None else 0.0
     motions = []
@@ -86,9 +86,8 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
     if torque is not None:
         carried = torque.value - model.c_o * rate
     else:
-        carried = _steady_torque(
-            model, _local(log["engine_torque"], time).value, ratio, wheel_speed
-        )
+        engine_torque = _local(log["engine_torque"], time).value
+        carried = model.steady_torque(engine_torque, ratio, wheel_speed)
     return State(
         engine_speed=ratio * output_speed,
         output_speed=output_speed,
@@ -96,28 +95,6 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
         twist=carried / model.k_o,
         locked=(shift.offgoing,),
     )
-
-
-def _ratio(model: DualClutch, element: str) -> float:
-    """Overall ratio ω_e/ω_out with `element` locked."""
-    spec = next(one for one in model.elements if one.name == element)
-    return model.i_in * spec.i_c * spec.i_out
-
-
-def _steady_torque(
-    model: DualClutch, engine_torque: float, ratio: float, wheel_speed: float
-) -> float:
-    """Shaft torque [N m] at which both sides of the shaft accelerate alike."""
-    load = model.load.at(wheel_speed) / model.i_f
-    drive = ratio * model.eta * engine_torque
-    return load + _share(model, ratio) * (drive - load)
-
-
-def _share(model: DualClutch, ratio: float) -> float:
-    """Share of the surplus torque that accelerates the vehicle behind the shaft."""
-    before = (model.J1 * model.eta + model.J2e) * ratio**2 + model.J_out
-    behind = model.J_v / model.i_f**2
-    return behind / (before + behind)
 
 
 def _local(channel: Channel, time: float) -> _Local:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.driveline import RoadLoad
 from drivetwin.errors import InputError
 from drivetwin.export.subject import steady_start, subject_of
 from drivetwin.stepped import stepped_run
@@ -33,6 +34,14 @@ def test_unknown_or_impossible_shifts_are_refused() -> None:
     bare = replace(twin(), friction={})
     with pytest.raises(InputError, match="known friction curve"):
         subject_of(bare)
+
+
+def test_rolling_resistance_opposes_the_motion() -> None:
+    model = replace(paper_model(), load=RoadLoad(rolling=8000.0, aero=20.0))
+    ahead, back = (steady_start(model, "B2", speed).twist for speed in (150.0, -150.0))
+    wheel = 150.0 / 1.91 / model.i_f
+    assert ahead == pytest.approx((8000.0 + 20.0 * wheel**2) / model.i_f / model.k_o)
+    assert back == -ahead
 
 
 def test_a_steady_start_is_steady() -> None:

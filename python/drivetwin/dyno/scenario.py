@@ -113,8 +113,7 @@ class Scenario:
 
     def ratio(self, element: str) -> float:
         """Overall ratio with `element` locked."""
-        held = self.element(element)
-        return self.model.i_in * held.i_c * held.i_out
+        return self.model.ratio(element)
 
     def torque(self, time: FloatArray) -> FloatArray:
         """Engine torque [N m] at `time` (n,), with the TCU's reductions."""
@@ -124,23 +123,16 @@ class Scenario:
         return torque
 
     def start(self) -> State:
-        """Quasi-steady acceleration in the start gear: eqs. 10 and 11 with equal accelerations."""
+        """Quasi-steady acceleration in the start gear."""
         model, i_g = self.model, self.ratio(self.offgoing)
         wheel_speed = self.engine_speed / i_g / model.i_f
-        turning = model.load.rolling * float(np.sign(wheel_speed))
-        air = model.load.aero * wheel_speed * abs(wheel_speed)
-        load = (model.load.constant + turning + air) / model.i_f
         torque = float(self.torque(np.zeros(1))[0])
         if self.converter is not None:
             _, torque = self.converter.steady(torque, self.engine_speed)
-        drive = model.eta * torque * i_g
-        J4 = (model.J1 * model.eta + model.J2e) * i_g**2 + model.J_out
-        J5 = model.J_v / model.i_f**2
-        shaft_torque = load + J5 * (drive - load) / (J4 + J5)
         return State(
             engine_speed=self.engine_speed,
             output_speed=self.engine_speed / i_g,
             wheel_speed=wheel_speed,
-            twist=shaft_torque / model.k_o,
+            twist=model.steady_torque(torque, i_g, wheel_speed) / model.k_o,
             locked=(self.offgoing,),
         )

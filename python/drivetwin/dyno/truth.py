@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import inf, pi, sqrt
 from typing import Any
 
-from drivetwin.driveline import DualClutch, FrictionTable, Stribeck, Trajectory
+from drivetwin.driveline import DualClutch, FrictionTable, Stribeck, Trajectory, in_series
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.parameters import spec_of
 
@@ -73,9 +73,8 @@ def lockup_oscillation(model: DualClutch, ratio: float) -> tuple[float, float]:
     shaft's frame, with the drums that turn in that gear.
     """
     drums = sum(each.drum_inertia * (ratio / each.i_c - each.i_out) ** 2 for each in model.elements)
-    J4 = (model.J1 * model.eta + model.J2e) * ratio**2 + model.J_out + drums
-    J5 = model.J_v / model.i_f**2
-    J = J4 * J5 / (J4 + J5)
+    before, behind = model.sides(ratio)
+    J = in_series(before + drums, behind)
     zeta = model.c_o / (2.0 * sqrt(J * model.k_o))
     return sqrt(model.k_o / J * (1.0 - zeta**2)) / (2.0 * pi), zeta
 

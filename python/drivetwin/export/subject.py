@@ -59,12 +59,10 @@ def nominal_shift(twin: Twin, gears: tuple[str, str] | None) -> Shift:
 
 def steady_start(model: DualClutch, locked: str, engine_speed: float) -> State:
     """Constant speed with one element locked: the shaft carries the load, nothing slips."""
-    element = next(one for one in model.elements if one.name == locked)
-    output_speed = engine_speed / (model.i_in * element.i_c * element.i_out)
+    output_speed = engine_speed / model.ratio(locked)
     wheel_speed = output_speed / model.i_f
-    load = model.load
-    torque = load.constant + load.rolling + load.aero * wheel_speed * abs(wheel_speed)
-    return State(engine_speed, output_speed, wheel_speed, torque / model.i_f / model.k_o, (locked,))
+    twist = model.load.at(wheel_speed) / model.i_f / model.k_o
+    return State(engine_speed, output_speed, wheel_speed, twist, (locked,))
 
 
 def _first_shift(twin: Twin) -> tuple[str, str]:

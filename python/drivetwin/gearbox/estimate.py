@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray
+from drivetwin.driveline import FloatArray, in_series
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.maneuver import RAMP, Maneuver, plan, time_grid
 from drivetwin.gearbox.reduction import Reduction
@@ -127,7 +127,7 @@ def _motion(
     acceleration = (i_h * maneuver.engine_torque - maneuver.load) / (J4 + J5)
     settled = maneuver.load + J5 * acceleration
     after = np.maximum(time - phase.lock, 0.0)
-    decay, twist_rate = _release(drive, 1.0 / (1.0 / J4 + 1.0 / J5), after)
+    decay, twist_rate = _release(drive, in_series(J4, J5), after)
     locked = time >= phase.lock
     relative = J5 / (J4 + J5) * (phase.torque - settled) * twist_rate
     output = start_out + swing_out * done + np.where(locked, acceleration * after + relative, 0.0)

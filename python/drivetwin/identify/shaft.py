@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from drivetwin.driveline import in_series
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.signals import FloatArray
 
@@ -26,5 +27,5 @@ def stiffness_and_damping(decay_rate: float, omega_d: float, J4: float, J5: floa
             f"inertias {J4:.4g} and {J5:.4g} kg m^2 on the two sides of the output shaft",
             "check the inertia and load fits of this log: both must be positive",
         )
-    J = 1.0 / (1.0 / J4 + 1.0 / J5)
+    J = in_series(J4, J5)
     return np.array([J * (decay_rate**2 + omega_d**2), 2.0 * decay_rate * J])

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from drivetwin.driveline import in_series
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import OWN, Point, Structure
 from drivetwin.identify.signals import FloatArray, ShiftSignals
@@ -75,7 +76,7 @@ def oscillation(structure: Structure, point: Point) -> tuple[float, float]:
         inertia += structure.value(point, f"{one.name}.drum") * (one.a - one.b / d.i_after) ** 2
     J4 = inertia * d.i_after**2 + structure.value(point, "J_out")
     J5 = structure.value(point, "J_vehicle") / d.i_f**2
-    J = J4 * J5 / (J4 + J5)
+    J = in_series(J4, J5)
     k_o, c_o = structure.value(point, "k_o"), structure.value(point, "c_o")
     zeta = c_o / (2.0 * np.sqrt(J * k_o))
     return float(np.sqrt(k_o / J * max(1.0 - zeta**2, 0.0)) / (2.0 * np.pi)), float(zeta)

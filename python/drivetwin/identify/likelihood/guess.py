@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from drivetwin.driveline import in_series
 from drivetwin.identify.friction import LOG_V, MU_C, MU_DROP, MU_V
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.likelihood.unknowns import LAW
@@ -44,7 +45,7 @@ def _typical_shaft(found: Mapping[str, float], driveline: Driveline) -> dict[str
     omega, zeta = TYPICAL_MODE
     J4 = found["J_e"] * driveline.i_after**2 + found["J_out"]
     J5 = found["J_vehicle"] / driveline.i_f**2
-    J = J4 * J5 / (J4 + J5)
+    J = in_series(J4, J5)
     return {"k_o": J * omega**2, "c_o": 2.0 * zeta * omega * J}
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from drivetwin.driveline import in_series
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.guess import TYPICAL_LAW, TYPICAL_MODE
 from drivetwin.identify.momentum import MomentumSettings
@@ -36,7 +37,7 @@ def guess_without_torque(
     J_e, J_vehicle, load = inertia
     J_out = 0.0 if driveline.J_out is None else driveline.J_out.value
     J4, J5 = J_e * driveline.i_after**2 + J_out, J_vehicle / driveline.i_f**2
-    J = J4 * J5 / (J4 + J5)
+    J = in_series(J4, J5)
     rate, omega = _mode(signals, driveline)
     found = {
         "eta": 1.0,
