@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
@@ -14,10 +16,15 @@ from drivetwin.identify.signals import FloatArray
 from drivetwin.vehicle.spec import PriorValue
 
 
-def _shift(ids: tuple[str, ...], values: list[float], covariance: FloatArray) -> IntegralShift:
+def _shift(
+    ids: tuple[str, ...],
+    values: list[float],
+    covariance: FloatArray,
+    priors: Mapping[str, PriorValue] = MappingProxyType({}),
+) -> IntegralShift:
     nothing = cast("Any", None)
     return IntegralShift(
-        nothing, nothing, nothing, None, ids, np.array(values), covariance, refusals={}
+        nothing, nothing, nothing, None, ids, np.array(values), covariance, priors, refusals={}
     )
 
 
@@ -30,7 +37,7 @@ def test_a_parameter_that_follows_from_others_still_does() -> None:
         ids = ("J_vehicle", f"f_d_{gear}", "k_o")
         return _shift(ids, [x, z, 2.0 * x + z], covariance)
 
-    ids, values, covariance = combine([shift("3", 5.1, 7.2, 0.01), shift("4", 4.9, 7.4, 0.3)], None)
+    ids, values, covariance = combine([shift("3", 5.1, 7.2, 0.01), shift("4", 4.9, 7.4, 0.3)])
     found = dict(zip(ids, values, strict=True))
     stds = dict(zip(ids, np.sqrt(np.diag(covariance)), strict=True))
     for gear in ("3", "4"):
@@ -43,8 +50,9 @@ def test_equal_shifts_halve_the_variance_but_for_the_prior() -> None:
     prior = PriorValue(1.0, 0.1)
     data = 0.2
     std = (prior.std**-2 + data**-2) ** -0.5
-    one = _shift(("eta", "J_out"), [0.85, 1.05], np.diag([0.01**2, std**2]))
-    ids, values, covariance = combine([one, one], prior)
+    spread = np.diag([0.01**2, std**2])
+    one = _shift(("eta", "J_out"), [0.85, 1.05], spread, {"J_out": prior})
+    ids, values, covariance = combine([one, one])
     assert ids == ("eta", "J_out")
     assert covariance[0, 0] == pytest.approx(0.01**2 / 2.0, rel=1e-5)
     assert covariance[1, 1] == pytest.approx(1.0 / (prior.std**-2 + 2.0 * data**-2), rel=1e-5)
@@ -52,7 +60,47 @@ def test_equal_shifts_halve_the_variance_but_for_the_prior() -> None:
     assert values[1] == pytest.approx((1.0 / 0.01 + 2.0 * 1.25 / 0.04) / (1.0 / 0.01 + 2.0 / 0.04))
 
 
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_shifts_that_tell_nothing_leave_the_design_value_its_width(count: int) -> None:
+    design, age = PriorValue(8e4, 5e3), PriorValue(0.02, 0.03)
+    silent = _shift(
+        ("P0.B3", "te_delay"),
+        [design.value, age.value],
+        np.diag([design.std**2, age.std**2]),
+        {"P0.B3": design, "te_delay": age},
+    )
+    other = _shift(("P0.B4",), [8e4], np.array([[5e3**2]]), {"P0.B4": design})
+    ids, values, covariance = combine([silent] * count + [other])
+    assert ids == ("P0.B3", "te_delay", "P0.B4")
+    assert values == pytest.approx([design.value, age.value, design.value])
+    assert np.sqrt(np.diag(covariance)) == pytest.approx([5e3, 0.03, 5e3], rel=1e-6)
+
+
+def test_a_nuisance_that_two_shifts_share_is_eliminated_from_both_together() -> None:
+    """eta + a·drum is seen, with another `a` in each shift; the drum is known to its prior."""
+    prior, noise, seen = PriorValue(0.05, 0.03), 0.01, ((1.0, 0.92), (3.0, 1.07))
+    known = np.diag([0.5**-2, prior.std**-2])
+    at = np.array([0.8, prior.value])
+
+    def posterior(rows: tuple[tuple[float, float], ...]) -> tuple[FloatArray, FloatArray]:
+        A, y = np.array([[1.0, a] for a, _ in rows]), np.array([y for _, y in rows])
+        covariance = np.linalg.inv(known + A.T @ A / noise**2)
+        return covariance @ (known @ at + A.T @ y / noise**2), covariance
+
+    priors = {"eta": PriorValue(0.8, 0.5), "drum.B2": prior}
+    shifts = []
+    for row in seen:
+        values, covariance = posterior((row,))
+        shifts.append(_shift(("eta", "drum.B2"), values.tolist(), covariance, priors))
+    ids, found, spread = combine(shifts)
+    together, exact = posterior(seen)
+    assert ids == ("eta",)
+    assert found[0] == pytest.approx(together[0], rel=1e-4)
+    assert spread[0, 0] == pytest.approx(exact[0, 0], rel=1e-3)
+    assert combine(shifts[:1])[0] == ("eta",)
+
+
 def test_one_shift_stays_as_it_is() -> None:
     one = _shift(("eta",), [0.85], np.array([[1e-4]]))
-    ids, values, covariance = combine([one], None)
+    ids, values, covariance = combine([one])
     assert (ids, values[0], covariance[0, 0]) == (("eta",), 0.85, 1e-4)

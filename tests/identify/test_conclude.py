@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from drivetwin.identify.conclude import Conclusions, conclude, low_gear_notes
 from drivetwin.identify.result import Verdict
 from drivetwin.vehicle.spec import PriorValue
@@ -37,6 +39,24 @@ def test_where_the_linear_fit_gives_the_impossible_the_card_stands() -> None:
     told = _with_negative_J_out(PriorValue(0.9, 0.09)).estimates["J_out"]
     assert (told.value, told.std_noise, told.verdict) == (0.9, 0.09, Verdict.DESIGN)
     assert "-0.2 kg*m^2, which is impossible" in told.reason
+
+
+def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> None:
+    found = stepped()
+    (shift,), signals = found.evidence["integral"], found.evidence["signals"]
+    driveline = found.evidence["likelihood"].problem.parts[0].structure.driveline
+    name, design = f"P0.{driveline.oncoming.name}", PriorValue(8e4, 5e3)
+    coupling = replace(driveline.oncoming, P0=design)
+    couplings = {**driveline.couplings, coupling.name: coupling}
+    driveline = replace(driveline, oncoming=coupling, couplings=couplings)
+    covariance = shift.covariance.copy()
+    place = shift.ids.index(name)
+    covariance[place, place] = design.std**2
+    silent = replace(shift, covariance=covariance, priors={**shift.priors, name: design})
+    told = conclude([silent] * 3, [*signals] * 3, [driveline] * 3, {}).estimates
+    assert told[name].verdict is Verdict.DESIGN
+    assert told[name].std_noise == pytest.approx(design.std)
+    assert "te_rounding" not in told
 
 
 def test_what_is_impossible_and_not_on_the_card_is_refused() -> None:

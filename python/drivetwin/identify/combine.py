@@ -7,9 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivetwin.identify.integral import IntegralShift
+from drivetwin.identify.integral import NUISANCES, IntegralShift
 from drivetwin.identify.signals import FloatArray
-from drivetwin.vehicle.spec import PriorValue
 
 NUGGET = 1e-7
 """Variance, as a share of a parameter's own, by which derived parameters may leave the equation
@@ -17,13 +16,21 @@ that makes them: of k_o, J′ and ω_d one follows from the others, so their cov
 
 
 def combine(
-    shifts: Sequence[IntegralShift], J_out: PriorValue | None
+    shifts: Sequence[IntegralShift],
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Generalised least squares over the shifts' estimates: ids, values (q,), covariance (q, q).
 
-    The design prior of Jo′ is in every shift's estimate but counts once: its information is taken
-    out for all shifts but the first.
+    A prior is in the estimate of every shift with its parameter but counts once: its information
+    is taken out for all of them but the first. Nuisances that the shifts share are eliminated last.
     """
+    ids, values, covariance = _joined(shifts)
+    kept = [k for k, name in enumerate(ids) if name.split(".")[0] not in NUISANCES]
+    return tuple(ids[k] for k in kept), values[kept], covariance[np.ix_(kept, kept)]
+
+
+def _joined(
+    shifts: Sequence[IntegralShift],
+) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     if len(shifts) == 1:
         return shifts[0].ids, shifts[0].values, shifts[0].covariance
     ids = tuple(dict.fromkeys(name for shift in shifts for name in shift.ids))
@@ -39,10 +46,11 @@ def combine(
         weight = np.linalg.inv(shift.covariance / np.outer(unit, unit) + NUGGET * np.eye(unit.size))
         information[np.ix_(place, place)] += weight
         pull[place] += weight @ (shift.values / unit)
-    if J_out is not None and J_out.std > 0.0:
-        k = ids.index("J_out")
-        surplus = (len(shifts) - 1) * (scale[k] / J_out.std) ** 2
-        information[k, k] -= surplus
-        pull[k] -= surplus * J_out.value / scale[k]
+    for name, prior in {n: p for shift in shifts for n, p in shift.priors.items()}.items():
+        if prior.std > 0.0:
+            k, times = ids.index(name), sum(name in shift.priors for shift in shifts)
+            surplus = (times - 1) * (scale[k] / prior.std) ** 2
+            information[k, k] -= surplus
+            pull[k] -= surplus * prior.value / scale[k]
     covariance = np.linalg.inv(information)
     return ids, (covariance @ pull) * scale, covariance * np.outer(scale, scale)

@@ -63,7 +63,7 @@ def conclude(
     card states none.
     """
     J_out = drivelines[0].J_out
-    ids, values, covariance = combine(shifts, J_out)
+    ids, values, covariance = combine(shifts)
     beforehand = drivelines[0].known
     values, covariance, doubts = with_known(ids, values, covariance, beforehand)
     std = np.sqrt(np.diag(covariance))

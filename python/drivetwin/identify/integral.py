@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,13 +21,18 @@ from drivetwin.identify.ringdown import Drive, RingDown, fit_ringdown, quiet
 from drivetwin.identify.shaft import stiffness_and_damping
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
 from drivetwin.identify.uncertainty import independent, propagate
+from drivetwin.vehicle.spec import PriorValue
+
+NUISANCES = ("te_rounding", "drum")
+"""Stems of what acts on the parameters, is the same in all shifts of a log and is not reported."""
 
 
 @dataclass(frozen=True)
 class IntegralShift:
     """All stages for one shift; a stage the data could not carry is None, and `refusals` says why.
 
-    `ids`, `values` (q,), `covariance` (q, q): the parameters that follow, in SI.
+    `ids`, `values` (q,), `covariance` (q, q): the parameters that follow, in SI, and those of the
+    `NUISANCES` that are uncertain. `priors` by id: what was known beforehand, which is in them.
     """
 
     momentum: MomentumFit
@@ -36,6 +42,7 @@ class IntegralShift:
     ids: tuple[str, ...]
     values: FloatArray
     covariance: FloatArray
+    priors: Mapping[str, PriorValue]
     refusals: dict[str, str]
 
 
@@ -86,8 +93,11 @@ def _ring(
 def _derived(
     driveline: Driveline, momentum: MomentumFit, load: LoadFit, ring: RingDown | None, gear: str
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-    """Shaft parameters with all that they share: ids, values, covariance."""
+    """Shaft parameters and nuisances with all that they share: their ids, values, covariance."""
     size = len(momentum.names)
+    unknown = [name for name, one in momentum.priors.items() if one.std > 0.0]
+    nuisances = tuple(name for name in unknown if name.split(".")[0] in NUISANCES)
+    kept = [momentum.index(name) for name in nuisances]
     after = _gear_inertia(driveline, momentum, driveline.i_after) * driveline.i_after**2
     parts = [momentum.fit.theta, load.fit.theta]
     blocks = [momentum.fit.covariance, load.fit.covariance]
@@ -102,14 +112,14 @@ def _derived(
         before, then = (theta[1] + theta[2] / i**2 for i in (driveline.i_before, driveline.i_after))
         common = [theta[0], before, then, theta[2], theta[3], J3, tv]
         if ring is None:
-            return np.array(common)
+            return np.array([*common, *theta[kept]])
         rate, omega = x[size + 2 :]
         shaft = stiffness_and_damping(rate, omega, float(after @ theta), J3 / driveline.i_f**2)
         zeta = rate / np.hypot(rate, omega)
-        return np.array([*common, *shaft, omega / (2.0 * np.pi), zeta])
+        return np.array([*common, *shaft, omega / (2.0 * np.pi), zeta, *theta[kept]])
 
     found, covariance = propagate(values, np.concatenate(parts), independent(*blocks))
-    return ids, found, covariance
+    return (*ids, *nuisances), found, covariance
 
 
 def identify_shift(
@@ -136,17 +146,19 @@ def identify_shift(
         friction = momentum_friction(signals, driveline, momentum, free, FrictionSettings())
     except IdentificationError as error:
         refusals["friction"] = error.what
-    shaft_ids, values, covariance = _derived(driveline, momentum, load, ring, shift.end_gear)
+    further, values, covariance = _derived(driveline, momentum, load, ring, shift.end_gear)
     gears = (f"J_prime_{shift.start_gear}", f"J_prime_{shift.end_gear}")
     ids: tuple[str, ...] = ("eta", *gears, "J_out", "te_delay", "J_vehicle", "Tv_over_if")
-    ids = (*ids, *shaft_ids)
+    ids = (*ids, *further)
     if momentum.scan.best is None:
         keep = [k for k, name in enumerate(ids) if name != "te_delay"]
         ids = tuple(ids[k] for k in keep)
         values, covariance = values[keep], covariance[np.ix_(keep, keep)]
         refusals["te_delay"] = "the engine torque moves too little for its age to show"
+    priors = {name: one for name, one in momentum.priors.items() if name in ids}
     if friction is not None:
         ids = (*ids, f"P0.{friction.element}")
+        priors[ids[-1]] = driveline.oncoming.P0
         values = np.append(values, friction.P0)
         covariance = independent(covariance, np.array([[friction.P0_std**2]]))
-    return IntegralShift(momentum, load, ring, friction, ids, values, covariance, refusals)
+    return IntegralShift(momentum, load, ring, friction, ids, values, covariance, priors, refusals)

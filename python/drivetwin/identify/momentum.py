@@ -16,6 +16,7 @@ their design priors; Jo′ has one too. The age of the engine torque is estimate
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -103,7 +104,8 @@ class DelayScan:
 
 @dataclass(frozen=True)
 class MomentumFit:
-    """Result of the joint regression. `names` are the parameters of `fit.theta`, in order.
+    """Result of the joint regression. `names` are the parameters of `fit.theta`, in order,
+    `priors` what was known of them beforehand, by name.
 
     Evidence for the report, one entry per window: `time` [s], `stretch` name, `drive` = mean
     η·T_e - T_o/i [N m] and `acceleration` [rad/s^2] over the window, `inertia_torque` the fitted
@@ -111,6 +113,7 @@ class MomentumFit:
     """
 
     names: tuple[str, ...]
+    priors: Mapping[str, PriorValue]
     fit: Fit
     scan: DelayScan
     time: FloatArray
@@ -318,17 +321,15 @@ def rounding_error(torque: Sampled, step: float) -> float:
     return left if left > NO_ROUNDING * torque.sigma else 0.0
 
 
-def _prior(signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings) -> Prior:
+def _priors(
+    signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
+) -> dict[str, PriorValue]:
+    """What is known of the parameters beforehand, by name."""
     rounding = rounding_error(signals.engine_torque, signals.torque_resolution)
-    entries = {
-        3: (settings.delay_prior.value, settings.delay_prior.std),
-        ROUNDING: (0.0, known(PriorValue(0.0, rounding))),
-    }
+    found = {"te_delay": settings.delay_prior, "te_rounding": PriorValue(0.0, rounding)}
     if driveline.J_out is not None:
-        entries[2] = (driveline.J_out.value, known(driveline.J_out))
-    for k, element in enumerate(driveline.drums):
-        entries[FIRST_DRUM + k] = (element.drum.value, known(element.drum))
-    return Prior.independent(len(momentum_names(driveline)), entries)
+        found["J_out"] = driveline.J_out
+    return found | {f"drum.{one.name}": one.drum for one in driveline.drums}
 
 
 def known(prior: PriorValue) -> float:
@@ -389,7 +390,9 @@ def momentum_inertia(
     found = stretches(signals, driveline, settings)
     equations = _Equations(signals, driveline, found)
     names = momentum_names(driveline)
-    prior = _prior(signals, driveline, settings)
+    priors = _priors(signals, driveline, settings)
+    entries = {names.index(name): (one.value, known(one)) for name, one in priors.items()}
+    prior = Prior.independent(len(names), entries)
     start = prior.mean.copy()
     start[:2] = 0.9, start_inertia
     first = solve(equations.terms, start, prior.held(3, start[3]), tolerance=0.1)
@@ -400,11 +403,15 @@ def momentum_inertia(
     if not scan.tells(fit.std[3]):
         fit = solve(equations.terms, first.theta, prior.held(3, start[3]))
         scan = replace(scan, best=None)
-    return _with_evidence(equations, names, fit, scan)
+    return _with_evidence(equations, names, priors, fit, scan)
 
 
 def _with_evidence(
-    equations: _Equations, names: tuple[str, ...], fit: Fit, scan: DelayScan
+    equations: _Equations,
+    names: tuple[str, ...],
+    priors: Mapping[str, PriorValue],
+    fit: Fit,
+    scan: DelayScan,
 ) -> MomentumFit:
     area = 0.5 * equations.windows.width
     drive, load, engine, output, _ = (
@@ -413,6 +420,7 @@ def _with_evidence(
     speed = equations.signals.engine_speed
     return MomentumFit(
         names,
+        priors,
         fit,
         scan,
         equations.windows.centre,
