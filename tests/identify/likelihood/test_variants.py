@@ -14,7 +14,8 @@ from drivetwin.driveline import RoadLoad
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import paper_steps, throttle_steps
-from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood import variants
+from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.kinds import SPEEDS
 from drivetwin.identify.likelihood.record import TORQUE
 from drivetwin.identify.likelihood.unknowns import AERO
@@ -55,6 +56,24 @@ def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
     assert _deviation(fit, AERO, GROWTH) < 3.5
     assert _deviation(fit, "Tv_over_if", load.at(speed) / base.model.i_f) < 3.5
     assert _deviation(fit, "J_vehicle", base.model.J_v) < 3.5
+
+
+def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = realise(paper_steps(), 0, Knowledge())
+    monkeypatch.setattr(variants, "LESS_WORK", 0.0)
+    fit, _ = _chosen(made)
+    names, truth = fit.point.names, truth_of(made)
+    assert AERO not in names
+    assert fit.mean.names == names
+    assert all(part.structure.value(fit.point, AERO) == 0.0 for part in fit.problem.parts)
+    again = nearest(fit.problem, fit.point)
+    assert again is not None
+    std, expected = (np.sqrt(np.diag(one.covariance)) for one in (fit, again))
+    assert std == pytest.approx(expected, rel=0.02)
+    assert np.all(np.abs(fit.point.values - again.point.values) < 0.2 * expected)
+    assert _deviation(fit, "Tv_over_if", truth["Tv_over_if"]) < 3.5
 
 
 @pytest.mark.parametrize("rate", [100.0, 500.0, 1000.0])

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from drivetwin.identify.likelihood.fit import (
     Hopeless,
     LikelihoodFit,
     checked,
+    covariance_of,
     fit,
 )
 from drivetwin.identify.likelihood.kinds import averaged, in_words, likely_kinds, with_kinds
@@ -28,7 +30,8 @@ from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
 from drivetwin.identify.likelihood.work import OutOfWork, at_most
-from drivetwin.identify.signals import Driveline, ShiftSignals
+from drivetwin.identify.result import Z95
+from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
@@ -61,10 +64,12 @@ def choose(
     with part(0.0, 0.6), at_most(WORK) as search:
         best = _fit_either(problem, start, shifts)
     with part(0.6, 1.0), at_most(LESS_WORK):
+        narrower, start = problem_of(signals, drivelines, loss_law, guess)
         if _grows(best):
             notes.append(_growth(best))
+        elif best.point[AERO] == 0.0:
+            best, problem = _without_growth(best, narrower), narrower
         else:
-            narrower, start = problem_of(signals, drivelines, loss_law, guess)
             of_kinds = narrower.of_kinds(best.problem.kinds)
             with suppress(OutOfWork):  # the wider model is right all the same
                 best = fit(of_kinds, _taken(start, best.point), shifts, thorough=False)
@@ -107,10 +112,49 @@ def _grows(best: LikelihoodFit) -> bool:
     return bool(best.point[AERO] > SIGNIFICANT * np.sqrt(best.covariance[k, k]))
 
 
+def _without_growth(best: LikelihoodFit, narrower: Problem) -> LikelihoodFit:
+    """The fit of the model without the growing part, where that of the wider one ends without any.
+
+    It is the same minimum. What lies on its bound has no place in the covariance: it would widen
+    the interval of T_v/i_f, with which it nearly goes, by what it cannot be.
+    """
+    k = best.point.names.index(AERO)
+    point, normal = _taken_out(best.point, k), best.normal
+    parts = [
+        replace(part, structure=other.structure)
+        for part, other in zip(best.problem.parts, narrower.parts, strict=True)
+    ]
+    normal = replace(
+        normal,
+        gradient=np.delete(normal.gradient, k),
+        information=_without(normal.information, k),
+        data=_without(normal.data, k),
+        regressors=tuple(np.delete(one, k, axis=1) for one in normal.regressors),
+    )
+    return replace(
+        best,
+        problem=replace(narrower, parts=tuple(parts)),
+        point=point,
+        mean=_taken_out(best.mean, k),
+        covariance=max(best.chi2, 1.0) * covariance_of(normal.information),
+        normal=normal,
+    )
+
+
+def _taken_out(point: Point, k: int) -> Point:
+    """The point without its unknown number k."""
+    return Point((*point.names[:k], *point.names[k + 1 :]), np.delete(point.values, k))
+
+
+def _without(matrix: FloatArray, k: int) -> FloatArray:
+    """A matrix (p, p) without row and column k."""
+    return np.delete(np.delete(matrix, k, axis=0), k, axis=1)
+
+
 def _growth(best: LikelihoodFit) -> str:
     """What is said of a load that grows with speed."""
     k = best.point.names.index(AERO)
-    half = 1.96 * float(np.sqrt(best.covariance[k, k]))
+    half = Z95 * float(np.sqrt(best.covariance[k, k]))
     speed = best.problem.parts[0].structure.mean_speed
     return (
         f"the load grows with the square of the speed ({best.point[AERO]:.2g} ± {half:.1g} "
