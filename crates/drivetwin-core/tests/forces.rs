@@ -9,7 +9,11 @@ use common::{
 use drivetwin_core::model::Driveline;
 use drivetwin_core::model::FrictionLaw;
 use drivetwin_core::model::FrictionTable;
-use drivetwin_core::model::elements::{Clutch, Element, EngineMap, Inertia, Planetary, Torque};
+use drivetwin_core::model::Stribeck;
+use drivetwin_core::model::elements::{
+    Clutch, Element, EngineMap, Gear, GearLoss, Inertia, Planetary, Torque,
+};
+use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::torque_map::TorqueMap;
 use drivetwin_core::network::{CompileError, Network};
 use drivetwin_core::number::{Dual, Number as _};
@@ -250,5 +254,58 @@ fn a_sine_without_amplitude_is_differentiated_by_it() {
         assert_eq!(*w, 10.0);
         let exact = (1.0 - (omega * t).cos()) / (omega * j);
         assert!((slope[0] - exact).abs() < 1e-11, "{t} s: {} {exact}", slope[0]);
+    }
+}
+
+#[test]
+fn stiction_is_found_at_the_end_of_one_long_step() {
+    let (mu_c, mu_s, v_s, capacity) = (0.9, 0.5, 5.0, 100.0);
+    let friction = FrictionLaw::Stribeck(Stribeck { mu_c, mu_s, v_s, mu_v: 0.0 });
+    let brake = Clutch { friction, ..clutch("B", "rotor", "ground") };
+    let network = compile(vec![inertia("rotor", 1.0), Element::Clutch(brake)]);
+    for distance in [1.0, 10.0, 30.0, 34.0, 80.0, 400.0] {
+        let (from, end) = (distance * v_s, 0.99 * distance * v_s / (mu_c * capacity));
+        // u = exp(ω / v_s) obeys a linear equation.
+        let fall = mu_c * capacity * end;
+        let u = ((from - fall) / v_s).exp() + (mu_s - mu_c) / mu_c * ((-fall / v_s).exp() - 1.0);
+        for settings in [Settings::default(), Settings::exact()] {
+            let start = start(&[("rotor", from)], &[]);
+            let (pressure, span) = (constant("P B", capacity, end), [0.0, end]);
+            let how = (settings, false);
+            let run = simulate_by(how, &network, &[pressure], &start, &span, &[speed("rotor")]);
+            let error = run.columns[0][1] - v_s * u.ln();
+            assert!(error.abs() < 1e-6, "{error} rad/s from {distance} Stribeck speeds");
+        }
+    }
+}
+
+#[test]
+fn members_of_next_to_no_mass_are_told_from_rigid_ones_whatever_the_numbers() {
+    for (i, ratio) in [0.7, 1.3, 2.0, 2.9].into_iter().enumerate() {
+        for eta in [0.52, 0.73, 0.832_194, 0.97] {
+            for loss_law in [LossLaw::Paper, LossLaw::Dissipative] {
+                let heavy = 0.3 + 2.7 * i as f64;
+                let loss = Some(GearLoss::by_efficiency(loss_law, eta));
+                let network = compile(vec![
+                    inertia("b", heavy),
+                    inertia("c", 1.0),
+                    Element::Clutch(clutch("C", "a", "c")),
+                    Element::Gear(Gear {
+                        name: "G".into(),
+                        a: "c".into(),
+                        b: "b".into(),
+                        ratio,
+                        loss,
+                    }),
+                    torque("b", "T"),
+                ]);
+                let start = start(&[("a", 7.0), ("c", 2.0)], &[]);
+                let inputs = [constant("P C", 50.0, 1.0), constant("T", 10.0, 1.0)];
+                let outputs = [speed("a"), speed("c")];
+                let run = simulate(&network, &inputs, &start, &grid(1.0, 5), &outputs);
+                assert_eq!(run.status, Status::Completed);
+                assert!((run.columns[0][4] - run.columns[1][4]).abs() < 1e-9);
+            }
+        }
     }
 }

@@ -116,17 +116,18 @@ impl<T: Number> DualClutch<T> {
             }),
             Element::Gear(gear(const { Name::new_inline("i_f") }, &axle, &wheel, self.i_f)),
             inertia(const { Name::new_inline("J_v") }, &wheel, self.J_v),
-            Element::RoadLoad(RoadLoad {
-                name: const { Name::new_inline("load") },
-                node: wheel.clone(),
-                constant: self.load.constant,
-                rolling: self.load.rolling,
-                aero: self.load.aero,
-            }),
         ]);
         for element in &self.elements {
             elements.extend(element.path(&input, &output));
         }
+        // Last: whether it holds the vehicle follows from its values, and shift elements keep their places.
+        elements.push(Element::RoadLoad(RoadLoad {
+            name: const { Name::new_inline("load") },
+            node: wheel,
+            constant: self.load.constant,
+            rolling: self.load.rolling,
+            aero: self.load.aero,
+        }));
         Driveline { elements }
     }
 }

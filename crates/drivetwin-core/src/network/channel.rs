@@ -115,6 +115,16 @@ impl<T: Number> Channel<T> {
         matches!(self.law, Law::Quadratic(_) | Law::Map { .. } | Law::Converter { .. })
     }
 
+    /// Slip over which stiction decays by e, rad/s, and stiction itself.
+    pub fn stiction(&self) -> Option<(T, T)> {
+        match &self.law {
+            Law::Friction { mu: FrictionLaw::Stribeck(law), .. } => {
+                Some((law.v_s, law.mu_s - law.mu_c))
+            }
+            _ => None,
+        }
+    }
+
     /// Whether the active cell depends on an input and may change when that jumps.
     pub fn follows_inputs(&self) -> bool {
         matches!(self.law, Law::Map { .. })

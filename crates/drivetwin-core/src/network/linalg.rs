@@ -166,15 +166,22 @@ impl<T> std::ops::IndexMut<(usize, usize)> for Matrix<T> {
 }
 
 /// Solve `a x = b` for a square matrix; `Err(column)` where the matrix is singular to `1e-12`
-/// of its row scale. Sparse matrices are solved in fewer operations.
+/// of its row scale: of each row by itself, as some members have next to no mass. Sparse matrices are solved
+/// in fewer operations.
 pub fn solve<T: Number>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usize> {
     let mut x = b;
-    let least = a.max_abs().larger(T::Values::of(f64::MIN_POSITIVE)) * 1e-12;
+    let largest = |row: &[T]| {
+        let floor = T::Values::of(f64::MIN_POSITIVE);
+        row.iter().fold(floor, |largest, v| v.re().magnitude().larger(largest))
+    };
+    let mut scales: SmallVec<[_; 8]> = (0..a.rows).map(|i| largest(a.row(i))).collect();
     for c in 0..a.rows {
         let pivot = largest_in_column(&a, c, c);
-        if a[(pivot, c)].re().magnitude().decide_with(least, |entry, least| entry <= least) {
+        let size = a[(pivot, c)].re().magnitude();
+        if size.decide_with(scales[pivot], |size, scale| size <= 1e-12 * scale) {
             return Err(c);
         }
+        scales.swap(c, pivot);
         a.swap_rows(c, pivot);
         x.swap_rows(c, pivot);
         let inverse = a[(c, c)].recip();

@@ -206,7 +206,9 @@ impl Work<'_> {
     }
 
     fn do_alone(&self, job: &mut Job<'_>) {
-        let (network, state) = match self.sets.prepared(&[job.run]) {
+        let plan = self.plan(job.run);
+        let prepared = self.sets.prepared(&[job.run]);
+        let (network, state) = match prepared.and_then(|p| plan.check(&p.0).map(|()| p)) {
             Ok(prepared) => prepared,
             Err(error) => {
                 job.values.fill(f64::NAN);
@@ -214,7 +216,7 @@ impl Work<'_> {
                 return;
             }
         };
-        let run = self.plan(job.run).run(&network, &state);
+        let run = plan.run(&network, &state);
         if run.status == Status::Completed {
             self.keep.reduce(&run.columns.concat(), run.time.len(), job.values);
         } else {
@@ -238,6 +240,9 @@ impl Work<'_> {
         let alike = bits(runs.iter().map(alike));
         let (prepared, parting) = together(alike, || self.sets.prepared::<Lanes>(&runs));
         let Ok((network, State { x, locked })) = prepared else { return };
+        if plan.check(&network).is_err() {
+            return;
+        }
         let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &self.plan(run).inputs).collect();
         let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
         let (known, how) = (Known::of(&network), (plan.settings, alike & !parting));

@@ -4,7 +4,7 @@
 use super::batch::{Batch, Keep, Outcome, Sets, check_names, last_lock};
 use super::dual_clutch::DualClutchStart;
 use super::run::{Plan, SimulateError};
-use super::sensitivity::{LANES, Sampled, SensitivityError, delayed, variables};
+use super::sensitivity::{LANES, Sampled, SensitivityError, check_corners, delayed, variables};
 use super::threads::share_out;
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::DualClutch;
@@ -52,6 +52,7 @@ pub fn dual_clutch_batch_sensitivities(
     }
     let starts = scenarios.iter().map(|(_, start)| start).collect();
     let sets = Sets { model, starts, parameters, sets };
+    (0..sets.count()).try_for_each(|i| check_corners(by, &sets.placed(&[i]).0))?;
     let run = |i: usize| -> Result<Vec<Kept>, SimulateError> {
         let (signals, _) = &scenarios[i % scenarios.len()];
         let (model, start) = sets.placed(&[i]);
@@ -59,6 +60,7 @@ pub fn dual_clutch_batch_sensitivities(
             let (model, start, _) =
                 variables(&model, signals, &start, names).expect("names that were checked");
             let network = Network::compile(&model.driveline())?;
+            plan.check(&network)?;
             let state = start.state(&network)?;
             Ok(Kept::of(plan.run(&network, &state), keep))
         });

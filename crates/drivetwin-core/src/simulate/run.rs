@@ -44,6 +44,8 @@ pub struct Plan<T> {
     pub(super) grid: Vec<f64>,
     /// Point of the grid at every knot, see [`Inputs::points`].
     pub(super) points: Option<Vec<usize>>,
+    outputs: Vec<Output>,
+    /// These, in their order.
     pub(super) targets: Vec<Target>,
     pub(super) settings: Settings,
     audit: bool,
@@ -71,7 +73,14 @@ impl<T: Real> Plan<T> {
         let inputs = if fine { divided(network, inputs) } else { inputs };
         let points = inputs.points(grid);
         let settings = Settings { sprint: sprint && points.is_some(), ..settings };
-        Ok(Self { inputs, grid: grid.to_vec(), points, targets, settings, audit })
+        let (grid, outputs) = (grid.to_vec(), outputs.to_vec());
+        Ok(Self { inputs, grid, points, outputs, targets, settings, audit })
+    }
+
+    /// Refuse a network that lacks an element of an output: a road load without rolling resistance holds
+    /// nothing.
+    pub(super) fn check<N>(&self, network: &Network<N>) -> Result<(), SimulateError> {
+        Ok(self.outputs.iter().try_for_each(|output| output.find(network).map(drop))?)
     }
 
     fn integrator<'r>(

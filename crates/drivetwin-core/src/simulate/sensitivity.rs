@@ -27,6 +27,15 @@ pub enum SensitivityError {
         /// The name.
         name: String,
     },
+    /// A parameter at a value where the motion has a corner.
+    #[error(
+        "nothing has a derivative by {name:?} at 0: what has no capacity holds nothing; give it a \
+         small positive value"
+    )]
+    Corner {
+        /// The name.
+        name: String,
+    },
     /// The scenario cannot be run.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
@@ -57,6 +66,7 @@ pub fn dual_clutch_sensitivities(
     grid: &[f64],
     (settings, parameters): (Settings, &[&str]),
 ) -> Result<Sensitivities, SensitivityError> {
+    check_corners(parameters, model)?;
     let mut found: Option<Sensitivities> = None;
     // Without parameters one pass for the values.
     for k in 0..parameters.len().div_ceil(LANES).max(1) {
@@ -69,6 +79,18 @@ pub fn dual_clutch_sensitivities(
         }
     }
     Ok(found.expect("at least one pass"))
+}
+
+/// Refuse derivatives by a capacity of nothing.
+pub(super) fn check_corners(
+    parameters: &[&str],
+    model: &DualClutch<f64>,
+) -> Result<(), SensitivityError> {
+    let name = "load.rolling";
+    match parameters.contains(&name) && model.load.rolling == 0.0 {
+        true => Err(SensitivityError::Corner { name: name.to_owned() }),
+        false => Ok(()),
+    }
 }
 
 /// One pass for up to `P` parameters, added to what others have found.

@@ -6,8 +6,9 @@ use super::recorded::{Block, Picked, Recorded};
 use super::start::{StartError, find};
 use crate::model::mechanism::SpringLaw;
 use crate::network::channel::form;
+use crate::network::linalg::is_zero;
 use crate::network::{Network, Row};
-use crate::number::{Number, Real, Values};
+use crate::number::{Number, Real};
 use crate::solve::{
     Event, Integrator, Regime, RowState, Samples, Sink, Status, Step, Task, dispatch,
 };
@@ -328,8 +329,7 @@ impl<T: Number> Column<T> {
 
 /// Terms of a row that are not zero.
 fn terms<T: Number>(row: &[T]) -> Vec<(usize, T)> {
-    let counts = |(_, c): &(usize, T)| c.re().those(|c| c != 0.0) != 0;
-    row.iter().copied().enumerate().filter(counts).collect()
+    row.iter().copied().enumerate().filter(|&(_, c)| !is_zero(c)).collect()
 }
 
 fn shaft_torque<T: Number>(network: &Network<T>, i: usize) -> Column<T> {
@@ -376,7 +376,7 @@ fn holding_row<'r, T: Number>(regime: &'r Regime<'_, T>, j: usize) -> &'r [T] {
 fn integral<T: Real>(regime: &Regime<'_, T>, row: &[T], h: T) -> T {
     let mut sum = T::zero_();
     for (&c, series) in row.iter().zip(&regime.expansion.states) {
-        if c.re() != 0.0 {
+        if !is_zero(c) {
             let mut value = T::zero_();
             for k in (0..=regime.expansion.order).rev() {
                 value = value * h + series[k] / (k + 1) as f64;

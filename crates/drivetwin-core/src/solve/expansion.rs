@@ -32,6 +32,12 @@ pub struct Accuracy {
     pub order: Option<usize>,
 }
 
+/// Most that the exponent of stiction changes by within a step: its series then falls from its second term
+/// on.
+const MAX_DECAY: f64 = 2.0;
+/// Slip [Stribeck speeds] at which stiction is nothing, e^-40.
+const NO_STICTION: f64 = 40.0;
+
 impl<T: Number> Expansion<T> {
     /// Working space for a network.
     pub fn new(network: &Network<T>) -> Self {
@@ -102,7 +108,7 @@ impl<T: Number> Expansion<T> {
             }
             if growing == 0 {
                 self.finish(network, cells, (k + 1, &ended));
-                return h;
+                return self.within_decay(network, cells, h);
             }
         }
         ended[last] |= growing;
@@ -112,7 +118,33 @@ impl<T: Number> Expansion<T> {
         }
         let excess = largest(&sizes[TERMS - window..]) / accuracy.tolerance;
         let shorter = |run| (0.8 * excess.of_run(run).powf(-1.0 / last as f64)).min(1.0);
-        h.with(growing, h * T::Values::gathered(shorter))
+        let h = h.with(growing, h * T::Values::gathered(shorter));
+        self.within_decay(network, cells, h)
+    }
+
+    /// The part of a step `h` [s] over which no stiction grows or decays so far that terms which are small at
+    /// the start could become large: those of `exp(-s / v_s)` do so first where `s >> v_s`.
+    #[inline(always)]
+    fn within_decay(&self, network: &Network<T>, cells: &[Cell], h: T::Values) -> T::Values {
+        let mut within = h;
+        for ((channel, cell), series) in network.channels.iter().zip(cells).zip(&self.channels) {
+            let (Cell::Moving { .. }, Some((speed, stiction))) = (cell, channel.stiction()) else {
+                continue;
+            };
+            let slip = &series.arguments[0];
+            let (mut swing, mut power) = (T::Values::zero_(), T::Values::of(1.0));
+            for term in &slip[1..=self.order] {
+                power *= h;
+                swing += term.re().magnitude() * power;
+            }
+            // Further away stiction is nothing throughout.
+            let room = slip[0].re().magnitude() - speed.re() * NO_STICTION;
+            let room = room.larger(speed.re() * MAX_DECAY);
+            let shorter = within.smaller(h * (room / swing.larger(room)));
+            let none = stiction.re().those(|v| v == 0.0 && stiction.is_constant());
+            within = shorter.with(none, within);
+        }
+        within
     }
 
     /// Highest coefficient of the inputs: lines have one, sines all.

@@ -39,7 +39,9 @@ impl<T: Number> RoadLoad<T> {
             m.forces.push(Force { element, node, law, lag: None, account });
         };
         force(ForceLaw::Constant(-self.constant));
-        if self.aero.re().decide(|v| v != 0.0) {
+        // Nothing now may be something for a derivative.
+        let acts = |v: T| !v.is_constant() || v.re().decide(|v| v != 0.0);
+        if acts(self.aero) {
             force(ForceLaw::Quadratic { coefficient: -self.aero, node });
         }
         if self.rolling.re().decide(|v| v != 0.0) {
