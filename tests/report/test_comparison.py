@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from drivetwin.identify.result import Z95
 from drivetwin.report.candidates import Candidate, Trial
 from drivetwin.report.comparison import render_comparison, trials_of
 from drivetwin.report.figures.comparison import agreement_figure, trial_figure
@@ -47,7 +48,7 @@ def test_narrow_and_wide_parameters_are_drawn_alike() -> None:
     section = agreement_section(candidates())
     block = next(block for block in section.blocks if isinstance(block, FigureBlock))
     first, second = block.figure.data
-    assert np.allclose(first.error_x.array, 1.96)
+    assert np.allclose(first.error_x.array, Z95)
     assert np.allclose(np.asarray(second.x) - np.asarray(first.x), [20.0, 1.0])
 
 

@@ -183,6 +183,8 @@ def _profile(one: Profile, found: Identification) -> Table:
 
 
 def _bootstrap(one: Bootstrap, found: Identification) -> Table:
+    from drivetwin.identify.result import Z95
+
     title = f"Bootstrap: {len(one.values)} fits, {one.failed} failed"
     numbers = ("by covariance", "by bootstrap", "bias")
     table = table_of(title, "parameter", *numbers, "unit", right=numbers)
@@ -190,11 +192,11 @@ def _bootstrap(one: Bootstrap, found: Identification) -> Table:
         estimate = found.estimates[name]
         if one.std[k] == 0.0:
             continue
-        linear = 1.96 * (estimate.std_noise or float("inf"))
+        linear = Z95 * (estimate.std_noise or float("inf"))
         table.add_row(
             name,
             around(estimate.value, linear, estimate.unit),
-            around(estimate.value, 1.96 * float(one.std[k]), estimate.unit),
+            around(estimate.value, Z95 * float(one.std[k]), estimate.unit),
             f"{one.bias[k] / one.std[k]:+.2f} σ",
             shown(None, None, estimate.unit)[2],
         )
@@ -202,6 +204,7 @@ def _bootstrap(one: Bootstrap, found: Identification) -> Table:
 
 
 def _departures(found: tuple[Departure, ...]) -> Table:
+    from drivetwin.identify.result import Z95
     from drivetwin.identify.shape.departures import UNITS
 
     table = table_of(
@@ -209,6 +212,6 @@ def _departures(found: tuple[Departure, ...]) -> Table:
         right=("value", "± (95 %)"),
     )  # fmt: skip
     for one in found:
-        value, half = f"{one.value:.2g}", f"{1.96 * one.std:.1g}"
+        value, half = f"{one.value:.2g}", f"{Z95 * one.std:.1g}"
         table.add_row(one.element, one.kind, value, half, UNITS[one.kind], one.text)
     return table

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from drivetwin.fleet.joint.result import Change, JointEstimate
 
 RUN = "run"
-_Z95 = 1.96
 
 
 class LogsOrCommand(TyperGroup):
@@ -230,8 +229,9 @@ def _change(one: JointEstimate, change: Change) -> str:
     """What happened to a unit, in words."""
     from drivetwin.cli.numbers import shown
     from drivetwin.fleet.readings import span_text
+    from drivetwin.identify.result import Z95
 
-    ends = (change.size - _Z95 * change.std, change.size + _Z95 * change.std)
+    ends = (change.size - Z95 * change.std, change.size + Z95 * change.std)
     step = " ".join(shown(change.size, ends, one.si_unit)).removesuffix(" –")
     where = span_text(change.field, change.before, change.after)
     return f"{one.parameter}: unit {change.unit} changed by {step} between {where}"

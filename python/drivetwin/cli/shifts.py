@@ -86,11 +86,13 @@ def _name(shift: Shift) -> str:
 
 
 def _said(swing: Resonance | str) -> str:
+    from drivetwin.identify.result import Z95
+
     if isinstance(swing, str):
         return swing
     return (
-        f"resonance at {swing.f_d:.2f} ± {1.96 * swing.f_d_std:.2f} Hz, damping ratio "
-        f"{swing.zeta:.2f} ± {1.96 * swing.zeta_std:.2f} (95 %)"
+        f"resonance at {swing.f_d:.2f} ± {Z95 * swing.f_d_std:.2f} Hz, damping ratio "
+        f"{swing.zeta:.2f} ± {Z95 * swing.zeta_std:.2f} (95 %)"
     )
 
 

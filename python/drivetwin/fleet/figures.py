@@ -11,13 +11,13 @@ from drivetwin.fleet.joint.mixed import FloatArray
 from drivetwin.fleet.joint.result import Drift, JointEstimate, UnitValue
 from drivetwin.fleet.readings import moment, reading_text
 from drivetwin.fleet.rules import is_date
+from drivetwin.identify.result import Z95
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, axis, layout
 from drivetwin.report.units import display_of
 
 _MOST_POINTS = 4000
 _BAND = "rgba(213,94,0,0.18)"
-_Z95 = 1.96
 
 
 def drift_figure(one: JointEstimate) -> go.Figure:
@@ -108,7 +108,7 @@ def units_figure(one: JointEstimate) -> go.Figure:
             x=[k for k, _ in picked],
             y=[unit.deviation * display.factor for _, unit in picked],
             error_y={
-                "array": [_Z95 * unit.std * display.factor for _, unit in picked],
+                "array": [Z95 * unit.std * display.factor for _, unit in picked],
                 "color": MUTED,
                 "thickness": 1,
                 "width": 0,

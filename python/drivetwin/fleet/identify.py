@@ -17,7 +17,7 @@ from drivetwin.fleet.parts import writing
 from drivetwin.fleet.rows import MU, Found, Row, RowKind
 from drivetwin.fleet.task import Recipe, ShiftRow, Task
 from drivetwin.identify.pipeline import identify
-from drivetwin.identify.result import Estimate, FrictionCurve, Identification, Verdict
+from drivetwin.identify.result import Z95, Estimate, FrictionCurve, Identification, Verdict
 from drivetwin.identify.uncertainty import judge
 from drivetwin.logs.formats import open_recording
 from drivetwin.logs.profile import read_mapping
@@ -33,7 +33,6 @@ from drivetwin.vehicle.card import VehicleCard, load_card
 if TYPE_CHECKING:
     from drivetwin.logs.shiftlog import ShiftLog
 
-_Z95 = 1.959963984540054
 _CARDS = 64
 """Cards that a worker keeps at hand."""
 
@@ -181,7 +180,7 @@ def _mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
             RowKind.PARAMETER, name, mu, si_unit=spec.unit, verdict=verdict, method=curve.method,
             at=slip,
         )  # fmt: skip
-    std = (high - low) / (2.0 * _Z95)
+    std = (high - low) / (2.0 * Z95)
     one = judge(name, mu, std, curve.method)
     return replace(_estimate_row(one), at=slip)
 

@@ -19,6 +19,7 @@ from drivetwin.fleet.readings import drift_unit, span_text
 from drivetwin.fleet.singles import MOST_ROWS, cut, single, singles
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import State
+from drivetwin.identify.result import Z95
 from drivetwin.parameters import spec_of
 from drivetwin.report.figures.friction import friction_figure
 from drivetwin.report.html import render_page
@@ -310,7 +311,7 @@ def _values(one: JointEstimate, outlier: Outlier) -> tuple[str, str]:
 
 def _with_error(one: JointEstimate, value: float, std: float) -> str:
     display = display_of(one.si_unit)
-    text, half = with_uncertainty(value * display.factor, 1.96 * std * display.factor)
+    text, half = with_uncertainty(value * display.factor, Z95 * std * display.factor)
     return f"{text} ± {half} {display.label}".removesuffix(" –")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin.identify.combine import combine
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.known import with_known
-from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw
+from drivetwin.identify.result import Z95, Estimate, FrictionCurve, LoadLaw
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import correlation, designed, judge, refused
 from drivetwin.parameters import spec_of
@@ -209,6 +209,6 @@ def _warnings(
 
 def with_systematic_band(curve: FrictionCurve, std: FloatArray) -> FrictionCurve:
     """`curve` with its band widened by the sensors' systematic errors `std` (n,) of μ."""
-    noise = (curve.mu_hi - curve.mu_lo) / (2.0 * 1.96)
-    half = 1.96 * np.hypot(noise, std)
+    noise = (curve.mu_hi - curve.mu_lo) / (2.0 * Z95)
+    half = Z95 * np.hypot(noise, std)
     return replace(curve, mu_lo=curve.mu - half, mu_hi=curve.mu + half)

@@ -19,7 +19,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.identify.modulating import Quadrature, Windows, hann_kernels, join, windows_in
 from drivetwin.identify.momentum import FIRST_DRUM, MomentumFit, known
 from drivetwin.identify.regression import Fit, Prior, Term, solve
-from drivetwin.identify.result import FrictionCurve
+from drivetwin.identify.result import Z95, FrictionCurve
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
 from drivetwin.identify.wlse import whole, window_edges, window_means
 from drivetwin.shifts.recorded import parts_between
@@ -300,8 +300,8 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
     curve = FrictionCurve(
         slip=grid,
         mu=mu,
-        mu_lo=mu - 1.96 * std,
-        mu_hi=mu + 1.96 * std,
+        mu_lo=mu - Z95 * std,
+        mu_hi=mu + Z95 * std,
         points_slip=slip,
         points_mu=mu_points,
         stribeck=law,

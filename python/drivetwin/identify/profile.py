@@ -21,7 +21,7 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.newton import minimise
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
-from drivetwin.identify.result import Identification
+from drivetwin.identify.result import Z95, Identification
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.progress import tell
 
@@ -81,7 +81,7 @@ def profile(found: Identification, parameter: str) -> Profile:
     distance, rise = sides[:, 0], sides[:, 1]
     values = held.estimate + held.std * distance
     ends = (_crossing(values[::-1], rise[::-1]), _crossing(values, rise))
-    half = 1.96 * held.std
+    half = Z95 * held.std
     linear = (held.estimate - half, held.estimate + half)
     return Profile(parameter, values, rise, held.estimate, ends, linear)
 

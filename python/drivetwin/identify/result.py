@@ -21,7 +21,8 @@ FloatArray = NDArray[np.float64]
 OF_RATIO = ", μ over η"
 """What follows the method of a curve where no output torque gives μ its scale."""
 
-_Z95 = 1.959963984540054
+Z95 = 1.959963984540054
+"""Half width of a 95 % interval in standard deviations, of a normal distribution."""
 
 
 class Verdict(StrEnum):
@@ -65,7 +66,7 @@ class Estimate:
     def _interval(self, std: float | None) -> tuple[float, float] | None:
         if self.value is None or std is None:
             return None
-        return (self.value - _Z95 * std, self.value + _Z95 * std)
+        return (self.value - Z95 * std, self.value + Z95 * std)
 
     @property
     def ci95(self) -> tuple[float, float] | None:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from drivetwin.identify.inputs import disturbed
-from drivetwin.identify.result import Estimate, Verdict
+from drivetwin.identify.result import Z95, Estimate, Verdict
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.parameters import spec_of
 from drivetwin.vehicle.spec import SensorTolerance
@@ -54,7 +54,7 @@ def judge(
     absolute width, since zero is a sound value for them.
     """
     spec = spec_of(parameter_id)
-    half = 1.96 * float(np.hypot(std_noise, std_systematic or 0.0))
+    half = Z95 * float(np.hypot(std_noise, std_systematic or 0.0))
     if spec.stem == "te_delay":
         width, limit, end = half, DELAY_IDENTIFIED, 4.0 * DELAY_IDENTIFIED
     else:

@@ -9,13 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin.identify.result import Z95
 from drivetwin.observer.kind import Observer as Observer
 from drivetwin.shifts.shift import Shift
 
 FloatArray = NDArray[np.float64]
-
-Z95 = 1.959963984540054
-"""Half width of a 95 % band in standard deviations."""
 
 
 @dataclass(frozen=True)

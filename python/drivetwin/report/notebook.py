@@ -11,7 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import escape
 
-from drivetwin.identify.result import Estimate, Identification, SignalFit
+from drivetwin.identify.result import Z95, Estimate, Identification, SignalFit
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.figures.comparison import friction_overlay
 from drivetwin.report.figures.parameters import interval_figure
@@ -170,7 +170,7 @@ def _parameters(estimates: Iterable[Estimate]) -> Table:
     rows = []
     for one in estimates:
         display = display_of(one.unit)
-        half = None if one.std_total is None else 1.96 * one.std_total * display.factor
+        half = None if one.std_total is None else Z95 * one.std_total * display.factor
         value, width = (
             ("–", "") if one.value is None else with_uncertainty(one.value * display.factor, half)
         )

@@ -33,6 +33,7 @@ from drivetwin.app.views.parts import (
 from drivetwin.app.work import Work
 from drivetwin.errors import MissingParameterError
 from drivetwin.identify.method import Method
+from drivetwin.identify.result import Z95
 from drivetwin.parameters import spec_of
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.trust import TONES
@@ -320,7 +321,7 @@ def _lock_row(work: Work, name: str) -> list[Any]:
     value, width = "–", "–"
     if estimate is not None and estimate.value is not None:
         std = estimate.std_total
-        half = None if std is None else 1.96 * std * display.factor
+        half = None if std is None else Z95 * std * display.factor
         value, width = with_uncertainty(estimate.value * display.factor, half)
     verdict: Any = ""
     if estimate is not None:

@@ -23,7 +23,7 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.momentum import MomentumSettings
 from drivetwin.identify.profile import likelihood_of
-from drivetwin.identify.result import Estimate, Identification, Verdict
+from drivetwin.identify.result import Z95, Estimate, Identification, Verdict
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import DELAY_IDENTIFIED, judge
 from drivetwin.progress import part, tell
@@ -172,7 +172,7 @@ def _suggestion(
     signals: Sequence[ShiftSignals],
     gains: Sequence[_Gain],
 ) -> Suggestion:
-    half = np.inf if one.std_total is None else 1.96 * one.std_total
+    half = np.inf if one.std_total is None else Z95 * one.std_total
     told = parameters(fit.problem, fit.point, signals)
     if one.id not in told:
         return Suggestion(one.id, one.verdict, half, (), NO_SCALE)
@@ -188,7 +188,7 @@ def _suggestion(
             std = float(np.sqrt(row @ _covariance(fit, names, gain, repeats) @ row))
             verdict = judge(one.id, told[one.id], std, "", systematic).verdict
             prospect = Prospect(
-                gain.experiment, repeats, 1.96 * float(np.hypot(std, systematic)), verdict
+                gain.experiment, repeats, Z95 * float(np.hypot(std, systematic)), verdict
             )
             if verdict is Verdict.IDENTIFIED or one.verdict is Verdict.IDENTIFIED:
                 break

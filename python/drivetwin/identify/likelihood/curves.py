@@ -12,7 +12,7 @@ from drivetwin.identify.friction import stribeck
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.unknowns import LAW
-from drivetwin.identify.result import OF_RATIO, FrictionCurve
+from drivetwin.identify.result import OF_RATIO, Z95, FrictionCurve
 from drivetwin.identify.signals import FloatArray
 
 METHOD = "likelihood"
@@ -40,7 +40,7 @@ def curves_of(
         theta, square = fit.mean.values[index], np.ix_(index, index)
         mu, slopes = stribeck(theta, base.slip)
         total = (fit.covariance + systematic)[square]
-        half = 1.96 * np.sqrt(np.einsum("pn,pq,qn->n", slopes, total, slopes))
+        half = Z95 * np.sqrt(np.einsum("pn,pq,qn->n", slopes, total, slopes))
         mu_c, drop, mu_v, ln_v_s = (float(v) for v in theta)
         v_s = float(np.exp(ln_v_s))
         to_law = np.array([[1.0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, v_s], [0, 0, 1, 0]])

@@ -22,6 +22,7 @@ from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
 from drivetwin.identify.likelihood.score import score_of
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import OutOfWork
+from drivetwin.identify.result import Z95
 from drivetwin.identify.signals import FloatArray
 
 SIGNALS = (*OUTPUTS, TORQUE)
@@ -103,7 +104,7 @@ def averaged(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list
     weight = _weights(choices, best)
     step = weight @ choices.steps
     apart = choices.steps - step
-    reached = np.where(choices.left < np.min(choices.left) + TIE, 1.96**-2, 0.0)
+    reached = np.where(choices.left < np.min(choices.left) + TIE, Z95**-2, 0.0)
     values = np.clip(best.point.values + step, best.problem.lower, best.problem.upper)
     covariance = best.covariance + apart.T @ (np.maximum(weight, reached)[:, None] * apart)
     told = replace(best, mean=best.point.moved(values), covariance=covariance)

@@ -14,6 +14,7 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.score import score_of
 from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.result import Z95
 from drivetwin.identify.signals import FloatArray
 
 TORQUE = "output_torque"
@@ -42,7 +43,7 @@ def lateness_in_words(fit: LikelihoodFit) -> list[str]:
         return []
     side = "late" if delay > 0.0 else "early"
     return [
-        f"the output torque is {1e3 * abs(delay):.1f} ± {1e3 * 1.96 * std:.1f} ms {side} against "
+        f"the output torque is {1e3 * abs(delay):.1f} ± {1e3 * Z95 * std:.1f} ms {side} against "
         "the speeds, if the model of the shaft holds: c_o and ζ hang on it; set "
         f"channels.output_torque.time_shift_s = {-delay:.4f} in the channel mapping and compare"
     ]

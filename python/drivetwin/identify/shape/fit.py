@@ -24,7 +24,7 @@ from drivetwin.identify.likelihood.tolerance import sensor_shifts
 from drivetwin.identify.likelihood.unknowns import LAW, Point
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.regression import Prior
-from drivetwin.identify.result import FrictionCurve, Identification
+from drivetwin.identify.result import Z95, FrictionCurve, Identification
 from drivetwin.identify.shape.kind import Shape
 from drivetwin.identify.shape.monotone import shaped
 from drivetwin.identify.shape.structure import Shaped, Table
@@ -201,7 +201,7 @@ def _curve(
     total = (best.covariance + systematic)[part, part]
     at_knots, spread = shaped(shape, best.point.values[part], total)
     mu = between @ at_knots
-    half = 1.96 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))
+    half = Z95 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))
     return replace(
         seen,
         slip=slip,

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.identify.result import FrictionCurve
+from drivetwin.identify.result import Z95, FrictionCurve
 from drivetwin.report.candidates import Agreement, Trial
 from drivetwin.report.figures.friction import band
 from drivetwin.report.figures.stack import Curve, Panel, stacked
@@ -74,7 +74,7 @@ def _standardised(one: Agreement, k: int) -> tuple[float, float]:
     estimate = one.estimates[k]
     assert estimate is not None
     assert estimate.value is not None
-    return (estimate.value - one.mean) / unit, 1.96 * (estimate.std_total or 0.0) / unit
+    return (estimate.value - one.mean) / unit, Z95 * (estimate.std_total or 0.0) / unit
 
 
 def friction_overlay(

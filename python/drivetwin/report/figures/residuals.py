@@ -9,14 +9,13 @@ import numpy as np
 import plotly.graph_objects as go
 
 from drivetwin.identify.likelihood.residuals import block_means
-from drivetwin.identify.result import FloatArray
+from drivetwin.identify.result import Z95, FloatArray
 from drivetwin.report.figures.stack import Curve, Panel, Phases, stacked
 from drivetwin.report.labels import channel_label
 from drivetwin.report.style import FITTED, MEASURED
 from drivetwin.report.units import Display
 
 _SIGMA = Display("σ")
-_BOUND = 1.96
 
 
 def residual_figure(
@@ -38,7 +37,7 @@ def residual_panels(residuals: Mapping[str, tuple[FloatArray, FloatArray]]) -> l
         ends = middle[[0, -1]]
         bounds = [
             Curve("95 % of noise", ends, np.full(2, bound), FITTED, 1.0, "dash", listed=bound > 0.0)
-            for bound in (-_BOUND, _BOUND)
+            for bound in (-Z95, Z95)
         ]
         panels.append(
             Panel(channel_label(name), _SIGMA, [Curve("mean", middle, means, MEASURED), *bounds])

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from drivetwin.identify.result import Estimate
+from drivetwin.identify.result import Z95, Estimate
 from drivetwin.report.candidates import DIFFER, Agreement, Candidate, Trial, agreements
 from drivetwin.report.figures.comparison import (
     agreement_figure,
@@ -112,7 +112,7 @@ def value_cell(one: Estimate | None, display: Display) -> Cell:
     """A value with its total 95 % half width below; a dash where there is none."""
     if one is None or one.value is None:
         return Cell("–", number=True, note="" if one is None else one.verdict.value)
-    half = None if one.std_total is None else 1.96 * one.std_total * display.factor
+    half = None if one.std_total is None else Z95 * one.std_total * display.factor
     value, width = with_uncertainty(one.value * display.factor, half)
     return Cell(value, number=True, note=f"± {width}" if width else "")
 

@@ -8,7 +8,7 @@ from collections import Counter
 
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.residuals import residual_tests
-from drivetwin.identify.result import Estimate, Identification, SignalFit, Verdict
+from drivetwin.identify.result import Z95, Estimate, Identification, SignalFit, Verdict
 from drivetwin.parameters import spec_of
 from drivetwin.report.figures.parameters import interval_figure
 from drivetwin.report.labels import parameter_label
@@ -190,7 +190,7 @@ def _parameter_row(estimate: Estimate, remark: str) -> tuple[Cell, ...]:
 def _shown(estimate: Estimate, std: float | None, display: Display) -> tuple[str, str]:
     if estimate.value is None:
         return "–", "–"
-    half = None if std is None else 1.96 * std * display.factor
+    half = None if std is None else Z95 * std * display.factor
     value, width = with_uncertainty(estimate.value * display.factor, half)
     return value, width or "–"
 
