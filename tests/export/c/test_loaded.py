@@ -10,12 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 from drivetwin.driveline import (
     DualClutch,
     FloatArray,
     FrictionTable,
     RoadLoad,
+    ShiftElement,
     State,
     Stribeck,
     Trajectory,
@@ -188,6 +190,72 @@ def test_any_driveline_agrees_with_the_core(loaded: CModel, seed: int) -> None:
         run = CRun(columns, "completed")
         core = cut(core, seen)
     compare(run, core, 1e-8)
+
+
+BRAKED_SPEED = 185.0
+
+
+def brake(law: Stribeck, normal: float) -> DualClutch:
+    """An inertia of 1 kg m^2 on a brake: its load is `normal` [N m] at a pressure of 1 Pa."""
+    pressed = ShiftElement("A", 1.0, 1.0, normal, 0.0, law)
+    elements = (pressed, replace(pressed, name="B", i_out=3.0))
+    return DualClutch(1.0, 0.0, 1.0, "paper", 1.0, 1e15, 1.0, 1e15, 0.0, 0.0, RoadLoad(), elements)
+
+
+def braked(loaded: CModel, law: Stribeck, normal: float, left: float) -> float:
+    """Speed after one step over the time in which a brake leaves `left` [rad/s] of the speed."""
+
+    def at_end(_: float, w: FloatArray) -> float:
+        return float(w[0]) - left
+
+    at_end.terminal = True  # type: ignore[attr-defined]
+
+    def deceleration(_: float, w: FloatArray) -> FloatArray:
+        stiction = np.exp(-np.maximum(w, 0.0) / law.v_s)  # a trial beyond rest is left again
+        return -normal * (law.mu_c + (law.mu_s - law.mu_c) * stiction)
+
+    reference = solve_ivp(
+        deceleration,
+        (0.0, 2.0 * BRAKED_SPEED / (law.mu_c * normal)),
+        (BRAKED_SPEED,),
+        "DOP853",
+        events=at_end,
+        rtol=1e-13,
+        atol=1e-12,
+    )
+    set_model(loaded, brake(law, normal), State(BRAKED_SPEED, 0.0, 0.0, 0.0))
+    time = np.array([0.0, reference.t[-1]])
+    run = loaded.run(time, np.full((2, 3), (0.0, 1.0, 0.0)))
+    assert run.status == "completed"
+    return float(run.columns["engine_speed"][-1])
+
+
+@pytest.mark.parametrize("decays", [30.0, 34.0, 80.0, 4000.0])
+def test_one_long_step_meets_the_stiction_that_starts_below_any_tolerance(
+    loaded: CModel, loaded_float: CModel, decays: float
+) -> None:
+    """Over the step the exponential of the friction law grows from exp(-decays) to 0.4."""
+    law = Stribeck(0.1, 0.5, BRAKED_SPEED / decays, 0.0)
+    left = 0.9 * law.v_s
+    assert braked(loaded, law, 100.0, left) == pytest.approx(left, abs=1e-9 * BRAKED_SPEED)
+    # Rounding is a time: what it shifts grows with the deceleration at the end over the mean one.
+    assert braked(loaded_float, law, 100.0, left) == pytest.approx(left, abs=1e-5 * BRAKED_SPEED)
+
+
+@given(
+    st.floats(5.0, 300.0),
+    st.floats(0.1, 40.0),
+    st.floats(0.02, 0.2),
+    st.floats(0.02, 0.5),
+    st.floats(10.0, 1e4),
+)
+@settings(max_examples=100, deadline=None)
+def test_one_long_step_meets_any_stiction(
+    loaded: CModel, decays: float, at_end: float, mu_c: float, mu_s: float, normal: float
+) -> None:
+    law = Stribeck(mu_c, mu_s, BRAKED_SPEED / decays, 0.0)
+    left = min(at_end, 0.9 * decays) * law.v_s
+    assert braked(loaded, law, normal, left) == pytest.approx(left, abs=1e-9 * BRAKED_SPEED)
 
 
 def test_what_is_out_of_range_is_refused_by_name(loaded: CModel) -> None:

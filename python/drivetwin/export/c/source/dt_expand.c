@@ -155,6 +155,31 @@ static dt_real relative_size(const dt_expansion *e, int k) {
     return size;
 }
 
+/* The part of `h` over which the terms of stiction up to `order` tell how large those after it are.
+ * With q the swing of |slip| / v_s they are as q^k / k! times exp(-|slip| / v_s) at the start: where
+ * that is tiny they may start below any tolerance and still rise, up to k = q. Only a swing at whose
+ * end nothing is left of stiction may be larger. */
+static dt_real told_span(const dt_expansion *e, const dt_params *p, const dt_state *s, int order,
+                         dt_real h) {
+    dt_real part = DT_C(1);
+    for (int j = 0; j < DT_CLUTCHES; ++j) {
+        const dt_friction *friction = &p->clutch[j].friction;
+        const int decays = dt_abs(friction->mu_s - friction->mu_c) > DT_C(0);
+        if (friction->points > 0 || !decays || !dt_slips(s->mode[j])) {
+            continue;
+        }
+        dt_real swing = DT_C(0);
+        for (int k = order; k >= 1; --k) {
+            swing = (swing + dt_abs(e->size[j][k])) * h;
+        }
+        swing /= friction->v_s;
+        const dt_real most =
+            dt_larger(DT_C(0.5) * DT_C(order), e->size[j][0] / friction->v_s - DT_FADED);
+        part = swing > most ? dt_smaller(part, most / swing) : part;
+    }
+    return h * part;
+}
+
 dt_real dt_expand(dt_expansion *e, const dt_mechanism *m, const dt_params *p, const dt_state *s,
                   dt_real h) {
     /* Two successive terms must be small: every other one of an even or odd motion is zero. */
@@ -168,15 +193,15 @@ dt_real dt_expand(dt_expansion *e, const dt_mechanism *m, const dt_params *p, co
         power *= h;
         before = recent;
         recent = relative_size(e, k + 1) * power;
-        if (dt_larger(before, recent) <= DT_TOLERANCE) {
+        if (dt_larger(before, recent) <= DT_TOLERANCE && told_span(e, p, s, k, h) >= h) {
             e->order = k + 1;
             break;
         }
     }
     dt_expand_term(e, m, p, s, e->order);
     const dt_real excess = dt_larger(before, recent) / DT_TOLERANCE;
-    if (excess <= DT_C(1)) {
-        return h;
+    if (excess > DT_C(1)) {
+        h *= dt_smaller(DT_C(0.8) * dt_pow(excess, DT_C(-1) / DT_C(DT_TERMS - 1)), DT_C(1));
     }
-    return h * dt_smaller(DT_C(0.8) * dt_pow(excess, DT_C(-1) / DT_C(DT_TERMS - 1)), DT_C(1));
+    return told_span(e, p, s, e->order, h);
 }

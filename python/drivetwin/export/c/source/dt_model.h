@@ -13,10 +13,10 @@
  *      J_v w_w'   = i_f T_o - constant - rolling Sgn(w_w) - aero w_w |w_w|
  *      T_k in cap_k Sgn(s_k),  cap_k = mu_k(|s_k|) gain_k (P_k - P0_k)
  *
- *  Cost: a piece of a step takes at most 272250 operations on floating point numbers in double
- *  precision and 145300 in single, a step at most DT_PIECES times as many, whatever the inputs;
+ *  Cost: a piece of a step takes at most 273150 operations on floating point numbers in double
+ *  precision and 145750 in single, a step at most DT_PIECES times as many, whatever the inputs;
  *  nearly all of that is a search for roots that in practice ends at its first test. Without an
- *  event a step of 1 ms is one piece and takes at most 2250 (double) or 1300 (single) for it and
+ *  event a step of 1 ms is one piece and takes at most 3150 (double) or 1750 (single) for it and
  *  some 50 for each of up to 12 guards. Stack: below 4 kB in double precision.
  *
  *  phi(T) = eta T in every direction (loss law "paper"), or eta T with power from the engine and

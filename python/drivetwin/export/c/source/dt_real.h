@@ -17,6 +17,7 @@ typedef float dt_real;
 #define DT_REST 5e-7F        /* slip that counts as zero, relative to the speeds behind it */
 #define DT_ROUND_OFF 2e-5F   /* what counts as zero in a sum, relative to its terms */
 #define DT_LOOK_AHEAD 1e-6F  /* how far ahead a decision looks, s */
+#define DT_FADED 24.0F       /* slip over v_s at which nothing is left of stiction */
 #define dt_exp(x) expf(x)
 #define dt_pow(x, y) powf(x, y)
 #define dt_sqrt(x) sqrtf(x)
@@ -31,6 +32,7 @@ typedef double dt_real;
 #define DT_REST 1e-11
 #define DT_ROUND_OFF 1e-10
 #define DT_LOOK_AHEAD 1e-10
+#define DT_FADED 35.0
 #define dt_exp(x) exp(x)
 #define dt_pow(x, y) pow(x, y)
 #define dt_sqrt(x) sqrt(x)
