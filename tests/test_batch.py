@@ -300,3 +300,10 @@ def test_a_run_that_fails_has_no_derivatives() -> None:
 def test_derivatives_by_nothing_known_are_refused(by: list[str]) -> None:
     with pytest.raises(InputError):
         batch_sensitivities(MODEL, [scenario()], TIME, by=by)
+
+
+def test_times_too_far_from_zero_are_refused() -> None:
+    with pytest.raises(InputError, match="too far for a simulation"):
+        simulate_batch(MODEL, [scenario()], TIME + 1e9)
+    with pytest.raises(InputError, match="too far for a simulation"):
+        batch_sensitivities(MODEL, [scenario()], TIME + 1e9, by=["eta"])

@@ -362,3 +362,14 @@ def test_an_unknown_parameter_of_a_derivative_is_refused() -> None:
     torque, pressures, start, time = upshift()
     with pytest.raises(InputError, match=r"parameter \"B3\.nu\" is unknown"):
         sensitivities(paper_model(), torque, pressures, start, time, ["B3.nu"])
+
+
+def test_times_too_far_from_zero_are_refused() -> None:
+    torque, pressures, start = held_second_gear()
+    time, far = np.linspace(0.0, 1.0, 101), 1763866345.0
+    torque = replace(torque, time=torque.time + far)
+    pressures = {name: replace(one, time=one.time + far) for name, one in pressures.items()}
+    with pytest.raises(InputError, match=r"time reaches 1.76387e\+09 s from zero"):
+        simulate(paper_model(), torque, pressures, start, time + far)
+    with pytest.raises(InputError, match="too far for a simulation"):
+        sensitivities(paper_model(), torque, pressures, start, time - far, ["eta"])

@@ -262,3 +262,9 @@ def test_the_accuracy_asked_for_is_reached() -> None:
     for accuracy, low, high in ((coarse, 1e-6, 1e-1), (None, 0.0, 1e-13)):
         result = simulate(elements, inputs, start, SECOND, [("speed", "a")], accuracy=accuracy)
         assert low <= np.abs(result.columns["speed", "a"] - exact).max() < high
+
+
+def test_times_too_far_from_zero_are_refused() -> None:
+    inputs = {"torque": Sine(1.0, 1.0)}
+    with pytest.raises(InputError, match="too far for a simulation"):
+        simulate([inertia("a"), torque("a")], inputs, Start({"a": 0.0}), SECOND + 1e9, [])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin import _native
-from drivetwin.driveline import DualClutch, FloatArray, Signal, State, as_json
+from drivetwin.driveline import DualClutch, FloatArray, Signal, State, as_json, run_time
 from drivetwin.errors import InputError
 
 
@@ -189,7 +189,7 @@ class _Asked:
         return cls(
             [_plain(scenario) for scenario in scenarios],
             (list(sets), np.ascontiguousarray(table)),
-            np.ascontiguousarray(time, dtype=np.float64),
+            run_time(time),
             (np.ascontiguousarray(wanted), keep.value if isinstance(keep, Keep) else "misfit"),
             json.dumps([_output(name) for name in outputs]),
             shape if keep is Keep.COLUMNS else shape[:2],

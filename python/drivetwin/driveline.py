@@ -21,6 +21,10 @@ from drivetwin.errors import InputError
 FloatArray = NDArray[np.float64]
 LossLaw = Literal["paper", "dissipative"]
 
+LATEST = 1e6
+"""Times farther from zero [s], 12 days, are too coarse for a run: what the core tells apart in time
+it takes relative to them, and stamps that count from 1970 give wrong results."""
+
 ORDERS = range(1, 15)
 """Fixed orders of integration; a step of the core holds no more than 15 Taylor coefficients."""
 
@@ -292,7 +296,7 @@ def simulate(
             as_json(model),
             [(name, _array(s.time + s.delay), _array(s.values)) for name, s in signals.items()],
             _start(start),
-            _array(time),
+            run_time(time),
             options,
         )
     except ValueError as error:
@@ -322,7 +326,7 @@ def sensitivities(
     options = (Accuracy().tolerance, list(parameters))
     try:
         columns, events, status, derivatives, event_derivatives = _native.sensitivities(
-            as_json(model), delayed, _start(start), _array(time), options
+            as_json(model), delayed, _start(start), run_time(time), options
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
@@ -409,6 +413,20 @@ def _leaves(path: str, value: object) -> Iterator[tuple[str, float]]:
             yield from _leaves(f"{path}[{i}]", item)
     elif isinstance(value, float):
         yield path, value
+
+
+def run_time(time: FloatArray) -> FloatArray:
+    """Return the time (n,) [s] of a run as the core takes it.
+
+    Raises InputError where it lies beyond LATEST.
+    """
+    farthest = float(np.max(np.abs(time), initial=0.0))
+    if LATEST < farthest < math.inf:
+        raise InputError(
+            f"time reaches {farthest:.6g} s from zero, too far for a simulation",
+            f"let the time of run and inputs count from the start, or lie within {LATEST:g} s",
+        )
+    return _array(time)
 
 
 def _array(values: FloatArray) -> FloatArray:

@@ -16,7 +16,15 @@ from typing import Any, Literal
 import numpy as np
 
 from drivetwin import _native
-from drivetwin.driveline import Accuracy, EnergyAudit, Event, FloatArray, Signal, as_json
+from drivetwin.driveline import (
+    Accuracy,
+    EnergyAudit,
+    Event,
+    FloatArray,
+    Signal,
+    as_json,
+    run_time,
+)
 from drivetwin.errors import InputError
 
 Element = Mapping[str, Any]
@@ -88,7 +96,7 @@ def simulate(
             json.dumps([{kind: name} for kind, name in outputs]),
             (samples, sines),
             (list(start.speeds.items()), list(start.twists.items()), list(start.locked)),
-            _array(time),
+            run_time(time),
             (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit),
         )
     except ValueError as error:

@@ -215,3 +215,11 @@ def test_rows_of_numbers_above_the_names_are_no_head() -> None:
 def test_a_row_without_time_below_the_units_is_no_row_of_types() -> None:
     with pytest.raises(TimeError, match="line 3"):
         read(PLAIN.replace("0.0,1000", "x,1000"))
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e3)])
+def test_stamps_from_1970_count_from_the_first(unit: str, factor: float) -> None:
+    rows = [f"{factor * (1763866345 + k / 100):.15g},{k}" for k in range(20)]
+    log = read("\n".join(["time,x", f"{unit},Nm", *rows]))
+    assert log.channels[0].time == pytest.approx(np.arange(20) / 100, abs=1e-12)
+    assert log.warnings == ("time counts from the first stamp, 1763866345 s",)

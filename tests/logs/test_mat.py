@@ -187,3 +187,12 @@ def test_a_matrix_of_time_and_values_is_a_signal(tmp_path: Path) -> None:
 def test_a_time_series_keeps_its_unit_in_its_data_info(tmp_path: Path) -> None:
     series = {"Time": T, "Data": T * 2, "DataInfo": {"Units": "bar"}}
     assert by_name(read(tmp_path, {"p": series}))["p"].unit == "bar"
+
+
+def test_stamps_from_1970_count_from_the_first_of_all(tmp_path: Path) -> None:
+    late = {"te": T, "te_t": T + 1.7e9 + 0.25, "x": T[::2], "x_t": T[::2] + 1.7e9}
+    raw = read(tmp_path, late)
+    found = by_name(raw)
+    assert found["te"].time == pytest.approx(T + 0.25, abs=1e-12)
+    assert found["x"].time == pytest.approx(T[::2], abs=1e-12)
+    assert raw.warnings == ("time counts from the first stamp, 1700000000 s",)

@@ -250,3 +250,18 @@ def test_a_damaged_comment_of_the_file_leaves_nothing_behind(tmp_path: Path) -> 
     finally:
         sys.unraisablehook = hook
     assert late == []
+
+
+def test_stamps_from_1970_count_from_the_first_of_all_groups(tmp_path: Path) -> None:
+    groups = [
+        ("slow", [signal("te", SLOW + 1.7e9, SLOW)]),
+        ("fast", [signal("to", FAST + 1.7e9, FAST)]),
+    ]
+    path = save(tmp_path / "log.mf4", groups, "4.10")
+    with open_recording(path) as recording:
+        slow, fast = (recording.load(index) for index in range(2))
+        part = recording.load(1, (0.5, 1.0))
+        assert recording.warnings == ("time counts from the first stamp, 1700000000 s",)
+    assert slow.time == pytest.approx(SLOW, abs=1e-9)
+    assert fast.time == pytest.approx(FAST, abs=1e-9)
+    assert part.time == pytest.approx(FAST[(FAST >= 0.5) & (FAST <= 1.0)], abs=1e-9)

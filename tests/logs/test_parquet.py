@@ -152,3 +152,10 @@ def test_units_among_the_attributes_that_pandas_keeps(tmp_path: Path) -> None:
         {"PANDAS_ATTRS": json.dumps({"units": {"time": "s", "te": "Nm"}})}
     )
     assert read(tmp_path, made).channels[0].unit == "Nm"
+
+
+def test_numbers_from_1970_count_from_the_first(tmp_path: Path) -> None:
+    stamps = [1763866345_000_000 + 500 * k for k in range(4)]
+    raw = read(tmp_path, table({"t": "us"}, t=stamps, x=T))
+    assert raw.channels[0].time.tolist() == [0.0, 0.0005, 0.001, 0.0015]
+    assert raw.warnings == ("time counts from the first stamp, 1763866345 s",)

@@ -21,6 +21,7 @@ from drivetwin.errors import FileFormatError, TimeError, Where
 from drivetwin.logs.cells import Numbers, decimal_sign, is_number, to_numbers
 from drivetwin.logs.clock import clock_seconds, is_clock
 from drivetwin.logs.names import name_and_unit, time_index
+from drivetwin.logs.origin import origin_of, origin_told, since
 from drivetwin.logs.raw import RawChannel, RawLog, TimeColumn
 from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.units import is_unit, time_factor
@@ -80,14 +81,17 @@ def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
     columns = [to_numbers(column, lines, decimal) for column in cells]
     where = Where(file=file, channel=header.names[header.time])
     days = next((i for i, name in enumerate(header.names) if name.casefold() in _DATE_NAMES), None)
+    warnings = table.warnings
     if is_clock(cells[header.time][0]):
         dates = None if days is None else cells[days]
         seconds = _clock(cells[header.time], dates, lines, where)
     else:
         unit = time.unit if time.unit is not None else header.units[header.time]
-        seconds = _stamps(columns[header.time], lines, where) * time_factor(unit, where)
+        stamps = _stamps(columns[header.time], lines, where) * time_factor(unit, where)
+        origin = origin_of(stamps[:1])
+        seconds, warnings = since(stamps, origin), (*warnings, *origin_told(origin))
     channels, unreadable = _channels(header, columns, seconds, without={header.time, days})
-    return RawLog(tuple(channels), unreadable, table.warnings, file)
+    return RawLog(tuple(channels), unreadable, warnings, file)
 
 
 def _channels(

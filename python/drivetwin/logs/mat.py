@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from drivetwin.errors import FileFormatError, MissingChannelError, Where
 from drivetwin.logs.extras import foreign_parser, require
 from drivetwin.logs.mat_blocks import check_blocks
 from drivetwin.logs.mat_signals import Signals, find_signals
+from drivetwin.logs.origin import origin_of, origin_told, since
 from drivetwin.logs.raw import RawLog, ReadOptions, Recording
 
 _KIND = "a MATLAB file"
@@ -41,7 +43,9 @@ def open_mat(path: Path, options: ReadOptions) -> Iterator[Recording]:
         found = find_signals(tree, options.time, str(path))
     if not found.channels:
         raise _nothing(tree, found, path)
-    yield RawLog(tuple(found.channels), found.unreadable, source=str(path))
+    origin = origin_of(channel.time[0] for channel in found.channels)
+    channels = tuple(replace(one, time=since(one.time, origin)) for one in found.channels)
+    yield RawLog(channels, found.unreadable, origin_told(origin), str(path))
 
 
 def _nothing(

@@ -7,10 +7,12 @@ read. asammdf's own resampling and one-table export hold or invent values, so th
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from drivetwin.logs.can.mdf_frames import bus_frames, holds_frames
 from drivetwin.logs.can.open import bus_recording
 from drivetwin.logs.extras import foreign_parser, require
 from drivetwin.logs.mdf_blocks import check_blocks
+from drivetwin.logs.origin import origin_of, origin_told, since
 from drivetwin.logs.raw import Column, Joined, RawChannel, ReadOptions, Recording, Window
 from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.units import time_factor
@@ -64,7 +67,7 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
         try:
             with foreign_parser(_KIND, path):
                 signals = MdfRecording(mdf, path, options)
-                frames = bus_frames(mdf)
+                frames = bus_frames(mdf, signals.origin)
             yield _with_bus(signals, frames, options, path)
         finally:
             mdf.close()
@@ -93,7 +96,10 @@ def _with_bus(
 
 
 class MdfRecording:
-    """Channels of an open MDF file; the group is the recorder's name for it, else its number."""
+    """Channels of an open MDF file; the group is the recorder's name for it, else its number.
+
+    `origin` [s] is the stamp of the file from which time counts.
+    """
 
     def __init__(self, mdf: Any, path: Path, options: ReadOptions) -> None:
         self._mdf = mdf
@@ -121,8 +127,10 @@ class MdfRecording:
                 columns.append(Column(channel.name, unit_text.strip() or None, names[number]))
         self._places = tuple(places)
         self.columns: Sequence[Column] = tuple(columns)
+        self.origin = self._found_origin()
         if timeless:
             self.warnings = (f"groups without a time channel left out: {', '.join(timeless)}",)
+        self.warnings = (*self.warnings, *origin_told(self.origin))
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one channel, in a window only the records inside; see `Recording`."""
@@ -158,11 +166,24 @@ class MdfRecording:
             time, numbers = time[~invalid], numbers[~invalid]
         return RawChannel(column.name, column.unit, time, numbers, column.group, notes)
 
+    def _found_origin(self) -> float:
+        """Origin of all groups; where the first one starts near zero, no other is looked at."""
+        starts = self._starts()
+        first = [*islice(starts, 1)]
+        return origin_of([*first, *starts]) if origin_of(first) else 0.0
+
+    def _starts(self) -> Iterator[float]:
+        """First stamp [s] of each group with records; one that is damaged is told when read."""
+        for number in self._mdf.masters_db:
+            with contextlib.suppress(Exception):
+                first = self._mdf.get_master(number, record_offset=0, record_count=1)
+                yield from np.asarray(first, dtype=np.float64) * self._factor
+
     def _time(self, group: int) -> FloatArray:
         """Stamps [s] of a group; those of the last one stay in memory for its other channels."""
         if self._stamps is None or self._stamps[0] != group:
             master = np.asarray(self._mdf.get_master(group), dtype=np.float64)
-            self._stamps = (group, master * self._factor)
+            self._stamps = (group, since(master * self._factor, self.origin))
         return self._stamps[1]
 
     def _samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:

@@ -14,6 +14,7 @@ import numpy as np
 from drivetwin.errors import DamagedChannelError, FileFormatError, TimeError, Where
 from drivetwin.logs.extras import foreign_parser, require
 from drivetwin.logs.names import is_time_name, name_and_unit, time_index
+from drivetwin.logs.origin import origin_of, origin_told, since
 from drivetwin.logs.raw import Column, RawChannel, ReadOptions, Recording, Window
 from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.units import time_factor
@@ -122,14 +123,17 @@ class ParquetRecording:
             stamps = np.asarray(data.to_numpy(zero_copy_only=False))
             if np.isnat(stamps).any():
                 raise TimeError("a row has no time stamp", "remove the row", where)
-            since = stamps - stamps[0] if stamps.size else stamps
-            return since.astype("timedelta64[ns]").astype(np.float64) * _NANOSECONDS
+            passed = stamps - stamps[0] if stamps.size else stamps
+            return passed.astype("timedelta64[ns]").astype(np.float64) * _NANOSECONDS
         factor = time_factor(asserted if asserted is not None else column.unit, where)
         values, present = self._numbers(field, where)
         if not present.all():
             row = int(present.argmin())
             raise TimeError(f"row {row} has no time stamp", "remove the row", where)
-        return values * factor
+        stamps = values * factor
+        origin = origin_of(stamps[:1])
+        self.warnings = origin_told(origin)
+        return since(stamps, origin)
 
 
 def _column(field: Any, units: Mapping[str, str]) -> Column:

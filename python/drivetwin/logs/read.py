@@ -19,6 +19,7 @@ from drivetwin.logs.agreement import (
     check_common_span,
     check_gearing,
     check_torque_signs,
+    partly_recorded,
     torque_balance,
 )
 from drivetwin.logs.align import clock_warnings
@@ -48,7 +49,7 @@ def read_log(
     Columns come from the `mapping` file, else from the card's [channels], else by name. `needed`
     are the roles that must exist (or their stand-in: engine for input speed, wheel for output
     speed); what else there is comes along. Only mapped columns are read, in a `window` (first and
-    last time of the file [s], before any time_shift) only the samples inside.
+    last time [s] as the log counts it, before any time_shift) only the samples inside.
 
     What is damaged is left out and listed in `warnings`, also a pedal, gear or flag as a whole that
     nobody asked for; nothing is replaced. Raises
@@ -79,7 +80,7 @@ def read_log(
     check_common_span(channels, str(path))
     check_gearing(channels, card, str(path))
     check_torque_signs(channels, str(path))
-    warnings += torque_balance(channels, card)
+    warnings += [*partly_recorded(channels), *torque_balance(channels, card)]
     warnings += [*clock_warnings(channels, card), *torque_warnings(channels)]
     return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
 

@@ -10,7 +10,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.errors import MissingChannelError, Where
+from drivetwin.driveline import LATEST
+from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.shown import Shown
 
 FloatArray = NDArray[np.float64]
@@ -24,6 +25,14 @@ def gap_limit(time: FloatArray) -> float:
     if time.size < 2:
         return np.inf
     return GAP_STEPS * float(np.median(np.diff(time)))
+
+
+def open_ends(time: FloatArray, span: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    """What of `span` [s] lies before the first or after the last sample, where more than a gap."""
+    limit = gap_limit(time)
+    first, last = float(time[0]), float(time[-1])
+    ends = ((span[0], min(first, span[1])), (max(last, span[0]), span[1]))
+    return tuple((low, high) for low, high in ends if high - low > limit)
 
 
 def pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
@@ -91,12 +100,25 @@ class Channel:
 
 @dataclass(frozen=True)
 class ShiftLog(Shown):
-    """All mapped channels of one recording, by role."""
+    """All mapped channels of one recording, by role.
+
+    Raises TimeError where the time of a channel reaches beyond LATEST, as stamps from 1970 do.
+    """
 
     channels: Mapping[str, Channel]
     source: str
     sha256: str
     warnings: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        for channel in self.channels.values():
+            ends = channel.time[[0, -1]] if channel.time.size else channel.time
+            if (np.abs(ends) > LATEST).any():
+                raise TimeError(
+                    f"time stamps from {ends[0]:.6g} s to {ends[1]:.6g} s, too far from zero",
+                    f"let time count from the start of the log, or lie within {LATEST:g} s",
+                    Where(file=self.source, channel=channel.source_name),
+                )
 
     def __contains__(self, role: object) -> bool:
         return role in self.channels

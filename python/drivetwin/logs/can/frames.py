@@ -9,13 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin.logs.origin import origin_of, since
 from drivetwin.logs.shiftlog import FloatArray
 
 PAYLOAD, LONGEST = 8, 64
 """Most data bytes of a classical frame, and of one of CAN FD."""
-
-_ABSOLUTE = 1e8
-"""Stamps above this [s] count from 1970 and are made relative to the first frame."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +35,6 @@ class Frames:
     warnings: tuple[str, ...] = field(default=())
 
 
-def relative(time: FloatArray) -> FloatArray:
-    """Stamps (n,) [s] from the first frame on where they count from 1970, else as they are."""
-    return time - time[0] if time.size and time[0] > _ABSOLUTE else time
-
-
 def frame_table(
     stamps: Sequence[float],
     identifiers: Sequence[int],
@@ -51,13 +44,13 @@ def frame_table(
     warnings: tuple[str, ...] = (),
 ) -> Frames:
     """Build the table from one entry for each frame; payloads have at most LONGEST bytes."""
-    time = relative(np.array(stamps, np.float64))
+    time = np.array(stamps, np.float64)
     names = tuple(dict.fromkeys(buses))
     index = {name: place for place, name in enumerate(names)}
     width = max(PAYLOAD, max(map(len, payloads), default=0))
     padded = b"".join(payload.ljust(width, b"\xff") for payload in payloads)
     return Frames(
-        time=time,
+        time=since(time, origin_of(time[:1])),
         identifier=np.array(identifiers, np.uint32),
         extended=np.array(extended, np.bool_),
         data=np.frombuffer(padded, np.uint8).reshape(-1, width),

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.logs.can.frames import PAYLOAD, Frames, relative
+from drivetwin.logs.can.frames import PAYLOAD, Frames
+from drivetwin.logs.origin import since
 
 DATA_FRAME = "CAN_DataFrame"
 """Name of the record of a data frame; its parts follow after a dot."""
@@ -24,9 +25,10 @@ def holds_frames(group: Any) -> bool:
     return any(str(channel.name).partition(".")[0] in _RECORDS for channel in group.channels)
 
 
-def bus_frames(mdf: Any) -> Frames | None:
+def bus_frames(mdf: Any, origin: float) -> Frames | None:
     """Return the data frames of all groups in order of time; None where the file has none.
 
+    Their time counts from the `origin` of the file [s].
     Frames whose stamp is no number are left out and counted.
     """
     parts = [
@@ -48,7 +50,7 @@ def bus_frames(mdf: Any) -> Frames | None:
         for part in parts
     ]
     return Frames(
-        time=relative(time[order]),
+        time=since(time[order], origin),
         identifier=np.concatenate([part.identifier for part in parts])[order],
         extended=np.concatenate([part.extended for part in parts])[order],
         data=np.concatenate(padded)[order],
