@@ -79,6 +79,26 @@ def test_a_gap_over_a_throttle_step_costs_precision_only(role: str, method: Meth
     assert holds(found, method) == []
 
 
+ENDS = ((-1.0, 0.5), (4.4, 9.0))
+"""Before the first and after the last sample of a channel that starts late or ends early."""
+
+
+@pytest.mark.parametrize("role", ["engine_torque", "output_torque", "wheel_speed"])
+@pytest.mark.parametrize("end", ENDS)
+def test_what_starts_late_or_ends_early_costs_precision_only(
+    role: str, end: tuple[float, float]
+) -> None:
+    found = identified(without(role, end), Method.INTEGRAL)
+    assert holds(found, Method.INTEGRAL) == []
+
+
+def test_no_window_reaches_beyond_what_was_recorded() -> None:
+    """A window that the output torque covers in part would be taken for a whole one."""
+    late = identified(without("output_torque", ENDS[0]), Method.INTEGRAL)
+    (shift,) = late.evidence["integral"]
+    assert min(shift.momentum.time) > ENDS[0][1] + 0.19
+
+
 def test_the_samples_beside_a_gap_are_not_joined() -> None:
     """Bridged, the same gap would move η by several standard deviations."""
     log = without("engine_torque", STEP)

@@ -3,13 +3,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from drivetwin.errors import PlausibilityError
-from drivetwin.logs.agreement import check_gearing, check_torque_signs, torque_balance
+from drivetwin.logs.agreement import (
+    check_gearing,
+    check_torque_signs,
+    partly_recorded,
+    torque_balance,
+)
 from drivetwin.logs.roles import quantity_of
 from drivetwin.logs.shiftlog import Channel
 from tests.logs.made import card
@@ -45,6 +51,18 @@ def test_standstill_and_absent_speeds_show_no_gearing(tmp_path: Path) -> None:
     vehicle = card(tmp_path)
     check_gearing(speeds(input_speed=70.0, output_speed=0.0), vehicle, "log.csv")
     check_gearing(speeds(input_speed=70.0), vehicle, "log.csv")
+
+
+def test_channels_that_start_late_or_end_early_are_told() -> None:
+    channels = speeds(input_speed=180.0, output_speed=100.0, wheel_speed=20.0)
+    assert partly_recorded(channels) == []
+    late = channels["output_speed"]
+    channels["output_speed"] = replace(late, time=late.time[10:], values=late.values[10:])
+    channels["wheel_speed"] = replace(late, time=late.time[:40], values=late.values[:40])
+    assert partly_recorded(channels) == [
+        f"channel 'n_output_speed': no samples from 0.000 s to {TIME[10]:.3f} s",
+        f"channel 'n_output_speed': no samples from {TIME[39]:.3f} s to 0.500 s",
+    ]
 
 
 def powered(ratio: float, share: float) -> dict[str, Channel]:

@@ -255,3 +255,12 @@ def test_seconds_that_are_told_in_ms_are_refused(tmp_path: Path) -> None:
     with pytest.raises(TimeError, match="1e-05 s apart") as caught:
         read(tmp_path, units={**UNITS, "time": "ms"})
     assert 'time = { unit = "s" }' in caught.value.remedy
+
+
+def test_a_channel_that_starts_late_is_told_with_its_times(tmp_path: Path) -> None:
+    table: dict[str, list[object]] = {name: list(cells) for name, cells in columns().items()}
+    table["TrqOut"][:30] = [""] * 30
+    path = write(tmp_path, table)
+    log = read_log(path, card(tmp_path))
+    assert log["output_torque"].time[0] == 0.3
+    assert "channel 'TrqOut': no samples from 0.000 s to 0.300 s" in log.warnings

@@ -83,6 +83,26 @@ def test_gap_of_the_engine_torque_cuts_the_gear_after() -> None:
     assert cut.before == SHIFT.before
 
 
+@pytest.mark.parametrize(
+    ("role", "reach"), [("engine_torque", (YOUNGEST, OLDEST)), ("pressure.B3", (0.0, 0.0))]
+)
+def test_input_that_starts_late_or_ends_early_cuts_as_a_gap_does(
+    role: str, reach: tuple[float, float]
+) -> None:
+    late = recorded(log((-1.0, 1.0), role), SHIFT, FILLS)
+    assert late.before == pytest.approx((1.001 + reach[0], 2.0))
+    assert f"{role!r} has no samples from 0.000 s to 1.001 s: gear 2 counts" in late.warnings[0]
+    early = recorded(log((4.0, 9.0), role), SHIFT, FILLS)
+    assert early.after == pytest.approx((2.5, 3.999 - reach[1]))
+    assert early.before == SHIFT.before
+
+
+@pytest.mark.parametrize("gap", [(-1.0, 2.1), (2.4, 9.0)])
+def test_input_that_starts_or_ends_in_the_shift_refuses_it(gap: tuple[float, float]) -> None:
+    with pytest.raises(DamagedChannelError, match="during the shift"):
+        recorded(log(gap, "pressure.B3"), SHIFT, FILLS)
+
+
 @pytest.mark.parametrize("role", ["engine_torque", "pressure.B2", "pressure.B3"])
 def test_gap_in_the_shift_refuses_it(role: str) -> None:
     with pytest.raises(DamagedChannelError, match="during the shift"):

@@ -100,11 +100,7 @@ def held_gear(gear: str, ratio: float, span: Span, torque: Sampled, speed: Sampl
 
     `speed` is that of the output shaft [rad/s]. Its verdict says what the value is worth.
     """
-    both = (
-        max(span[0], float(torque.time[0]), float(speed.time[0])),
-        min(span[1], float(torque.time[-1]), float(speed.time[-1])),
-    )
-    parts = parts_between(both, (*torque.gaps, *speed.gaps))
+    parts = parts_between(span, (*torque.unrecorded, *speed.unrecorded))
     windows = join([windows_in(part, WIDTH, WIDTH / STEPS) for part in parts])
     recorded = sum(high - low for low, high in parts if high - low >= WIDTH)
     freedom = 2.0 * recorded / WIDTH - 3.0

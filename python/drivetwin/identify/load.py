@@ -114,7 +114,7 @@ def momentum_load(
     """
     wheel = signals.wheel_speed
     speed = signals.output_speed if wheel is None else wheel
-    gaps = (*speed.gaps, *signals.output_torque.gaps)
+    gaps = (*speed.unrecorded, *signals.output_torque.unrecorded)
     parts = [part for span in spans for part in parts_between(span, gaps)]
     windows = join([windows_in(part, width, width / 16.0) for part in parts])
     if not windows.count:

@@ -99,7 +99,8 @@ def hann_kernels(time: FloatArray, windows: Windows, shift: float = 0.0) -> Kern
 
     A sample stamped t is taken to show the instant t - `shift` (the age of the value). `psi` is
     the trapezoidal sum, scaled to be exact for a constant; `slope` is exact for a signal that is
-    linear between its samples, so a large constant speed leaves nothing behind. Raises
+    linear between its samples, so a large constant speed leaves nothing behind. Windows must lie
+    between the first and the last sample; scaling hides it where one does not. Raises
     IdentificationError for a window without a sample.
     """
     instants = time - shift
@@ -113,10 +114,11 @@ def hann_kernels(time: FloatArray, windows: Windows, shift: float = 0.0) -> Kern
     u = (instants[column] - windows.start[row]) / windows.width[row]
     psi = np.sin(np.pi * np.clip(u, 0.0, 1.0)) ** 2 * _sample_weights(time)[column]
     total = np.add.reduceat(psi, indptr[:-1]) if row.size else np.empty(0)
-    if not np.all(total > 0.0):
+    bare = np.flatnonzero(~(total > 0.0))
+    if bare.size:
         raise IdentificationError(
-            f"{np.count_nonzero(~(total > 0.0))} windows of {windows.width.min():.3g} s hold no "
-            "sample of a channel",
+            f"{bare.size} windows of {windows.width.min():.3g} s hold no sample of a channel, the "
+            f"first from {windows.start[bare[0]]:.3f} s on",
             "record the channels at 10 ms or faster",
         )
     psi *= (0.5 * windows.width / total)[row]

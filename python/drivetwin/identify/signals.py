@@ -30,8 +30,17 @@ class Sampled:
 
     @cached_property
     def gaps(self) -> tuple[Span, ...]:
-        """Spans [s] without a sample, across which nothing is interpolated."""
+        """Spans [s] between samples across which nothing is interpolated."""
         return pauses(self.time)
+
+    @property
+    def unrecorded(self) -> tuple[Span, ...]:
+        """All spans [s] of which nothing is known: the gaps, before the first sample and after the
+        last."""
+        if not self.time.size:
+            return ((-np.inf, np.inf),)
+        first, last = float(self.time[0]), float(self.time[-1])
+        return ((-np.inf, first), *self.gaps, (last, np.inf))
 
     def at(self, time: FloatArray) -> FloatArray:
         """Values at `time` (m,), linear between samples; NaN inside a gap."""
@@ -121,9 +130,10 @@ class ShiftSignals:
 
     @property
     def output_gaps(self) -> tuple[Span, ...]:
-        """Gaps of what is compared with the equations: output torque and the gearbox speeds."""
+        """Where something compared with the equations is unrecorded: output torque, a speed of the
+        gearbox."""
         compared = (self.output_torque, self.engine_speed, self.output_speed)
-        return tuple(gap for signal in compared for gap in signal.gaps)
+        return tuple(gap for signal in compared for gap in signal.unrecorded)
 
     @property
     def scale_known(self) -> bool:

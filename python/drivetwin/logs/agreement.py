@@ -8,8 +8,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from drivetwin.errors import PlausibilityError, TimeError, Where
-from drivetwin.logs.shiftlog import Channel
+from drivetwin.logs.held import fresh_samples
+from drivetwin.logs.roles import AUXILIARY, quantity_of
+from drivetwin.logs.shiftlog import Channel, open_ends
 from drivetwin.vehicle.spec import VehicleCard
+
+STARTS_APART = 0.05
+"""The groups of a recording start and end so far apart [s]."""
 
 STANDSTILL = 1.0
 """Median speed [rad/s] below which a log does not show the gearing."""
@@ -47,6 +52,23 @@ def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
             "set time_shift_s in the channel mapping, or export the channels on one clock",
             Where(file=file),
         )
+
+
+def partly_recorded(channels: Mapping[str, Channel]) -> list[str]:
+    """Tell which channels start later or end earlier than the log."""
+    measured = [one for role, one in channels.items() if quantity_of(role) not in AUXILIARY]
+    if not measured:
+        return []
+    whole = (
+        min(float(channel.time[0]) for channel in measured),
+        max(float(channel.time[-1]) for channel in measured),
+    )
+    return [
+        f"channel {channel.source_name!r}: no samples from {low:.3f} s to {high:.3f} s"
+        for channel in measured
+        for low, high in open_ends(fresh_samples(channel).time, whole)
+        if high - low > STARTS_APART
+    ]
 
 
 def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str) -> None:

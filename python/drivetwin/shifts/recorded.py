@@ -4,7 +4,8 @@
 A gap in the engine torque or in a pressure is no input that a model could be driven by, so the
 gears held before and after the shift are cut at it, and a shift with a gap inside is refused. A
 pressure counts only while an element may slip: one that stays above or below P0 on both sides of
-its gap, while the speeds show a held gear, decides nothing.
+its gap, while the speeds show a held gear, decides nothing. An input that starts after the gear
+before the shift, or ends before the gear after it, has a gap there.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from drivetwin.errors import DamagedChannelError, Where
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.roles import PRESSURE
-from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.logs.shiftlog import Channel, ShiftLog, open_ends
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
 
@@ -88,15 +89,18 @@ def recorded(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> Sh
 
 
 def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[_Gap]:
-    """Gaps of the inputs that matter to the shift."""
+    """Gaps of the inputs that matter to the shift, where they start late or end early too."""
     found = []
+    whole = (shift.before[0], shift.after[1])
     if "engine_torque" in log:
         torque = fresh_samples(log["engine_torque"])
-        found += [_Gap(torque, gap, (gap[0] - OLDEST, gap[1] + YOUNGEST)) for gap in torque.gaps]
+        gaps = (*torque.gaps, *open_ends(torque.time, whole))
+        found += [_Gap(torque, gap, (gap[0] - OLDEST, gap[1] + YOUNGEST)) for gap in gaps]
     for name, fill in fills.items():
         if PRESSURE + name in log:
             pressure = log.pressure(name)
-            gaps = [gap for gap in pressure.gaps if _decides(pressure, gap, shift, fill)]
+            inner = [gap for gap in pressure.gaps if _decides(pressure, gap, shift, fill)]
+            gaps = (*inner, *open_ends(pressure.time, whole))
             found += [_Gap(pressure, gap, gap) for gap in gaps]
     return found
 
