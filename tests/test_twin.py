@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.errors import InputError, MissingParameterError, ResultFileError
-from drivetwin.identify.result import Estimate, LoadLaw, Verdict
+from drivetwin.identify.result import OF_RATIO, Estimate, LoadLaw, Verdict
 from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.parameters import OVER_ETA
 from drivetwin.twin import Twin
@@ -49,9 +49,8 @@ def test_a_twin_of_the_schema_before_has_a_constant_load(twin: Twin, tmp_path: P
     assert Twin.load(path).dual_clutch(SHIFT).load == twin.dual_clutch(SHIFT).load
 
 
-def test_without_a_torque_scale_the_model_is_over_eta_and_its_motion_the_same(twin: Twin) -> None:
-    eta = twin.parameters["eta"].value
-    assert eta is not None
+def without_scale(twin: Twin, eta: float) -> Twin:
+    """What a log without an output torque tells of the twin."""
     told = dict(twin.parameters)
     for name in ("J_prime_2", "J_prime_3", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o"):
         one = told[name]
@@ -64,7 +63,14 @@ def test_without_a_torque_scale_the_model_is_over_eta_and_its_motion_the_same(tw
     )
     curve = twin.friction["B3"]
     law = {k: v if k == "v_s" else v / eta for k, v in (curve.stribeck or {}).items()}
-    partial = replace(twin, parameters=told, friction={"B3": replace(curve, stribeck=law)})
+    curve = replace(curve, stribeck=law, method=curve.method + OF_RATIO)
+    return replace(twin, parameters=told, friction={"B3": curve})
+
+
+def test_without_a_torque_scale_the_model_is_over_eta_and_its_motion_the_same(twin: Twin) -> None:
+    eta = twin.parameters["eta"].value
+    assert eta is not None
+    partial = without_scale(twin, eta)
     assert partial.over_eta
     whole, ratio = twin.dual_clutch(SHIFT), partial.dual_clutch(SHIFT)
     for name in ("J_out", "J_v", "k_o", "c_o"):
@@ -77,6 +83,57 @@ def test_without_a_torque_scale_the_model_is_over_eta_and_its_motion_the_same(tw
     assert pytest.approx(whole.J1) == scaled.J1
     law_found, law_true = scaled.elements[1].friction, whole.elements[1].friction
     assert law_found.at(np.array([30.0])) == pytest.approx(law_true.at(np.array([30.0])))
+
+
+def test_with_the_efficiency_from_design_all_of_the_model_has_one_scale(twin: Twin) -> None:
+    eta = twin.parameters["eta"].value
+    assert eta is not None
+    law = LoadLaw(aero=4.8, std=0.1, mean_speed=14.3)
+    part = without_scale(twin, eta)
+    ratios = {name: one for name, one in part.parameters.items() if name.endswith(OVER_ETA)}
+    over = replace(law, aero=law.aero / eta, over_eta=True)
+    card_eta = replace(part, parameters={**twin.parameters, **ratios}, load_law=over)
+    told_eta = replace(part, parameters={**part.parameters, "eta": twin.parameters["eta"]})
+    model = replace(twin, load_law=law).dual_clutch(SHIFT)
+    for one in (card_eta, replace(told_eta, load_law=over)):
+        found = one.dual_clutch(SHIFT)
+        assert (found.J1, found.k_o, found.eta) == pytest.approx((model.J1, model.k_o, model.eta))
+        assert found.load.constant == pytest.approx(model.load.constant)
+        assert found.load.aero == pytest.approx(model.load.aero)
+        assert found.elements[1].drum_inertia == pytest.approx(model.elements[1].drum_inertia)
+        mu, true = (each.elements[1].friction.at(np.array([30.0])) for each in (found, model))
+        assert mu == pytest.approx(true)
+        other = one.dual_clutch(SHIFT, overrides={"eta": 0.5 * eta})
+        assert other.eta == 0.5 * eta
+        assert (other.k_o, other.elements) == (found.k_o, found.elements)
+
+
+def test_a_twin_is_made_with_the_efficiency_from_design_in_friction_and_load() -> None:
+    found, eta, std = identification(), 0.85, 0.02
+    design = Estimate("eta", eta, std, Verdict.DESIGN, "card")
+    curve = replace(found.friction["B3"], stribeck_covariance=np.diag([1e-6, 1e-6, 0.5, 1e-10]))
+    curve = replace(curve, method=curve.method + OF_RATIO)
+    law = LoadLaw(aero=4.8, std=0.1, mean_speed=14.3, over_eta=True)
+    told = replace(found, estimates={**found.estimates, "eta": design}, friction={"B3": curve})
+    made = Twin.from_identification(replace(told, load=law), card())
+    one, load = made.friction["B3"], made.load_law
+    assert not one.over_eta
+    assert one.mu == pytest.approx(eta * curve.mu)
+    assert one.points_mu == pytest.approx(eta * curve.points_mu)
+    half = np.hypot(eta * (curve.mu_hi - curve.mu), 1.96 * std * curve.mu)
+    assert one.mu_hi - one.mu == pytest.approx(half, rel=1e-4)
+    assert one.mu - one.mu_lo == pytest.approx(half, rel=1e-4)
+    assert one.stribeck == pytest.approx(
+        {key: v if key == "v_s" else eta * v for key, v in STRIBECK.items()}
+    )
+    assert one.stribeck_covariance is not None
+    assert one.stribeck_covariance[0, 0] == pytest.approx(eta**2 * 1e-6 + (std * 0.11) ** 2)
+    assert one.stribeck_covariance[0, 1] == pytest.approx(std**2 * 0.11 * 0.135)
+    assert one.stribeck_covariance[2, 2] == 0.5
+    assert load is not None
+    assert (load.aero, load.std) == pytest.approx((eta * 4.8, np.hypot(eta * 0.1, std * 4.8)))
+    assert not load.over_eta
+    assert made.dual_clutch(SHIFT).elements[1].friction == Stribeck(**one.stribeck or {})
 
 
 def test_locked_ratios_are_those_of_the_gears(twin: Twin) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -140,8 +140,8 @@ class Twin(Shown):
         Only Je = J1·η + J2e is identifiable: J′ = Je + Jo′/i_g² gives it, and it is carried as
         J2e = 0, J1 = Je/η. `overrides` sets parameters by id, in place of identified ones: any of
         `model_ids`, of the two J′ one.
-        A twin that knows quantities over η only (`over_eta`) is simulated with the η of the
-        overrides, else with η = 1: the speeds are the same, all torques are then over η.
+        What is known over η only counts times the twin's own η, else times that of the overrides.
+        Without either (`over_eta`) η is 1: the speeds are the same, all torques are then over η.
         Raises MissingParameterError naming every parameter that neither source gives, and
         InputError for a gear or element the twin does not know and for an override without effect.
         """
@@ -149,7 +149,7 @@ class Twin(Shown):
         self._refuse_idle(shift, given)
         gear = self.inertia_gear(shift, given)
         inertia_id = f"J_prime_{gear}"
-        scale = given.get("eta", 1.0) if self.over_eta else 1.0
+        scale = self.value("eta", given.get("eta", 1.0))
         values = self._values((*COMMON, inertia_id), given, scale)
         J_e = values[inertia_id] - values["J_out"] / self.gear(gear).ratio ** 2
         return DualClutch(
@@ -201,9 +201,7 @@ class Twin(Shown):
     def _load(self, Tv_over_if: float, scale: float) -> RoadLoad:
         """Load at the wheel: constant, or with the part that grows with speed."""
         law = self.load_law or LoadLaw(aero=0.0, std=0.0, mean_speed=0.0)
-        if law.over_eta:
-            law = replace(law, aero=scale * law.aero)
-        return law.road_load(Tv_over_if, self.final_drive)
+        return (law.times(scale) if law.over_eta else law).road_load(Tv_over_if, self.final_drive)
 
     def gear(self, name: str) -> TwinGear:
         """Gear by its name on the card. Raises InputError where the twin has none such."""
@@ -284,7 +282,7 @@ class Twin(Shown):
     def _value(self, parameter_id: str, given: Mapping[str, float], scale: float) -> float | None:
         """Value of one parameter: given, told, or told over η and brought to `scale`."""
         value = given.get(parameter_id, self._known(parameter_id))
-        ratio = self._known(parameter_id + OVER_ETA) if self.over_eta else None
+        ratio = self._known(parameter_id + OVER_ETA)
         if value is None and ratio is not None:
             value = scale * ratio
         return None if value is None else float(value)
@@ -319,18 +317,17 @@ class Twin(Shown):
             i_out=design.i_out,
             gain=design.gain,
             P0=design.P0 if P0 is None else P0,
-            friction=friction_law(curve, scale),
+            friction=friction_law(curve.times(scale) if curve.over_eta else curve),
             peak=design.peak,
             drum_inertia=design.drum if drum is None else drum,
         )
 
 
-def friction_law(curve: FrictionCurve, scale: float = 1.0) -> Stribeck | FrictionTable:
-    """Fitted Stribeck law, or the smoothed curve continued flat to zero slip, times `scale`."""
+def friction_law(curve: FrictionCurve) -> Stribeck | FrictionTable:
+    """Fitted Stribeck law, or the smoothed curve continued flat to zero slip."""
     if curve.stribeck is not None:
-        law = Stribeck(**curve.stribeck)
-        return Stribeck(scale * law.mu_c, scale * law.mu_s, law.v_s, scale * law.mu_v)
-    slip, mu = curve.slip.tolist(), (scale * curve.mu).tolist()
+        return Stribeck(**curve.stribeck)
+    slip, mu = curve.slip.tolist(), curve.mu.tolist()
     if slip[0] > 0.0:
         slip, mu = [0.0, *slip], [mu[0], *mu]
     return FrictionTable(tuple(slip), tuple(mu))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
@@ -102,6 +102,27 @@ class FrictionCurve:
         """Whether the curve is μ/η: no output torque gave μ its scale."""
         return self.method.endswith(OF_RATIO)
 
+    def times(self, eta: float, std: float = 0.0) -> FrictionCurve:
+        """μ of a curve that is μ/η, from η and its standard deviation, which widens the band."""
+        mu, law = eta * self.mu, self.stribeck
+        ends = (self.mu_lo, self.mu_hi)
+        below, above = (np.hypot(eta * (end - self.mu), Z95 * std * self.mu) for end in ends)
+        scale = np.array([eta, eta, 1.0, eta])
+        covariance = self.stribeck_covariance
+        if law is not None and covariance is not None:
+            by_eta = np.array([law["mu_c"], law["mu_s"], 0.0, law["mu_v"]])
+            covariance = np.outer(scale, scale) * covariance + std**2 * np.outer(by_eta, by_eta)
+        return replace(
+            self,
+            mu=mu,
+            mu_lo=mu - below,
+            mu_hi=mu + above,
+            points_mu=eta * self.points_mu,
+            stribeck=law and {key: v if key == "v_s" else eta * v for key, v in law.items()},
+            method=self.method.removesuffix(OF_RATIO),
+            stribeck_covariance=covariance,
+        )
+
 
 @dataclass(frozen=True)
 class LoadLaw:
@@ -118,6 +139,11 @@ class LoadLaw:
     std: float
     mean_speed: float
     over_eta: bool = False
+
+    def times(self, eta: float, std: float = 0.0) -> LoadLaw:
+        """The law of a log without an output torque, from η and its standard deviation."""
+        spread = float(np.hypot(eta * self.std, std * self.aero))
+        return replace(self, aero=eta * self.aero, std=spread, over_eta=False)
 
     def road_load(self, Tv_over_if: float, i_f: float) -> RoadLoad:
         """The same law in the model's terms."""

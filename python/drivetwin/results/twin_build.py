@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drivetwin.identify.conclude import KNOWN
-from drivetwin.identify.result import FloatArray, Identification
-from drivetwin.identify.uncertainty import designed
+from drivetwin.identify.result import FloatArray, FrictionCurve, Identification, LoadLaw
+from drivetwin.identify.uncertainty import KNOWN, designed
 from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.results.records import FrictionRecord, LoadRecord, ParameterRecord
 from drivetwin.results.result_file import plain
@@ -39,6 +38,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
         parameters["J_out"] = designed("J_out", card.J_out.value, card.J_out.std, KNOWN)
         assumptions.append("Jo′ is the vehicle card's value")
     assumptions += _borrowed_friction(found)
+    friction, load = _absolute(found)
     ids, covariance = _covariance(found)
     loss_law: LossLaw = "dissipative" if found.loss_law == "dissipative" else "paper"
     return Twin(
@@ -55,7 +55,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
         J_prime_range=card.J_prime_range,
         J_vehicle_range=card.J_vehicle_range,
         parameters=parameters,
-        friction=found.friction,
+        friction=friction,
         validity=found.validity,
         inputs=found.inputs,
         settings=plain(found.settings),
@@ -64,7 +64,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
         covariance_ids=ids,
         covariance=covariance,
         channels=card.channels,
-        load_law=found.load,
+        load_law=load,
         converter=card.converter,
     )
 
@@ -75,6 +75,16 @@ def _element(card: VehicleCard, name: str) -> TwinElement:
     i_c, i_out = card.clutch_ratios(name)
     P0, drum = spec.P0.value, spec.drum_inertia.value
     return TwinElement(spec.kind, i_c, i_out, spec.gain, P0, spec.peak, drum)
+
+
+def _absolute(found: Identification) -> tuple[dict[str, FrictionCurve], LoadLaw | None]:
+    """Friction and load law; what is over η times η where that is known, as the parameters are."""
+    eta, load = found.estimates.get("eta"), found.load
+    if eta is None or eta.value is None:
+        return found.friction, load
+    by = (eta.value, eta.std_total or 0.0)
+    friction = {n: one.times(*by) if one.over_eta else one for n, one in found.friction.items()}
+    return friction, load.times(*by) if load is not None and load.over_eta else load
 
 
 def _borrowed_friction(found: Identification) -> list[str]:

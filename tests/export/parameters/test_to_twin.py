@@ -14,7 +14,7 @@ from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
 from drivetwin.export.parameters.of_twin import parameters_of
 from drivetwin.export.parameters.to_twin import updated
-from drivetwin.identify.result import Estimate, LoadLaw, Verdict
+from drivetwin.identify.result import OF_RATIO, Estimate, LoadLaw, Verdict
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT
 
@@ -80,6 +80,22 @@ def test_an_edited_curve_becomes_the_law() -> None:
     law = update.twin.dual_clutch(SHIFT).elements[1].friction
     assert isinstance(law, FrictionTable)
     assert (law.slip, law.mu) == (curve.axis.points, raised)
+
+
+def test_friction_over_eta_is_written_and_changed_as_such() -> None:
+    given = twin()
+    curve = given.friction["B3"]
+    given = replace(given, friction={"B3": replace(curve, method=curve.method + OF_RATIO)})
+    content = parameters_of(given)
+    numbers = {one.name: one for one in content.scalars}
+    mu_c, (curve_then,) = numbers["mu_c.B3"], content.curves
+    assert mu_c.text.endswith("over η")
+    assert not numbers["v_s.B3"].text.endswith("over η")
+    raised = replace(curve_then, values=tuple(1.1 * mu for mu in curve_then.values))
+    law = ParameterSet("t", (replace(mu_c, value=0.1),))
+    curve_only = ParameterSet("t", (), (raised,))
+    for file in (law, curve_only):
+        assert updated(given, file).twin.friction["B3"].over_eta
 
 
 def test_a_curve_and_its_law_cannot_both_change() -> None:

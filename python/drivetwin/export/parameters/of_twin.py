@@ -129,7 +129,8 @@ def _laws(twin: Twin) -> Iterator[Scalar]:
     for name, curve in twin.friction.items():
         for field, value in (curve.stribeck or {}).items():
             unit, text = LAW_FIELDS[field]
-            yield Scalar(f"{field}.{name}", value, unit, text)
+            over = ", over η" if curve.over_eta and field != "v_s" else ""
+            yield Scalar(f"{field}.{name}", value, unit, text + over)
 
 
 def _friction(twin: Twin) -> Iterator[Curve]:

@@ -12,7 +12,7 @@ from drivetwin.errors import InputError
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, parameters_of
 from drivetwin.export.parameters.spelling import dotted_name, flat_name
-from drivetwin.identify.result import Estimate, FrictionCurve, Verdict
+from drivetwin.identify.result import OF_RATIO, Estimate, FrictionCurve, Verdict
 from drivetwin.parameters import spec_of
 from drivetwin.twin import SIMULATED
 
@@ -110,7 +110,7 @@ def _with(twin: Twin, name: str, value: float) -> Twin:
 def _with_law(twin: Twin, element: str, field: str, value: float) -> Twin:
     curve = twin.friction[element]
     law = {**(curve.stribeck or {}), field: value}
-    changed = replace(curve, stribeck=law, method=METHOD, stribeck_covariance=None)
+    changed = replace(curve, stribeck=law, method=_method(curve), stribeck_covariance=None)
     return replace(twin, friction={**twin.friction, element: changed})
 
 
@@ -124,5 +124,11 @@ def _with_curve(twin: Twin, name: str, given: Curve, changed: dict[str, Scalar |
         )
     slip, mu = np.array(given.axis.points), np.array(given.values)
     nothing = np.zeros(0)
-    curve = FrictionCurve(slip, mu, mu, mu, nothing, nothing, None, METHOD)
+    method = _method(twin.friction[element])
+    curve = FrictionCurve(slip, mu, mu, mu, nothing, nothing, None, method)
     return replace(twin, friction={**twin.friction, element: curve})
+
+
+def _method(curve: FrictionCurve) -> str:
+    """Method of a changed curve: what was μ/η is changed as μ/η."""
+    return METHOD + OF_RATIO if curve.over_eta else METHOD
