@@ -9,8 +9,15 @@ import pytest
 from drivetwin.identify.integral import identify_shift
 from drivetwin.identify.result import Verdict
 from drivetwin.identify.signals import FloatArray, ShiftSignals
-from drivetwin.identify.uncertainty import correlation, judge, propagate, refused, systematic_std
-from drivetwin.vehicle.spec import SensorTolerance
+from drivetwin.identify.uncertainty import (
+    correlation,
+    judge,
+    judge_with_design,
+    propagate,
+    refused,
+    systematic_std,
+)
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.identify.synthetic import Run, Truth
 
 
@@ -44,6 +51,31 @@ def test_a_value_outside_its_bounds_is_never_given() -> None:
 
 def test_refusal_names_the_experiment() -> None:
     assert "pedal" in refused("te_delay", "integral", "no motion").reason
+
+
+DRUM = PriorValue(0.05, 0.03)
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "verdict"),
+    [
+        (0.05, 0.029, Verdict.DESIGN),
+        (0.0067, 0.022, Verdict.WEAK),
+        (0.05, 0.012, Verdict.WEAK),
+        (0.05, 0.002, Verdict.IDENTIFIED),
+    ],
+)
+def test_what_the_card_states_keeps_a_number_the_better_known_the_more_its_own(
+    value: float, std: float, verdict: Verdict
+) -> None:
+    one = judge_with_design(("drum.B3", value, std), DRUM, "likelihood with design prior")
+    assert (one.value, one.std_noise, one.verdict) == (value, std, verdict)
+    assert ("card" in one.reason) == (verdict is not Verdict.IDENTIFIED)
+
+
+def test_what_is_impossible_is_withheld_although_the_card_states_it() -> None:
+    one = judge_with_design(("drum.B3", -0.2, 0.002), DRUM, "likelihood with design prior")
+    assert one.verdict is Verdict.NOT_IDENTIFIABLE
 
 
 def test_propagation_is_exact_for_a_linear_map() -> None:

@@ -13,15 +13,18 @@ from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.known import with_known
 from drivetwin.identify.result import Z95, Estimate, FrictionCurve, LoadLaw
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
-from drivetwin.identify.uncertainty import correlation, designed, judge, refused
+from drivetwin.identify.uncertainty import (
+    KNOWN,
+    correlation,
+    designed,
+    judge,
+    judge_with_design,
+    refused,
+)
 from drivetwin.parameters import spec_of
 from drivetwin.vehicle.spec import PriorValue
 
 METHOD = "integral"
-PRIOR_SHARE = 0.8
-"""A posterior standard deviation above this share of the prior's says the prior decided."""
-KNOWN = "known from design, as the card says"
-ADDS_LITTLE = "design value of the card, to which the log adds little"
 CHI2_WARN = 1.6
 """Residual power over stated noise above which a warning is due."""
 
@@ -73,11 +76,9 @@ def conclude(
         prior = beforehand.get(name, J_out if name == "J_out" else _fill_prior(name, drivelines))
         if (instead := _impossible(name, value, prior)) is not None:
             estimates[name] = instead
-        elif prior is not None and noise >= PRIOR_SHARE * prior.std:
-            estimates[name] = (
-                designed(name, value, 0.0, KNOWN)
-                if prior.std == 0.0
-                else designed(name, value, noise, ADDS_LITTLE, systematic.get(name))
+        elif prior is not None:
+            estimates[name] = judge_with_design(
+                (name, value, noise), prior, METHOD, systematic.get(name), notes.get(name, "")
             )
         else:
             estimates[name] = judge(

@@ -12,10 +12,14 @@ from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.result import Z95, Estimate, Verdict
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.parameters import spec_of
-from drivetwin.vehicle.spec import SensorTolerance
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
 DELAY_IDENTIFIED = 0.005
 """Half width of the 95 % interval of a delay [s] below which it counts as identified."""
+PRIOR_SHARE = 0.8
+"""A posterior standard deviation above this share of the prior's says the prior decided."""
+KNOWN = "known from design, as the card says"
+ADDS_LITTLE = "design value of the card, to which the log adds little"
 
 _EXPERIMENT = {
     "eta": "step the pedal in the lower gear: engine torque must change while the gear is held",
@@ -29,7 +33,7 @@ _EXPERIMENT = {
     "zeta": "hold the pedal still for a second after a firm lock-up",
     "P0": "record a shift with a slower pressure ramp, or shifts at two torque levels",
     "mu": "record shifts whose inertia phase passes the slip asked for",
-    "drum": "state the drum inertias on the vehicle card from design",
+    "drum": "state the drum inertias on the vehicle card more narrowly, from design",
     "te_delay": "step the pedal in gear: a constant torque has no visible age",
 }
 
@@ -77,6 +81,33 @@ def judge(
         reason, verdict = "", Verdict.IDENTIFIED
     text = "; ".join(part for part in (note, reason) if part)
     return Estimate(parameter_id, value, std_noise, verdict, method, std_systematic, text)
+
+
+def judge_with_design(
+    told: tuple[str, float, float],
+    design: PriorValue,
+    method: str,
+    std_systematic: float | None = None,
+    note: str = "",
+) -> Estimate:
+    """Estimate of (id, value, standard deviation from noise) in which its own design value took
+    part, with its verdict.
+
+    The card's where the log adds little. Never withheld for its width: without the log there would
+    be the card's value, which is known less.
+    """
+    name, value, std = told
+    if design.std == 0.0:
+        return designed(name, value, 0.0, KNOWN)
+    if std >= PRIOR_SHARE * design.std:
+        return designed(name, value, std, ADDS_LITTLE, std_systematic)
+    one, spec = judge(name, value, std, method, std_systematic, note), spec_of(name)
+    if one.value is not None or not spec.lower <= value <= spec.upper:
+        return one
+    half = Z95 * float(np.hypot(std, std_systematic or 0.0))
+    wide = f"the 95 % interval is ± {half:.2g} {spec.unit}, with the card's design value in it"
+    text = "; ".join(part for part in (note, wide, experiment_for(name)) if part)
+    return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, text)
 
 
 def designed(

@@ -42,3 +42,20 @@ def test_a_design_value_that_the_log_moves_is_as_wrong_as_its_sensors() -> None:
     assert sound.std_total == pytest.approx(np.hypot(sound.std_noise, sound.std_systematic))
     assert abs(moved.value - sound.value) == pytest.approx(sound.std_systematic, rel=0.1)
     assert sound.std_systematic > 0.5 * sound.std_noise
+
+
+def test_a_drum_known_better_than_on_the_card_keeps_its_value_however_wide() -> None:
+    made = bench(know=Knowledge(J_out=0.1, drum=0.03))
+    posed, start = problem(made)
+    fit = nearest(posed, start)
+    assert fit is not None
+    name = made.driveline.oncoming.name
+    k = fit.point.names.index(f"{name}.drum")
+    values, covariance = fit.point.values.copy(), fit.covariance.copy()
+    values[k] = 0.007
+    covariance[k, :] *= 0.022 / np.sqrt(fit.covariance[k, k])
+    covariance[:, k] *= 0.022 / np.sqrt(fit.covariance[k, k])
+    known = replace(fit, mean=fit.point.moved(values), covariance=covariance)
+    told = conclude(known, [made.signals], [made.driveline], {}, {}).estimates[f"drum.{name}"]
+    assert told.value == pytest.approx(0.007)
+    assert told.verdict is Verdict.WEAK

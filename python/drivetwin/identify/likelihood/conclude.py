@@ -8,13 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.identify.conclude import (
-    ADDS_LITTLE,
-    KNOWN,
-    PRIOR_SHARE,
-    Conclusions,
-    low_gear_notes,
-)
+from drivetwin.identify.conclude import Conclusions, low_gear_notes
 from drivetwin.identify.likelihood.curves import METHOD, curves_of
 from drivetwin.identify.likelihood.derived import absolute_ids, of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
@@ -26,7 +20,14 @@ from drivetwin.identify.likelihood.tolerance import sensor_shifts
 from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
-from drivetwin.identify.uncertainty import correlation, designed, judge, refused
+from drivetwin.identify.uncertainty import (
+    KNOWN,
+    correlation,
+    designed,
+    judge,
+    judge_with_design,
+    refused,
+)
 from drivetwin.parameters import OVER_ETA, spec_of
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
@@ -73,7 +74,9 @@ def conclude(
     if not signals[0].scale_known:
         eta = drivelines[0].known.get("eta")
         estimates |= {
-            name: _without_scale(name, eta, estimates.get(name + OVER_ETA))
+            name: _without_scale(
+                name, eta, estimates.get(name + OVER_ETA), _design(name, drivelines)
+            )
             for name in absolute_ids(signals)
         }
     for one in (part.structure for part in fit.problem.parts):
@@ -104,16 +107,15 @@ def _estimate(
     told: tuple[str, float, float], design: PriorValue | None, systematic: float | None, note: str
 ) -> Estimate:
     """Verdict on (id, value, standard deviation from noise)."""
+    if design is not None:
+        return judge_with_design(told, design, WITH_PRIOR, systematic, note)
     name, value, std = told
-    if design is not None and (design.std == 0.0 or std >= PRIOR_SHARE * design.std):
-        if design.std == 0.0:
-            return designed(name, value, 0.0, KNOWN)
-        return designed(name, value, std, ADDS_LITTLE, systematic)
-    method = METHOD if design is None else WITH_PRIOR
-    return judge(name, value, std, method, systematic, note)
+    return judge(name, value, std, METHOD, systematic, note)
 
 
-def _without_scale(name: str, eta: PriorValue | None, ratio: Estimate | None) -> Estimate:
+def _without_scale(
+    name: str, eta: PriorValue | None, ratio: Estimate | None, design: PriorValue | None
+) -> Estimate:
     """A torque-like parameter of a log without an output torque.
 
     Told only where η is known from design: the ratio times it, the spread of η as a systematic
@@ -129,6 +131,8 @@ def _without_scale(name: str, eta: PriorValue | None, ratio: Estimate | None) ->
     value, noise = eta.value * ratio.value, eta.value * ratio.std_noise
     if ratio.verdict is Verdict.DESIGN:
         return replace(ratio, id=name, value=value, std_noise=noise, std_systematic=spread)
+    if design is not None:
+        return judge_with_design((name, value, noise), design, WITH_ETA, spread, ratio.reason)
     return judge(name, value, noise, WITH_ETA, spread, ratio.reason)
 
 
