@@ -106,7 +106,7 @@ def friction_table(friction: Mapping[str, FrictionCurve]) -> Table:
         "Friction", "element", "slip rad/s", "μ", "95 %", right=("slip rad/s", "μ", "95 %")
     )
     for name, curve in friction.items():
-        element = f"{name} (μ/η)" if curve.over_eta else name
+        element = f"{name} ({curve.symbol})" if curve.over_eta else name
         for place, index in enumerate((0, curve.slip.size // 2, curve.slip.size - 1)):
             band = (float(curve.mu_lo[index]), float(curve.mu_hi[index]))
             value, interval, _ = shown(float(curve.mu[index]), band, "1")

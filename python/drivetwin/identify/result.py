@@ -102,6 +102,11 @@ class FrictionCurve:
         """Whether the curve is μ/η: no output torque gave μ its scale."""
         return self.method.endswith(OF_RATIO)
 
+    @property
+    def symbol(self) -> str:
+        """What the curve is, in a formula."""
+        return "μ/η" if self.over_eta else "μ"
+
     def times(self, eta: float, std: float = 0.0) -> FrictionCurve:
         """μ of a curve that is μ/η, from η and its standard deviation, which widens the band."""
         mu, law = eta * self.mu, self.stribeck

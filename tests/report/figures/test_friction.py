@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.identify.result import OF_RATIO
+from drivetwin.report.figures.comparison import friction_overlay
 from drivetwin.report.figures.friction import friction_figure
 from tests.report.sample import friction
 
@@ -29,3 +31,12 @@ def test_curve_without_interval_or_law_is_still_drawn() -> None:
     assert [trace.name for trace in figure.data] == ["points from the log", "curve of B3"]
     low, high = figure.layout.yaxis.range
     assert low < bare.mu.min() < bare.mu.max() < high
+
+
+def test_a_curve_over_eta_says_so_on_its_axis() -> None:
+    told = friction()
+    ratio = replace(told, method=told.method + OF_RATIO)
+    titles = [friction_figure("B3", one).layout.yaxis.title.text for one in (told, ratio)]
+    assert titles == ["friction coefficient μ [–]", "friction coefficient μ/η [–]"]
+    overlay = friction_overlay("B3", {"a": told, "b": ratio}, ["a", "b"])
+    assert [one.name for one in overlay.data if one.name] == ["a", "b (μ/η)"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin.identify.result import Verdict
+from drivetwin.identify.result import SignalFit, Verdict
 from drivetwin.report.figures.parameters import interval_figure
-from drivetwin.report.sections.blocks import Tone
+from drivetwin.report.sections.blocks import TilesBlock, Tone
 from drivetwin.report.sections.trust import fit_table, parameter_table, trust_section
 from drivetwin.report.units import RPM, significant
 from drivetwin.validate import with_fit
@@ -97,3 +97,20 @@ def test_the_question_is_answered_with_what_stands_against_it() -> None:
     assert trust_section(clean).intro.startswith("Yes, within the range that the log covered.")
     unseen = replace(clean, fit={})
     assert "could not be simulated" in trust_section(unseen).intro
+
+
+def test_a_phase_that_the_simulation_misses_stands_against_a_good_fit_of_the_whole() -> None:
+    found = with_fit(identification(), [validation()])
+    whole = SignalFit(rmse=1.0, fit_percent=92.7)
+    missed = {"all": whole, "before": whole, "inertia": SignalFit(3.7, 60.1)}
+    still = {"all": whole, "before": SignalFit(1.1, 55.0), "inertia": whole}
+    told = replace(found, fit={"input_speed": missed, "output_speed": still}, warnings=())
+    section = trust_section(told)
+    first = section.blocks[0]
+    assert isinstance(first, TilesBlock)
+    tiles = {tile.label: tile for tile in first.tiles}
+    assert tiles["fit of input speed"].tone is Tone.DOUBTFUL
+    assert tiles["fit of input speed"].note.endswith("; 3 inertia phase: 60.1 %")
+    assert tiles["fit of output speed"].tone is Tone.GOOD
+    assert "leaves too much of an output" in section.intro
+    assert "too much" not in trust_section(replace(told, fit={"output_speed": still})).intro

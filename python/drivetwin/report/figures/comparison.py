@@ -92,7 +92,7 @@ def friction_overlay(
             x=curve.slip,
             y=curve.mu,
             mode="lines",
-            name=name,
+            name=f"{name} ({curve.symbol})" if curve.over_eta else name,
             legendgroup=name,
             line={"color": style.colour, "width": 2.0, "dash": style.dash},
         )

@@ -50,7 +50,7 @@ def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
         layout(
             420,
             xaxis=axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
-            yaxis=axis("friction coefficient μ [–]", range=_mu_range(curve)),
+            yaxis=axis(f"friction coefficient {curve.symbol} [–]", range=_mu_range(curve)),
             hovermode="x",
         )
     )

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.identify.result import Identification
+from drivetwin.identify.result import FrictionCurve, Identification
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.figures.friction import friction_figure
 from drivetwin.report.figures.recording import log_figure, log_panels
@@ -28,6 +28,17 @@ PHASE_KEY = (
     "1 gear held before the shift · 2 torque phase: the on-coming element takes over torque, the "
     "output torque dips · 3 inertia phase: the input speed falls to the new gear · 4 new gear "
     "locked, lock-up oscillation."
+)
+
+OF_TORQUE = (
+    "The clutch torque follows from the output torque (eq. 16, with the output side's inertia), "
+    "the slip from both speeds (eq. 15); μ = T_c / (N·D·A·r·(P − P0))."
+)
+OF_SPEEDS = (
+    "The log has no output torque: the clutch torque follows from the engine torque and what it "
+    "does to the speeds, which tells it over η alone. So the curve is "
+    "μ/η = T_c/η / (N·D·A·r·(P − P0)), the slip from both speeds (eq. 15); the twin has μ where "
+    "the vehicle card states η."
 )
 
 
@@ -99,26 +110,23 @@ def friction_section(found: Identification) -> Section:
     blocks: list[Block] = []
     for element, curve in found.friction.items():
         caption = f"Friction of {element}, method: {curve.method}. "
-        blocks.append(
-            FigureBlock(friction_figure(element, curve), caption + _law_text(curve.stribeck))
-        )
+        blocks.append(FigureBlock(friction_figure(element, curve), caption + _law_text(curve)))
+    over_eta = any(curve.over_eta for curve in found.friction.values())
     return Section(
         "friction",
         "Friction of the on-coming element",
-        "The clutch torque follows from the output torque (eq. 16, with the output side's "
-        "inertia), the slip from both speeds (eq. 15); μ = T_c / (N·D·A·r·(P − P0)). Only the "
-        "product of μ and N·D·A·r can be told from a log: an error of the geometry scales the "
-        "whole curve. Points that scatter at one slip are of the torque phase, where the element "
-        "carries little.",
+        f"{OF_SPEEDS if over_eta else OF_TORQUE} Only the product of μ and N·D·A·r can be told "
+        "from a log: an error of the geometry scales the whole curve. Points that scatter at one "
+        "slip are of the torque phase, where the element carries little.",
         blocks,
     )
 
 
-def _law_text(law: dict[str, float] | None) -> str:
-    if law is None:
+def _law_text(curve: FrictionCurve) -> str:
+    if (law := curve.stribeck) is None:
         return "No Stribeck law fits within the range seen; the smoothed curve is used."
     return (
-        f"Stribeck law μ(s) = μ_c + (μ_s − μ_c)·exp(−|s|/v_s) + μ_v·|s| with "
+        f"Stribeck law {curve.symbol} = μ_c + (μ_s − μ_c)·exp(−|s|/v_s) + μ_v·|s| with "
         f"μ_c = {significant(law['mu_c'])}, μ_s = {significant(law['mu_s'])}, "
         f"v_s = {significant(law['v_s'], 3)} rad/s, μ_v = {significant(law['mu_v'], 3)} s/rad."
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.residuals import residual_tests
@@ -43,6 +44,11 @@ PHASES = {
     "inertia": "3 inertia phase",
     "after": "4 after lock-up",
 }
+
+FITS = 80.0
+"""Fit [%] from which the simulation counts as one of the signal ..."""
+UNEVEN = 1.5
+"""... in every phase too that has an error so many times that of the whole."""
 
 
 def trust_section(found: Identification) -> Section:
@@ -89,7 +95,7 @@ def _answer(found: Identification) -> str:
     against = []
     if not found.fit:
         against.append("the model could not be simulated over the log")
-    elif any(_fit_tone(fits["all"]) is not Tone.GOOD for fits in found.fit.values()):
+    elif any(_missed(fits) for fits in found.fit.values()):
         against.append("the simulation leaves too much of an output")
     if passed < tests:
         against.append("the residuals show an effect that the model lacks")
@@ -119,10 +125,14 @@ def _verdicts(found: Identification) -> Counter[Verdict]:
 def _tiles(found: Identification) -> list[Tile]:
     tiles = []
     for name, (label, display) in SIGNALS.items():
-        fit = found.fit.get(name, {}).get("all")
-        if fit is not None:
+        fits = found.fit.get(name, {})
+        if "all" in fits:
+            fit, missed = fits["all"], _missed(fits)
             note = f"rmse {significant(fit.rmse * display.factor, 3)} {display.label}"
-            tiles.append(Tile(f"fit of {label}", _percent(fit), _fit_tone(fit), note))
+            if missed not in ("", "all"):
+                note += f"; {PHASES[missed]}: {_percent(fits[missed])}"
+            tone = Tone.DOUBTFUL if missed else Tone.GOOD
+            tiles.append(Tile(f"fit of {label}", _percent(fit), tone, note))
     passed, tests = residual_score(found)
     if tests:
         tone = Tone.GOOD if passed == tests else Tone.DOUBTFUL
@@ -225,5 +235,15 @@ def _percent(fit: SignalFit) -> str:
     return f"{fit.fit_percent:.1f} %" if math.isfinite(fit.fit_percent) else "–"
 
 
-def _fit_tone(fit: SignalFit) -> Tone:
-    return Tone.GOOD if fit.fit_percent >= 80.0 else Tone.DOUBTFUL
+def _missed(fits: Mapping[str, SignalFit]) -> str:
+    """Phase of a signal that the simulation misses: "all", else the worst; empty for none.
+
+    A phase in which the signal hardly moves has a low fit although only noise is left, of which it
+    has no more than the others.
+    """
+    whole = fits["all"]
+    if not whole.fit_percent >= FITS:
+        return "all"
+    uneven = [phase for phase, one in fits.items() if one.rmse > UNEVEN * whole.rmse]
+    low = [phase for phase in uneven if fits[phase].fit_percent < FITS]
+    return min(low, key=lambda phase: fits[phase].fit_percent, default="")
