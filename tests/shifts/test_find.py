@@ -182,6 +182,46 @@ def test_oncoming_element_that_takes_hold_after_break_away() -> None:
     assert any("after break-away" in warning for warning in shift.warnings)
 
 
+def _pressure_cut(span: tuple[float, float]) -> ShiftLog:
+    """The upshift, its on-coming pressure without samples in a span [s]."""
+    log = _UP.log()
+    channel = log["pressure.B3"]
+    keep = (channel.time < span[0]) | (channel.time > span[1])
+    cut = replace(channel, time=channel.time[keep], values=channel.values[keep])
+    return replace(log, channels={**log.channels, "pressure.B3": cut})
+
+
+@pytest.mark.parametrize("span", [(-1.0, 1.4), (-1.0, 1.6), (0.3, 1.4), (1.2, 1.4)])
+def test_refused_where_the_oncoming_pressure_rises_unseen(span: tuple[float, float]) -> None:
+    """The first sample there is, or a line across a gap, tells no onset."""
+    shifts, (rejected,) = find_shifts(_pressure_cut(span), _UP.card())
+    low = span[0] - 1e-3 if span[0] > 0.0 else 0.5
+    assert shifts == ()
+    assert f"the pressure of B3 is missing from {low:.3f} s" in rejected.reason
+
+
+@pytest.mark.parametrize("span", [(-1.0, 1.3), (0.3, 1.1)])
+def test_oncoming_pressure_that_is_there_when_it_rises_tells_the_onset(
+    span: tuple[float, float],
+) -> None:
+    (shift,), _ = find_shifts(_pressure_cut(span), _UP.card())
+    assert shift.torque_phase == _only(_UP).torque_phase
+
+
+def test_refused_where_the_open_element_rests_above_P0() -> None:
+    """As an absolute pressure does that is labelled as a gauge pressure."""
+    log = _UP.log()
+    channels = {
+        role: replace(channel, values=channel.values + 1.013e5)
+        if role.startswith("pressure.")
+        else channel
+        for role, channel in log.channels.items()
+    }
+    shifts, (rejected,) = find_shifts(replace(log, channels=channels), _UP.card())
+    assert shifts == ()
+    assert "B2 holds the gear, but the pressure of B3 is never below" in rejected.reason
+
+
 def test_ratio_off_the_card_is_warned_of() -> None:
     (shift,), _ = find_shifts(_UP.log(), make_card({"2": 1.92, "3": 1.43}))
     assert any("gear 2 is 1.91, the card says 1.92" in warning for warning in shift.warnings)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.logs.shiftlog import Channel, ShiftLog, open_ends
 from drivetwin.shifts.boundaries import Boundary, break_away, lock_up
 from drivetwin.shifts.flags import flag_before
 from drivetwin.shifts.held import Run
@@ -16,7 +16,7 @@ from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds
 from drivetwin.shifts.pressures import one_clutch
 from drivetwin.shifts.settings import ShiftSettings
 from drivetwin.shifts.shift import Shift, ShiftKind
-from drivetwin.shifts.torque_onset import pressure_onset, smoothed, torque_dip_onset
+from drivetwin.shifts.torque_onset import SMOOTH, pressure_onset, smoothed, torque_dip_onset
 from drivetwin.vehicle.spec import VehicleCard
 
 _RATIO_DRIFT = 0.002
@@ -162,28 +162,13 @@ def _torque_start(
     downshift) the torque phase before it is empty and starts at break-away.
     """
     kind, (offgoing, oncoming), step = passage
-    begin, lock = phase
+    begin = phase[0]
     if one_clutch(search.log, offgoing, oncoming):
         reason = f"one clutch is {offgoing} and {oncoming} in turn: the torque phase is empty"
         return begin, (reason,)
     earliest = max(earliest, begin.time - search.settings.max_torque_phase)
-    role = f"pressure.{oncoming}"
-    if role in search.log:
-        P0 = search.card.elements[oncoming].P0
-        pressure = smoothed(search.log[role], (earliest, lock.time + _GRIP))
-        grip = pressure.values[pressure.time >= lock.time - _GRIP]
-        if not len(grip):
-            raise CandidateRefusedError(f"the pressure of {oncoming} is missing at lock-up")
-        if grip.max() < P0.value - 3.0 * P0.std - pressure.noise:
-            raise CandidateRefusedError(
-                f"pressures contradict the speeds: {oncoming} locks, but its pressure is only "
-                f"{grip.max():.4g} Pa then, below P0 = {P0.value:.4g} Pa"
-            )
-        onset = pressure_onset(pressure, (P0.value, P0.std), begin.time)
-        if onset is not None and onset.time <= begin.time:
-            return onset, ()
-        when = "never" if onset is None else f"at {onset.time:.3f} s, after break-away"
-        return begin, (f"{oncoming} exceeds P0 {when}: the torque phase is empty",)
+    if f"pressure.{oncoming}" in search.log:
+        return _pressure_start(search, (offgoing, oncoming), earliest, phase)
     if "output_torque" in search.log and kind is ShiftKind.POWER_ON_UP:
         torque = smoothed(search.log["output_torque"], (earliest, begin.time))
         dip = torque_dip_onset(torque, begin.time, step)
@@ -200,6 +185,56 @@ def _torque_start(
     sigma = float(np.hypot(begin.sigma, search.settings.unknown_torque_phase))
     reason = f"no channel tells when {oncoming} takes up torque: torque phase set empty"
     return Boundary(begin.time, sigma), (reason,)
+
+
+def _pressure_start(
+    search: Search,
+    elements: tuple[str, str],
+    earliest: float,
+    phase: tuple[Boundary, Boundary],
+) -> tuple[Boundary, tuple[str, ...]]:
+    """The same by the on-coming pressure, refused where it is missing or contradicts the speeds."""
+    offgoing, oncoming = elements
+    begin, lock = phase
+    channel, P0 = search.log.pressure(oncoming), search.card.elements[oncoming].P0
+    pressure = smoothed(channel, (earliest, lock.time + _GRIP))
+    margin = 3.0 * P0.std + pressure.noise
+    grip = pressure.values[pressure.time >= lock.time - _GRIP]
+    if not len(grip):
+        raise CandidateRefusedError(f"the pressure of {oncoming} is missing at lock-up")
+    if grip.max() < P0.value - margin:
+        raise CandidateRefusedError(
+            f"pressures contradict the speeds: {oncoming} locks, but its pressure is only "
+            f"{grip.max():.4g} Pa then, below P0 = {P0.value:.4g} Pa"
+        )
+    onset = pressure_onset(pressure, (P0.value, P0.std), begin.time)
+    if onset is not None:
+        _check_seen(channel, oncoming, (earliest, onset.time))
+    rest = pressure.values[pressure.time <= begin.time]
+    if len(rest) and rest.min() > P0.value + margin:
+        raise CandidateRefusedError(
+            f"pressures contradict the speeds: {offgoing} holds the gear, but the pressure of "
+            f"{oncoming} is never below {rest.min():.4g} Pa from {earliest:.3f} s on, above "
+            f"P0 = {P0.value:.4g} Pa; is it absolute, or in another unit?"
+        )
+    if onset is not None and onset.time <= begin.time:
+        return onset, ()
+    when = "never" if onset is None else f"at {onset.time:.3f} s, after break-away"
+    return begin, (f"{oncoming} exceeds P0 {when}: the torque phase is empty",)
+
+
+def _check_seen(pressure: Channel, oncoming: str, span: tuple[float, float]) -> None:
+    """Refuse where the rise above P0, which ends `span` [s], lies before or between samples.
+
+    Averaging moves it beside a gap.
+    """
+    onset = span[1]
+    for low, high in (*pressure.gaps, *open_ends(pressure.time, span)):
+        if low - SMOOTH < onset < high + SMOOTH:
+            raise CandidateRefusedError(
+                f"the pressure of {oncoming} is missing from {low:.3f} s to {high:.3f} s, where it "
+                "comes to exceed P0: the start of the torque phase is unknown"
+            )
 
 
 def _ratio_warnings(search: Search, *runs: Run) -> tuple[str, ...]:

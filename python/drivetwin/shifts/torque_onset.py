@@ -15,7 +15,8 @@ from drivetwin.shifts.hinge import Moving, fit_hinge
 
 FloatArray = NDArray[np.float64]
 
-_SMOOTH = 0.01
+SMOOTH = 0.01
+"""Span [s] that pressures and torque are averaged over."""
 _DIP = 0.03
 """A torque dip must be this part of the torque after it, and clear of its noise."""
 _BEGUN = 0.8
@@ -36,7 +37,7 @@ class OnsetSource(StrEnum):
 
 @dataclass(frozen=True)
 class Smoothed:
-    """A channel averaged over about 10 ms; `noise` is what is left in `values` of its noise."""
+    """A channel averaged over about SMOOTH; `noise` is what is left in `values` of its noise."""
 
     time: FloatArray
     values: FloatArray
@@ -47,7 +48,7 @@ def smoothed(channel: Channel, span: tuple[float, float]) -> Smoothed:
     """Moving average of the finite samples within `span` [s], centred, so a ramp is kept."""
     keep = np.isfinite(channel.values) & (channel.time >= span[0]) & (channel.time <= span[1])
     time, values = channel.time[keep], channel.values[keep]
-    half = round(0.5 * _SMOOTH / channel.step)
+    half = round(0.5 * SMOOTH / channel.step)
     width = 2 * half + 1
     if len(values) < width + 2:
         return Smoothed(time, values, 0.0)
