@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli.staging import staged
-from drivetwin.errors import FileFormatError, Where
+from drivetwin.errors import FileFormatError, InputError, Where
+from drivetwin.results.atomic import keeping
 
 
 def test_files_appear_together_in_a_new_folder(tmp_path: Path) -> None:
@@ -60,3 +61,40 @@ def test_an_existing_folder_keeps_its_other_files(tmp_path: Path) -> None:
     with staged(tmp_path) as beside:
         (beside / "result.json").write_text("{}")
     assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", "result.json"}
+
+
+def test_a_file_to_be_kept_keeps_the_whole_folder_as_it_was(tmp_path: Path) -> None:
+    log = tmp_path / "z.csv"
+    log.write_text("log")
+
+    def write() -> None:
+        with staged(tmp_path) as beside:
+            (beside / "a.toml").write_text("card")
+            (beside / "z.csv").write_text("synthetic")
+
+    with keeping([log]), pytest.raises(InputError) as caught:
+        write()
+    assert caught.value.where.file == str(log)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("z.csv", "log")]
+
+
+def test_a_folder_that_is_a_file_is_named_as_given(tmp_path: Path) -> None:
+    (tmp_path / "afile").touch()
+    for folder in (tmp_path / "afile", tmp_path / "afile" / "deep"):
+        with pytest.raises(NotADirectoryError) as caught, staged(folder):
+            pass
+        assert caught.value.filename == str(tmp_path / "afile")
+
+
+def test_a_refusal_of_the_system_names_the_file_where_it_was_to_stand(tmp_path: Path) -> None:
+    def write(name: str) -> None:
+        with staged(tmp_path / "out") as beside:
+            (beside / name).write_text("1")
+
+    with pytest.raises(FileNotFoundError) as absent:
+        write("absent/one.txt")
+    assert absent.value.filename == str(tmp_path / "out" / "absent" / "one.txt")
+    (tmp_path / "out" / "one.txt").mkdir(parents=True)
+    with pytest.raises(IsADirectoryError) as taken:
+        write("one.txt")
+    assert taken.value.filename == str(tmp_path / "out" / "one.txt")

@@ -17,6 +17,7 @@ from drivetwin.cli.export import export
 from drivetwin.cli.fleet import fleet
 from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
+from drivetwin.cli.inputs import keeping_inputs
 from drivetwin.cli.inspect import inspect
 from drivetwin.cli.observe import observe
 from drivetwin.cli.output import show_error
@@ -52,6 +53,9 @@ for command in (
     app.command()(command)
 app.command(name="app")(workbench)
 app.add_typer(fleet, name="fleet")
+for entry in (*app.registered_commands, *fleet.registered_commands):
+    if entry.callback is not None:
+        entry.callback = keeping_inputs(entry.callback)
 
 
 def _version(wanted: bool) -> None:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from drivetwin.errors import DrivetwinError, InputError
+from drivetwin.results.atomic import check_kept
 
 
 def refuse_alike(files: Sequence[Path], remedy: str) -> None:
@@ -29,19 +30,35 @@ def staged(folder: Path) -> Iterator[Path]:
     """Yield an empty folder to write into; its files move to `folder` when the block succeeds.
 
     When the block fails or is interrupted, `folder` is as it was: not made, nothing added or
-    replaced. An error about a file in the empty folder names it in `folder`. Raises OSError.
+    replaced. An error about a file in the empty folder names it in `folder`. Raises OSError, and
+    InputError where a file would take the place of one to be kept.
     """
     existing = next(path for path in (folder, *folder.parents) if path.exists())
-    beside = Path(tempfile.mkdtemp(dir=existing, prefix=".drivetwin-"))
+    try:
+        beside = Path(tempfile.mkdtemp(dir=existing, prefix=".drivetwin-"))
+    except OSError as error:
+        error.filename = str(existing)
+        raise
     try:
         yield beside
         folder.mkdir(parents=True, exist_ok=True)
-        for file in sorted(beside.iterdir()):
+        files = sorted(beside.iterdir())
+        for file in files:
+            check_kept(folder / file.name)
+        for file in files:
             file.replace(folder / file.name)
     except DrivetwinError as error:
-        file = Path(error.where.file or "")
-        if file.is_relative_to(beside):
-            error.where = replace(error.where, file=str(folder / file.relative_to(beside)))
+        error.where = replace(error.where, file=_told(error.where.file, beside, folder))
+        raise
+    except OSError as error:
+        error.filename = _told(error.filename, beside, folder)
         raise
     finally:
         shutil.rmtree(beside, ignore_errors=True)
+
+
+def _told(file: str | None, beside: Path, folder: Path) -> str | None:
+    """The path of a file in `beside` as it will be in `folder`; any other as it is."""
+    if file is None or not Path(file).is_relative_to(beside):
+        return file
+    return str(folder / Path(file).relative_to(beside))

@@ -1,23 +1,68 @@
 # SPDX-License-Identifier: MIT
-"""Files appear whole or not at all."""
+"""Files appear whole or not at all, and never in place of one that is to be kept."""
 
 from __future__ import annotations
 
 import os
 import platform
+import stat
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
+
+from drivetwin.errors import InputError, Where
+
+_Identity = tuple[int, int]
+"""Device and number of a file, by whatever path or link it is named."""
+
+_kept: ContextVar[frozenset[_Identity]] = ContextVar("kept", default=frozenset())
+
+
+@contextmanager
+def keeping(files: Iterable[Path]) -> Iterator[None]:
+    """Let nothing that is written in the block take the place of one of `files`.
+
+    What is no file is passed over.
+    """
+    identities = (_identity(file) for file in files)
+    token = _kept.set(frozenset(one for one in identities if one is not None))
+    try:
+        yield
+    finally:
+        _kept.reset(token)
+
+
+def check_kept(path: Path) -> None:
+    """Raise InputError where `path` is a file to be kept, also by another path or a link."""
+    if _identity(path) in _kept.get():
+        what = "this file is read by the same command and would be written over"
+        raise InputError(what, "give the result another name or folder", Where(file=str(path)))
+
+
+def _identity(path: Path) -> _Identity | None:
+    with suppress(OSError, ValueError):
+        found = path.stat()
+        if stat.S_ISREG(found.st_mode):
+            return found.st_dev, found.st_ino
+    return None
 
 
 def write_text(path: Path, text: str) -> None:
     """Write `text` (UTF-8) beside `path` and rename it into place.
 
-    A run that is stopped leaves the old file, never half of the new one. Raises OSError.
+    A run that is stopped leaves the old file, never half of the new one. Raises OSError, and
+    InputError where `path` is to be kept.
     """
     write_bytes(path, text.encode("utf-8"))
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write `data` as `write_text` does; several machines may write the same file."""
+    """Write `data` as `write_text` does; several machines may write the same file.
+
+    Raises InputError where `path` is to be kept.
+    """
+    check_kept(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f"{path.name}.{platform.node()}.{os.getpid()}.partial")
     try:

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""What a command reads, it does not write over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+from drivetwin.results.atomic import check_kept, keeping
+
+_OUTPUTS = frozenset(("output", "figure", "write_mapping", "modelica"))
+"""Parameters of commands that name what is written; files that all others name are read."""
+
+
+def keeping_inputs(command: Callable[..., None]) -> Callable[..., None]:
+    """Return the command so that it raises InputError instead of writing over what it reads."""
+
+    @wraps(command)
+    def careful(**given: Any) -> None:
+        read = (value for name, value in given.items() if name not in _OUTPUTS)
+        with keeping(path for value in read for path in _paths(value)):
+            for name in _OUTPUTS & given.keys():
+                for path in _paths(given[name]):
+                    check_kept(path)  # at once, not after the computation
+            command(**given)
+
+    return careful
+
+
+def _paths(value: object) -> Iterator[Path]:
+    """What a parameter may name of files; some take a path or the name of a built-in."""
+    for one in value if isinstance(value, list) else [value]:
+        if isinstance(one, Path | str):
+            yield Path(one)
