@@ -24,21 +24,28 @@ def test_another_shift_from_that_gear_with_steps_tells_it() -> None:
     assert low_gear_notes(both) == {}
 
 
-def _with_negative_J_out(known: PriorValue | None) -> Conclusions:
-    """The conclusions of the linear fit of a log as if it had found Jo′ below zero."""
+def _with_J_out(value: float, known: PriorValue | None) -> Conclusions:
+    """The conclusions of the linear fit of a log as if it had found Jo′ to be `value`."""
     found = stepped()
     (shift,), signals = found.evidence["integral"], found.evidence["signals"]
     values = shift.values.copy()
-    values[shift.ids.index("J_out")] = -0.2
+    values[shift.ids.index("J_out")] = value
     driveline = found.evidence["likelihood"].problem.parts[0].structure.driveline
     driveline = replace(driveline, J_out=known)
     return conclude([replace(shift, values=values)], signals, [driveline], {})
 
 
 def test_where_the_linear_fit_gives_the_impossible_the_card_stands() -> None:
-    told = _with_negative_J_out(PriorValue(0.9, 0.09)).estimates["J_out"]
+    told = _with_J_out(-0.2, PriorValue(0.9, 0.09)).estimates["J_out"]
     assert (told.value, told.std_noise, told.verdict) == (0.9, 0.09, Verdict.DESIGN)
     assert "-0.2 kg*m^2, which is impossible" in told.reason
+
+
+def test_a_value_far_off_the_cards_is_no_design_value_however_wide() -> None:
+    told = _with_J_out(29.9, PriorValue(1.35, 0.01))
+    assert told.estimates["J_out"].verdict is Verdict.WEAK
+    assert "contradicts" in told.estimates["J_out"].reason
+    assert any(text.startswith("J_out: the vehicle card says 1.35") for text in told.warnings)
 
 
 def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> None:
@@ -60,6 +67,6 @@ def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> No
 
 
 def test_what_is_impossible_and_not_on_the_card_is_refused() -> None:
-    told = _with_negative_J_out(None).estimates["J_out"]
+    told = _with_J_out(-0.2, None).estimates["J_out"]
     assert told.value is None
     assert "impossible" in told.reason

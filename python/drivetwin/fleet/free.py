@@ -12,13 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.identify.friction import P0, stribeck
+from drivetwin.identify.known import without_prior
 from drivetwin.identify.likelihood.unknowns import LAW
 from drivetwin.identify.result import FloatArray, Identification
-from drivetwin.vehicle.spec import PriorValue, VehicleCard
+from drivetwin.vehicle.spec import VehicleCard
 
 _LAW_SIZE = P0
-_LEAST = 0.02
-"""Share of the information on P0 below which nothing of it is the log's own."""
 
 
 @dataclass(frozen=True)
@@ -47,32 +46,13 @@ def free_friction(
     to_pair[0, :_LAW_SIZE] = slopes[:, 0]
     to_pair[1, P0] = 1.0
     pair = np.array([float(mu[0]), theta[P0]])
-    freed = without_prior(pair, to_pair @ covariance @ to_pair.T, card.elements[element].P0)
+    prior = card.elements[element].P0
+    freed = without_prior(pair, to_pair @ covariance @ to_pair.T, 1, prior)
     if freed is None:
         return None
     values, spread = freed
     stds = np.sqrt(np.diag(spread))
     return FreeFriction(float(values[0]), float(stds[0]), float(values[1]), float(stds[1]))
-
-
-def without_prior(
-    values: FloatArray, covariance: FloatArray, prior: PriorValue
-) -> tuple[FloatArray, FloatArray] | None:
-    """Values (p,) and covariance (p, p) with the Gaussian `prior` of the last one taken out.
-
-    None where the prior is exact or what is left would be next to nothing.
-    """
-    if prior.std <= 0.0 or not np.isfinite(covariance).all() or covariance[-1, -1] <= 0.0:
-        return None
-    own = 1.0 - covariance[-1, -1] / prior.std**2
-    if own < _LEAST:
-        return None
-    information = np.linalg.inv(covariance)
-    pull = information @ values
-    information[-1, -1] -= prior.std**-2
-    pull[-1] -= prior.value * prior.std**-2
-    freed = np.linalg.inv(information)
-    return freed @ pull, freed
 
 
 def _posterior(found: Identification, element: str) -> tuple[FloatArray, FloatArray] | None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.identify.combine import combine
+from drivetwin.identify.design import contradictions, held_against
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.known import with_known
 from drivetwin.identify.result import Z95, Estimate, FrictionCurve, LoadLaw
@@ -65,25 +66,20 @@ def conclude(
     `systematic` holds standard deviations from sensor tolerances by parameter id; empty where the
     card states none.
     """
-    J_out = drivelines[0].J_out
     ids, values, covariance = combine(shifts)
     beforehand = drivelines[0].known
     values, covariance, doubts = with_known(ids, values, covariance, beforehand)
     std = np.sqrt(np.diag(covariance))
     notes = low_gear_notes(signals)
-    estimates = {}
-    for name, value, noise in zip(ids, values.tolist(), std.tolist(), strict=True):
-        prior = beforehand.get(name, J_out if name == "J_out" else _fill_prior(name, drivelines))
-        if (instead := _impossible(name, value, prior)) is not None:
-            estimates[name] = instead
-        elif prior is not None:
-            estimates[name] = judge_with_design(
-                (name, value, noise), prior, METHOD, systematic.get(name), notes.get(name, "")
-            )
-        else:
-            estimates[name] = judge(
-                name, value, noise, METHOD, systematic.get(name), notes.get(name, "")
-            )
+    designs = {name: one for name in ids if (one := _design(name, drivelines)) is not None}
+    estimates = {
+        told[0]: _estimate(
+            told, designs.get(told[0]), systematic.get(told[0]), notes.get(told[0], "")
+        )
+        for told in zip(ids, values.tolist(), std.tolist(), strict=True)
+    }
+    against = contradictions(ids, values, covariance, designs, systematic)
+    estimates = held_against(estimates, against, METHOD)
     estimates |= _card_values(estimates, drivelines)
     estimates |= _refusals(shifts, signals, estimates)
     return Conclusions(
@@ -91,8 +87,20 @@ def conclude(
         _curves(shifts),
         ids,
         correlation(covariance),
-        (*doubts, *_warnings(shifts, signals, notes)),
+        (*doubts, *(one.text for one in against), *_warnings(shifts, signals, notes)),
     )
+
+
+def _estimate(
+    told: tuple[str, float, float], design: PriorValue | None, systematic: float | None, note: str
+) -> Estimate:
+    """Verdict on (id, value, standard deviation from noise)."""
+    name, value, std = told
+    if (instead := _impossible(name, value, design)) is not None:
+        return instead
+    if design is not None:
+        return judge_with_design(told, design, METHOD, systematic, note)
+    return judge(name, value, std, METHOD, systematic, note)
 
 
 def _impossible(name: str, value: float, prior: PriorValue | None) -> Estimate | None:
@@ -124,11 +132,14 @@ def low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
     return notes
 
 
-def _fill_prior(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
-    """Design P0 behind an id `P0.<element>`; None for other ids."""
-    if not name.startswith("P0."):
-        return None
-    return drivelines[0].couplings[name.removeprefix("P0.")].P0
+def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
+    """What is known beforehand of a parameter itself, where anything is."""
+    first = drivelines[0]
+    if name in first.known:
+        return first.known[name]
+    if name.startswith("P0."):
+        return first.couplings[name.removeprefix("P0.")].P0
+    return first.J_out if name == "J_out" else None
 
 
 def _card_values(

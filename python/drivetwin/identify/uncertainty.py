@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -125,6 +126,13 @@ def refused(parameter_id: str, method: str, why: str) -> Estimate:
     """A parameter that the log cannot tell, with the reason and the experiment that would."""
     reason = f"{why}; {experiment_for(parameter_id)}"
     return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
+
+
+def doubted(one: Estimate, why: str) -> Estimate:
+    """The estimate with what speaks against it: whatever its width, it is not identified."""
+    verdict = Verdict.WEAK if one.verdict is Verdict.IDENTIFIED else one.verdict
+    reason = "; ".join(part for part in (why, one.reason) if part)
+    return replace(one, verdict=verdict, reason=reason)
 
 
 def propagate(

@@ -13,8 +13,8 @@ from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import nearest
 from drivetwin.identify.result import Estimate, Verdict
-from drivetwin.vehicle.spec import SensorTolerance
-from tests.identify.likelihood.made import bench, problem
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance
+from tests.identify.likelihood.made import bench, fitted, problem
 
 CLOSE = Knowledge(J_out=0.02)
 """A card that knows Jo′ better than the log does."""
@@ -59,3 +59,21 @@ def test_a_drum_known_better_than_on_the_card_keeps_its_value_however_wide() -> 
     told = conclude(known, [made.signals], [made.driveline], {}, {}).estimates[f"drum.{name}"]
     assert told.value == pytest.approx(0.007)
     assert told.verdict is Verdict.WEAK
+
+
+def test_a_design_value_that_the_log_contradicts_is_told_with_what_rests_on_it() -> None:
+    made = bench()
+    truth = made.run.scenario.model.J_out
+    wrong = replace(made.driveline, J_out=PriorValue(2.0 * truth, 0.08 * truth))
+    posed, start = problem(replace(made, driveline=wrong))
+    fit = nearest(posed, start)
+    assert fit is not None
+    told = conclude(fit, [made.signals], [wrong], {}, {})
+    (text,) = [one for one in told.warnings if one.startswith("J_out: the vehicle card says")]
+    assert f"{2.0 * truth:.4g}" in text
+    assert told.estimates["J_out"].verdict is Verdict.WEAK
+    assert "without the card's J_out" in told.estimates["k_o"].reason
+    assert told.estimates["k_o"].verdict is Verdict.WEAK
+    assert told.estimates["Tv_over_if"].verdict is Verdict.IDENTIFIED
+    sound = conclude(fitted(), [made.signals], [made.driveline], {}, {})
+    assert not [one for one in sound.warnings if "the vehicle card says" in one]

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.identify.conclude import Conclusions, low_gear_notes
+from drivetwin.identify.design import contradictions, held_against
 from drivetwin.identify.likelihood.curves import METHOD, curves_of
 from drivetwin.identify.likelihood.derived import absolute_ids, of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
@@ -24,6 +25,7 @@ from drivetwin.identify.uncertainty import (
     KNOWN,
     correlation,
     designed,
+    doubted,
     judge,
     judge_with_design,
     refused,
@@ -58,19 +60,22 @@ def conclude(
     values = parameters(fit.problem, fit.mean, signals)
     matrix = slopes(fit.problem, fit.mean, np.sqrt(np.diag(fit.covariance)), signals)
     covariance = matrix @ fit.covariance @ matrix.T
-    spread = _systematic(matrix, systematic) if shifts else {}
+    spread = dict(zip(values, _systematic(matrix, systematic), strict=True)) if shifts else {}
     notes = low_gear_notes(signals)
+    designs = {n: known for n in values if (known := _design(n, drivelines)) is not None}
     estimates = {
         name: _estimate(
             (name, value, float(np.sqrt(max(variance, 0.0)))),
-            _design(name, drivelines),
-            spread.get(k),
+            designs.get(name),
+            spread.get(name),
             notes.get(name, ""),
         )
-        for k, (name, value, variance) in enumerate(
-            zip(values, values.values(), np.diag(covariance), strict=True)
-        )
+        for name, value, variance in zip(values, values.values(), np.diag(covariance), strict=True)
     }
+    against = contradictions(
+        tuple(values), np.array(list(values.values())), covariance, designs, spread
+    )
+    estimates = held_against(estimates, against, WITH_PRIOR)
     if not signals[0].scale_known:
         eta = drivelines[0].known.get("eta")
         estimates |= {
@@ -88,7 +93,11 @@ def conclude(
         curves_of(fit, linear, systematic),
         tuple(values),
         correlation(covariance),
-        (*dict.fromkeys(notes.values()), *_warnings(fit, signals)),
+        (
+            *dict.fromkeys(notes.values()),
+            *(one.text for one in against),
+            *_warnings(fit, signals),
+        ),
         _load_law(fit, systematic),
     )
 
@@ -132,8 +141,10 @@ def _without_scale(
     if ratio.verdict is Verdict.DESIGN:
         return replace(ratio, id=name, value=value, std_noise=noise, std_systematic=spread)
     if design is not None:
-        return judge_with_design((name, value, noise), design, WITH_ETA, spread, ratio.reason)
-    return judge(name, value, noise, WITH_ETA, spread, ratio.reason)
+        one = judge_with_design((name, value, noise), design, WITH_ETA, spread, ratio.reason)
+    else:
+        one = judge(name, value, noise, WITH_ETA, spread, ratio.reason)
+    return one if ratio.verdict is Verdict.IDENTIFIED else doubted(one, "")
 
 
 def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
@@ -158,9 +169,9 @@ def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
     return coupling.drum
 
 
-def _systematic(matrix: FloatArray, systematic: FloatArray) -> dict[int, float]:
+def _systematic(matrix: FloatArray, systematic: FloatArray) -> list[float]:
     variance = np.einsum("qp,pr,qr->q", matrix, systematic, matrix)
-    return {k: float(np.sqrt(max(v, 0.0))) for k, v in enumerate(variance)}
+    return [float(np.sqrt(max(v, 0.0))) for v in variance]
 
 
 def _warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str, ...]:

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""Design values of the card, held against what the log tells.
+
+A design value is one measurement more. Where the log speaks against it the estimate lies between
+the two and may be neither: that is told, and what rests on it does not count as identified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.identify.known import CONTRADICTS, without_prior
+from drivetwin.identify.result import Z95, Estimate, Verdict
+from drivetwin.identify.signals import FloatArray
+from drivetwin.identify.uncertainty import doubted
+from drivetwin.parameters import spec_of
+from drivetwin.vehicle.spec import PriorValue
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """A design value of parameter `id` that the log speaks against.
+
+    `log` is what it tells without it, `apart` the difference in standard deviations, `without` by
+    id what every parameter would be; empty where the log is too weak for that.
+    """
+
+    id: str
+    design: PriorValue
+    log: PriorValue
+    apart: float
+    without: Mapping[str, float]
+
+    @property
+    def text(self) -> str:
+        """The same in words."""
+        unit = spec_of(self.id).unit
+        return (
+            f"{self.id}: the vehicle card says {self.design.value:.4g} ± {self.design.std:.2g} "
+            f"{unit}, the log {self.log.value:.4g} ± {self.log.std:.2g} (1 sigma), "
+            f"{self.apart:.1f} standard deviations apart: correct the card, or find what the "
+            "model or a sensor lacks"
+        )
+
+
+def contradictions(
+    ids: Sequence[str],
+    values: FloatArray,
+    covariance: FloatArray,
+    designs: Mapping[str, PriorValue],
+    systematic: Mapping[str, float],
+) -> tuple[Contradiction, ...]:
+    """The `designs` by id that the estimates `values` (q,) with `covariance` (q, q) contradict.
+
+    Each takes part in the estimates; `systematic` are the standard deviations of these from the
+    sensors' tolerances. Exact design values contradict nothing here.
+    """
+    found = []
+    for name, design in designs.items():
+        k, sensors = ids.index(name), systematic.get(name, 0.0)
+        moved, spec = abs(float(values[k]) - design.value), spec_of(name)
+        if design.std == 0.0 or not spec.lower <= values[k] <= spec.upper:
+            continue
+        if moved <= design.std:  # no further off than the card allows, however sure the log is
+            continue
+        freed = without_prior(values, covariance, k, design)
+        log = PriorValue(float(values[k]), float(np.sqrt(covariance[k, k])))
+        without: dict[str, float] = {}
+        spread = float(np.hypot(design.std, sensors))
+        if freed is not None:
+            log = PriorValue(float(freed[0][k]), float(np.sqrt(freed[1][k, k])))
+            without = dict(zip(ids, freed[0].tolist(), strict=True))
+            alone = sensors * abs(log.value - design.value) / moved
+            spread = float(np.linalg.norm([design.std, log.std, alone]))
+        apart = abs(log.value - design.value) / spread
+        if apart > CONTRADICTS:
+            found.append(Contradiction(name, design, log, apart, without))
+    return tuple(found)
+
+
+def held_against(
+    estimates: Mapping[str, Estimate], found: Sequence[Contradiction], method: str
+) -> dict[str, Estimate]:
+    """The estimates, none of them identified that a contradicted design value decides.
+
+    Such are its own, by `method`, and those that would leave their interval without it.
+    """
+    told = dict(estimates)
+    for one in found:
+        told[one.id] = replace(
+            told[one.id], verdict=Verdict.WEAK, method=method, reason="the log contradicts the card"
+        )
+        for name, free in one.without.items():
+            other = told[name]
+            if name == one.id or other.value is None or other.std_total is None:
+                continue
+            if abs(free - other.value) > Z95 * other.std_total:
+                why = f"without the card's {one.id} the log gives {free:.5g} {other.unit}"
+                told[name] = doubted(other, why.removesuffix(" 1"))
+    return told

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""Design values against what the log alone tells, by normal distributions in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivetwin.identify.design import Contradiction, contradictions, held_against
+from drivetwin.identify.known import CONTRADICTS, without_prior
+from drivetwin.identify.result import Verdict
+from drivetwin.identify.signals import FloatArray
+from drivetwin.identify.uncertainty import ADDS_LITTLE, designed, judge
+from drivetwin.vehicle.spec import PriorValue
+
+IDS = ("J_out", "J_prime_2", "Tv_over_if")
+LOG = np.array([1.2, 14.3, 1800.0])
+"""What the log alone tells; J′ follows Jo′, T_v/i_f does not."""
+_ROOT = np.array([[0.12, 0.0, 0.0], [0.06, 0.01, 0.0], [0.0, 0.0, 0.3]])
+COVARIANCE = _ROOT @ _ROOT.T
+STD = float(np.sqrt(COVARIANCE[0, 0]))
+
+
+def _posterior(design: PriorValue) -> tuple[FloatArray, FloatArray]:
+    """The estimates with the card's Jo′ in them."""
+    information = np.linalg.inv(COVARIANCE)
+    pull = information @ LOG
+    information[0, 0] += design.std**-2
+    pull[0] += design.value / design.std**2
+    covariance = np.linalg.inv(information)
+    return covariance @ pull, covariance
+
+
+def _found(design: PriorValue, sensors: float = 0.0) -> tuple[Contradiction, ...]:
+    systematic = {"J_out": sensors}
+    return contradictions(IDS, *_posterior(design), {"J_out": design}, systematic)
+
+
+@pytest.mark.parametrize("std", [0.02, 0.1, 0.3])
+@pytest.mark.parametrize(("apart", "told"), [(CONTRADICTS - 0.1, False), (7.0, True)])
+def test_a_contradiction_is_the_distance_from_what_the_log_alone_tells(
+    std: float, apart: float, told: bool
+) -> None:
+    design = PriorValue(LOG[0] + apart * float(np.hypot(std, STD)), std)
+    moved = _posterior(design)[0][0] - design.value
+    found = _found(design)
+    assert bool(found) == (told and abs(moved) > std)
+    for one in found:
+        assert one.apart == pytest.approx(apart, rel=1e-6)
+        assert (one.log.value, one.log.std) == pytest.approx((LOG[0], STD), rel=1e-6)
+        assert list(one.without) == list(IDS)
+        assert list(one.without.values()) == pytest.approx(LOG, rel=1e-9)
+        assert f"{design.value:.4g}" in one.text
+        assert "1.2" in one.text
+
+
+def test_sensors_that_may_be_off_explain_as_much() -> None:
+    design = PriorValue(LOG[0] + 4.0 * float(np.hypot(0.1, STD)), 0.1)
+    assert _found(design)
+    assert not _found(design, sensors=0.1)
+
+
+def test_an_estimate_that_is_off_the_card_although_it_is_as_wide_is_told() -> None:
+    design = PriorValue(1.35, 0.135)
+    values, covariance = np.array([29.9]), np.array([[0.2**2]])
+    assert without_prior(values, covariance, 0, design) is None
+    (found,) = contradictions(("J_out",), values, covariance, {"J_out": design}, {})
+    assert found.apart == pytest.approx((29.9 - 1.35) / 0.135)
+    estimates = {"J_out": designed("J_out", 29.9, 0.2, ADDS_LITTLE)}
+    told = held_against(estimates, [found], "integral")["J_out"]
+    assert (told.verdict, told.value, told.method) == (Verdict.WEAK, 29.9, "integral")
+    assert "contradicts" in told.reason
+
+
+def test_what_rests_on_a_contradicted_value_is_not_identified() -> None:
+    design = PriorValue(2.4, 0.1)
+    values, covariance = _posterior(design)
+    estimates = {
+        name: judge(name, value, std, "likelihood")
+        for name, value, std in zip(IDS, values, np.sqrt(np.diag(covariance)), strict=True)
+    }
+    assert estimates["J_prime_2"].verdict is Verdict.IDENTIFIED
+    told = held_against(estimates, _found(design), "likelihood with design prior")
+    assert told["J_out"].verdict is told["J_prime_2"].verdict is Verdict.WEAK
+    assert "the log gives 14.3 kg*m^2" in told["J_prime_2"].reason
+    assert told["Tv_over_if"] == estimates["Tv_over_if"]
+
+
+def test_an_exact_value_and_one_that_physics_excludes_are_judged_elsewhere() -> None:
+    nothing = np.array([[1e-4]])
+    for value, std in ((1.2, 0.0), (-0.2, 0.1)):
+        design = {"J_out": PriorValue(2.4, std)}
+        assert contradictions(("J_out",), np.array([value]), nothing, design, {}) == ()
