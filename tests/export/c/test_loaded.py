@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,7 @@ from drivetwin.driveline import (
 )
 from drivetwin.errors import InputError
 from drivetwin.export.c.layout import Precision
-from drivetwin.export.c.loaded import CModel, CObserver, CRun
+from drivetwin.export.c.loaded import STATUS, CModel, CObserver, CRun
 from drivetwin.export.entries import entries_of, locked_index, start_entries
 from drivetwin.export.subject import steady_start
 from drivetwin.stepped import stepped_run
@@ -256,6 +257,156 @@ def test_one_long_step_meets_any_stiction(
     law = Stribeck(mu_c, mu_s, BRAKED_SPEED / decays, 0.0)
     left = min(at_end, 0.9 * decays) * law.v_s
     assert braked(loaded, law, normal, left) == pytest.approx(left, abs=1e-9 * BRAKED_SPEED)
+
+
+class Steps:
+    """A loaded model step by step, inputs held, so that parameters may change on the way."""
+
+    def __init__(self, loaded: CModel, model: DualClutch, start: State, row: FloatArray) -> None:
+        set_model(loaded, model, start)
+        self.loaded = loaded
+        self.state, self.outputs = loaded.layout.state(), loaded.layout.outputs()
+        self.inputs = loaded.inputs(row)
+        memory = (self.state, loaded.params, loaded.start, self.inputs, self.outputs)
+        assert loaded.library.dt_begin(*map(ctypes.byref, memory)) == 0
+
+    def step(self, h: float = 1e-3) -> str:
+        """One step of `h` [s]; returns its status."""
+        memory = (self.state, self.loaded.params, self.inputs, self.inputs)
+        outputs = ctypes.byref(self.outputs)
+        return STATUS[self.loaded.library.dt_step(*map(ctypes.byref, memory), h, outputs)]
+
+    def row(self) -> list[float]:
+        """Speeds, twist and torques now."""
+        y = self.outputs
+        speeds = [y.engine_speed, y.output_speed, y.wheel_speed, y.twist]
+        return [*speeds, y.output_torque, *y.clutch_torque]
+
+    def resumed(self, model: DualClutch) -> State:
+        """A start of `model` from here; what is locked and has no slip by it stays locked."""
+        y = self.outputs
+        speeds = (y.engine_speed, y.output_speed, y.wheel_speed, y.twist)
+        held = (
+            element.name
+            for element, mode in zip(model.elements, y.mode, strict=True)
+            if mode == STUCK
+            and abs(speeds[0] / (model.i_in * element.i_c) - element.i_out * speeds[1]) < 1e-9
+        )
+        return State(*speeds, tuple(held))
+
+
+STUCK = 1
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=100, deadline=None)
+def test_other_parameters_go_on_as_the_core_starts_with_them(loaded: CModel, seed: int) -> None:
+    """Any two drivelines, one after the other in one run, and the core from where they change."""
+    rng = np.random.default_rng(seed)
+    model, start, _, inputs = random_case(seed)
+    other = mixed(model, random_case(int(rng.integers(2**32)))[0], rng)
+    row = inputs[int(rng.integers(len(inputs)))]
+    run = Steps(loaded, model, start, row)
+    before = [run.step() for _ in range(40)][-1]
+    if before == "engine stalled":
+        return
+    assert_goes_on_as_the_core(run, other, row)
+
+
+def assert_goes_on_as_the_core(run: Steps, other: DualClutch, row: FloatArray) -> None:
+    """With the parameters of `other` for 40 ms."""
+    at_change = run.resumed(other)
+    set_model(run.loaded, other, at_change)
+    told = [(run.step(), run.row()) for _ in range(40)]
+    time = np.linspace(0.0, 0.04, 41)
+    core = stepped_run(other, at_change, time, np.tile(row, (41, 1)), InputKind.HOLD)
+    signals = (core.engine_speed, core.output_speed, core.wheel_speed, core.twist)
+    torques = (core.shaft_torque, *core.clutch_torque.values())
+    expected = np.column_stack((*signals, *torques))[1:]
+    seen = np.array([values for status, values in told if status == "completed"])
+    assert seen.shape == expected.shape or told[-1][0] == "engine stalled"
+    scale = np.abs(expected).max(axis=0) + 1e-3
+    assert np.all(np.abs(seen - expected[: len(seen)]) < 1e-7 * scale)
+
+
+def test_drag_set_after_the_wheel_has_turned_round_opposes_its_motion(loaded: CModel) -> None:
+    model, row = replace(paper_model(), load=RoadLoad(-1e5)), np.zeros(3)
+    run = Steps(loaded, model, State(100.0, 0.0, -0.05, 0.0), row)
+    while run.outputs.wheel_speed < 0.5:
+        assert run.step(1e-2) == "completed"
+    assert_goes_on_as_the_core(run, replace(model, load=RoadLoad(-1e5, 0.0, 1e4)), row)
+
+
+def mixed(model: DualClutch, other: DualClutch, rng: np.random.Generator) -> DualClutch:
+    """Some parameters of another driveline, and pressures at which the elements just carry."""
+    pairs = zip(model.elements, other.elements, strict=True)
+    elements = tuple(
+        replace(
+            mine if rng.random() < 0.7 else theirs,
+            friction=theirs.friction if rng.random() < 0.3 else mine.friction,
+            gain=mine.gain * float(rng.choice([0.0, 0.05, 1.0, 1.0])),
+            P0=float(rng.choice([0.0, mine.P0, mine.P0, 4e5])),
+        )
+        for mine, theirs in pairs
+    )
+    load = other.load if rng.random() < 0.3 else model.load
+    eta = float(rng.choice([model.eta, 0.95]))
+    law = other.loss_law if rng.random() < 0.3 else model.loss_law
+    return replace(model, elements=elements, load=load, eta=eta, loss_law=law)
+
+
+def pressed_for(loaded: CModel, locked: tuple[str, ...] = ()) -> Steps:
+    """The paper's driveline in motion with one element pressed: B2 if it is locked, else B3."""
+    model = paper_model()
+    start = replace(steady_start(model, "B2", 178.0), locked=locked)
+    row = np.array([1500.0, 6e5, 0.0] if locked else [1500.0, 0.0, 3e5])
+    run = Steps(loaded, model, start, row)
+    for _ in range(3):
+        assert run.step(1e-2) == "completed"
+    return run
+
+
+@pytest.mark.parametrize("other", [{"P0": 4e5}, {"gain": 0.0}])
+def test_a_slipping_clutch_whose_capacity_is_taken_away_opens(
+    loaded: CModel, other: dict[str, float]
+) -> None:
+    run = pressed_for(loaded)
+    assert run.outputs.clutch_torque[1] > 500.0
+    carrying = [run.outputs.clutch_torque[1]]
+    clutch = loaded.params.clutch[1]
+    given_before = {name: getattr(clutch, name) for name in other}
+    for values in (other, given_before):
+        for name, value in values.items():
+            setattr(clutch, name, value)
+        assert run.step(1e-2) == "completed"
+        carrying.append(run.outputs.clutch_torque[1])
+    assert carrying[1] == 0.0
+    assert carrying[2] == pytest.approx(carrying[0], rel=0.05)
+
+
+def test_a_locked_clutch_that_other_parameters_overload_or_part_slips_at_once(
+    loaded: CModel,
+) -> None:
+    run = pressed_for(loaded, ("B2",))
+    assert run.outputs.mode[0] == STUCK
+    loaded.params.clutch[0].gain *= 0.1
+    assert run.step() == "completed"
+    assert run.outputs.mode[0] != STUCK
+    run = pressed_for(loaded, ("B2",))
+    loaded.params.clutch[0].i_c = 1.0
+    assert run.step() == "completed"
+    y, clutch = run.outputs, loaded.params.clutch[0]
+    assert y.mode[0] != STUCK
+    assert y.slip[0] == pytest.approx(y.engine_speed - clutch.i_out * y.output_speed, rel=1e-9)
+    assert y.slip[0] < -1.0
+
+
+def test_parameters_out_of_range_are_refused_between_steps_too(loaded: CModel) -> None:
+    run = pressed_for(loaded)
+    loaded.params.clutch[0].friction.points = 1000
+    before = bytes(run.state)
+    assert run.step() == "bad parameter"
+    assert bytes(run.state) == before
 
 
 def test_what_is_out_of_range_is_refused_by_name(loaded: CModel) -> None:

@@ -35,7 +35,7 @@ pytestmark = pytest.mark.skipif(
     native_platform() is None, reason="FMI names no platform like this one"
 )
 INPUTS = [FIRST_INPUT, FIRST_INPUT + 1, FIRST_INPUT + 2]
-SPEED, TORQUE = OUTPUTS, OUTPUTS + 4
+SPEED, TORQUE, ONCOMING_TORQUE = OUTPUTS, OUTPUTS + 4, OUTPUTS + 6
 START_SPEED, STIFFNESS = START, PARAMETERS + 7
 
 
@@ -243,6 +243,23 @@ def test_parameters_are_tuned_while_it_runs(built: Built, instance: Instance) ->
     assert instance.get(STIFFNESS) == [2.0 * case.subject.model.k_o]
     after = instance.run(case, 100, 101)[-1, 1]
     assert after > 1.5 * before
+
+
+def test_a_clutch_opens_where_its_touch_point_is_tuned_above_its_pressure(
+    built: Built, instance: Instance
+) -> None:
+    names = [one.name for one in entries_of(built.case.subject.model)]
+    touch_point = PARAMETERS + names.index("B3.P0")
+    instance.initialize(np.array([1500.0, 0.0, 3e5]))
+    instance.fmu.doStep(0.0, 0.01)
+    (carried,) = instance.get(ONCOMING_TORQUE)
+    assert carried > 500.0
+    instance.set([touch_point], [4e5])
+    instance.fmu.doStep(0.01, 0.01)
+    assert instance.get(ONCOMING_TORQUE) == [0.0]
+    instance.set([touch_point], [8e4])
+    instance.fmu.doStep(0.02, 0.01)
+    assert instance.get(ONCOMING_TORQUE) == pytest.approx([carried], rel=0.05)
 
 
 @pytest.mark.parametrize(

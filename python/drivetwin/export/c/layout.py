@@ -51,6 +51,7 @@ def layout_of(precision: Precision) -> Layout:
             power_backward=integer,
             wheel_backward=integer,
             inputs=inputs,
+            params=ctypes.c_uint64,
         ),
         outputs=_structure(
             "Outputs",

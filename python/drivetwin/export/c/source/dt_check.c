@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The ranges of the parameters. */
+/* The ranges of the parameters, and what tells one set of them from another. */
 
 #include "dt_internal.h"
 
@@ -69,4 +69,37 @@ const char *dt_check(const dt_params *p) {
         fault = dt_abs(first - second) > DT_C(1e-3) * dt_abs(first) ? 0 : "i_c * i_out";
     }
     return fault;
+}
+
+/* FNV-1a by whole numbers, with the upper half of each product folded into the lower. */
+static uint64_t marked(uint64_t mark, const dt_real *values, int count) {
+    for (int i = 0; i < count; ++i) {
+        const union {
+            dt_real value;
+            dt_bits bits;
+        } of = {values[i]};
+        mark = (mark ^ of.bits) * 0x100000001b3U;
+        mark ^= mark >> 32;
+    }
+    return mark;
+}
+
+uint64_t dt_mark(const dt_params *p) {
+    const dt_real own[] = {p->J1,  p->J2e, p->eta,           p->i_in,         p->J_out,
+                           p->i_f, p->J_v, p->k_o,           p->c_o,          p->load_constant,
+                           p->load_rolling, p->load_aero, DT_C(p->loss_law)};
+    uint64_t mark = marked(0xcbf29ce484222325U, own, (int)(sizeof own / sizeof own[0]));
+    for (int j = 0; j < DT_CLUTCHES; ++j) {
+        const dt_clutch *clutch = &p->clutch[j];
+        const dt_friction *law = &clutch->friction;
+        const int points = law->points < DT_POINTS ? law->points : DT_POINTS;
+        const dt_real each[] = {clutch->i_c,          clutch->i_out, clutch->gain,
+                                clutch->P0,           clutch->peak,  clutch->drum_inertia,
+                                DT_C(law->points),    law->mu_c,     law->mu_s,
+                                law->v_s,             law->mu_v};
+        mark = marked(mark, each, (int)(sizeof each / sizeof each[0]));
+        mark = marked(mark, law->slip, points);
+        mark = marked(mark, law->mu, points);
+    }
+    return mark;
 }

@@ -16,12 +16,12 @@ typedef struct {
     int sign;
 } fault;
 
-static int at_rest(const dt_mechanism *m, const dt_real *x, int row) {
+int dt_at_rest(const dt_mechanism *m, const dt_real *x, int row, dt_real round_off) {
     dt_real scale = DT_C(1);
     for (int i = 0; i < 3; ++i) {
         scale = dt_larger(scale, dt_abs(m->row[row][i] * x[i]));
     }
-    return dt_abs(dt_slip(m, row, x)) <= DT_REST * scale;
+    return dt_abs(dt_slip(m, row, x)) <= round_off * scale;
 }
 
 /* Impulse-like change of the speeds that moves row j by -`slip`, scaled by 1 / `w`. */
@@ -169,7 +169,8 @@ dt_status dt_decide(dt_state *s, const dt_params *p, dt_expansion *e, dt_event o
     }
     look_ahead(&trial, &m, p, e, remaining);
     for (int j = 0; j < DT_ROWS; ++j) {
-        candidate[j] = s->mode[j] == DT_STUCK || (s->mode[j] != DT_OPEN && at_rest(&m, s->x, j));
+        candidate[j] = s->mode[j] == DT_STUCK ||
+                       (s->mode[j] != DT_OPEN && dt_at_rest(&m, s->x, j, DT_REST));
         if (candidate[j]) {
             trial.mode[j] = DT_STUCK;
         }

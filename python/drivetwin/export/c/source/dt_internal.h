@@ -92,6 +92,10 @@ int dt_first_fall(const dt_real *c, int order, dt_real h, dt_real *at);
 dt_event dt_earliest(const dt_expansion *e, const dt_mechanism *m, const dt_params *p,
                      const dt_state *s, dt_real h);
 
+/** What tells one set of parameters from another. */
+uint64_t dt_mark(const dt_params *p);
+/** Whether the slip of a row is zero within `round_off` of the speeds behind it. */
+int dt_at_rest(const dt_mechanism *m, const dt_real *x, int row, dt_real round_off);
 /** Remove the round-off slip of all rows at rest and of row `more` (-1: none). */
 void dt_bring_to_rest(dt_state *s, const dt_mechanism *m, int more);
 /** Give a row a normal load or take it away. */

@@ -88,7 +88,8 @@ typedef struct {
     dt_friction friction;
 } dt_clutch;
 
-/** Parameters; may change between steps. */
+/** Parameters; may change between steps: what slips, holds or is open is then decided anew, from
+ *  speeds and twist alone, as at a start. */
 typedef struct {
     dt_real J1;            /**< inertia before the input gear, kg m^2, >= 0 */
     dt_real J2e;           /**< inertia from input gear to clutches, at the engine, kg m^2, >= 0 */
@@ -122,6 +123,7 @@ typedef struct {
     int power_backward;         /**< whether power flows to the engine */
     int wheel_backward;         /**< whether the wheel turns backward */
     dt_inputs inputs;           /**< at the end of the last step */
+    uint64_t params;            /**< dt_mark of its parameters */
 } dt_state;
 
 /** Outputs at the end of a step. */
@@ -155,7 +157,8 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
 
 /** Advance by `h` [s] with inputs linear from `from` to `to` (the same twice: held).
  *
- *  Locks and break-aways are located inside the step to round-off. Inputs may jump between steps.
+ *  Locks and break-aways are located inside the step to round-off. Inputs may jump between steps,
+ *  and so may parameters, whose ranges are checked again.
  *  Where the result is not DT_OK the state is that of the instant the run ended, and the outputs
  *  are those of the last piece that was completed, if any. */
 dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *from,

@@ -7,10 +7,12 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 
 #ifdef DT_FLOAT
 
 typedef float dt_real;
+typedef uint32_t dt_bits; /* as wide */
 #define DT_EPSILON FLT_EPSILON
 #define DT_TERMS 10          /* Taylor coefficients of a piece */
 #define DT_TOLERANCE 1e-7F   /* truncation error of a piece, relative to the state */
@@ -26,6 +28,7 @@ typedef float dt_real;
 #else
 
 typedef double dt_real;
+typedef uint64_t dt_bits;
 #define DT_EPSILON DBL_EPSILON
 #define DT_TERMS 15
 #define DT_TOLERANCE 1e-12

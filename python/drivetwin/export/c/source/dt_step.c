@@ -23,13 +23,13 @@ static dt_inputs rate_of(const dt_inputs *from, const dt_inputs *to, dt_real h) 
 
 static int differ(dt_real a, dt_real b) { return a < b || a > b; }
 
-/* Whether inputs or the rolling resistance are not those that the last step ended with. */
-static int has_jumped(const dt_state *s, const dt_params *p, const dt_inputs *now) {
+/* Whether inputs are not those that the last step ended with. */
+static int has_jumped(const dt_state *s, const dt_inputs *now) {
     int jumped = differ(s->inputs.engine_torque, now->engine_torque);
     for (int j = 0; j < DT_CLUTCHES; ++j) {
         jumped = jumped || differ(s->inputs.pressure[j], now->pressure[j]);
     }
-    return jumped || (p->load_rolling > DT_C(0)) != (s->mode[DT_CLUTCHES] != DT_OPEN);
+    return jumped;
 }
 
 static int inputs_are_finite(const dt_inputs *u) {
@@ -38,6 +38,19 @@ static int inputs_are_finite(const dt_inputs *u) {
         finite = finite && dt_is_finite(u->pressure[j]);
     }
     return finite;
+}
+
+/* Forget what was decided by other parameters, but for locks that are at rest by these as well. */
+static void let_go(dt_state *s, const dt_params *p) {
+    dt_mechanism m;
+    dt_mechanism_of(&m, p, 0);
+    s->power_backward = 0;
+    s->wheel_backward = s->x[DT_WHEEL] < DT_C(0);
+    for (int j = 0; j < DT_ROWS; ++j) {
+        if (s->mode[j] != DT_STUCK || !dt_at_rest(&m, s->x, j, DT_ROUND_OFF)) {
+            s->mode[j] = DT_OPEN;
+        }
+    }
 }
 
 /* Take up everything that follows the inputs anew at this instant. */
@@ -132,7 +145,7 @@ static void fill_outputs(dt_outputs *out, const dt_state *s, const dt_params *p,
 
 dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *start,
                    const dt_inputs *inputs, dt_outputs *outputs) {
-    const dt_state blank = {{0}, {0}, {DT_OPEN}, {0}, {0}, 0, 0, {0, {0}}};
+    const dt_state blank = {{0}, {0}, {DT_OPEN}, {0}, {0}, 0, 0, {0, {0}}, 0};
     const dt_inputs still = {0, {0}};
     dt_expansion e;
     dt_mechanism m;
@@ -151,8 +164,9 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
     if (!sound) {
         return DT_BAD_STATE;
     }
-    state->wheel_backward = start->wheel_speed < DT_C(0);
+    let_go(state, params);
     state->inputs = *inputs;
+    state->params = dt_mark(params);
     dt_mechanism_of(&m, params, 0);
     dt_bring_to_rest(state, &m, start->locked - 1);
     dt_set_inputs(&e, params, inputs, &still);
@@ -174,12 +188,20 @@ dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *fro
         return DT_BAD_STATE;
     }
     const dt_inputs rate = rate_of(from, to, h);
-    const int jumped = has_jumped(state, params, from);
+    const uint64_t mark = dt_mark(params);
+    const int changed = mark != state->params;
+    const int jumped = changed || has_jumped(state, from);
+    if (changed && dt_check(params) != 0) {
+        return DT_BAD_PARAMETER;
+    }
     dt_event event = {DT_NOTHING, 0, 0, DT_C(0)};
     dt_real t = DT_C(0);
     dt_expansion e;
     dt_mechanism m;
     dt_status status = DT_OK;
+    if (changed) {
+        let_go(state, params);
+    }
     for (int n = 1; n <= DT_PIECES && status == DT_OK; ++n) {
         const dt_inputs at = between(from, &rate, t);
         const dt_real remaining = h - t;
@@ -189,6 +211,7 @@ dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *fro
         if (status != DT_OK) {
             return status;
         }
+        state->params = mark;
         dt_set_inputs(&e, params, &at, &rate); /* a decision looks ahead and moves them on */
         dt_mechanism_of(&m, params, state->power_backward);
         const dt_real length = dt_expand(&e, &m, params, state, remaining);
