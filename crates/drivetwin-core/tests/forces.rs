@@ -10,8 +10,9 @@ use drivetwin_core::model::Driveline;
 use drivetwin_core::model::FrictionLaw;
 use drivetwin_core::model::FrictionTable;
 use drivetwin_core::model::Stribeck;
+use drivetwin_core::model::converter_map::ConverterMap;
 use drivetwin_core::model::elements::{
-    Clutch, Element, EngineMap, Gear, GearLoss, Inertia, Planetary, Torque,
+    Clutch, Element, EngineMap, Gear, GearLoss, Inertia, Planetary, Torque, TorqueConverter,
 };
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::torque_map::TorqueMap;
@@ -305,6 +306,56 @@ fn members_of_next_to_no_mass_are_told_from_rigid_ones_whatever_the_numbers() {
                 let run = simulate(&network, &inputs, &start, &grid(1.0, 5), &outputs);
                 assert_eq!(run.status, Status::Completed);
                 assert!((run.columns[0][4] - run.columns[1][4]).abs() < 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_converter_with_a_pump_that_turns_backwards_mirrors_itself() {
+    let map = ConverterMap {
+        speed_ratio: vec![0.0, 1.0, 2.0],
+        capacity: vec![0.03, 0.0, -0.01],
+        torque_ratio: vec![2.0, 1.0, 1.0],
+    };
+    let network = compile(vec![
+        inertia("pump", 1.0),
+        inertia("turbine", 1.0),
+        Element::TorqueConverter(TorqueConverter {
+            name: "converter".into(),
+            pump: "pump".into(),
+            turbine: "turbine".into(),
+            map: map.clone(),
+            number: PhantomData,
+        }),
+        torque("pump", "T"),
+    ]);
+    let outputs = [speed("pump"), speed("turbine")];
+    let moved = |torque: f64, from: [f64; 2]| {
+        let start = start(&[("pump", from[0]), ("turbine", from[1])], &[]);
+        simulate(&network, &[constant("T", torque, 3.0)], &start, &grid(3.0, 31), &outputs).columns
+    };
+    let rates = |torque: f64, [p, t]: [f64; 2]| {
+        let cell = map.cell(map.cell_index(t / p));
+        let [c, m] = [cell.c, cell.m].map(|[constant, slope]| constant + slope * t / p);
+        let taken = c * p * p.abs();
+        [torque - taken, m * taken]
+    };
+    // Through zero and on, driving and driven.
+    for (torque, from) in [(-20.0, [10.0, 5.0]), (-20.0, [10.0, -5.0]), (-5.0, [1.0, 12.0])] {
+        let (forth, back) = (moved(torque, from), moved(-torque, from.map(|v| -v)));
+        assert!(forth[0][30] < -1.0, "the pump turns backwards in the end");
+        let (mut x, h) = (from, 1e-4);
+        for point in 1..31 {
+            for _ in 0..1000 {
+                let middle = |x: [f64; 2], k: [f64; 2], h: f64| [x[0] + h * k[0], x[1] + h * k[1]];
+                let first = rates(torque, x);
+                let second = rates(torque, middle(x, first, h / 2.0));
+                x = middle(x, second, h);
+            }
+            for i in 0..2 {
+                assert!((forth[i][point] - x[i]).abs() < 1e-5, "{} {}", forth[i][point], x[i]);
+                assert!((forth[i][point] + back[i][point]).abs() < 1e-12);
             }
         }
     }

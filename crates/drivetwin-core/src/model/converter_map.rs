@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Pump torque `capacity(ν) ω_p²` and turbine torque `torque_ratio(ν) capacity(ν) ω_p²` over the speed
 /// ratio ν = ω_t / ω_p, both factors linear between points and held beyond the ends. Overrun is the
-/// part of the map with ν > 1, where the capacity is negative.
+/// part of the map with ν > 1, where the capacity is negative. A pump that turns backwards takes the
+/// opposite torques.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConverterMap {

@@ -36,6 +36,8 @@ pub enum Cell {
     Converter {
         /// Cell of its map.
         index: usize,
+        /// Sign of the pump speed: turning backwards, its torques are those of a mirror.
+        sign: f64,
     },
     /// Region of a piecewise linear compliance.
     Region {
@@ -61,8 +63,10 @@ impl<T: Number> Channel<T> {
                 speed: s.decide(|s| span_index(&map.speed, s)),
             },
             Law::Converter { map, .. } => {
-                let index = |s, r| map.cell_index(if s == 0.0 && r == 0.0 { 0.0 } else { r / s });
-                Cell::Converter { index: s.decide_with(r, index) }
+                let index = |s: f64, r: f64| {
+                    map.cell_index(if s == 0.0 && r == 0.0 { 0.0 } else { r / s.abs() * sign })
+                };
+                Cell::Converter { index: s.decide_with(r, index), sign }
             }
             Law::Regions(regions) => {
                 let (s, r) = (T::lifted(s), T::lifted(r));
@@ -106,14 +110,22 @@ impl<T: Number> Channel<T> {
                 });
                 across.chain(along).collect()
             }
-            (Law::Converter { map, .. }, Cell::Converter { index }) => {
+            (Law::Converter { map, .. }, Cell::Converter { index, sign }) => {
                 let (from, to) = map.cell(index).span;
-                let ends = [(from, 1.0, -1), (to, -1.0, 1)];
-                let border = |(end, sign, step): (f64, f64, isize)| {
-                    let index = index.wrapping_add_signed(step);
-                    (weighted(r, T::of(sign), s, T::of(-sign * end)), Cell::Converter { index })
+                let ends = [(from, sign, -1), (to, -sign, 1)];
+                let border = |(end, side, step): (f64, f64, isize)| {
+                    let next = Cell::Converter { index: index.wrapping_add_signed(step), sign };
+                    (weighted(r, T::of(side), s, T::of(-side * end)), next)
                 };
-                ends.into_iter().filter(|e| e.0.is_finite()).map(border).collect()
+                let ends = ends.into_iter().filter(|e| e.0.is_finite()).map(border);
+                // Where the pump alone stops, the speed ratio goes from one infinity to the other.
+                let mirrored = match (from.is_finite(), to.is_finite()) {
+                    (true, false) => 0,
+                    (false, true) => map.speed_ratio.len(),
+                    _ => index,
+                };
+                let back = Cell::Converter { index: mirrored, sign: -sign };
+                ends.chain([(scaled(s, sign), back)]).collect()
             }
             (Law::Regions(regions), Cell::Region { index }) => {
                 let border = |&(form, next): &(TwistForm<T>, usize)| {

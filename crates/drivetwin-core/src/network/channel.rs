@@ -161,18 +161,19 @@ impl<T: Number> Channel<T> {
                 let linear = bilinear + position[k] * cell.t10 + s[k] * cell.t01;
                 if k == 0 { linear + cell.t00 } else { linear }
             }
-            (Law::Converter { map, at_turbine }, Cell::Converter { index }) => {
+            (Law::Converter { map, at_turbine }, Cell::Converter { index, sign }) => {
                 let cell = map.cell(index);
-                // torque = q0 ω_p² + q1 ω_p ω_t + q2 ω_t², with ν = ω_t / ω_p multiplied out
+                // torque = Sgn(ω_p) (q0 ω_p² + q1 ω_p ω_t + q2 ω_t²), with ν = ω_t / ω_p multiplied out
                 let ([c0, c1], [m0, m1]) = (cell.c, cell.m);
                 let q = if *at_turbine {
                     [c0 * m0, c0 * m1 + c1 * m0, c1 * m1]
                 } else {
                     [-c0, -c1, 0.0]
                 };
-                product_term(s, s, k) * q[0]
+                let sum = product_term(s, s, k) * q[0]
                     + product_term(s, r, k) * q[1]
-                    + product_term(r, r, k) * q[2]
+                    + product_term(r, r, k) * q[2];
+                sum * sign
             }
             (Law::Regions(regions), Cell::Region { index }) => {
                 let TwistForm { constant, per_twist, per_rate } = regions[index].torque;

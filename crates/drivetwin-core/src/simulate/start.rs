@@ -41,6 +41,12 @@ pub enum StartError {
         /// What would be accepted.
         known: String,
     },
+    /// A speed or twist that is no number.
+    #[error("the start of {name:?} is not finite")]
+    NotFinite {
+        /// Node or shaft.
+        name: String,
+    },
     /// Too few speeds.
     #[error("the start leaves speeds undetermined: state the speed of one of {free} as well")]
     Undetermined {
@@ -91,6 +97,10 @@ pub(super) fn state_of<T: Number>(
     let elements = network.frictions.iter().map(|f| &f.element);
     let indices = locked.iter().map(|name| find("friction element", name, elements.clone()));
     let indices = indices.collect::<Result<Vec<_>, _>>()?;
+    let infinite = |(_, v): &&(&str, T)| v.re().decide(|v| !v.is_finite());
+    if let Some((name, _)) = speeds.iter().chain(twists).find(infinite) {
+        return Err(StartError::NotFinite { name: (*name).to_owned() });
+    }
     let mut x = speeds_of(network, speeds)?;
     for (j, friction) in network.frictions.iter().enumerate().filter(|(_, f)| f.one_way) {
         let slip = form(&friction.slip, &x).re();

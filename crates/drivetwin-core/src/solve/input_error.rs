@@ -40,6 +40,12 @@ pub enum InputError {
         /// First offending sample.
         index: usize,
     },
+    /// A sine is none.
+    #[error("input {name:?}: offset, amplitude, frequency and phase of a sine must be finite")]
+    Sine {
+        /// Name of the input.
+        name: String,
+    },
     /// A prescribed speed jumps.
     #[error("input {name:?} prescribes a speed and must not jump (at {time} s)")]
     Jump {

@@ -93,6 +93,10 @@ impl<T: Real> Inputs<T> {
                     }
                 }
                 Signal::Sine { offset, amplitude, frequency, phase } => {
+                    let whole = [offset.re(), amplitude.re(), frequency, phase];
+                    if !whole.iter().all(|v| v.is_finite()) {
+                        return Err(InputError::Sine { name: name.to_owned() });
+                    }
                     let omega = 2.0 * std::f64::consts::PI * frequency;
                     sines.push(Some((offset, amplitude, omega, phase)));
                     shifts.push(T::zero_());
