@@ -12,7 +12,8 @@ use drivetwin_core::model::FrictionTable;
 use drivetwin_core::model::Stribeck;
 use drivetwin_core::model::converter_map::ConverterMap;
 use drivetwin_core::model::elements::{
-    Clutch, Element, EngineMap, Gear, GearLoss, Inertia, Planetary, Torque, TorqueConverter,
+    Clutch, Element, EngineMap, Gear, GearLoss, Inertia, Planetary, PrescribedSpeed, Torque,
+    TorqueConverter,
 };
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::torque_map::TorqueMap;
@@ -282,30 +283,35 @@ fn stiction_is_found_at_the_end_of_one_long_step() {
 
 #[test]
 fn members_of_next_to_no_mass_are_told_from_rigid_ones_whatever_the_numbers() {
+    let driven = [
+        torque("b", "T"),
+        Element::PrescribedSpeed(PrescribedSpeed {
+            name: "b".into(),
+            node: "b".into(),
+            input: "T".into(),
+            number: PhantomData,
+        }),
+    ];
     for (i, ratio) in [0.7, 1.3, 2.0, 2.9].into_iter().enumerate() {
         for eta in [0.52, 0.73, 0.832_194, 0.97] {
             for loss_law in [LossLaw::Paper, LossLaw::Dissipative] {
-                let heavy = 0.3 + 2.7 * i as f64;
-                let loss = Some(GearLoss::by_efficiency(loss_law, eta));
-                let network = compile(vec![
-                    inertia("b", heavy),
-                    inertia("c", 1.0),
-                    Element::Clutch(clutch("C", "a", "c")),
-                    Element::Gear(Gear {
-                        name: "G".into(),
-                        a: "c".into(),
-                        b: "b".into(),
-                        ratio,
-                        loss,
-                    }),
-                    torque("b", "T"),
-                ]);
-                let start = start(&[("a", 7.0), ("c", 2.0)], &[]);
-                let inputs = [constant("P C", 50.0, 1.0), constant("T", 10.0, 1.0)];
-                let outputs = [speed("a"), speed("c")];
-                let run = simulate(&network, &inputs, &start, &grid(1.0, 5), &outputs);
-                assert_eq!(run.status, Status::Completed);
-                assert!((run.columns[0][4] - run.columns[1][4]).abs() < 1e-9);
+                for drive in &driven {
+                    let loss = Some(GearLoss::by_efficiency(loss_law, eta));
+                    let (name, a, b) = ("G".into(), "c".into(), "b".into());
+                    let network = compile(vec![
+                        inertia("b", 0.3 + 2.7 * i as f64),
+                        inertia("c", 1.0),
+                        Element::Clutch(clutch("C", "a", "c")),
+                        Element::Gear(Gear { name, a, b, ratio, loss }),
+                        drive.clone(),
+                    ]);
+                    let start = start(&[("a", 7.0), ("c", 2.0)], &[]);
+                    let inputs = [constant("P C", 50.0, 1.0), constant("T", 2.0 / ratio, 1.0)];
+                    let outputs = [speed("a"), speed("c")];
+                    let run = simulate(&network, &inputs, &start, &grid(1.0, 5), &outputs);
+                    assert_eq!(run.status, Status::Completed);
+                    assert!((run.columns[0][4] - run.columns[1][4]).abs() < 1e-9);
+                }
             }
         }
     }
