@@ -259,6 +259,29 @@ def test_one_long_step_meets_any_stiction(
     assert braked(loaded, law, normal, left) == pytest.approx(left, abs=1e-9 * BRAKED_SPEED)
 
 
+@pytest.mark.parametrize("loss_law", _LOSS_LAWS)
+@pytest.mark.parametrize("drum_inertia", [0.0, 0.15])
+@pytest.mark.parametrize("engine_speed", [100.0, 178.0])
+def test_a_start_locks_as_a_clutch_that_is_strong_beyond_measure_does(
+    loaded: CModel, loss_law: str, drum_inertia: float, engine_speed: float
+) -> None:
+    """The engine is slower or faster than the locked B2 asks for; nothing but B2 acts meanwhile."""
+    b2, b3 = (replace(one, drum_inertia=drum_inertia) for one in paper_model().elements)
+    model = replace(
+        paper_model(), loss_law=loss_law, elements=(replace(b2, gain=1e9 * b2.gain), b3)
+    )
+    output_speed = 140.0 / (b2.i_c * b2.i_out)
+    start = State(engine_speed, output_speed, output_speed / model.i_f, 0.0)
+    time, inputs = np.linspace(0.0, 5e-8, 51), np.tile((0.0, 1e6, 0.0), (51, 1))
+    slipping = stepped_run(model, start, time, inputs, InputKind.HOLD)
+    assert slipping.slip["B2"][-1] == pytest.approx(0.0, abs=1e-12)
+    set_model(loaded, model, replace(start, locked=("B2",)))
+    locked = loaded.run(time, inputs).columns
+    assert abs(locked["engine_speed"][0] - engine_speed) > 0.1
+    assert locked["engine_speed"][0] == pytest.approx(slipping.engine_speed[-1], rel=1e-6)
+    assert locked["output_speed"][0] == pytest.approx(slipping.output_speed[-1], rel=1e-6)
+
+
 class Steps:
     """A loaded model step by step, inputs held, so that parameters may change on the way."""
 

@@ -145,7 +145,8 @@ typedef struct {
     dt_real output_speed; /**< rad/s */
     dt_real wheel_speed;  /**< rad/s */
     dt_real twist;        /**< rad */
-    int locked;           /**< 0: none; k: clutch k, brought to zero slip, holds if it can */
+    int locked;           /**< 0: none; k: clutch k, brought to zero slip by an impulse of its torque,
+                               holds if it can */
 } dt_start;
 
 /** Null where all parameters are in range, else the name of the first that is not. */

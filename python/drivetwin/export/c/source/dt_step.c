@@ -143,6 +143,20 @@ static void fill_outputs(dt_outputs *out, const dt_state *s, const dt_params *p,
     }
 }
 
+/* Bring a clutch to zero slip by the impulse of its torque, of which the input gear loses its part
+ * as of any torque: an impulse that accelerates the engine comes through it from behind. */
+static void lock(dt_state *s, const dt_params *p, int row) {
+    const dt_state before = *s;
+    dt_mechanism m;
+    dt_mechanism_of(&m, p, 0);
+    dt_bring_to_rest(s, &m, row);
+    if (p->loss_law == DT_DISSIPATIVE && s->x[DT_ENGINE] > before.x[DT_ENGINE]) {
+        *s = before;
+        dt_mechanism_of(&m, p, 1);
+        dt_bring_to_rest(s, &m, row);
+    }
+}
+
 dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *start,
                    const dt_inputs *inputs, dt_outputs *outputs) {
     const dt_state blank = {{0}, {0}, {DT_OPEN}, {0}, {0}, 0, 0, {0, {0}}, 0};
@@ -167,8 +181,7 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
     let_go(state, params);
     state->inputs = *inputs;
     state->params = dt_mark(params);
-    dt_mechanism_of(&m, params, 0);
-    dt_bring_to_rest(state, &m, start->locked - 1);
+    lock(state, params, start->locked - 1);
     dt_set_inputs(&e, params, inputs, &still);
     const dt_status status = refresh(state, params, &e, DT_C(1));
     if (status != DT_OK) {
