@@ -127,3 +127,33 @@ def test_report_says_what_is_missing(
     shutil.copy(written.folder / "result.json", tmp_path)
     assert main(["report", str(tmp_path)]) == 2
     assert "report.html" in capsys.readouterr().err
+
+
+def test_one_bad_log_leaves_the_others_their_results(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad, last, out = (tmp_path / name for name in ("bad.csv", "last.csv", "out"))
+    lines = bench_files.log.read_text().splitlines(keepends=True)
+    bad.write_text("".join(lines[:500]))
+    shutil.copy(bench_files.log, last)
+    assert main(_by_the_paper(bench_files, out, bad, last)) == 2
+    shown = capsys.readouterr()
+    assert {path.name for path in out.iterdir()} == {"bench", "last"}
+    assert f"wrote {out / 'last' / 'result.json'}" in shown.out
+    assert shown.err.startswith(f"error: {bad}")
+    assert main([*_by_the_paper(bench_files, out, bad), "--json"]) == 2
+    good, fault = json.loads(capsys.readouterr().out)["results"]
+    assert good["files"][0] == str(out / "bench" / "result.json")
+    assert fault["error"]["where"]["file"] == str(bad)
+
+
+def test_a_bad_card_is_told_once_for_all_logs(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    logs = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for log in logs:
+        shutil.copy(bench_files.log, log)
+    card = tmp_path / "card.toml"
+    card.write_text("nothing = 1")
+    assert main(["identify", *map(str, logs), "--vehicle", str(card)]) == 2
+    assert capsys.readouterr().err.count("error: ") == 1

@@ -4,14 +4,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, VehicleFile
-from drivetwin.cli.output import JsonFlag, note, print_json, say, show
+from drivetwin.cli.output import (
+    JsonFlag,
+    error_document,
+    note,
+    print_json,
+    say,
+    show,
+    show_error,
+)
 from drivetwin.cli.staging import refuse_alike
+from drivetwin.errors import DrivetwinError
 from drivetwin.identify.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
@@ -45,7 +55,8 @@ def identify(
     """Identify the driveline behind a shift log.
 
     With -o, DIR/result.json, DIR/twin.toml and DIR/report.html are written;
-    several logs are identified one by one, each into DIR/NAME-OF-LOG.
+    several logs are identified one by one, each into DIR/NAME-OF-LOG. One that cannot be
+    identified is told, and the exit code is 2; the others have their results.
 
     With --together they are fitted as one: the driveline is common to all, the load and the age
     of the engine torque are each log's own. What --hold-out names takes no part in the fit; it is
@@ -54,21 +65,39 @@ def identify(
     if together or hold_out:
         _together(logs, (vehicle, channels, method), hold_out or [], output, as_json)
         return
+    folders = _folders(logs, output)
+    results: list[dict[str, Any]] = []
+    failed: DrivetwinError | None = None
+    for log in logs:
+        try:
+            results.append(_one(log, (vehicle, channels, method), folders.get(log), as_json))
+        except DrivetwinError as error:
+            error.where = replace(error.where, file=error.where.file or str(log))
+            if len(logs) == 1 or error.where.file in (str(vehicle), str(channels)):
+                raise
+            results.append(error_document(error))
+            failed = error
+            if not as_json:
+                show_error(error, as_json=False)
+    if as_json:
+        print_json(results[0] if len(results) == 1 else {"results": results})
+    if failed is not None:
+        raise typer.Exit(failed.exit_code)
+
+
+def _one(
+    log: Path, how: tuple[Path, Path | None, Method], folder: Path | None, as_json: bool
+) -> dict[str, Any]:
+    """Identify a log, write and print what was found; `how` are card, mapping and method."""
     from drivetwin.cli.pipeline import run, write
 
-    folders = _folders(logs, output)
-    outcomes = {log: run(log, vehicle, channels, method) for log in logs}
-    files = {
-        log: write(outcome, folders[log]) if folders else () for log, outcome in outcomes.items()
-    }
-    if as_json:
-        results = [_document(outcomes[log].found, files[log]) for log in logs]
-        print_json(results[0] if len(results) == 1 else {"results": results})
-        return
-    for log in logs:
-        _print(outcomes[log].found, {log.name: outcomes[log].found.shifts})
-        for file in files[log]:
+    outcome = run(log, *how)
+    files = () if folder is None else write(outcome, folder)
+    if not as_json:
+        _print(outcome.found, {log.name: outcome.found.shifts})
+        for file in files:
             say(f"wrote {file}")
+    return _document(outcome.found, files)
 
 
 def _together(

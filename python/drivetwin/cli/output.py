@@ -111,6 +111,11 @@ def show_error(error: DrivetwinError, *, as_json: bool) -> None:
         message = Text.assemble(("error: ", "bold red"), str(error))
         console(stderr=True).print(message, soft_wrap=True)
         return
+    print_json(error_document(error))
+
+
+def error_document(error: DrivetwinError) -> dict[str, Any]:
+    """An error as JSON: type, what, where and remedy under `error`."""
     place = {key: part for key, part in vars(error.where).items() if part is not None}
     fault = {
         "type": type(error).__name__,
@@ -118,4 +123,4 @@ def show_error(error: DrivetwinError, *, as_json: bool) -> None:
         "where": place,
         "remedy": error.remedy,
     }
-    print_json({"error": fault})
+    return {"error": fault}
