@@ -106,6 +106,26 @@ def test_runs_stay_close_to_the_exact_solution() -> None:
     assert (batch.events <= 6).all()
 
 
+@pytest.mark.parametrize("nominal", [0.0, 300.0])
+def test_values_that_change_what_holds_leave_the_outputs_their_names(nominal: float) -> None:
+    load = dataclasses.replace(MODEL.load, rolling=nominal, aero=nominal / 100.0)
+    model = dataclasses.replace(MODEL, load=load)
+    values = {
+        "load.rolling": np.array([0.0, 300.0] * 5 + [-1.0]),
+        "load.aero": np.array([3.0] * 4 + [0.0] * 7),
+    }
+    outputs = ("slip.B3", "torque.B2", "shaft_torque")
+    batch = simulate_batch(model, [scenario()], TIME, values, outputs=outputs)
+    assert list(batch.failed) == [10]
+    s = scenario()
+    for i in range(10):
+        rolling, aero = (float(column[i]) for column in values.values())
+        one = dataclasses.replace(model, load=dataclasses.replace(load, rolling=rolling, aero=aero))
+        run = simulate(one, s.engine_torque, s.pressures, s.start, TIME)
+        columns = [run.slip["B3"], run.clutch_torque["B2"], run.shaft_torque]
+        np.testing.assert_array_equal(batch.values[i], columns)
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.permutations(range(11)), st.integers(1, 3), st.integers(1, 11))
 def test_order_threads_and_company_do_not_matter(

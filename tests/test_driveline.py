@@ -319,6 +319,43 @@ def test_derivatives_agree_with_central_differences_through_all_events(name: str
     assert found.event_times[name][-1] == pytest.approx(event_difference, rel=2e-6)
 
 
+def test_what_is_nothing_now_has_a_derivative_all_the_same() -> None:
+    torque, pressures, start, time = upshift()
+    plain = paper_model()
+    model = replace(plain, c_o=0.0, load=replace(plain.load, aero=0.0, rolling=0.0))
+    steps = {"c_o": 1e-2, "load.aero": 1e-3}
+    found = sensitivities(model, torque, pressures, start, time, list(steps))
+    exact = Accuracy(exact=True)
+    none = simulate(model, torque, pressures, start, time, accuracy=exact)
+    for name, step in steps.items():
+        runs = [none]
+        for times in (1.0, 2.0):
+            some = (
+                replace(model, c_o=times * step)
+                if name == "c_o"
+                else replace(model, load=replace(model.load, aero=times * step))
+            )
+            runs.append(simulate(some, torque, pressures, start, time, accuracy=exact))
+        # Second order, on the side that there is.
+        columns = [run.shaft_torque for run in runs]
+        difference = (4.0 * columns[1] - 3.0 * columns[0] - columns[2]) / (2.0 * step)
+        derivative = found.derivatives[name].shaft_torque
+        assert np.abs(derivative - difference).max() < 1e-4 * np.abs(difference).max()
+
+
+def test_a_derivative_by_a_resistance_that_holds_nothing_is_refused() -> None:
+    torque, pressures, start, time = upshift()
+    with pytest.raises(InputError, match=r"load\.rolling"):
+        sensitivities(paper_model(), torque, pressures, start, time, ["load.rolling"])
+
+
+def test_a_start_that_is_no_number_is_refused_by_name() -> None:
+    torque, pressures, start, time = upshift()
+    with pytest.raises(InputError, match="engine"):
+        broken = replace(start, engine_speed=float("nan"))
+        simulate(paper_model(), torque, pressures, broken, time)
+
+
 def test_the_derivative_by_a_delay_agrees_with_differences() -> None:
     torque, pressures, start, time = upshift()
     found = sensitivities(
