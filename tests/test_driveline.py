@@ -351,8 +351,8 @@ def test_a_derivative_by_a_resistance_that_holds_nothing_is_refused() -> None:
 
 def test_a_start_that_is_no_number_is_refused_by_name() -> None:
     torque, pressures, start, time = upshift()
+    broken = replace(start, engine_speed=float("nan"))
     with pytest.raises(InputError, match="engine"):
-        broken = replace(start, engine_speed=float("nan"))
         simulate(paper_model(), torque, pressures, broken, time)
 
 
