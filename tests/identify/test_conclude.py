@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.identify.conclude import Conclusions, conclude, low_gear_notes
+from drivetwin.identify.conclude import MISFIT, Conclusions, conclude, low_gear_notes
 from drivetwin.identify.result import Verdict
 from drivetwin.vehicle.spec import PriorValue
 from tests.identify.asked import stepped, still
@@ -46,6 +46,25 @@ def test_a_value_far_off_the_cards_is_no_design_value_however_wide() -> None:
     assert told.estimates["J_out"].verdict is Verdict.WEAK
     assert "contradicts" in told.estimates["J_out"].reason
     assert any(text.startswith("J_out: the vehicle card says 1.35") for text in told.warnings)
+
+
+@pytest.mark.parametrize(
+    ("stage", "touched", "spared"),
+    [("momentum", "J_prime_2", "Tv_over_if"), ("load", "J_vehicle", "eta")],
+)
+def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identified(
+    stage: str, touched: str, spared: str
+) -> None:
+    found = stepped()
+    (shift,), signals = found.evidence["integral"], found.evidence["signals"]
+    driveline = found.evidence["likelihood"].problem.parts[0].structure.driveline
+    before = getattr(shift, stage)
+    for chi2, verdict in ((0.9 * MISFIT, Verdict.IDENTIFIED), (1.1 * MISFIT, Verdict.WEAK)):
+        after = replace(before, fit=replace(before.fit, chi2=chi2))
+        told = conclude([replace(shift, **{stage: after})], signals, [driveline], {}).estimates
+        assert told[touched].verdict is verdict
+        assert told[spared].verdict is Verdict.IDENTIFIED
+    assert "11 times the noise power" in told[touched].reason
 
 
 def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> None:

@@ -135,6 +135,10 @@ def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
     found = identify(*recording("truck_a"), Method.LIKELIHOOD)
     assert found.method is Method.INTEGRAL
     assert any("went astray" in text for text in found.warnings)
+    assert Verdict.IDENTIFIED not in [one.verdict for one in found.estimates.values()]
+    stiffness = found.estimates["k_o"]
+    assert (stiffness.verdict, stiffness.value is None) == (Verdict.WEAK, False)
+    assert "no simulation" in stiffness.reason
 
 
 def test_tolerances_enter_the_likelihood_as_shifts_of_its_minimum() -> None:

@@ -18,6 +18,7 @@ from drivetwin.identify.uncertainty import (
     KNOWN,
     correlation,
     designed,
+    doubted,
     judge,
     judge_with_design,
     refused,
@@ -28,6 +29,15 @@ from drivetwin.vehicle.spec import PriorValue
 METHOD = "integral"
 CHI2_WARN = 1.6
 """Residual power over stated noise above which a warning is due."""
+MISFIT = 10.0
+"""Residual power over stated noise above which the model does not hold: an interval, however
+widened, counts what scatters and not what is missing."""
+RESTS_ON = {
+    "momentum balance": ("eta", "J_prime", "J_out", "te_delay", "k_o", "c_o", "zeta", "P0"),
+    "load": ("J_vehicle", "Tv_over_if", "k_o", "c_o", "zeta"),
+    "friction": ("P0",),
+}
+"""Stems of the parameters that rest on each regression."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +90,8 @@ def conclude(
     }
     against = contradictions(ids, values, covariance, designs, systematic)
     estimates = held_against(estimates, against, METHOD)
+    for name, why in _misfits(shifts, signals, ids).items():
+        estimates[name] = doubted(estimates[name], why)
     estimates |= _card_values(estimates, drivelines)
     estimates |= _refusals(shifts, signals, estimates)
     return Conclusions(
@@ -178,6 +190,31 @@ def _refusals(
     return found
 
 
+def _residual_powers(shift: IntegralShift) -> dict[str, float]:
+    """Residual power over stated noise by regression."""
+    found = {"momentum balance": shift.momentum.fit.chi2, "load": shift.load.fit.chi2}
+    if shift.friction is not None:
+        found["friction"] = shift.friction.fit.chi2
+    return found
+
+
+def _misfits(
+    shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], ids: Sequence[str]
+) -> dict[str, str]:
+    """By parameter of `ids` the regression behind it in which the model does not hold."""
+    found: dict[str, str] = {}
+    for shift, s in zip(shifts, signals, strict=True):
+        for name, chi2 in _residual_powers(shift).items():
+            if chi2 > MISFIT:
+                text = (
+                    f"the {name} of shift {s.shift.start_gear}-{s.shift.end_gear} leaves "
+                    f"{chi2:.0f} times the noise power: some effect is not in the model"
+                )
+                concerned = [i for i in ids if i in shift.ids and spec_of(i).stem in RESTS_ON[name]]
+                found |= dict.fromkeys(concerned, text)
+    return found
+
+
 def _curves(shifts: Sequence[IntegralShift]) -> dict[str, FrictionCurve]:
     """One curve per element: of several shifts onto it, the one with the narrowest band."""
     best: dict[str, FrictionCurve] = {}
@@ -201,12 +238,9 @@ def _warnings(
     for shift, s in zip(shifts, signals, strict=True):
         label = f"shift {s.shift.start_gear}-{s.shift.end_gear}"
         texts += list(s.shift.warnings)
-        fits = [("momentum balance", shift.momentum.fit.chi2), ("load", shift.load.fit.chi2)]
-        if shift.friction is not None:
-            fits.append(("friction", shift.friction.fit.chi2))
         texts += [
             f"{label}: the {name} leaves {chi2:.1f} times the noise power; intervals are widened"
-            for name, chi2 in fits
+            for name, chi2 in _residual_powers(shift).items()
             if chi2 > CHI2_WARN
         ]
         if abs(shift.load.speed_trend) > 4.0:

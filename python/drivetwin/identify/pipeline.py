@@ -27,7 +27,7 @@ from drivetwin.identify.method import DEFAULT_METHOD, Method
 from drivetwin.identify.momentum import MomentumSettings
 from drivetwin.identify.result import FloatArray, Identification
 from drivetwin.identify.signals import Driveline, ShiftSignals
-from drivetwin.identify.uncertainty import systematic_std
+from drivetwin.identify.uncertainty import doubted, systematic_std
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.parameters import spec_of
 from drivetwin.progress import part
@@ -42,6 +42,10 @@ BEHIND_CONVERTER = (
     "the converter is open in the shifts: what drives the gearbox is its turbine, by the map on "
     "the card from the speeds of engine and input; J′ is without the engine"
 )
+GAVE_UP = (
+    "of the integral method: no simulation with such parameters follows the log within its noise"
+)
+"""Why a value is not identified where the likelihood method has found no plausible minimum."""
 LOADS = {
     False: "is constant over the log",
     True: "grows with the square of the wheel speed and else is constant over the log",
@@ -169,7 +173,8 @@ def _with_torque(
         except IdentificationError as error:
             method = Method.INTEGRAL
             text = f"likelihood: {error.what}; the values are those of the integral method"
-            found = replace(found, warnings=(text, *found.warnings))
+            estimates = {name: doubted(one, GAVE_UP) for name, one in found.estimates.items()}
+            found = replace(found, estimates=estimates, warnings=(text, *found.warnings))
     try:
         evidence["paper"] = _paper_shifts(signals, drivelines, card)
     except IdentificationError as error:

@@ -129,10 +129,14 @@ def refused(parameter_id: str, method: str, why: str) -> Estimate:
 
 
 def doubted(one: Estimate, why: str) -> Estimate:
-    """The estimate with what speaks against it: whatever its width, it is not identified."""
-    verdict = Verdict.WEAK if one.verdict is Verdict.IDENTIFIED else one.verdict
+    """The estimate with what speaks against it: however narrow, it is not identified.
+
+    One that is refused, or the card's, stays as it is.
+    """
+    if one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
+        return one
     reason = "; ".join(part for part in (why, one.reason) if part)
-    return replace(one, verdict=verdict, reason=reason)
+    return replace(one, verdict=Verdict.WEAK, reason=reason)
 
 
 def propagate(
