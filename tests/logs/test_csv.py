@@ -223,3 +223,19 @@ def test_stamps_from_1970_count_from_the_first(unit: str, factor: float) -> None
     log = read("\n".join(["time,x", f"{unit},Nm", *rows]))
     assert log.channels[0].time == pytest.approx(np.arange(20) / 100, abs=1e-12)
     assert log.warnings == ("time counts from the first stamp, 1763866345 s",)
+
+
+@pytest.mark.parametrize(
+    "row", ["double,double,double", ",CAN1,XCP", "-,-,-", "s,double,1/min", "double,,"]
+)
+def test_comments_and_types_below_leave_the_names_their_units(row: str) -> None:
+    log = read(f"time [s],EngTrq [Nm],nAb [1/min]\n{row}\n0.0,1000,700\n0.1,1001,701\n")
+    assert {one.name: one.unit for one in log.channels} == {"EngTrq": "Nm", "nAb": "1/min"}
+    assert log.channels[0].time.tolist() == [0.0, 0.1]
+
+
+def test_a_unit_below_counts_where_brackets_in_the_name_hold_none() -> None:
+    log = read("time,Prs [1],Trq [CAN],x\ns,bar,Nm,furlong\n0.0,1,2,3\n0.1,1,2,3\n")
+    assert [one.unit for one in log.channels] == ["bar", "Nm", "furlong"]
+    log = read("time [s],Trq [Nm],x\ndouble,double,double\n0.0,1,2\n0.1,1,2\n")
+    assert [one.unit for one in log.channels] == ["Nm", None]

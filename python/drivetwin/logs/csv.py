@@ -24,7 +24,7 @@ from drivetwin.logs.names import name_and_unit, time_index
 from drivetwin.logs.origin import origin_of, origin_told, since
 from drivetwin.logs.raw import RawChannel, RawLog, TimeColumn
 from drivetwin.logs.shiftlog import FloatArray
-from drivetwin.logs.units import is_unit, time_factor
+from drivetwin.logs.units import is_unit, lookup, time_factor
 
 _DATE_NAMES = frozenset(("date", "datum"))
 _COMMENT_MARKS = ("#", "%", "//")
@@ -283,10 +283,19 @@ def _header(table: _Table, time: TimeColumn, file: str) -> _Header:
         if any(is_number(cell) or is_number(cell, ",") or is_clock(cell) for cell in looked_at):
             break
         below.append([cell.strip() for cell in row])
-    if below:
-        stated = max(below, key=lambda row: sum(map(is_unit, row)))
-        units = [under or beside for under, beside in zip(stated, units, strict=True)]
+    stated = max(below, key=lambda row: sum(map(is_unit, row)), default=[])
+    if any(map(is_unit, stated)) or (stated and not any(units)):
+        units = [_unit(beside, under) for beside, under in zip(units, stated, strict=True)]
     return _Header(names, units, index, height=1 + len(below))
+
+
+def _unit(beside: str | None, under: str) -> str | None:
+    """Unit of a column from its name and the row below, where a comment or a type may stand.
+
+    What is no unit, or says that there is none, as `-`, leaves the name its unit.
+    """
+    tells = is_unit(under) and lookup(under) != lookup("-")
+    return under if tells or (beside is None and under) else beside
 
 
 def _clock(
