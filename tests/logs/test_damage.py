@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.logs.damage import (
+    beyond,
     clipped,
     dropouts,
     longest_rest,
@@ -111,6 +112,62 @@ def test_dropouts_to_zero_are_found() -> None:
     assert dropouts(TIME, speed()) is None
 
 
+def test_a_short_dropout_out_of_a_calm_torque_is_found() -> None:
+    """The tip-in begins right after it."""
+    driven = np.where(TIME < 2.0, 400.0, np.minimum(400.0 + 4e3 * (TIME - 2.0), 1500.0))
+    values = driven + np.where(np.arange(TIME.size) % 7 == 0, 11.0, 0.0)
+    sound = values.copy()
+    values[980:996] = 0.0
+    found = dropouts(TIME, values)
+    assert found is not None
+    assert runs(found.mask) == [(980, 996)]
+    assert dropouts(TIME, sound) is None
+
+
+def test_a_torque_that_truly_rests_at_zero_is_no_dropout() -> None:
+    overrun = np.maximum(400.0 - 4e3 * np.clip(np.abs(TIME - 2.0) - 0.1, 0.0, None), 0.0)
+    around_zero = np.round(np.random.default_rng(3).normal(0.0, 0.6, TIME.size)) * 20.0
+    around_zero[-300:] = 400.0
+    lasting = np.where((TIME > 1.0) & (TIME < 2.0), 0.0, 400.0)
+    lasting[-300:] = 1500.0
+    for values in (overrun, 400.0 - overrun, around_zero, lasting):
+        assert dropouts(TIME, values) is None
+
+
+@pytest.mark.parametrize(("value", "width"), [(-9999.0, 5), (32767.0, 1), (8191.0, 40)])
+@pytest.mark.parametrize("every", [1, 5, 10])
+def test_numbers_far_beyond_all_others_are_found(value: float, width: int, every: int) -> None:
+    time, values = TIME[::every], torque()[::every]
+    width = max(1, width // every)
+    for start in (20, 120):
+        values[start : start + width] = value
+    found = beyond(time, values)
+    assert found is not None
+    assert runs(found.mask) == [(start, start + width) for start in (20, 120)]
+    assert "far beyond all other numbers" in found.text
+
+
+def test_a_large_torque_that_was_measured_is_not_beyond() -> None:
+    """What moves, passes through the numbers between, lasts or is sampled slowly may be true."""
+    coast = np.random.default_rng(4).normal(-40.0, 3.0, TIME.size)
+    blip = (TIME > 2.0) & (TIME < 2.2)
+    assert beyond(TIME, torque()) is None
+    assert beyond(TIME, np.where(blip, coast + 400.0, coast)) is None
+    assert beyond(TIME, coast + np.clip(400.0 - 8e3 * np.abs(TIME - 2.0), 0.0, 300.0)) is None
+    assert beyond(TIME, np.where(np.abs(TIME - 2.0) < 0.3, 400.0, coast)) is None
+    assert beyond(TIME[::50], np.where(blip, 400.0, coast)[::50]) is None
+    assert beyond(TIME, np.where(blip, 400.0, 100.0)) is None
+
+
+@pytest.mark.parametrize("start", [0, 600])
+def test_a_number_that_the_signal_jumped_to_is_stuck_from_its_first_sample(start: int) -> None:
+    values = torque()
+    values[start : start + 50] = -9999.0
+    found = stuck(TIME, values, Quantity.TORQUE)
+    assert found is not None
+    assert runs(found.mask) == [(start, start + 50)]
+
+
 def test_a_coarse_signal_in_steady_driving_is_not_stuck() -> None:
     values = np.round(120.0 + 0.4 * TIME)
     assert stuck(TIME, values, Quantity.SPEED) is None
@@ -153,7 +210,15 @@ def test_missing_numbers_are_told_by_span() -> None:
     values[100:200] = np.nan
     found = missing(TIME, values)
     assert found is not None
-    assert found.text == "no number from 0.2 s to 0.398 s"
+    assert found.text == "no number from 0.200 s to 0.398 s"
+
+
+def test_late_times_are_told_to_the_millisecond() -> None:
+    values = speed()
+    values[100:200] = np.nan
+    found = missing(TIME + 123456.0, values)
+    assert found is not None
+    assert found.text == "no number from 123456.200 s to 123456.398 s"
 
 
 @given(st.lists(st.booleans(), max_size=60))

@@ -54,7 +54,7 @@ def test_single_samples_without_number_are_left_out_and_told() -> None:
     assert checked.channel.time.tolist() == np.delete(TIME, [10, 50, 51, 52]).tolist()
     assert np.isfinite(checked.channel.values).all()
     assert checked.warnings == (
-        "channel 'X': 4 samples without a number left out, the first at 0.1 s",
+        "channel 'X': 4 samples without a number left out, the first at 0.100 s",
     )
 
 
@@ -65,7 +65,7 @@ def test_runs_without_numbers_are_left_out_and_told_with_their_spans() -> None:
     checked = check_channel(channel("input_speed", values), "log.csv")
     assert checked.channel.values.size == 84
     assert checked.warnings == (
-        "channel 'X': no number from 0.2 s to 0.29 s, from 0.6 s to 0.65 s",
+        "channel 'X': no number from 0.200 s to 0.290 s, from 0.600 s to 0.650 s",
     )
 
 
@@ -165,7 +165,7 @@ def test_a_negative_speed_asks_for_the_sign() -> None:
 def test_a_gap_of_the_file_is_told() -> None:
     time = np.concatenate((TIME[:40], TIME[60:]))
     checked = check_channel(channel("input_speed", ramp(100, 150)[:80], time=time), "log.csv")
-    assert checked.warnings == ("channel 'X': no samples from 0.39 s to 0.6 s",)
+    assert checked.warnings == ("channel 'X': no samples from 0.390 s to 0.600 s",)
 
 
 def test_a_stamp_far_ahead_is_refused() -> None:
@@ -224,3 +224,16 @@ def test_a_channel_of_few_steps_is_told() -> None:
     assert fine.warnings == ()
     switched = np.where(np.arange(TIME.size) < TIME.size // 2, 0.0, 9e5)
     assert check_channel(channel("pressure.B2", switched), "log.csv").warnings == ()
+
+
+@pytest.mark.parametrize(("value", "words"), [(8191.0, "far beyond"), (0.0, "fell to zero")])
+def test_all_samples_that_repeat_a_damaged_update_are_left_out(value: float, words: str) -> None:
+    """Engine torque every 10 ms in a table of 1 ms."""
+    time = np.round(np.arange(4000) * 0.001, 3)
+    updates = np.round(400.0 + 30.0 * np.sin(time[::10] * 9.0))
+    updates[150:152] = value
+    torque = channel("engine_torque", np.repeat(updates, 10), "Nm", time)
+    checked = check_channel(torque, "log.csv")
+    assert checked.channel.time.tolist() == np.delete(time, np.s_[1500:1520]).tolist()
+    assert len(checked.warnings) == 1
+    assert words in checked.warnings[0]

@@ -47,8 +47,8 @@ def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
     earliest = min(channels.values(), key=lambda channel: float(channel.time[-1]))
     if latest.time[0] >= earliest.time[-1]:
         raise TimeError(
-            f"no common time span: {latest.source_name!r} starts at {latest.time[0]:.6g} s, "
-            f"{earliest.source_name!r} ends at {earliest.time[-1]:.6g} s",
+            f"no common time span: {latest.source_name!r} starts at {latest.time[0]:.3f} s, "
+            f"{earliest.source_name!r} ends at {earliest.time[-1]:.3f} s",
             "set time_shift_s in the channel mapping, or export the channels on one clock",
             Where(file=file),
         )

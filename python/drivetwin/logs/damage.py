@@ -61,7 +61,21 @@ _UNLIKELY = float(np.log(1e-9))
 """Logarithm of the chance below which a rest is none of the jitter's own."""
 
 _DROP = 0.3
-"""Least step into and out of a dropout as a share of the signal's level."""
+"""Least step into and out of a dropout as a share of the signal's level; that of a spike is enough
+where the signal is calm before or after, and goes on from where it fell."""
+
+_DROP_TIME = 0.25
+"""Longest such dropout [s]."""
+
+_BEYOND = 2.0
+"""A torque is none if it is so many times as large as any other of the log ..."""
+
+_BEYOND_STEP = 0.025
+"""... and reached in one sample, with no more than so much time [s] for it, ..."""
+
+_BEYOND_TIME, _OTHERS = 0.5, 10
+"""... left likewise, and one number for no longer than this [s], while the rest, which is more than
+half, takes so many numbers at least."""
 
 _CLIPPED_SAMPLES = 3
 _CLIPPED_RUNS = 3
@@ -92,7 +106,7 @@ def missing(time: FloatArray, values: FloatArray) -> Damage | None:
         first = float(time[found[0][0]])
         return Damage(
             mask,
-            f"{int(mask.sum())} samples without a number left out, the first at {first:.6g} s",
+            f"{int(mask.sum())} samples without a number left out, the first at {first:.3f} s",
         )
     return Damage(mask, f"no number {_spans(time, found)}")
 
@@ -158,7 +172,9 @@ def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | 
         beside = (steps[max(0, start - _BEFORE) : start], steps[end : end + _BEFORE])
         noisy = any(_restless(some, usual) for some in beside)
         if (slow and released) or (fine and noisy):
-            mask[start + 1 : end + 1] = True
+            # The first is the last that was measured, unless the signal jumped to it.
+            jumped = start == 0 or moving[start - 1] > _STUCK_RELEASE * usual
+            mask[start if jumped else start + 1 : end + 1] = True
     if not mask.any():
         return None
     return Damage(mask, f"stuck at one number {_spans(time, runs(mask))}, left out")
@@ -214,13 +230,49 @@ def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
     moving = np.abs(np.diff(values))
     mask = np.zeros(values.size, np.bool_)
     for start, end in runs(values == 0.0):
-        fell = start > 0 and moving[start - 1] > _DROP * level
-        rose = end < values.size and moving[end - 1] > _DROP * level
-        if fell and rose:
+        if start == 0 or end == values.size:
+            continue
+        least = _DROP * level
+        if time[end] - time[start] <= _DROP_TIME:
+            before, after = moving[: start - 1][-_SURROUNDINGS:], moving[end:][:_SURROUNDINGS]
+            apart = abs(float(values[end] - values[start - 1]))
+            calm = min(before.max(initial=apart), after.max(initial=apart))
+            least = min(least, max(_SPIKE_SHARE * level, _SPIKE_CONTRAST * calm))
+        if min(moving[start - 1], moving[end - 1]) > least:
             mask[start:end] = True
     if not mask.any():
         return None
     return Damage(mask, f"fell to zero {_spans(time, runs(mask))}, left out")
+
+
+def beyond(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Short stretches of one number far beyond all others, entered and left in one step.
+
+    Numbers that stand for no value, as -9999, and those of a torque message that was not received.
+    """
+    if float(np.median(np.diff(time))) > _BEYOND_STEP:
+        return None
+    size = np.abs(values)
+    sizes = np.unique(size)
+    far = np.flatnonzero(sizes[1:] > _BEYOND * sizes[:-1])
+    for largest in sizes[far[sizes[far] >= np.median(size)]]:
+        mask = size > largest
+        if np.unique(values[~mask]).size >= _OTHERS and _is_put_in(time, values, mask):
+            return Damage(
+                mask, f"far beyond all other numbers {_spans(time, runs(mask))}, left out"
+            )
+    return None
+
+
+def _is_put_in(time: FloatArray, values: FloatArray, mask: Mask) -> bool:
+    """Whether all stretches of `mask` are one number each, short and in the midst of others."""
+    return all(
+        start > 0
+        and end < values.size
+        and time[end] - time[start] <= _BEYOND_TIME
+        and np.all(values[start:end] == values[start])
+        for start, end in runs(mask)
+    )
 
 
 def clipped(time: FloatArray, values: FloatArray) -> Damage | None:
@@ -241,11 +293,11 @@ def clipped(time: FloatArray, values: FloatArray) -> Damage | None:
 
 
 def _spans(time: FloatArray, found: Sequence[tuple[int, int]]) -> str:
-    """`from 0.2 s to 0.29 s` of the first stretches, and how many more."""
+    """`from 0.200 s to 0.290 s` of the first stretches, and how many more."""
     parts = [
-        f"at {time[start]:.6g} s"
+        f"at {time[start]:.3f} s"
         if end - start == 1
-        else f"from {time[start]:.6g} s to {time[end - 1]:.6g} s"
+        else f"from {time[start]:.3f} s to {time[end - 1]:.3f} s"
         for start, end in found[:_LISTED]
     ]
     more = f" and {len(found) - _LISTED} more times" if len(found) > _LISTED else ""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
 from drivetwin.logs.damage import (
     Damage,
+    beyond,
     clipped,
     dropouts,
     longest_rest,
@@ -112,7 +114,7 @@ def check_channel(channel: Channel, file: str) -> Checked:
     channel = _without(channel, found, warnings)
     _check_count(channel, total, where)
     _check_variation(channel, where)
-    for look in (_dropouts, _spikes, _stuck, _clipped):
+    for look in (_dropouts, _spikes, _stuck, _beyond, _clipped):
         channel = _without(channel, look(channel), warnings)
         _check_count(channel, total, where)
     _check_magnitude(channel, where)
@@ -129,7 +131,7 @@ def _gaps(channel: Channel) -> list[str]:
     """Words for the gaps that the file itself has."""
     if not channel.gaps:
         return []
-    spans = ", ".join(f"{start:.6g} s to {end:.6g} s" for start, end in channel.gaps[:3])
+    spans = ", ".join(f"{start:.3f} s to {end:.3f} s" for start, end in channel.gaps[:3])
     more = f" and {len(channel.gaps) - 3} more" if len(channel.gaps) > 3 else ""
     return [f"channel {channel.source_name!r}: no samples from {spans}{more}"]
 
@@ -154,7 +156,7 @@ def _at_rest(channel: Channel) -> list[str]:
     if span is None:
         return []
     return [
-        f"channel {channel.source_name!r}: one number from {span[0]:.6g} s to {span[1]:.6g} s, "
+        f"channel {channel.source_name!r}: one number from {span[0]:.3f} s to {span[1]:.3f} s, "
         "though it jitters elsewhere; if it is stuck there, results that rest on it are wrong"
     ]
 
@@ -178,7 +180,7 @@ def _switched(values: FloatArray) -> bool:
 def _dropouts(channel: Channel) -> Damage | None:
     if channel.quantity not in (Quantity.SPEED, Quantity.TORQUE):
         return None
-    return dropouts(channel.time, channel.values)
+    return _of_updates(channel, lambda fresh: dropouts(fresh.time, fresh.values))
 
 
 def _spikes(channel: Channel) -> Damage | None:
@@ -188,14 +190,25 @@ def _spikes(channel: Channel) -> Damage | None:
 def _stuck(channel: Channel) -> Damage | None:
     """Stretches of one number; of an engine torque that a logger holds, in its fresh values."""
     if channel.role == "engine_torque":
-        held = find_raster(channel) is not None
-        fresh = fresh_samples(replace(channel, held=held))
-        found = stuck(fresh.time, fresh.values, channel.quantity)
-        if found is None or not held:
-            return found
-        update = np.searchsorted(fresh.time, channel.time, side="right") - 1
-        return Damage(found.mask[np.clip(update, 0, None)], found.text)
+        return _of_updates(channel, lambda fresh: stuck(fresh.time, fresh.values, fresh.quantity))
     return stuck(channel.time, channel.values, channel.quantity) if _measured(channel) else None
+
+
+def _beyond(channel: Channel) -> Damage | None:
+    if channel.quantity is not Quantity.TORQUE:
+        return None
+    return _of_updates(channel, lambda fresh: beyond(fresh.time, fresh.values))
+
+
+def _of_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> Damage | None:
+    """What `look` finds in the fresh values of a channel, with the samples that repeat them."""
+    held = find_raster(channel) is not None
+    fresh = fresh_samples(replace(channel, held=held))
+    found = look(fresh)
+    if found is None or not held:
+        return found
+    update = np.searchsorted(fresh.time, channel.time, side="right") - 1
+    return Damage(found.mask[np.clip(update, 0, None)], found.text)
 
 
 def _clipped(channel: Channel) -> Damage | None:
