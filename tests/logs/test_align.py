@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from drivetwin.logs.align import clock_warnings, speed_delay
+from drivetwin.logs.align import clock_warnings, speed_delay, speed_ratio
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 from tests.logs.made import card
 
@@ -82,6 +83,44 @@ def test_steady_driving_tells_no_delay() -> None:
     steady = channel("output_speed", time + 0.05, np.full(time.size, 80.0) + time)
     found = speed_delay(channel("input_speed", time, 1.8 * (80.0 + time)), steady, RATIOS)
     assert found is None or abs(found.value) < 5.0 * found.sigma
+
+
+@pytest.mark.parametrize("ratio", [5.0, 5.01])
+@pytest.mark.parametrize("late", [0.0, 0.05])
+def test_the_ratio_is_found_whether_or_not_one_speed_is_late(ratio: float, late: float) -> None:
+    time = np.arange(0.0, 8.0, 0.01)
+    faster = channel("output_speed", time, output(time))
+    found = speed_ratio(faster, channel("wheel_speed", time + late, output(time) / ratio))
+    assert found is not None
+    value, sigma = found
+    # The sensors' noise of 0.05 in 16 rad/s over 80 independent means of 10 samples.
+    assert sigma < 3e-4 * ratio
+    assert value == pytest.approx(ratio, abs=4.0 * sigma + 1e-4 * ratio)
+
+
+def test_a_gap_costs_what_it_touches_only() -> None:
+    time = np.arange(0.0, 8.0, 0.01)
+    slower = channel("output_speed", time + 0.03, output(time))
+    keep = (slower.time < 0.4) | (slower.time > 0.7)
+    slower = replace(slower, time=slower.time[keep], values=slower.values[keep])
+    found = speed_delay(channel("input_speed", time, 1.8 * output(time)), slower, RATIOS)
+    assert found is not None
+    assert found.value == pytest.approx(0.03, abs=4.0 * found.sigma)
+    assert found.span > 6.0
+
+
+def test_a_speed_of_repeated_means_is_not_late(tmp_path: Path) -> None:
+    """Means over 20 ms, held in a table of 2 ms: by the first of each value 10 ms late."""
+    fine = np.arange(0.0, 8.0, 2e-3)
+    start = np.floor(fine / 0.02) * 0.02
+    middle = start - 0.01
+    slower = replace(channel("output_speed", fine, output(middle)), held=True)
+    slower = replace(slower, values=slower.values[np.searchsorted(fine, start - 1e-6)])
+    inlet = channel("input_speed", fine, 1.8 * output(fine))
+    assert clock_warnings({"input_speed": inlet, "output_speed": slower}, card(tmp_path)) == []
+    late = replace(slower, time=slower.time + 0.03)
+    (text,) = clock_warnings({"input_speed": inlet, "output_speed": late}, card(tmp_path))
+    assert "'output_speed' is 40." in text or "'output_speed' is 39." in text
 
 
 def test_no_gear_held_tells_nothing() -> None:

@@ -92,6 +92,27 @@ def test_two_late_channels_are_told() -> None:
     assert "early against 'output_torque'" in late[0]
 
 
+def bus(channel: Channel, period: float) -> Channel:
+    """The channel as an encoder on a bus: means over `period` [s], held until the next one."""
+    count = round(period / STEP)
+    sums = channel.values.reshape(-1, count).mean(axis=1)
+    values = np.repeat(np.concatenate((sums[:1], sums[:-1])), count)
+    return replace(channel, values=values, held=True)
+
+
+def test_speeds_that_are_means_and_held_do_not_make_the_torque_early() -> None:
+    channels = recorded()
+    held = channels | {role: bus(channels[role], 0.01) for role in ("output_speed", "wheel_speed")}
+    found = torque_delay(held["output_torque"], held["wheel_speed"])
+    assert found is not None
+    assert found.value == pytest.approx(0.01, abs=2e-3)
+    assert torque_warnings(held) == []
+    late = recorded(output_torque=0.03)
+    held = late | {role: bus(late[role], 0.01) for role in ("output_speed", "wheel_speed")}
+    (text,) = torque_warnings(held)
+    assert re.search(r"'output_torque' is about 2[3-7] ms late", text)
+
+
 def test_a_gap_is_not_bridged() -> None:
     channels = recorded(wheel_speed=0.03)
     wheel = channels["wheel_speed"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Delay and clock drift between speed channels, where physics ties them together.
+"""Delay and clock drift between speed channels, where physics ties them together, and their ratio.
 
 In a gear ω_in = i·ω_out at every instant, so what differs in time with the acceleration is a delay.
 It is told, with the mapping line that cures it, and never applied unasked.
@@ -14,6 +14,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
+from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, FloatArray
 from drivetwin.vehicle.spec import VehicleCard
 
@@ -32,11 +33,11 @@ _LEAST_TIME = 1.0
 LONGEST = 100.0
 """Points of the raster for each sample at most: beyond that the log is nearly all gap."""
 
-_SIGNIFICANT = 5.0
+SIGNIFICANT = 5.0
 """Standard deviations from which a delay is told ..."""
 
 _LEAST_DELAY = 5e-3
-"""... if it also exceeds this [s] and half the coarser sample interval."""
+"""... if it also exceeds this [s], and by so much half the coarser sample interval."""
 
 
 @dataclass(frozen=True)
@@ -74,12 +75,9 @@ def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> De
     if not _LEAST_TIME <= end - start <= LONGEST * max(faster.time.size, slower.time.size) * GRID:
         return None
     time = np.arange(start, end, GRID)
-    width = round(SMOOTH / GRID)
-    fast, slow = (
-        uniform_filter1d(means(one, time), width, mode="nearest") for one in (faster, slower)
-    )
+    fast, slow = averaged(faster, time), averaged(slower, time)
     rate = np.gradient(slow, GRID)
-    gear = _gears(fast, slow, ratios, width)
+    gear = _gears(fast, slow, ratios, round(SMOOTH / GRID))
     known = (gear >= 0) & np.isfinite(rate) & np.isfinite(fast)
     if np.count_nonzero(known) * GRID < _LEAST_TIME:
         return None
@@ -95,6 +93,25 @@ def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> De
     return Delay(float(value), float(sigma), float(drift), float(drift_sigma), float(np.ptp(t)))
 
 
+def speed_ratio(faster: Channel, slower: Channel) -> tuple[float, float] | None:
+    """Ratio of two speeds that are always geared to each other, and its standard deviation.
+
+    Least squares of ω_f = i·ω_s + i·τ·dω_s/dt: a delay τ between the two is no error of the ratio.
+    None where there is too little time, or no motion.
+    """
+    start, end = max(faster.time[0], slower.time[0]), min(faster.time[-1], slower.time[-1])
+    if not _LEAST_TIME <= end - start <= LONGEST * max(faster.time.size, slower.time.size) * GRID:
+        return None
+    time = np.arange(start, end, GRID)
+    fast, slow = averaged(faster, time), averaged(slower, time)
+    rate = np.gradient(slow, GRID)
+    known = np.isfinite(rate) & np.isfinite(fast)
+    if np.count_nonzero(known) * GRID < _LEAST_TIME:
+        return None
+    fit = least_squares(np.column_stack([slow[known], rate[known]]), fast[known])
+    return None if fit is None else (float(fit.solution[0]), float(np.sqrt(fit.covariance[0, 0])))
+
+
 def means(channel: Channel, time: FloatArray) -> FloatArray:
     """Means (n,) of a channel over GRID around each `time` (n,), from all samples there are.
 
@@ -107,6 +124,18 @@ def means(channel: Channel, time: FloatArray) -> FloatArray:
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.diff(sums) / np.diff(edges)
     return np.where(np.isfinite(channel.at(time)), mean, np.nan)
+
+
+def averaged(channel: Channel, time: FloatArray) -> FloatArray:
+    """Means (n,) of a channel over SMOOTH around each `time` (n,), which are GRID apart.
+
+    NaN outside its span and where they touch a gap.
+    """
+    width, values = round(SMOOTH / GRID), means(channel, time)
+    unknown = ~np.isfinite(values)
+    smooth = uniform_filter1d(np.where(unknown, 0.0, values), width, mode="nearest")
+    touched = uniform_filter1d(unknown.astype(np.float64), width, mode="nearest") > 1e-9
+    return np.where(touched, np.nan, smooth)
 
 
 def _gears(
@@ -143,14 +172,14 @@ def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[s
     """Tell delays and drifts of speed channels against the input speed that are beyond doubt."""
     if "input_speed" not in channels:
         return []
-    inlet = channels["input_speed"]
+    inlet = fresh_samples(channels["input_speed"])
     texts: list[str] = []
     if "output_speed" in channels:
-        outlet = channels["output_speed"]
+        outlet = fresh_samples(channels["output_speed"])
         found = speed_delay(inlet, outlet, [gear.ratio for gear in card.gears])
         texts += _told(found, outlet, inlet)
     if "engine_speed" in channels:
-        engine = channels["engine_speed"]
+        engine = fresh_samples(channels["engine_speed"])
         found = speed_delay(engine, inlet, [card.i_in])
         turned = None if found is None else replace(found, value=-found.value, drift=-found.drift)
         texts += _told(turned, engine, inlet)
@@ -158,8 +187,14 @@ def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[s
 
 
 def beyond_doubt(delay: Delay, one: Channel, other: Channel) -> bool:
-    """Whether a delay is significant and more than the sampling of both channels explains."""
-    return abs(delay.value) > max(_least(one, other), _SIGNIFICANT * delay.sigma)
+    """Whether a delay is more than noise and the sampling of both channels explain together.
+
+    A sample may be the mean over its period, as encoders on a bus send it, and is then half of it
+    late without any clock being wrong.
+    """
+    by_sampling = 0.5 * max(one.step, other.step)
+    beyond = abs(delay.value) - by_sampling
+    return abs(delay.value) > _LEAST_DELAY and beyond > SIGNIFICANT * delay.sigma
 
 
 def _least(one: Channel, other: Channel) -> float:
@@ -179,7 +214,7 @@ def _told(delay: Delay | None, other: Channel, reference: Channel) -> list[str]:
             f"{reference.source_name!r} (± {1e3 * delay.sigma:.1f} ms): to correct it set "
             f"channels.{other.role}.time_shift_s = {-delay.value:.4f} in the channel mapping"
         )
-    if abs(delay.drift) * delay.span > max(least, _SIGNIFICANT * delay.drift_sigma * delay.span):
+    if abs(delay.drift) * delay.span > max(least, SIGNIFICANT * delay.drift_sigma * delay.span):
         texts.append(
             f"the clocks of {other.source_name!r} and {reference.source_name!r} drift apart by "
             f"{1e6 * abs(delay.drift):.0f} µs/s: export both on one clock"

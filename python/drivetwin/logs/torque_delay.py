@@ -22,6 +22,7 @@ from drivetwin.logs.align import (
     least_squares,
     means,
 )
+from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, FloatArray
 
 SLOW = 1.0
@@ -88,12 +89,13 @@ def _delay(fit: Fit) -> Delay | None:
 def torque_warnings(channels: Mapping[str, Channel]) -> list[str]:
     """Tell a delay between output torque and speeds that is beyond doubt.
 
-    One against all speeds that there are is the torque's, else the speed's.
+    One against all speeds that there are is the torque's, else the speed's. Of a value that is
+    repeated until the next one comes, the first counts.
     """
     if "output_torque" not in channels:
         return []
-    torque = channels["output_torque"]
-    speeds = [channels[role] for role in SPEEDS if role in channels]
+    torque = fresh_samples(channels["output_torque"])
+    speeds = [fresh_samples(channels[role]) for role in SPEEDS if role in channels]
     found = [(speed, delay) for speed in speeds if (delay := torque_delay(torque, speed))]
     late = [(speed, one.value) for speed, one in found if beyond_doubt(one, torque, speed)]
     if not late:
