@@ -239,3 +239,30 @@ def test_a_unit_below_counts_where_brackets_in_the_name_hold_none() -> None:
     assert [one.unit for one in log.channels] == ["bar", "Nm", "furlong"]
     log = read("time [s],Trq [Nm],x\ndouble,double,double\n0.0,1,2\n0.1,1,2\n")
     assert [one.unit for one in log.channels] == ["Nm", None]
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ['0,"1,001"', "1,990"],
+        ['0,"1,001"', '1,"1,002"'],
+        ['0,"-1,001"', '1,"121,500"'],
+        ['0,"1,234,567"', '1,"1,002"'],
+    ],
+)
+def test_commas_that_may_group_thousands_are_refused(rows: list[str]) -> None:
+    with pytest.raises(FileFormatError, match="may stand for decimals or for thousands"):
+        read("\n".join(["time,x", "ms,Nm", *rows]))
+
+
+def test_whole_numbers_beside_commas_of_thousands_are_refused_in_each_column() -> None:
+    with pytest.raises(FileFormatError, match="a column with '1,001' and '990'"):
+        read("time;x\ns;Nm\n0,0;1,001\n0,1;990\n")
+    log = read("time;x\ns;Nm\n0,0;1,001\n0,1;1,990\n")
+    assert values(log, "x") == [1.001, 1.99]
+
+
+@pytest.mark.parametrize("proof", ["0,990", "1,5", "1,0021", "1001,002", ",500", "1,001e3"])
+def test_one_comma_that_groups_no_thousands_tells_for_its_column(proof: str) -> None:
+    log = read(f"time;x\nms;Nm\n0;1,001\n1;{proof}\n2;990\n")
+    assert values(log, "x") == [1.001, float(proof.replace(",", ".")), 990.0]

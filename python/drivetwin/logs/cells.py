@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,9 @@ from drivetwin.logs.shiftlog import FloatArray
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
+"""A number with comma that may be a whole one from a thousand to a million."""
+
 _NOT_A_NUMBER = frozenset(("nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"))
 
 
@@ -39,20 +42,39 @@ def is_number(cell: str, decimal: str = ".") -> bool:
 def decimal_sign(rows: Sequence[Sequence[str]], file: str) -> str:
     """Return `,` where numbers in `rows` are written with it, else `.`.
 
-    Raises FileFormatError where both occur: then one of them groups thousands.
+    Raises FileFormatError where both occur: then one of them groups thousands; and where each comma
+    stands as between thousands, in the file or in a column that holds whole numbers without.
     """
     commas = [cell for row in rows for cell in row if "," in cell]
-    if not any(is_number(cell, ",") for cell in commas):
+    example = next((cell.strip() for cell in commas if is_number(cell, ",")), None)
+    if example is None:
         return "."
     pointed = next((c for row in rows for c in row if "." in c and is_number(c)), None)
     if pointed is not None:
-        example = next(cell for cell in commas if is_number(cell, ","))
-        raise FileFormatError(
-            f"numbers with point ({pointed.strip()!r}) and with comma ({example.strip()!r})",
-            "export with one decimal sign and no sign between thousands",
-            Where(file=file),
-        )
-    return ","
+        fault = f"numbers with point ({pointed.strip()!r}) and with comma ({example!r})"
+    elif _may_group(commas):
+        fault = f"the comma in {example!r} and all others may stand for decimals or for thousands"
+    elif (grouped := next(filter(None, map(_grouped, zip(*rows, strict=True))), None)) is not None:
+        fault = f"a column with {grouped[0]!r} and {grouped[1]!r}: the comma may group thousands"
+    else:
+        return ","
+    remedy = "export with one decimal sign and no sign between thousands"
+    raise FileFormatError(fault, remedy, Where(file=file))
+
+
+def _may_group(commas: Iterable[str]) -> bool:
+    """Whether no number among cells with commas shows that a comma is a decimal one."""
+    return all(_THOUSANDS.fullmatch(cell.strip()) for cell in commas if is_number(cell, ","))
+
+
+def _grouped(column: Sequence[str]) -> tuple[str, str] | None:
+    """A number with comma and a whole one without, of a column whose commas may group thousands."""
+    commas = [cell for cell in column if "," in cell]
+    example = next((cell.strip() for cell in commas if is_number(cell, ",")), None)
+    if example is None or not _may_group(commas):
+        return None
+    whole = next((cell.strip() for cell in column if is_number(cell)), None)
+    return None if whole is None else (example, whole)
 
 
 def to_numbers(cells: Sequence[str], line_numbers: Sequence[int], decimal: str) -> Numbers:
