@@ -14,6 +14,7 @@ from drivetwin.identify.likelihood.curves import METHOD, curves_of
 from drivetwin.identify.likelihood.derived import absolute_ids, of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.late import lateness_in_words
+from drivetwin.identify.likelihood.limits import at_limits
 from drivetwin.identify.likelihood.null_space import null_directions
 from drivetwin.identify.likelihood.priors import over_eta
 from drivetwin.identify.likelihood.residuals import residual_tests
@@ -76,18 +77,13 @@ def conclude(
         tuple(values), np.array(list(values.values())), covariance, designs, spread
     )
     estimates = held_against(estimates, against, WITH_PRIOR)
-    if not signals[0].scale_known:
-        eta = drivelines[0].known.get("eta")
-        estimates |= {
-            name: _without_scale(
-                name, eta, estimates.get(name + OVER_ETA), _design(name, drivelines)
-            )
-            for name in absolute_ids(signals)
-        }
-    for one in (part.structure for part in fit.problem.parts):
-        if one.unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
-            name = of_log(AGE, one.log)
-            estimates[name] = refused(name, METHOD, NO_AGE)
+    limits = {
+        name: text
+        for name, text in at_limits(fit, tuple(values), matrix).items()
+        if estimates[name].verdict is not Verdict.DESIGN
+    }
+    estimates |= {name: doubted(estimates[name], text) for name, text in limits.items()}
+    estimates |= _of_what_is_fixed(fit, signals, drivelines, estimates)
     return Conclusions(
         estimates,
         curves_of(fit, linear, systematic),
@@ -96,10 +92,32 @@ def conclude(
         (
             *dict.fromkeys(notes.values()),
             *(one.text for one in against),
+            *(f"{name}: {text}" for name, text in limits.items()),
             *_warnings(fit, signals),
         ),
         _load_law(fit, systematic),
     )
+
+
+def _of_what_is_fixed(
+    fit: LikelihoodFit,
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    estimates: Mapping[str, Estimate],
+) -> dict[str, Estimate]:
+    """Estimates of what the fit holds: the scale of torques no output torque shows, and with it
+    all absolute values, and the age of an engine torque that hardly moves."""
+    found: dict[str, Estimate] = {}
+    if not signals[0].scale_known:
+        eta = drivelines[0].known.get("eta")
+        for name in absolute_ids(signals):
+            ratio = estimates.get(name + OVER_ETA)
+            found[name] = _without_scale(name, eta, ratio, _design(name, drivelines))
+    for one in (part.structure for part in fit.problem.parts):
+        if one.unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
+            name = of_log(AGE, one.log)
+            found[name] = refused(name, METHOD, NO_AGE)
+    return found
 
 
 def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
