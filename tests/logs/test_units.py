@@ -24,6 +24,7 @@ RPM = 2.0 * math.pi / 60.0
         ("Ncm", 1e-2),
         ("ft·lb", 1.3558179483314004),
         ("lbf-ft", 1.3558179483314004),
+        *((text, 1.3558179483314004) for text in ("ft-lbs", "ft lbs", "ft·lbf", "lbf.ft")),
     ],
 )
 def test_torque_spellings(spelling: str, factor: float) -> None:

@@ -46,7 +46,8 @@ _SPELLINGS: dict[Quantity, dict[float, str]] = {
         1e-2: "Ncm N·cm N.cm N*cm",
         1e-3: "Nmm N·mm N.mm N*mm",
         10.0: "daNm daN·m daN.m daN*m",
-        _FT_LB: "ft·lb ft.lb ft*lb ft-lb ftlb lb·ft lb.ft lb*ft lb-ft lbft lbf·ft lbf*ft lbf-ft",
+        _FT_LB: "ft·lb ft.lb ft*lb ft-lb ftlb lb·ft lb.ft lb*ft lb-ft lbft lbf·ft lbf*ft lbf-ft "
+        "ft·lbs ft.lbs ft*lbs ft-lbs ftlbs lbs·ft lbs-ft ft·lbf ft.lbf ft*lbf ft-lbf ftlbf lbf.ft",
         _KGF: "kgf·m kgf.m kgf*m kgfm kp·m kpm",
     },
     Quantity.SPEED: {
