@@ -106,6 +106,14 @@ def test_a_matrix_is_told(tmp_path: Path) -> None:
     assert "a matrix 200×2" in raw.unreadable["both"]
 
 
+def test_complex_numbers_are_told(tmp_path: Path) -> None:
+    content = {"t": T, "x": T, "n": T + 0j, "s": {"time": T, "data": T * 1j}, "one": 1j}
+    raw = read(tmp_path, content)
+    assert [one.name for one in raw.channels] == ["x"]
+    assert raw.unreadable.keys() == {"n", "s"}
+    assert set(raw.unreadable.values()) == {"complex numbers: export their real part"}
+
+
 def test_version_7_3(tmp_path: Path) -> None:
     path = tmp_path / "log.mat"
     path.write_bytes(SEEDS["mat73"](tmp_path))

@@ -163,7 +163,9 @@ class _Search:
 
     def _told(self, name: str, value: Any) -> None:
         """Say why a variable is none of the above, unless it is a text or a single number."""
-        if isinstance(value, np.ndarray) and value.ndim > 1:
+        if isinstance(value, np.ndarray) and value.dtype.kind == "c" and value.size > 1:
+            self.found.unreadable[name] = "complex numbers: export their real part"
+        elif isinstance(value, np.ndarray) and value.ndim > 1:
             shape = "×".join(map(str, value.shape))
             self.found.unreadable[name] = f"a matrix {shape}: one vector for each signal is needed"
         elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
