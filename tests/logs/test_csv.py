@@ -266,3 +266,9 @@ def test_whole_numbers_beside_commas_of_thousands_are_refused_in_each_column() -
 def test_one_comma_that_groups_no_thousands_tells_for_its_column(proof: str) -> None:
     log = read(f"time;x\nms;Nm\n0;1,001\n1;{proof}\n2;990\n")
     assert values(log, "x") == [1.001, float(proof.replace(",", ".")), 990.0]
+
+
+@pytest.mark.parametrize("day", ["11/22/2026", "31.02.2026", "Monday"])
+def test_a_date_that_cannot_be_read_is_told_and_not_the_clock(day: str) -> None:
+    with pytest.raises(TimeError, match=f"line 2: '{day}' is no date that can be read"):
+        read(f"Date,Time,n_in [rpm]\n{day},12:00:00,1200\n{day},12:00:01,1201\n")

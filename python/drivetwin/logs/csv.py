@@ -304,8 +304,13 @@ def _clock(
     """Seconds (n,) since the first row of a column that shows a clock."""
     seconds, count = clock_seconds(cells, dates)
     if count < seconds.size:
-        what = f"no time stamp: line {lines[count]}: {cells[count].strip()[:40]!r} is no clock time"
-        raise TimeError(what, "export time as seconds since the start of the recording", where)
+        remedy = "export time as seconds since the start of the recording"
+        cell, word = cells[count], "clock time"
+        if dates is not None and is_clock(cell):  # the day beside it is at fault
+            cell, word = dates[count], "date that can be read"
+            remedy = f"write it as 2024-05-31 or 31.05.2024, or {remedy}"
+        what = f"no time stamp: line {lines[count]}: {cell.strip()[:40]!r} is no {word}"
+        raise TimeError(what, remedy, where)
     return seconds
 
 
