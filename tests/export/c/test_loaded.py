@@ -17,6 +17,7 @@ from drivetwin.driveline import (
     DualClutch,
     FloatArray,
     FrictionTable,
+    LossLaw,
     RoadLoad,
     ShiftElement,
     State,
@@ -35,7 +36,7 @@ from tests.export.cases import CASES, paper_model, paper_subject
 FLOAT_ERROR = 2e-4
 """Largest deviation of the float model from a reference, of its largest torque: seen are 4e-6 to
 1.2e-4 (0.04 to 0.53 N m), the last where a lock at a steep slip turns round-off into time."""
-_LOSS_LAWS = ["paper", "dissipative"]
+_LOSS_LAWS: list[LossLaw] = ["paper", "dissipative"]
 
 
 @pytest.fixture(scope="module")
@@ -263,7 +264,7 @@ def test_one_long_step_meets_any_stiction(
 @pytest.mark.parametrize("drum_inertia", [0.0, 0.15])
 @pytest.mark.parametrize("engine_speed", [100.0, 178.0])
 def test_a_start_locks_as_a_clutch_that_is_strong_beyond_measure_does(
-    loaded: CModel, loss_law: str, drum_inertia: float, engine_speed: float
+    loaded: CModel, loss_law: LossLaw, drum_inertia: float, engine_speed: float
 ) -> None:
     """The engine is slower or faster than the locked B2 asks for; nothing but B2 acts meanwhile."""
     b2, b3 = (replace(one, drum_inertia=drum_inertia) for one in paper_model().elements)
