@@ -7,7 +7,7 @@ import re
 import shutil
 import zipfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import fmpy
@@ -388,9 +388,46 @@ def test_sources_inside_are_complete(built: Built, tmp_path: Path) -> None:
     compile_library([folder / name for name in listed], tmp_path / "again.so", None)
 
 
+@pytest.mark.parametrize("version", FmiVersion)
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (("Brémse α", "C1"), ("'Bremse alpha'", "C1")),
+        (("Б", "В"), ("'?'", "'? 2'")),
+        (("B 2's", "`B3`\\"), (r"'B 2\'s'", "'_B3_/'")),
+        (("load", "start"), ("load", "start")),
+        (("B" * 300, "1"), ("B" * 300, "'1'")),
+    ],
+)
+def test_any_name_is_one_that_fmpy_accepts(
+    tmp_path: Path, version: FmiVersion, names: tuple[str, str], expected: tuple[str, str]
+) -> None:
+    subject = CASES["tie_up"]().subject
+    pairs = zip(subject.model.elements, names, strict=True)
+    model = replace(subject.model, elements=tuple(replace(one, name=name) for one, name in pairs))
+    start = replace(subject.start, locked=(names[0],))
+    path = tmp_path / "named.fmu"
+    build_fmu(replace(subject, model=model, start=start), path, BuildOptions(version))
+    assert validate_fmu(str(path)) == []
+    told = {one.name for one in fmpy.read_model_description(str(path)).modelVariables}
+    assert {f"{name}.{end}" for name in expected for end in ("P0", "pressure", "slip")} <= told
+
+
+def test_a_twin_with_a_name_of_any_length_is_built(tmp_path: Path) -> None:
+    path = tmp_path / "long.fmu"
+    build_fmu(replace(CASES["tie_up"]().subject, name="twin of " * 1000), path)
+    assert validate_fmu(str(path)) == []
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [("paper 2-3", "paper_2_3"), ("7G Wörth", "twin_7G_W_rth"), ("", "twin"), ("a", "a")],
+    [
+        ("paper 2-3", "paper_2_3"),
+        ("7G Wörth", "twin_7G_W_rth"),
+        ("", "twin"),
+        ("a", "a"),
+        ("a" * 300, "a" * 63),
+    ],
 )
 def test_identifier_is_one_of_c(name: str, expected: str) -> None:
     assert identifier(name) == expected

@@ -72,9 +72,13 @@ def build_fmu(subject: Subject, path: Path, options: BuildOptions | None = None)
 
 
 def identifier(name: str) -> str:
-    """A C identifier from a name."""
+    """A C identifier from a name, short enough for a file."""
     text = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "twin"
-    return text if text[0].isalpha() else f"twin_{text}"
+    return (text if text[0].isalpha() else f"twin_{text}")[:_LONGEST_IDENTIFIER]
+
+
+_LONGEST_IDENTIFIER = 63
+"""What C99 tells apart; file names may have 255 bytes, paths in archives on Windows some less."""
 
 
 def _sources(subject: Subject, options: BuildOptions) -> tuple[Header, dict[str, bytes]]:

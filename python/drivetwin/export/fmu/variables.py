@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
 from drivetwin.export.entries import Entry, entries_of, locked_index, start_entries
+from drivetwin.export.parameters.spelling import ascii_line, one_line
 from drivetwin.export.subject import Subject
 
 INPUTS, OUTPUTS, MODES, LOSS_LAW, LOCKED, START, PARAMETERS = 1, 10, 30, 40, 41, 50, 100
@@ -68,7 +71,9 @@ class Variable:
 def variables_of(subject: Subject) -> tuple[Variable, ...]:
     """All variables: inputs, outputs, parameters; names are structured as FMI has it."""
     model = subject.model
-    names = [structured(element.name) for element in model.elements]
+    elements = [element.name for element in model.elements]
+    spelled = structured_names(elements)
+    names = list(spelled.values())
     return (
         *_inputs(names),
         *_outputs(names),
@@ -85,26 +90,49 @@ def variables_of(subject: Subject) -> tuple[Variable, ...]:
             LOCKED,
             Kind.INTEGER,
             Role.FIXED,
-            f"element that starts locked: 0 none, 1 {names[0]}, 2 {names[1]}",
+            "element that starts locked: 0 none, 1 {}, 2 {}".format(*map(one_line, elements)),
             start=float(locked_index(model, subject.start)),
             least=0.0,
             most=2.0,
         ),
-        *(_parameter(e, START + i, Role.FIXED) for i, e in enumerate(start_entries(subject.start))),
-        *(_parameter(e, PARAMETERS + i, Role.TUNABLE) for i, e in enumerate(entries_of(model))),
+        *(
+            _parameter(e, START + i, Role.FIXED, spelled)
+            for i, e in enumerate(start_entries(subject.start))
+        ),
+        *(
+            _parameter(e, PARAMETERS + i, Role.TUNABLE, spelled)
+            for i, e in enumerate(entries_of(model))
+        ),
     )
 
 
-def structured(name: str) -> str:
-    """A name part that FMI's structured naming accepts: quoted where it is no identifier."""
-    plain = name.isascii() and name.isidentifier()
-    escaped = name.replace("\\", "\\\\").replace("'", "\\'")
-    return name if plain else f"'{escaped}'"
+def structured_names(names: Iterable[str]) -> dict[str, str]:
+    """Name parts that FMI's structured naming accepts; those that would coincide are numbered."""
+    chosen: dict[str, str] = {}
+    for name in names:
+        part, count = _structured(name), 1
+        while part in chosen.values():
+            count += 1
+            part = _structured(f"{name} {count}")
+        chosen[name] = part
+    return chosen
 
 
-def _parameter(entry: Entry, reference: int, role: Role) -> Variable:
+def _structured(name: str) -> str:
+    """Quoted where the name is no identifier, in ASCII."""
+    if name.isascii() and name.isidentifier():
+        return name
+    quoted = re.sub(_NOT_IN_QUOTES, "_", ascii_line(name)).replace("'", "\\'")
+    return f"'{quoted or '_'}'"
+
+
+_NOT_IN_QUOTES = r"[^A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ']"
+"""What a quoted name of FMI cannot hold, the apostrophe aside, which it escapes."""
+
+
+def _parameter(entry: Entry, reference: int, role: Role, spelled: Mapping[str, str]) -> Variable:
     head, dot, tail = entry.name.rpartition(".")
-    name = f"{structured(head)}{dot}{tail}" if dot else tail
+    name = f"{spelled.get(head, head)}{dot}{tail}"
     return Variable(
         name,
         reference,
