@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,12 +14,14 @@ from drivetwin.errors import PlausibilityError
 from drivetwin.logs.agreement import (
     check_gearing,
     check_torque_signs,
+    final_drive_held,
     partly_recorded,
     torque_balance,
 )
+from drivetwin.logs.read import read_log
 from drivetwin.logs.roles import quantity_of
 from drivetwin.logs.shiftlog import Channel
-from tests.logs.made import card
+from tests.logs.made import CARD, card, write
 
 TIME = np.linspace(0.0, 0.5, 50)
 
@@ -93,3 +96,37 @@ def test_a_torque_of_the_wrong_scale_is_told(tmp_path: Path, share: float, told:
 def test_without_a_gear_there_is_no_balance(tmp_path: Path) -> None:
     assert torque_balance(powered(2.5, 0.3), card(tmp_path)) == []
     assert torque_balance(speeds(input_speed=180.0, output_speed=100.0), card(tmp_path)) == []
+
+
+def driven(wheel_over: float, noise: float = 0.02) -> dict[str, Channel]:
+    """Output and wheel speed of a vehicle that speeds up, at output over wheel `wheel_over`."""
+    time = np.arange(0.0, 4.0, 0.002)
+    output = 70.0 + 3.0 * time + np.sin(4.0 * time)
+    rng = np.random.default_rng(2)
+    values = {"output_speed": output, "wheel_speed": output / wheel_over}
+    return {
+        role: Channel(
+            role, quantity_of(role), time, v + rng.normal(0.0, noise, time.size), role, ""
+        )
+        for role, v in values.items()
+    }
+
+
+def test_a_final_drive_that_is_not_the_cards_is_told(tmp_path: Path) -> None:
+    vehicle = card(tmp_path)
+    (text,) = final_drive_held(driven(4.99), vehicle)
+    found = re.match(r"'output_speed' over 'wheel_speed' is ([\d.]+), .* final_drive = 5:", text)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(4.99, abs=0.001)
+    assert final_drive_held(driven(5.0), vehicle) == []
+    assert final_drive_held(driven(4.998), vehicle) == []
+    assert final_drive_held(driven(4.99, noise=3.0), vehicle) == []
+    assert final_drive_held({"output_speed": driven(5.2)["output_speed"]}, vehicle) == []
+
+
+def test_reading_a_log_tells_the_final_drive(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    off = card(tmp_path, CARD.replace("final_drive = 5.0", "final_drive = 5.15"))
+    assert any("final_drive = 5.15" in one for one in read_log(path, off).warnings)
+    fits = read_log(path, card(tmp_path))
+    assert not any("final_drive" in one for one in fits.warnings)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from drivetwin.errors import PlausibilityError, TimeError, Where
+from drivetwin.logs.align import SIGNIFICANT, speed_ratio
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.roles import AUXILIARY, quantity_of
 from drivetwin.logs.shiftlog import Channel, open_ends
@@ -21,6 +22,10 @@ STANDSTILL = 1.0
 
 FINAL_DRIVE_TOLERANCE = 0.2
 """Relative; generous to one-wheel sensors in a bend, far below any mistaken unit."""
+
+FINAL_DRIVE_DRIFT = 0.001
+"""Relative deviation of the held final drive from the card that is worth a warning: no clutch lies
+between the two speeds, and J3 and the shaft's damping hang on it."""
 
 GEAR_MARGIN = 3.0
 """Factor around the card's gears, for logs that also hold other gears; rpm/(rad/s) is 9.5."""
@@ -106,6 +111,21 @@ def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str)
                 "or correct the card",
                 Where(file=file),
             )
+
+
+def final_drive_held(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
+    """Tell where output and wheel speed are not in the ratio of the final drive."""
+    if "output_speed" not in channels or "wheel_speed" not in channels:
+        return []
+    outlet, wheel, final = channels["output_speed"], channels["wheel_speed"], card.final_drive
+    found = speed_ratio(outlet, wheel)
+    if found is None or abs(found[0] - final) < FINAL_DRIVE_DRIFT * final + SIGNIFICANT * found[1]:
+        return []
+    return [
+        f"{outlet.source_name!r} over {wheel.source_name!r} is {found[0]:.5g}, the card says "
+        f"final_drive = {final:.5g}: correct it, or the scale of a speed; the speed of a wheel "
+        "that is not driven is off by the slip of the tyres and cannot stand for the driven ones"
+    ]
 
 
 def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:

@@ -19,6 +19,7 @@ from drivetwin.logs.agreement import (
     check_common_span,
     check_gearing,
     check_torque_signs,
+    final_drive_held,
     partly_recorded,
     torque_balance,
 )
@@ -81,6 +82,7 @@ def read_log(
     check_gearing(channels, card, str(path))
     check_torque_signs(channels, str(path))
     warnings += [*partly_recorded(channels), *torque_balance(channels, card)]
+    warnings += final_drive_held(channels, card)
     warnings += [*clock_warnings(channels, card), *torque_warnings(channels)]
     return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
 
