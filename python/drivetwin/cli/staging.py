@@ -57,8 +57,9 @@ def staged(folder: Path) -> Iterator[Path]:
         shutil.rmtree(beside, ignore_errors=True)
 
 
-def _told(file: str | None, beside: Path, folder: Path) -> str | None:
+def _told(file: object, beside: Path, folder: Path) -> str | None:
     """The path of a file in `beside` as it will be in `folder`; any other as it is."""
-    if file is None or not Path(file).is_relative_to(beside):
-        return file
-    return str(folder / Path(file).relative_to(beside))
+    if file is None:
+        return None
+    path = Path(str(file))
+    return str(folder / path.relative_to(beside) if path.is_relative_to(beside) else file)
