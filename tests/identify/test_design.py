@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from drivetwin.identify.design import Contradiction, contradictions, held_against
+from drivetwin.identify.design import Contradiction, contradictions, held_against, outside_ranges
 from drivetwin.identify.known import CONTRADICTS, without_prior
-from drivetwin.identify.result import Verdict
+from drivetwin.identify.result import Estimate, Verdict
 from drivetwin.identify.signals import FloatArray
 from drivetwin.identify.uncertainty import ADDS_LITTLE, designed, judge
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, VehicleCard
 
 IDS = ("J_out", "J_prime_2", "Tv_over_if")
 LOG = np.array([1.2, 14.3, 1800.0])
@@ -91,3 +93,23 @@ def test_an_exact_value_and_one_that_physics_excludes_are_judged_elsewhere() -> 
     for value, std in ((1.2, 0.0), (-0.2, 0.1)):
         design = {"J_out": PriorValue(2.4, std)}
         assert contradictions(("J_out",), np.array([value]), nothing, design, {}) == ()
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "told"),
+    [(14.3, 0.1, True), (2.0, 0.1, True), (9.1, 0.1, False), (5.0, 0.1, False), (14.3, None, True)],
+)
+def test_an_inertia_whose_interval_lies_outside_the_design_range_is_told(
+    value: float, std: float | None, told: bool
+) -> None:
+    card = VehicleCard("truck", "paper", 1.0, 5.0, (), {}, (3.0, 9.0), (1000.0, 2000.0))
+    estimate = Estimate("J_prime_2", value, std, Verdict.IDENTIFIED, "likelihood")
+    ratio = replace(estimate, id="J_prime_2_over_eta")
+    texts = outside_ranges({"J_prime_2": estimate, "J_prime_2_over_eta": ratio}, card)
+    assert len(texts) == int(told)
+    for text in texts:
+        assert f"J_prime_2 = {value:.4g} kg m^2" in text
+        assert "3 to 9 kg m^2" in text
+    design = replace(estimate, verdict=Verdict.DESIGN)
+    refused = Estimate("J_vehicle", None, None, Verdict.NOT_IDENTIFIABLE, "likelihood")
+    assert outside_ranges({"J_prime_2": design, "J_vehicle": refused}, card) == ()

@@ -141,6 +141,14 @@ def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
     assert "no simulation" in stiffness.reason
 
 
+def test_inertias_outside_the_cards_ranges_are_told() -> None:
+    log, card, shifts = recording("truck_a")
+    assert not [one for one in identify(log, card, shifts).warnings if "design range" in one]
+    strict = replace(card, J_prime_range=(3.0, 9.0), J_vehicle_range=(1000.0, 2000.0))
+    texts = [one for one in identify(log, strict, shifts).warnings if "design range" in one]
+    assert [one.split()[0] for one in texts] == ["J_prime_2", "J_prime_3", "J_vehicle"]
+
+
 def test_tolerances_enter_the_likelihood_as_shifts_of_its_minimum() -> None:
     log, card, shifts = recording("truck_a")
     stated = replace(card, sensors={"output_torque": SensorTolerance(gain=0.01)})

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Design values of the card, held against what the log tells.
+"""Design values and ranges of the card, held against what the log tells.
 
 A design value is one measurement more. Where the log speaks against it the estimate lies between
-the two and may be neither: that is told, and what rests on it does not count as identified.
+the two and may be neither: that is told, and what rests on it does not count as identified. A
+design range binds no estimate; one outside it is told.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from drivetwin.identify.known import CONTRADICTS, without_prior
 from drivetwin.identify.result import Z95, Estimate, Verdict
 from drivetwin.identify.signals import FloatArray
 from drivetwin.identify.uncertainty import doubted
-from drivetwin.parameters import spec_of
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.parameters import OVER_ETA, spec_of
+from drivetwin.vehicle.spec import PriorValue, VehicleCard
 
 
 @dataclass(frozen=True)
@@ -101,3 +102,28 @@ def held_against(
                 why = f"without the card's {one.id} the log gives {free:.5g} {other.unit}"
                 told[name] = doubted(other, why.removesuffix(" 1"))
     return told
+
+
+def outside_ranges(estimates: Mapping[str, Estimate], card: VehicleCard) -> tuple[str, ...]:
+    """What is said of inertias whose whole interval lies outside the card's design range."""
+    ranges = {"J_prime": card.J_prime_range, "J_vehicle": card.J_vehicle_range}
+    texts = []
+    for name, one in estimates.items():
+        design = None if name.endswith(OVER_ETA) else ranges.get(spec_of(name).stem)
+        if design is None or one.value is None or one.verdict is Verdict.DESIGN:
+            continue
+        low, high = one.ci95_total or (one.value, one.value)
+        if high < design[0] or low > design[1]:
+            text = outside(name, one.value, design)
+            texts.append(f"{text}: correct the range, or check ratios, gains and units of the log")
+    return tuple(texts)
+
+
+def outside(symbol: str, value: float, design: tuple[float, float]) -> str:
+    """What is said of an inertia [kg m^2] outside its design range; empty where it lies within."""
+    if design[0] <= value <= design[1]:
+        return ""
+    return (
+        f"{symbol} = {value:.4g} kg m^2 lies outside its design range "
+        f"{design[0]:g} to {design[1]:g} kg m^2"
+    )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.errors import IdentificationError
+from drivetwin.identify.design import outside
 from drivetwin.identify.friction import PaperFriction, paper_friction
 from drivetwin.identify.inertia import PaperInertiaSettings, paper_inertia
 from drivetwin.identify.load import PaperLoadSettings, paper_load
@@ -44,7 +45,7 @@ def _inertia_doubts(
     """Why η and J′ of the grid search deserve little trust, by parameter id."""
     torque = signals.engine_torque.within(signals.shift.before).values
     moving = float(np.std(torque)) / max(abs(float(np.mean(torque))), 1e-9)
-    reasons = [_outside("J′", fit.best.inertia, bounds), _at_the_end("η", fit)]
+    reasons = [outside("J′", fit.best.inertia, bounds), _at_the_end("η", fit)]
     if moving < EXCITATION:
         reasons.append(
             f"the engine torque moves by {100 * moving:.1f} % only while gear {gear} is held, so "
@@ -52,15 +53,6 @@ def _inertia_doubts(
         )
     text = "; ".join(reason for reason in reasons if reason)
     return dict.fromkeys(("eta", f"J_prime_{gear}"), text) if text else {}
-
-
-def _outside(symbol: str, value: float, bounds: tuple[float, float]) -> str:
-    if bounds[0] <= value <= bounds[1]:
-        return ""
-    return (
-        f"{symbol} = {value:.4g} kg m^2 lies outside its design range "
-        f"{bounds[0]:g} to {bounds[1]:g} kg m^2"
-    )
 
 
 def _at_the_end(symbol: str, fit: GridFit) -> str:
@@ -110,10 +102,10 @@ def paper_shift(
     except IdentificationError as error:
         refusals["friction"] = error.what
     doubts = _inertia_doubts(signals, inertia, J_prime_range, shift.start_gear)
-    reasons = [_outside("J3", load.best.inertia, J_vehicle_range), _at_the_end("T_v/i_f", load)]
+    reasons = [outside("J3", load.best.inertia, J_vehicle_range), _at_the_end("T_v/i_f", load)]
     if text := "; ".join(reason for reason in reasons if reason):
         doubts |= dict.fromkeys(("Tv_over_if", "J_vehicle"), text)
-    if text := _outside("J′", after.best.inertia, J_prime_range):
+    if text := outside("J′", after.best.inertia, J_prime_range):
         doubts[f"J_prime_{shift.end_gear}"] = text
     doubts |= {k: "it rests on doubtful inertias" for k in ("k_o", "c_o") if doubts and k in values}
     return PaperShift(inertia, after, load, ring, friction, values, doubts, refusals)

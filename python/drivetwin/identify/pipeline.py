@@ -17,6 +17,7 @@ from drivetwin.errors import (
     Where,
 )
 from drivetwin.identify.conclude import Conclusions, conclude, with_systematic_band
+from drivetwin.identify.design import outside_ranges
 from drivetwin.identify.friction import FrictionSettings, stribeck_at
 from drivetwin.identify.inputs import driveline_of, signals_of
 from drivetwin.identify.integral import IntegralShift, identify_shift
@@ -94,6 +95,9 @@ def identify(
         found, method, evidence = _with_torque(signals, drivelines, card, method)
     else:
         found, evidence = _without_torque(log, signals, drivelines, card, method)
+    # The paper's method doubts each value by itself; behind a converter J′ is without the engine.
+    elsewhere = method is Method.PAPER or is_open
+    ranges = () if elsewhere else outside_ranges(found.estimates, card)
     return Identification(
         estimates=found.estimates,
         friction=found.friction,
@@ -106,7 +110,7 @@ def identify(
         inputs={Path(log.source).name: log.sha256},
         settings=_settings(card, method),
         evidence={**evidence, "signals": tuple(signals)},
-        warnings=(*log.warnings, *found.warnings),
+        warnings=(*log.warnings, *found.warnings, *ranges),
         assumptions=(
             *((BEHIND_CONVERTER,) if is_open else ()),
             *_assumptions(card, method, found.load is not None),

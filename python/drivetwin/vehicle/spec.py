@@ -73,11 +73,11 @@ def brake_ratios(ratio: float) -> tuple[float, float]:
 class VehicleCard:
     """A vehicle as known from design; SI.
 
-    `gears` run from low to high. `final_drive` is i_f. `J_prime_range` [kg m^2] bounds J' at the
-    engine, `J_vehicle_range` [kg m^2] bounds J3 at the wheel; `J_out` [kg m^2] is the inertia of
-    the output side before the shaft (Jo' without drums), None if unknown. `sensors` and `channels`
-    go by channel role. `known` is what else is known, by parameter id (see parameters.py).
-    `converter` is the map of the torque converter, None where the card has none.
+    `gears` run from low to high. `final_drive` is i_f. `J_prime_range` [kg m^2] is the design
+    range of J' at the engine, `J_vehicle_range` [kg m^2] that of J3 at the wheel; `J_out` [kg m^2]
+    is the inertia of the output side before the shaft (Jo' without drums), None if unknown.
+    `sensors` and `channels` go by channel role. `known` is what else is known, by parameter id (see
+    parameters.py). `converter` is the map of the torque converter, None where the card has none.
     """
 
     name: str

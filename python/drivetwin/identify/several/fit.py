@@ -21,6 +21,7 @@ import numpy as np
 
 from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.identify.conclude import Conclusions
+from drivetwin.identify.design import outside_ranges
 from drivetwin.identify.inputs import driveline_of
 from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import PLAUSIBLE, LikelihoodFit, covariance_of
@@ -103,9 +104,10 @@ def identify_several(
         _share(k, log, one, fit) for k, (log, one) in enumerate(zip(logs, alone, strict=True), 1)
     )
     read = [f"{Path(log.source).name}: {text}" for log in logs for text in log.warnings]
+    ranges = outside_ranges(told.estimates, card)
     return _joined(
         alone,
-        replace(told, warnings=(*read, *told.warnings, *notes)),
+        replace(told, warnings=(*read, *told.warnings, *notes, *ranges)),
         {"likelihood": fit, "signals": tuple(signals), "several": Several(shares, tested)},
     )
 
