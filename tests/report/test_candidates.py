@@ -18,8 +18,8 @@ from drivetwin.validate import with_fit
 from tests.report.sample import card, identification, validation
 
 
-def candidate(name: str, **values: tuple[float, float]) -> Candidate:
-    """A candidate that tells some parameters: value and standard deviation."""
+def candidate(name: str, **values: tuple[float, float | None]) -> Candidate:
+    """A candidate that tells some parameters: value and standard deviation, None without one."""
     estimates = {
         key: Estimate(key, value, std, Verdict.IDENTIFIED, "integral")
         for key, (value, std) in values.items()
@@ -44,6 +44,23 @@ def test_one_value_alone_is_not_judged() -> None:
     assert [one.id for one in found] == ["eta", "k_o"]
     assert {one.agrees for one in found} == {None}
     assert found[0].estimates[1] is None
+
+
+def test_a_value_without_an_interval_is_held_against_those_of_the_others() -> None:
+    pair = [candidate("a", J3=(6059.7, 8.8)), candidate("b", J3=(6059.6, 8.8))]
+    (far,) = agreements([*pair, candidate("paper", J3=(6295.0, None))])
+    assert far.apart == pytest.approx((6295.0 - 6059.6) / 8.8)
+    assert far.agrees is False
+    assert far.bare == (2,)
+    (near,) = agreements([pair[0], candidate("paper", J3=(6070.0, None))])
+    assert near.agrees
+    assert near.mean == pytest.approx(6059.7)
+
+
+def test_values_without_any_interval_are_not_judged() -> None:
+    (one,) = agreements([candidate("a", J3=(6000.0, None)), candidate("b", J3=(6295.0, None))])
+    assert one.agrees is None
+    assert one.bare == (0, 1)
 
 
 def test_a_value_that_is_not_told_has_no_row() -> None:

@@ -44,6 +44,22 @@ def test_what_differs_is_named_first() -> None:
     ]
 
 
+def test_what_has_no_interval_is_named_beside_the_verdict() -> None:
+    pair = [
+        candidate("a", J_vehicle=(6059.7, 8.8), k_o=(1e5, None), eta=(0.9, 0.01)),
+        candidate("b"),
+    ]
+    paper = candidate("paper", J_vehicle=(6295.0, None), k_o=(1e5, None))
+    table = next(
+        block for block in agreement_section([*pair, paper]).blocks if isinstance(block, TableBlock)
+    )
+    assert [(row[-1].text, row[-1].note) for row in table.rows] == [
+        ("differ", "no interval: paper"),
+        ("not judged", "no interval: a, paper"),
+        ("", ""),
+    ]
+
+
 def test_narrow_and_wide_parameters_are_drawn_alike() -> None:
     section = agreement_section(candidates())
     block = next(block for block in section.blocks if isinstance(block, FigureBlock))

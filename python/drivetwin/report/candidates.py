@@ -79,13 +79,21 @@ class Agreement:
     """One parameter over the candidates, in their order; None where one does not tell it.
 
     `mean` is weighted by the inverse variances; `apart` is the largest difference of two
-    candidates in its standard deviations (sensor tolerances included), None below two values.
+    candidates in its standard deviations (sensor tolerances included). A value without an interval
+    is held against those of the others as if it were exact; None where no value with an interval
+    has another beside it.
     """
 
     id: str
     estimates: tuple[Estimate | None, ...]
     mean: float
     apart: float | None
+
+    @property
+    def bare(self) -> tuple[int, ...]:
+        """Places of the candidates that tell a value without an interval."""
+        told = [(k, one) for k, one in enumerate(self.estimates) if one and one.value is not None]
+        return tuple(k for k, one in told if not _has_interval(one.std_total))
 
     @property
     def agrees(self) -> bool | None:
@@ -106,13 +114,18 @@ def _agreement(name: str, estimates: Sequence[Estimate | None]) -> Agreement | N
         return None
     values = np.array([value for value, _ in told])
     stds = np.array([np.nan if std is None else std for _, std in told])
-    known = np.isfinite(stds) & (stds > 0.0)
+    known = np.array([_has_interval(std) for _, std in told])
     weights = np.where(known, 1.0 / np.where(known, stds, 1.0) ** 2, 0.0)
     mean = float(np.average(values, weights=weights if known.any() else None))
+    spread = np.where(known, stds, 0.0)
     apart = [
-        abs(values[i] - values[j]) / np.hypot(stds[i], stds[j])
+        abs(values[i] - values[j]) / np.hypot(spread[i], spread[j])
         for i in range(values.size)
         for j in range(i)
-        if known[i] and known[j]
+        if known[i] or known[j]
     ]
     return Agreement(name, tuple(estimates), mean, float(max(apart)) if apart else None)
+
+
+def _has_interval(std: float | None) -> bool:
+    return std is not None and np.isfinite(std) and std > 0.0

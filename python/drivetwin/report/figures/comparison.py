@@ -24,8 +24,7 @@ def agreement_figure(names: Sequence[str], found: Sequence[Agreement]) -> go.Fig
     """Deviation of each candidate from the common mean, with 95 % intervals, by parameter.
 
     In standard deviations of the parameter (the median of the candidates'), so that narrow and wide
-    ones read alike. Parameters that fewer than two candidates tell with an uncertainty are left
-    out; `names` are the candidates'.
+    ones read alike. Parameters that cannot be judged are left out; `names` are the candidates'.
     """
     shown = [one for one in found if one.apart is not None]
     figure = go.Figure()

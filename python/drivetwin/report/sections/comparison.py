@@ -60,7 +60,7 @@ def agreement_section(candidates: Sequence[Candidate]) -> Section:
 
 def _headline(judged: Sequence[Agreement], differing: Sequence[Agreement]) -> str:
     if not judged:
-        return "No parameter is told with an uncertainty by two of them."
+        return "No parameter that two of them tell has an uncertainty."
     text = f"{len(judged) - len(differing)} of {len(judged)} common parameters agree"
     return f"{text} within their total uncertainty ({DIFFER} standard deviations)."
 
@@ -95,7 +95,7 @@ def _parameter_table(candidates: Sequence[Candidate], found: Sequence[Agreement]
                 *(value_cell(each, display) for each in one.estimates),
                 Cell(display.label),
                 Cell("–" if one.apart is None else significant(one.apart, 2), number=True),
-                _verdict(one),
+                _verdict(one, candidates),
             )
         )
     head = (
@@ -117,11 +117,14 @@ def value_cell(one: Estimate | None, display: Display) -> Cell:
     return Cell(value, number=True, note=f"± {width}" if width else "")
 
 
-def _verdict(one: Agreement) -> Cell:
+def _verdict(one: Agreement, candidates: Sequence[Candidate]) -> Cell:
+    bare = ", ".join(candidates[k].name for k in one.bare)
+    note = f"no interval: {bare}" if bare else ""
     if one.agrees is None:
-        return Cell("")
+        alone = sum(each is not None and each.value is not None for each in one.estimates) < 2
+        return Cell("") if alone else Cell("not judged", badge=True, tone=Tone.UNKNOWN, note=note)
     word, tone = ("agree", Tone.GOOD) if one.agrees else ("differ", Tone.DOUBTFUL)
-    return Cell(word, badge=True, tone=tone)
+    return Cell(word, badge=True, tone=tone, note=note)
 
 
 def friction_overlay_section(candidates: Sequence[Candidate]) -> Section:
