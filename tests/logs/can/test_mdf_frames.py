@@ -109,3 +109,13 @@ def test_frames_without_a_stamp_are_counted(tmp_path: Path) -> None:
     raw = read_raw(write(tmp_path / "bus.mf4", [sent]))
     assert "1 frames without a time stamp left out" in raw.warnings
     assert all(np.isfinite(one.time).all() for one in raw.channels)
+
+
+def test_frames_from_1970_count_from_the_first_of_the_file(tmp_path: Path) -> None:
+    expected = read_log(write(tmp_path / "bus.mf4", [frames()]), card(tmp_path))
+    late = [(1.7e9 + time, identifier, data) for time, identifier, data in frames()]
+    found = read_log(write(tmp_path / "late.mf4", [late[::2], late[1::2]]), card(tmp_path))
+    start = min(time for time, _, _ in frames())
+    for role, channel in expected.channels.items():
+        assert found[role].time == pytest.approx(channel.time - start, abs=2e-6)
+    assert "time counts from the first stamp" in found.warnings[0]
