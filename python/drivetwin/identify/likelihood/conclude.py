@@ -16,6 +16,7 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.late import lateness_in_words
 from drivetwin.identify.likelihood.limits import at_limits
 from drivetwin.identify.likelihood.null_space import null_directions
+from drivetwin.identify.likelihood.other_law import other_law_in_words
 from drivetwin.identify.likelihood.priors import over_eta
 from drivetwin.identify.likelihood.residuals import residual_tests
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
@@ -94,6 +95,7 @@ def conclude(
             *(one.text for one in against),
             *(f"{name}: {text}" for name, text in limits.items()),
             *_warnings(fit, signals),
+            *other_law_in_words(fit, values, matrix, np.sqrt(np.diag(covariance))),
         ),
         _load_law(fit, systematic),
     )
