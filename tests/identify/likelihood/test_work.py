@@ -15,8 +15,8 @@ from drivetwin.identify.likelihood.work import EXPANSION, RUN, OutOfWork, at_mos
 from tests.identify.likelihood.made import bench, fitted, problem, truth_of
 
 
-def _chosen() -> LikelihoodFit:
-    made = bench()
+def _chosen(seed: int = 0) -> LikelihoodFit:
+    made = bench(seed)
     law = made.run.scenario.model.loss_law
     return choose([made.signals], [made.driveline], law, truth_of(made))[0]
 
@@ -53,7 +53,8 @@ def test_what_a_wider_model_found_stands_where_there_is_no_work_left(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(variants, "LESS_WORK", 2.0 * EXPANSION)
-    assert AERO in _chosen().point.names
+    # In this log's noise the load grows a little; where it ends at zero there is nothing to search.
+    assert _chosen(seed=1).point[AERO] > 0.0
 
 
 def test_a_fit_that_is_known_outlives_the_work_of_checking_it() -> None:
