@@ -285,3 +285,39 @@ fn an_element_without_pressure_transmits_nothing_even_at_zero_slip() {
     assert!((run.columns[0][10] - 1.0).abs() < 1e-12);
     assert!(run.events.is_empty());
 }
+
+#[test]
+fn a_start_locks_as_a_clutch_that_is_strong_beyond_measure_does() {
+    let outputs = [speed("input"), speed("drum"), speed("output")];
+    for (law, from) in [
+        (LossLaw::Paper, -40.0),
+        (LossLaw::Paper, 60.0),
+        (LossLaw::Paper, 178.0),
+        (LossLaw::Dissipative, 60.0),
+        (LossLaw::Dissipative, 100.0),
+        (LossLaw::Dissipative, 178.0),
+    ] {
+        let loss = |eta| Some(GearLoss::by_efficiency(law, eta));
+        let gear = |name: &str, a: &str, b: &str, ratio, loss| {
+            Element::Gear(Gear { name: name.into(), a: a.into(), b: b.into(), ratio, loss })
+        };
+        let network = compile(vec![
+            inertia("input", 20.3),
+            gear("first", "input", "between", 1.4, loss(0.7)),
+            inertia("between", 0.6),
+            Element::Clutch(clutch("C", "between", "drum")),
+            gear("second", "drum", "output", 1.9, loss(0.85)),
+            inertia("output", 9.0),
+        ]);
+        let begun = |locked: &[&str]| {
+            let start = start(&[("input", from), ("output", 50.0)], locked);
+            let (strong, how) = ([constant("P C", 1e13, 1.0)], (Settings::exact(), false));
+            simulate_by(how, &network, &strong, &start, &grid(1.0, 2), &outputs)
+        };
+        let (locked, slipping) = (begun(&["C"]), begun(&[]));
+        assert_eq!((locked.events.len(), slipping.events.len()), (0, 1));
+        for (locked, slipping) in locked.columns.iter().zip(&slipping.columns) {
+            assert!((locked[0] - slipping[1]).abs() < 1e-9, "{} {}", locked[0], slipping[1]);
+        }
+    }
+}

@@ -283,6 +283,39 @@ impl<T: Number> Network<T> {
         stuck.iter().map(weight).chain(prescribed).collect()
     }
 
+    /// What enters each lossy gear at its driving side, by what is left of the balance of the nodes.
+    fn entering(&self, key: ModeKey, residual: &Matrix<T>) -> Matrix<T> {
+        let dependent = &self.coordinates.dependent;
+        let balance = self.force_rows(key).select_columns(dependent).transposed();
+        let multipliers = solve(balance, residual.select_rows(dependent));
+        let multipliers = multipliers.expect("the forces determine the accelerations");
+        let lossy: Vec<usize> = self.losses.iter().map(|loss| loss.constraint).collect();
+        multipliers.select_rows(&lossy)
+    }
+
+    /// What impulses that take `excess` (rows and prescribed speeds × 1, rad/s) off the speeds of rows take off
+    /// the independent speeds, speeds × 1, and what of them enters each lossy gear, losses × 1. They act
+    /// through the gears as torques do: `KᵀIN Δv = -Kᵀ g λ`. `None` as of [`Network::mode`].
+    pub fn impulse(
+        &self,
+        key: ModeKey,
+        rows: &[Row],
+        excess: &Matrix<T>,
+    ) -> Option<(Matrix<T>, Matrix<T>)> {
+        let motion = self.motion_of(key)?;
+        let (speeds, nodes) = self.held_speeds(rows);
+        let response = motion.mobility.times_columns(&nodes);
+        let impulses = least_norm(&speeds.times(&response), excess);
+        let change = response.times(&impulses);
+        let mut residual = self.inertia.times(&self.coordinates.speeds).times(&change);
+        for (i, held) in nodes.iter().enumerate() {
+            for &(node, direction) in held {
+                residual.subtract_from_row(node, (impulses.row(i), direction));
+            }
+        }
+        Some((change, self.entering(key, &residual)))
+    }
+
     fn with_other_states(&self, acceleration: &Matrix<T>) -> Matrix<T> {
         let mut derivative = Matrix::zeros(self.states(), self.basis());
         for i in 0..self.speeds() {
@@ -320,12 +353,7 @@ impl<T: Number> Mode<T> {
                 }
             }
             residual.subtract(&inertia.times(&acceleration));
-            let dependent = &network.coordinates.dependent;
-            let balance = network.force_rows(self.key).select_columns(dependent).transposed();
-            let multipliers = solve(balance, residual.select_rows(dependent));
-            let multipliers = multipliers.expect("the forces determine the accelerations");
-            let lossy: Vec<usize> = network.losses.iter().map(|loss| loss.constraint).collect();
-            let mut entering = multipliers.select_rows(&lossy);
+            let mut entering = network.entering(self.key, &residual);
             for (position, &row) in self.stuck.iter().enumerate() {
                 if let Row::Gear(i) = row {
                     let loss = self.stuck_torque.row(position);

@@ -205,7 +205,7 @@ pub(super) fn sign_of<V: Values>(value: V) -> f64 {
     value.decide(|value| if value < 0.0 { -1.0 } else { 1.0 })
 }
 
-fn self_locking<T>(network: &Network<T>, time: f64) -> Status {
+pub(super) fn self_locking<T>(network: &Network<T>, time: f64) -> Status {
     let element = network.losses.first().map_or_else(String::new, |l| l.element.to_string());
     Status::SelfLocking { time, element }
 }

@@ -3,12 +3,15 @@
 
 use super::decide::Assignment;
 use super::guard::Cause;
-use super::regime::{Event, EventKind, Regime, RowState, sign_of};
+use super::regime::{Event, EventKind, Regime, RowState, self_locking, sign_of};
 use super::status::Status;
 use crate::network::channel::form;
 use crate::network::linalg::{Matrix, least_norm, solve};
-use crate::network::{GearState, Row};
+use crate::network::{GearState, ModeKey, Row};
 use crate::number::{Number, Values};
+
+/// Speed of what is to rest that is no more than round-off of a start, relative to the fastest.
+const ROUND_OFF: f64 = 1e-9;
 
 impl<T: Number> Regime<'_, T> {
     /// Carry out what an event caused; the inputs are those about this instant.
@@ -78,11 +81,11 @@ impl<T: Number> Regime<'_, T> {
     /// Start of a run: prescribed speeds, elements at rest, directions of gears, cells.
     pub(super) fn take_up(&mut self, locked: &[usize]) -> Result<(), Status> {
         let locked: Vec<Row> = locked.iter().map(|&j| Row::Friction(j)).collect();
-        self.bring_to_rest(&locked);
-        for (gear, loss) in self.gears.iter_mut().zip(&self.network.losses) {
-            let sign = sign_of(form(&loss.speed, &self.x).re());
-            *gear = GearState::Rolling { sign, backward: false };
+        if !self.network.losses.is_empty() {
+            self.lock_through_gears(&locked)?;
         }
+        self.bring_to_rest(&locked);
+        self.turn_gears();
         for i in self.rows.len()..self.network.channels.len() {
             self.cells[i] = self.cell_now(i);
         }
@@ -133,6 +136,60 @@ impl<T: Number> Regime<'_, T> {
         self.rows = after.rows;
     }
 
+    /// Directions of lossy gears by their speeds, power taken to flow forward.
+    fn turn_gears(&mut self) {
+        for (gear, loss) in self.gears.iter_mut().zip(&self.network.losses) {
+            let sign = sign_of(form(&loss.speed, &self.x).re());
+            *gear = GearState::Rolling { sign, backward: false };
+        }
+    }
+
+    /// Set prescribed speeds and bring rows to rest by impulses that pass the lossy gears as torques do, each in
+    /// the direction of its own.
+    fn lock_through_gears(&mut self, rows: &[Row]) -> Result<(), Status> {
+        let network = self.network;
+        let excess = self.excess(rows);
+        let speed = |largest: T::Values, v: &T| v.re().magnitude().larger(largest);
+        let fastest = self.x[..network.speeds()].iter().fold(T::Values::zero_(), speed);
+        if excess.max_abs().decide_with(fastest, |excess, fastest| excess <= ROUND_OFF * fastest) {
+            return Ok(());
+        }
+        self.turn_gears();
+        for _ in 0..=2 * self.gears.len() {
+            let key = ModeKey::new(std::iter::empty(), &self.gears);
+            let found = network.impulse(key, rows, &excess);
+            let (change, entering) = found.ok_or_else(|| self_locking(network, self.time()))?;
+            let before = self.gears.clone();
+            for (i, gear) in self.gears.iter_mut().enumerate() {
+                if let GearState::Rolling { sign, backward } = gear
+                    && network.losses[i].loss.is_directional()
+                {
+                    *backward = entering[(i, 0)].re().decide(|impulse| impulse * *sign < 0.0);
+                }
+            }
+            if self.gears == before {
+                for i in 0..network.speeds() {
+                    self.x[i] -= change[(i, 0)];
+                }
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Speeds of rows that are to rest, then what prescribed speeds are off theirs, rows × 1, rad/s.
+    fn excess(&self, rows: &[Row]) -> Matrix<T> {
+        let network = self.network;
+        let mut excess = Matrix::zeros(rows.len() + network.prescribed.len(), 1);
+        for (i, &row) in rows.iter().enumerate() {
+            excess[(i, 0)] = form(network.slip_of(row), &self.x);
+        }
+        for (i, (speed, input)) in (rows.len()..).zip(&network.prescribed) {
+            excess[(i, 0)] = form(speed, &self.x) - self.expansion.inputs[*input][0];
+        }
+        excess
+    }
+
     /// Set prescribed speeds and remove the round-off speed of everything at rest and of `more`,
     /// changing the momentum least.
     pub(super) fn bring_to_rest(&mut self, more: &[Row]) {
@@ -149,15 +206,13 @@ impl<T: Number> Regime<'_, T> {
             return;
         }
         let mut g = Matrix::zeros(count, network.speeds());
-        let mut excess = Matrix::zeros(count, 1);
         for (i, &row) in rows.iter().enumerate() {
             g.row_mut(i).copy_from_slice(network.slip_of(row));
-            excess[(i, 0)] = form(g.row(i), &self.x);
         }
-        for (i, (speed, input)) in (rows.len()..).zip(&network.prescribed) {
+        for (i, (speed, _)) in (rows.len()..).zip(&network.prescribed) {
             g.row_mut(i).copy_from_slice(speed);
-            excess[(i, 0)] = form(speed, &self.x) - self.expansion.inputs[*input][0];
         }
+        let excess = self.excess(&rows);
         let response = solve(network.mass.clone(), g.transposed()).expect("the mass is regular");
         let change = response.times(&least_norm(&g.times(&response), &excess));
         for i in 0..network.speeds() {
