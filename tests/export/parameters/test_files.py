@@ -7,11 +7,11 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.errors import FileFormatError, InputError
-from drivetwin.export.parameters.content import ParameterSet
+from drivetwin.export.parameters.content import Axis, Curve, ParameterSet
 from drivetwin.export.parameters.files import (
     CODECS,
     ParameterFormat,
@@ -26,7 +26,18 @@ TEXTS = {kind: codec.text(parameters_of(twin())) for kind, codec in CODECS.items
 EVERY_FORMAT = pytest.mark.parametrize("kind", ParameterFormat)
 
 
+LIKE_AN_AXIS = ParameterSet(
+    "",
+    (),
+    tuple(
+        Curve(name, Axis("0", (0.0, 1.0), "1"), (0.0, 2.0), "1", "") for name in (":", ".", ".0")
+    ),
+)
+"""Curves whose names begin like another's, as that of its axis does."""
+
+
 @EVERY_FORMAT
+@example(LIKE_AN_AXIS)
 @given(SETS)
 @settings(max_examples=25)
 def test_round_trip(kind: ParameterFormat, content: ParameterSet) -> None:

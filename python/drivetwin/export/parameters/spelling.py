@@ -58,8 +58,12 @@ def free_name(name: str) -> str:
 
 
 def dotted_name(name: str) -> str:
-    """Identifier of calibration tools: letters, digits, `_` and `.`, no digit or dot in front."""
-    return re.sub(r"^(?=[0-9.])|^$", "_", re.sub(r"[^A-Za-z0-9_.]", "_", ascii_line(name)))
+    """Identifier of calibration tools: letters, digits, `_` and `.`, no digit or dot in front.
+
+    Something stands after every dot, as in the structured names of FMI.
+    """
+    plain = re.sub(r"^(?=[0-9.])|^$", "_", re.sub(r"[^A-Za-z0-9_.]", "_", ascii_line(name)))
+    return re.sub(r"\.(?=\.|$)", "_", plain)
 
 
 def flat_name(name: str) -> str:

@@ -101,9 +101,10 @@ def _gathered(scalars: list[Scalar], source: str) -> tuple[tuple[Scalar, ...], t
             alone.append(scalar)
         else:
             arrays.setdefault(found[1], []).append(scalar)
-    axes = {
-        prefix: name for name in arrays for prefix in [name.rpartition(".")[0]] if prefix in arrays
-    }
+    within = {name: name.rpartition(".")[0] for name in arrays}
+    # What has an axis of its own is a curve, also where its name begins like another's.
+    ends = within.keys() - within.values()
+    axes = {prefix: name for name, prefix in within.items() if prefix in arrays and name in ends}
     curves = [_curve(name, arrays[name], axis, arrays[axis], source) for name, axis in axes.items()]
     paired = {*axes, *axes.values()}
     alone += [one for name, members in arrays.items() if name not in paired for one in members]
