@@ -19,7 +19,7 @@ class Where:
         parts = [
             self.file,
             f"channel {self.channel!r}" if self.channel is not None else None,
-            f"t = {self.time:.6g} s" if self.time is not None else None,
+            f"t = {self.time:.9g} s" if self.time is not None else None,
             f"key {self.key!r}" if self.key is not None else None,
         ]
         return ", ".join(part for part in parts if part)
