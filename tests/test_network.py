@@ -94,6 +94,11 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], Start, str]] = {
         AT_REST,
         "nothing determines the acceleration of b",
     ),
+    "start that is no number": (
+        [inertia("a")],
+        Start({"a": math.nan}),
+        'the start of "a" is not finite',
+    ),
     "dependent couplings": (
         [inertia("a"), inertia("z"), gear("g", "a", "b", 2.0), gear("h", "a", "b", 2.0)],
         AT_REST,
@@ -237,8 +242,8 @@ def test_locked_elements_start_without_slip_and_with_the_momentum_they_had() -> 
 
 
 def test_a_run_that_fails_keeps_its_length() -> None:
-    start = Start({"a": math.nan})
-    result = run([inertia("a")], start, ("speed", "a"))
+    runaway = [inertia("a"), torque("a")]
+    result = run(runaway, Start({"a": 1e308}), ("speed", "a"), torque=line((0.0, 1e308), (1.0, 1e308)))
     assert result.status.startswith("state not finite")
     assert result.columns["speed", "a"].shape == SECOND.shape
     assert np.isnan(result.columns["speed", "a"]).all()

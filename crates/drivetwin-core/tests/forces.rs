@@ -301,12 +301,17 @@ fn members_of_next_to_no_mass_are_told_from_rigid_ones_whatever_the_numbers() {
                     let network = compile(vec![
                         inertia("b", 0.3 + 2.7 * i as f64),
                         inertia("c", 1.0),
+                        Element::Clutch(clutch("B", "a", "ground")),
                         Element::Clutch(clutch("C", "a", "c")),
                         Element::Gear(Gear { name, a, b, ratio, loss }),
                         drive.clone(),
                     ]);
                     let start = start(&[("a", 7.0), ("c", 2.0)], &[]);
-                    let inputs = [constant("P C", 50.0, 1.0), constant("T", 2.0 / ratio, 1.0)];
+                    let inputs = [
+                        constant("P B", 0.0, 1.0),
+                        constant("P C", 50.0, 1.0),
+                        constant("T", 2.0 / ratio, 1.0),
+                    ];
                     let outputs = [speed("a"), speed("c")];
                     let run = simulate(&network, &inputs, &start, &grid(1.0, 5), &outputs);
                     assert_eq!(run.status, Status::Completed);

@@ -14,8 +14,8 @@ use smallvec::smallvec;
 /// Most friction elements and lossy gears together: the bits of a mode key.
 pub const MAX_ROWS: usize = 32;
 
-/// Inertia given to a massless member that only friction elements touch, relative to the largest
-/// inertia: it then follows whichever element is stronger, within nanoseconds.
+/// Inertia given to a massless member between friction elements, relative to the largest inertia: it then
+/// follows whichever element is stronger, within nanoseconds.
 const MASSLESS: f64 = 1e-12;
 
 /// A friction element as the solver sees it.
@@ -228,8 +228,8 @@ impl<T: Number> Network<T> {
         solve(self.mass.clone(), Matrix::zeros(self.mass.rows, 0)).err()
     }
 
-    /// Members without mass that only friction elements act on get a negligible one; whether there are
-    /// any.
+    /// Members without mass between friction elements get a negligible one; whether there are any. Behind one
+    /// element alone there is nothing to follow while it is open.
     fn give_mass_between_frictions(&mut self) -> bool {
         let floor = T::lifted(self.inertia.max_abs() * MASSLESS);
         let mut given = false;
@@ -238,7 +238,7 @@ impl<T: Number> Network<T> {
             let touches = |row: &Row<T>| {
                 row.iter().any(|&(n, _)| !is_nothing(self.coordinates.speeds[(n, j)]))
             };
-            let rubbed = self.mechanism.frictions.iter().any(|f| touches(&f.row));
+            let rubbed = self.mechanism.frictions.iter().filter(|f| touches(&f.row)).count() > 1;
             let sprung = self.mechanism.springs.iter().any(|s| touches(&s.row));
             if rubbed && !sprung {
                 self.inertia[(node, node)] += floor;
