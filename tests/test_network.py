@@ -243,7 +243,9 @@ def test_locked_elements_start_without_slip_and_with_the_momentum_they_had() -> 
 
 def test_a_run_that_fails_keeps_its_length() -> None:
     runaway = [inertia("a"), torque("a")]
-    result = run(runaway, Start({"a": 1e308}), ("speed", "a"), torque=line((0.0, 1e308), (1.0, 1e308)))
+    result = run(
+        runaway, Start({"a": 1e308}), ("speed", "a"), torque=line((0.0, 1e308), (1.0, 1e308))
+    )
     assert result.status.startswith("state not finite")
     assert result.columns["speed", "a"].shape == SECOND.shape
     assert np.isnan(result.columns["speed", "a"]).all()
