@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.identify.combine import combine
-from drivetwin.identify.design import contradictions, held_against
+from drivetwin.identify.design import contradictions, design_of, held_against
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.known import with_known
 from drivetwin.identify.result import Z95, Estimate, FrictionCurve, LoadLaw
@@ -146,12 +146,8 @@ def low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
 
 def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
     """What is known beforehand of a parameter itself, where anything is."""
-    first = drivelines[0]
-    if name in first.known:
-        return first.known[name]
-    if name.startswith("P0."):
-        return first.couplings[name.removeprefix("P0.")].P0
-    return first.J_out if name == "J_out" else None
+    known = drivelines[0].known.get(name)
+    return design_of(name, drivelines[0]) if known is None else known
 
 
 def _card_values(

@@ -15,10 +15,19 @@ import numpy as np
 
 from drivetwin.identify.known import CONTRADICTS, without_prior
 from drivetwin.identify.result import Z95, Estimate, Verdict
-from drivetwin.identify.signals import FloatArray
+from drivetwin.identify.signals import Driveline, FloatArray
 from drivetwin.identify.uncertainty import doubted
 from drivetwin.parameters import OVER_ETA, spec_of
 from drivetwin.vehicle.spec import PriorValue, VehicleCard
+
+
+def design_of(name: str, driveline: Driveline) -> PriorValue | None:
+    """The card's Jo′, or P0 or drum of an element in the shift, by id; None for others."""
+    if name == "J_out":
+        return driveline.J_out
+    stem, _, element = name.partition(".")
+    coupling = driveline.couplings.get(element)
+    return None if coupling is None else {"P0": coupling.P0, "drum": coupling.drum}.get(stem)
 
 
 @dataclass(frozen=True)

@@ -308,11 +308,7 @@ impl<T: Number> Network<T> {
         let impulses = least_norm(&speeds.times(&response), excess);
         let change = response.times(&impulses);
         let mut residual = self.inertia.times(&self.coordinates.speeds).times(&change);
-        for (i, held) in nodes.iter().enumerate() {
-            for &(node, direction) in held {
-                residual.subtract_from_row(node, (impulses.row(i), direction));
-            }
-        }
+        subtract_held(&mut residual, &nodes, &impulses);
         Some((change, self.entering(key, &residual)))
     }
 
@@ -347,11 +343,7 @@ impl<T: Number> Mode<T> {
             }
             let inertia = network.inertia.times(&network.coordinates.speeds);
             let mut residual = network.with_drag(self.key).into_owned();
-            for (i, held) in nodes.iter().enumerate() {
-                for &(node, direction) in held {
-                    residual.subtract_from_row(node, (self.stuck_torque.row(i), direction));
-                }
-            }
+            subtract_held(&mut residual, &nodes, &self.stuck_torque);
             residual.subtract(&inertia.times(&acceleration));
             let mut entering = network.entering(self.key, &residual);
             for (position, &row) in self.stuck.iter().enumerate() {
@@ -362,6 +354,19 @@ impl<T: Number> Mode<T> {
             }
             entering
         })
+    }
+}
+
+/// Take off node torques what held speeds exert: their nodes and their torques, one row each.
+fn subtract_held<T: Number>(
+    node_torques: &mut Matrix<T>,
+    nodes: &[mechanism::Row<T>],
+    torques: &Matrix<T>,
+) {
+    for (i, held) in nodes.iter().enumerate() {
+        for &(node, direction) in held {
+            node_torques.subtract_from_row(node, (torques.row(i), direction));
+        }
     }
 }
 

@@ -21,8 +21,8 @@ pub struct Settings {
     pub tolerance: f64,
     /// Longest step, s.
     pub max_step: f64,
-    /// Fixed order instead of one that follows the tolerance, from 1 to below [`TERMS`](crate::number::TERMS); for convergence
-    /// studies.
+    /// Fixed order instead of one that follows the tolerance, from 1 to below
+    /// [`TERMS`](crate::number::TERMS); for convergence studies.
     pub order: Option<usize>,
     /// Pass samples without events by exact operators, with slipping torques as cubics in time:
     /// several times faster at an error of a few 1e-3 N·m on 1 ms samples.

@@ -145,7 +145,7 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// Set prescribed speeds and bring rows to rest by impulses that pass the lossy gears as torques do, each in
-    /// the direction of its own.
+    /// the direction of its own; where no directions agree with their impulses, nothing is done.
     fn lock_through_gears(&mut self, rows: &[Row]) -> Result<(), Status> {
         let network = self.network;
         let excess = self.excess(rows);

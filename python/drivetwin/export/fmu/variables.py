@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from drivetwin.export.entries import Entry, entries_of, locked_index, start_entries
-from drivetwin.export.parameters.spelling import ascii_line, one_line
+from drivetwin.export.parameters.spelling import ascii_line, distinct, one_line
 from drivetwin.export.subject import Subject
 
 INPUTS, OUTPUTS, MODES, LOSS_LAW, LOCKED, START, PARAMETERS = 1, 10, 30, 40, 41, 50, 100
@@ -108,14 +108,7 @@ def variables_of(subject: Subject) -> tuple[Variable, ...]:
 
 def structured_names(names: Iterable[str]) -> dict[str, str]:
     """Name parts that FMI's structured naming accepts; those that would coincide are numbered."""
-    chosen: dict[str, str] = {}
-    for name in names:
-        part, count = _structured(name), 1
-        while part in chosen.values():
-            count += 1
-            part = _structured(f"{name} {count}")
-        chosen[name] = part
-    return chosen
+    return distinct(names, _structured)
 
 
 def _structured(name: str) -> str:

@@ -40,8 +40,8 @@ HELPERS = {
     w_pump = der(flange_a.phi);
     w_turbine = der(flange_b.phi);
     table.u = w_turbine/w_pump;
-    flange_a.tau = table.y[1]*w_pump^2;
-    flange_b.tau = -table.y[2]*table.y[1]*w_pump^2;
+    flange_a.tau = table.y[1]*w_pump*abs(w_pump);
+    flange_b.tau = -table.y[2]*flange_a.tau;
   end TorqueConverter;
 """,
 }

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from drivetwin.export.parameters.content import number
-from drivetwin.export.parameters.spelling import ascii_line
+from drivetwin.export.parameters.spelling import ascii_line, distinct
 
 _KEYWORDS = re.compile(
     "algorithm|and|annotation|assert|block|break|class|connect|connector|constant|constrainedby|"
@@ -26,14 +26,7 @@ def identifier(name: str) -> str:
 
 def identifiers(names: Iterable[str]) -> dict[str, str]:
     """An identifier for each name; those that would coincide are numbered."""
-    chosen: dict[str, str] = {}
-    for name in names:
-        plain, count = identifier(name), 1
-        while plain in chosen.values():
-            count += 1
-            plain = f"{identifier(name)}_{count}"
-        chosen[name] = plain
-    return chosen
+    return distinct(names, identifier)
 
 
 def string(text: str) -> str:

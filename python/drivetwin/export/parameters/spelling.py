@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Callable, Iterable
 
 _GREEK = {
     "α": "alpha",
@@ -72,6 +73,18 @@ def flat_name(name: str) -> str:
     if not flat[:1].isalpha() or _MATLAB_KEYWORDS.fullmatch(flat):
         flat = f"p_{flat}"
     return flat[:_MATLAB_NAME_LENGTH]
+
+
+def distinct(names: Iterable[str], spelled: Callable[[str], str]) -> dict[str, str]:
+    """Each name as `spelled`; those that would coincide are numbered."""
+    chosen: dict[str, str] = {}
+    for name in names:
+        one, count = spelled(name), 1
+        while one in chosen.values():
+            count += 1
+            one = spelled(f"{name} {count}")
+        chosen[name] = one
+    return chosen
 
 
 def shown_unit(unit: str) -> str:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.identify.conclude import Conclusions, low_gear_notes
-from drivetwin.identify.design import contradictions, held_against
+from drivetwin.identify.design import contradictions, design_of, held_against
 from drivetwin.identify.likelihood.curves import METHOD, curves_of
 from drivetwin.identify.likelihood.derived import absolute_ids, of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
@@ -174,19 +174,8 @@ def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
     known = drivelines[0].known.get(spec.stem + ending if spec.suffix == "log" else name)
     if known is not None:
         return known
-    if name == "J_out":
-        return drivelines[0].J_out
-    if name == "J_out" + OVER_ETA and drivelines[0].J_out is not None:
-        return over_eta(drivelines[0].J_out, drivelines[0])
-    stem, _, element = name.partition(".")
-    coupling = drivelines[0].couplings.get(element.removesuffix(OVER_ETA))
-    if coupling is None or stem not in ("P0", "drum"):
-        return None
-    if stem == "P0":
-        return coupling.P0
-    if name.endswith(OVER_ETA):
-        return over_eta(coupling.drum, drivelines[0])
-    return coupling.drum
+    design = design_of(name.removesuffix(OVER_ETA), drivelines[0])
+    return over_eta(design, drivelines[0]) if design is not None and ending else design
 
 
 def _systematic(matrix: FloatArray, systematic: FloatArray) -> list[float]:

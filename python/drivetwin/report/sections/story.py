@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.identify.result import FrictionCurve, Identification
+from drivetwin.identify.result import Z95, FrictionCurve, Identification
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.figures.friction import friction_figure
 from drivetwin.report.figures.recording import log_figure, log_panels
@@ -82,7 +82,7 @@ def _phase_table(shift: Shift) -> TableBlock:
     rows = []
     for label, (start, end), boundary in spans:
         sigma = shift.sigma.get(boundary) if boundary else None
-        doubt = f"± {significant(1.96e3 * sigma, 2)} ms" if sigma else ""
+        doubt = f"± {significant(1e3 * Z95 * sigma, 2)} ms" if sigma else ""
         rows.append(
             (
                 Cell(label),

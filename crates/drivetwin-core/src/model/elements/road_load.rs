@@ -39,9 +39,8 @@ impl<T: Number> RoadLoad<T> {
             m.forces.push(Force { element, node, law, lag: None, account });
         };
         force(ForceLaw::Constant(-self.constant));
-        // Nothing now may be something for a derivative.
-        let acts = |v: T| !v.is_constant() || v.re().decide(|v| v != 0.0);
-        if acts(self.aero) {
+        // Also where it is zero and something is differentiated by it.
+        if !self.aero.is_constant() || self.aero.re().decide(|v| v != 0.0) {
             force(ForceLaw::Quadratic { coefficient: -self.aero, node });
         }
         if self.rolling.re().decide(|v| v != 0.0) {
