@@ -261,6 +261,13 @@ def test_the_same_run_twice_is_bit_identical() -> None:
     assert first.events == second.events
 
 
+def test_an_input_acts_by_its_delay_later() -> None:
+    late = Signal(np.array([-1.0, 2.0]), np.array([0.0, 3.0]), delay=0.25)
+    elements = [inertia("a"), torque("a")]
+    speed = run(elements, Start({"a": 0.0}), ("speed", "a"), torque=late).columns["speed", "a"]
+    assert speed == pytest.approx(0.75 * SECOND + SECOND**2 / 2.0, abs=1e-12)
+
+
 def test_the_accuracy_asked_for_is_reached() -> None:
     elements = [inertia("a"), torque("a")]
     coarse = Accuracy(order=1, max_step=0.01)

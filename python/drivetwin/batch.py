@@ -16,7 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin import _native
-from drivetwin.driveline import DualClutch, FloatArray, Signal, State, as_json, run_time
+from drivetwin.driveline import (
+    DualClutch,
+    FloatArray,
+    Signal,
+    State,
+    as_json,
+    delayed_samples,
+    inputs_of,
+    plain_start,
+    run_time,
+)
 from drivetwin.errors import InputError
 
 
@@ -227,15 +237,5 @@ def _output(name: str) -> Mapping[str, str]:
 
 
 def _plain(scenario: Scenario) -> _Plain:
-    signals = {"engine torque": scenario.engine_torque, **scenario.pressures}
-    columns = [
-        (
-            name,
-            np.ascontiguousarray(s.time, np.float64),
-            np.ascontiguousarray(s.values, np.float64),
-            s.delay,
-        )
-        for name, s in signals.items()
-    ]
-    s = scenario.start
-    return columns, (s.engine_speed, s.output_speed, s.wheel_speed, s.twist, list(s.locked))
+    inputs = inputs_of(scenario.engine_torque, scenario.pressures)
+    return delayed_samples(inputs), plain_start(scenario.start)

@@ -171,6 +171,11 @@ class Signal:
     values: FloatArray
     delay: float = 0.0
 
+    @property
+    def arrival(self) -> FloatArray:
+        """Times (n,) [s] at which the values act: those of the samples, later by `delay`."""
+        return self.time + self.delay
+
 
 @dataclass(frozen=True)
 class Accuracy:
@@ -288,14 +293,13 @@ def simulate(
     always end on input samples and events.
     Raises InputError where the description is inconsistent; a run that fails returns its status.
     """
-    signals = {"engine torque": engine_torque, **pressures}
     accuracy = accuracy or Accuracy()
     options = (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit)
     try:
         columns, events, status, energy = _native.simulate(
             as_json(model),
-            [(name, _array(s.time + s.delay), _array(s.values)) for name, s in signals.items()],
-            _start(start),
+            samples(inputs_of(engine_torque, pressures)),
+            plain_start(start),
             run_time(time),
             options,
         )
@@ -321,12 +325,11 @@ def sensitivities(
     an event grazes no derivative exists.
     Raises InputError for an unknown name or an inconsistent description.
     """
-    signals = {"engine torque": engine_torque, **pressures}
-    delayed = [(n, _array(s.time), _array(s.values), s.delay) for n, s in signals.items()]
+    inputs = delayed_samples(inputs_of(engine_torque, pressures))
     options = (Accuracy().tolerance, list(parameters))
     try:
         columns, events, status, derivatives, event_derivatives = _native.sensitivities(
-            as_json(model), delayed, _start(start), run_time(time), options
+            as_json(model), inputs, plain_start(start), run_time(time), options
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
@@ -360,7 +363,27 @@ class _Derivatives(Mapping[str, Trajectory]):
         return len(set(self.parameters))
 
 
-def _start(start: State) -> tuple[float, float, float, float, list[str]]:
+def inputs_of(engine_torque: Signal, pressures: Mapping[str, Signal]) -> dict[str, Signal]:
+    """The inputs of a dual clutch by the names that the core knows them by."""
+    return {"engine torque": engine_torque, **pressures}
+
+
+def samples(inputs: Mapping[str, Signal]) -> list[tuple[str, FloatArray, FloatArray]]:
+    """Inputs as the core takes them: name, times [s] at which the values act, values."""
+    return [(name, as_array(one.arrival), as_array(one.values)) for name, one in inputs.items()]
+
+
+def delayed_samples(
+    inputs: Mapping[str, Signal],
+) -> list[tuple[str, FloatArray, FloatArray, float]]:
+    """Inputs whose delays the core differentiates by: name, sample times [s], values, delay [s]."""
+    return [
+        (name, as_array(one.time), as_array(one.values), one.delay) for name, one in inputs.items()
+    ]
+
+
+def plain_start(start: State) -> tuple[float, float, float, float, list[str]]:
+    """A start as the core takes it."""
     speeds = (start.engine_speed, start.output_speed, start.wheel_speed)
     return (*speeds, start.twist, list(start.locked))
 
@@ -426,8 +449,9 @@ def run_time(time: FloatArray) -> FloatArray:
             f"time reaches {farthest:.6g} s from zero, too far for a simulation",
             f"let the time of run and inputs count from the start, or lie within {LATEST:g} s",
         )
-    return _array(time)
+    return as_array(time)
 
 
-def _array(values: FloatArray) -> FloatArray:
+def as_array(values: FloatArray) -> FloatArray:
+    """Values as the core takes them: float64 without gaps."""
     return np.ascontiguousarray(values, dtype=np.float64)

@@ -13,8 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
-
 from drivetwin import _native
 from drivetwin.driveline import (
     Accuracy,
@@ -24,6 +22,7 @@ from drivetwin.driveline import (
     Signal,
     as_json,
     run_time,
+    samples,
 )
 from drivetwin.errors import InputError
 
@@ -75,16 +74,13 @@ def simulate(
 ) -> NetworkRun:
     """Simulate a network from `time[0]` and record `outputs` on `time` (n,) [s], increasing.
 
-    Sampled inputs are linear between samples; a time that stands twice is a jump.
+    Sampled inputs are linear between samples and act by their `delay` later; a time that stands
+    twice is a jump.
     Raises InputError where the description is inconsistent, naming the element; a run that fails
     on the way returns its status.
     """
     accuracy = accuracy or Accuracy()
-    samples = [
-        (name, _array(signal.time), _array(signal.values))
-        for name, signal in inputs.items()
-        if isinstance(signal, Signal)
-    ]
+    sampled = {name: one for name, one in inputs.items() if isinstance(one, Signal)}
     sines = [
         (name, sine.offset, sine.amplitude, sine.frequency, sine.phase)
         for name, sine in inputs.items()
@@ -94,7 +90,7 @@ def simulate(
         columns, events, status, energy = _native.simulate_network(
             as_json(list(elements)),
             json.dumps([{kind: name} for kind, name in outputs]),
-            (samples, sines),
+            (samples(sampled), sines),
             (list(start.speeds.items()), list(start.twists.items()), list(start.locked)),
             run_time(time),
             (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit),
@@ -108,7 +104,3 @@ def simulate(
         status,
         EnergyAudit(*energy) if energy is not None else None,
     )
-
-
-def _array(values: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(values, dtype=np.float64)

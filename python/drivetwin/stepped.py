@@ -46,7 +46,7 @@ class Stepping:
 
 def sampled(signals: Sequence[Signal], time: FloatArray) -> FloatArray:
     """Values (n, signals) of inputs at `time` (n,) [s], linear between their own samples."""
-    columns = [np.interp(time, one.time + one.delay, one.values) for one in signals]
+    columns = [np.interp(time, one.arrival, one.values) for one in signals]
     return np.column_stack(columns)
 
 

@@ -154,8 +154,8 @@ def _table(names: Names, run: Run) -> list[tuple[float, ...]]:
     """Time and inputs at every sample of any input within the run, each linear in between."""
     first, last = run.time
     signals = [run.inputs[name] for name in names.inputs]
-    moments = np.unique(np.concatenate([one.time + one.delay for one in signals]))
+    moments = np.unique(np.concatenate([one.arrival for one in signals]))
     inner = moments[(moments > first) & (moments < last)]
     time: FloatArray = np.concatenate([[first], inner, [last]])
-    columns = [np.interp(time, one.time + one.delay, one.values) for one in signals]
+    columns = [np.interp(time, one.arrival, one.values) for one in signals]
     return [tuple(float(value) for value in row) for row in zip(time, *columns, strict=True)]
