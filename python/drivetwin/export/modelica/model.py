@@ -151,11 +151,25 @@ def _shift(elements: Sequence[Element], parts: Mapping[str, Part], names: Names,
 
 
 def _table(names: Names, run: Run) -> list[tuple[float, ...]]:
-    """Time and inputs at every sample of any input within the run, each linear in between."""
+    """Time and inputs at every sample of any input within the run, each linear in between.
+
+    Where an input jumps the time stands twice, as Modelica's table wants it.
+    """
     first, last = run.time
     signals = [run.inputs[name] for name in names.inputs]
     moments = np.unique(np.concatenate([one.arrival for one in signals]))
+    jumps = np.concatenate([one.arrival[1:][np.diff(one.arrival) == 0.0] for one in signals])
     inner = moments[(moments > first) & (moments < last)]
-    time: FloatArray = np.concatenate([[first], inner, [last]])
-    columns = [np.interp(time, one.arrival, one.values) for one in signals]
+    twice = inner[np.isin(inner, jumps)]
+    time: FloatArray = np.sort(np.concatenate([[first], inner, twice, [last]]))
+    ends = np.append(np.diff(time) == 0.0, True)  # rows that end what came before
+    columns = [
+        np.where(ends, _until(one, time), np.interp(time, one.arrival, one.values))
+        for one in signals
+    ]
     return [tuple(float(value) for value in row) for row in zip(time, *columns, strict=True)]
+
+
+def _until(signal: Signal, time: FloatArray) -> FloatArray:
+    """Values at `time` (n,) [s]; at a jump the one before it."""
+    return np.interp(-time, -signal.arrival[::-1], signal.values[::-1])
