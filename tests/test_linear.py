@@ -19,7 +19,7 @@ from drivetwin.driveline import (
     simulate,
 )
 from drivetwin.errors import InputError
-from drivetwin.linear import Slip, linearise
+from drivetwin.linear import Element, Slip, linearise
 
 FRICTION = Stribeck(mu_c=0.12, mu_s=0.145, v_s=6.0, mu_v=1e-4)
 B2 = ShiftElement("B2", 1.4, 1.6, 2.9e-2, 8e4, FRICTION)
@@ -103,6 +103,60 @@ def test_a_falling_friction_curve_takes_damping_away() -> None:
     assert steep[-1].damping < plain[-1].damping
 
 
+def test_a_network_swings_as_the_closed_form_of_its_chain_says() -> None:
+    inertias, stiffness = (0.5, 2.0, 1.0), (300.0, 500.0)
+    chain: list[Element] = [
+        {"type": "inertia", "name": f"J{i}", "node": f"n{i}", "inertia": inertia}
+        for i, inertia in enumerate(inertias)
+    ]
+    chain += [
+        {"type": "spring_damper", "name": f"s{i}", "a": f"n{i}", "b": f"n{i + 1}"}
+        | {"stiffness": k, "damping": 0.0}
+        for i, k in enumerate(stiffness)
+    ]
+    a, b, c = inertias
+    k, h = stiffness
+    # ω⁴ - p ω² + q = 0 of three inertias in a row, beside the free turning of the whole.
+    p, q = k / a + (k + h) / b + h / c, k * h * (a + b + c) / (a * b * c)
+    squares = np.sort(np.roots([1.0, -p, q]))
+    found = [mode.frequency for mode in linearise(chain, []).oscillations()]
+    assert found == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-9)
+
+
+def test_inputs_of_what_is_held_are_left_out() -> None:
+    elements: list[Element] = [
+        {"type": "inertia", "name": "Ja", "node": "a", "inertia": 1.0},
+        {"type": "inertia", "name": "Jb", "node": "b", "inertia": 1.0},
+        {"type": "prescribed_speed", "name": "drive", "node": "b", "input": "speed"},
+        {"type": "torque", "name": "T", "node": "a", "input": "torque"},
+        {"type": "engine_map", "name": "map", "node": "a", "throttle": "pedal"}
+        | {"map": {"throttle": [0.0, 1.0], "speed": [0.0, 9.0], "torque": [[0.0, 0.0]] * 2}},
+        {"type": "spring_damper", "name": "shaft", "a": "a", "b": "b"}
+        | {"stiffness": 100.0, "damping": 0.0},
+    ]
+    system = linearise(elements, [], outputs=[("speed", "a")])
+    assert system.inputs == ("torque",)
+    assert system.B.shape == (len(system.states), 1)
+    assert system.B[system.states.index("a"), 0] == pytest.approx(1.0)
+    assert [mode.frequency for mode in system.oscillations()] == pytest.approx([5.0 / np.pi])
+
+
+def test_there_is_no_response_at_an_eigenvalue() -> None:
+    system = linearise(MODEL, ["B3"])  # turns freely
+    assert np.isfinite(system.frequency_response(np.array([0.1, 5.0]))).all()
+    with pytest.raises(InputError, match="is an eigenvalue"):
+        system.frequency_response(np.array([0.0, 5.0]))
+
+
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(InputError, match="B9"):
         linearise(MODEL, ["B9"])
+
+
+def test_what_no_linear_system_tells_is_refused() -> None:
+    with pytest.raises(InputError, match="B2: locked and slipping"):
+        linearise(MODEL, ["B2"], {"B2": Slip(5.0, 3e5)})
+    with pytest.raises(InputError, match="the angle of wheel is no output"):
+        linearise(MODEL, ["B2"], outputs=[("angle", "wheel")])
+    with pytest.raises(InputError, match="no operating point"):
+        Slip(np.nan, 3e5)

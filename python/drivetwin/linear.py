@@ -2,14 +2,15 @@
 """The driveline as a linear system in one gear or phase: eigenfrequencies, frequency response.
 
 In one friction mode the motion is linear but for μ(slip), the loads and maps; with μ and pressure
-linearised about an operating point, what is left are four matrices.
+linearised about an operating point and the rest held, what is left are four matrices.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +25,23 @@ Output = tuple[str, str]
 
 SHAFT_TORQUE: Output = ("shaft_torque", "output shaft")
 
+_HELD = {"prescribed_speed": "input", "engine_map": "throttle"}
+"""Elements that take no part in a linear system, and their field that names the input."""
+
 
 @dataclass(frozen=True)
 class Slip:
-    """Operating point of a slipping element: slip [rad/s], signed, and gauge pressure [Pa]."""
+    """Operating point of a slipping element: slip [rad/s], signed, and gauge pressure [Pa].
+
+    Raises InputError where one of them is not finite.
+    """
 
     slip: float
     pressure: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.slip) and math.isfinite(self.pressure)):
+            raise InputError(f"{self} is no operating point", "give finite numbers")
 
 
 @dataclass(frozen=True)
@@ -68,33 +79,80 @@ class LinearSystem:
         return tuple(sorted(found, key=lambda o: o.frequency))
 
     def frequency_response(self, frequency: FloatArray) -> NDArray[np.complex128]:
-        """Exact response C (jω - A)⁻¹ B + D at `frequency` (n,) [Hz]: (n, outputs, inputs)."""
-        omega = 2j * np.pi * np.asarray(frequency, dtype=np.float64)
+        """Exact response C (jω - A)⁻¹ B + D at `frequency` (n,) [Hz]: (n, outputs, inputs).
+
+        Raises InputError where a frequency is an eigenvalue, such as 0 of a driveline that turns
+        freely: a motion there grows without end.
+        """
+        omega = 2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64))
         unit = np.eye(len(self.A))
         moved = omega[:, None, None] * unit - self.A
-        return np.asarray(
-            self.C @ np.linalg.solve(moved, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
-            + self.D
-        )
+        try:
+            states = np.linalg.solve(moved, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
+        except np.linalg.LinAlgError as error:
+            raise InputError(
+                "one of the frequencies is an eigenvalue: there is no response to it",
+                "leave it out; 0 Hz is an eigenvalue of a driveline that turns freely",
+            ) from error
+        return np.asarray(self.C @ states + self.D)
 
 
 def linearise(
     driveline: DualClutch | Sequence[Element],
     locked: Sequence[str],
     slipping: Mapping[str, Slip] | None = None,
-    outputs: Sequence[Output] = (SHAFT_TORQUE,),
+    outputs: Sequence[Output] | None = None,
 ) -> LinearSystem:
     """Linearise with `locked` elements at rest, `slipping` ones at their points, all others open.
 
-    Loads that depend on speed, maps and converters count as constant torques.
+    `outputs` are by default the shaft torque of a dual clutch and nothing of a network; an angle is
+    none, since it is the integral of a speed. Loads that depend on speed, maps and converters count
+    as constant torques, speeds stay as prescribed, and their inputs are left out; backlash is in
+    its play; gears with loss pass power from `a` to `b`.
     Raises InputError for unknown names or an inconsistent description.
     """
-    plain = asdict(driveline) if isinstance(driveline, DualClutch) else list(driveline)
-    points = [(name, p.slip, p.pressure) for name, p in (slipping or {}).items()]
-    wanted = json.dumps([{kind: name} for kind, name in outputs])
+    elements = None if isinstance(driveline, DualClutch) else list(driveline)
+    if outputs is None:
+        outputs = (SHAFT_TORQUE,) if elements is None else ()
+    points = dict(slipping or {})
+    _check(locked, points, outputs)
     try:
-        matrices, states, inputs = _native.linearise(as_json(plain), list(locked), points, wanted)
+        matrices, states, inputs = _native.linearise(
+            as_json(driveline if elements is None else elements),
+            list(locked),
+            [(name, p.slip, p.pressure) for name, p in points.items()],
+            json.dumps([{kind: name} for kind, name in outputs]),
+        )
     except ValueError as error:
         raise InputError(str(error), "correct the description or the names") from error
     a, b, c, d = matrices
-    return LinearSystem(a, b, c, d, tuple(states), tuple(inputs), tuple(outputs))
+    held = _held(elements or ())
+    moving = [i for i, name in enumerate(inputs) if name not in held]
+    return LinearSystem(
+        a,
+        b[:, moving],
+        c.reshape(len(outputs), len(states)),
+        d.reshape(len(outputs), len(inputs))[:, moving],
+        tuple(states),
+        tuple(inputs[i] for i in moving),
+        tuple(outputs),
+    )
+
+
+def _check(locked: Sequence[str], points: Mapping[str, Slip], outputs: Sequence[Output]) -> None:
+    """Raise InputError for what no linear system can tell."""
+    both = [name for name in points if name in locked]
+    if both:
+        raise InputError(f"{', '.join(both)}: locked and slipping", "name it in one of them")
+    angles = [name for kind, name in outputs if kind == "angle"]
+    if angles:
+        raise InputError(
+            f"the angle of {', '.join(angles)} is no output of a linear system",
+            "ask for the speed; the response of the angle is that of the speed over jω",
+        )
+
+
+def _held(elements: Sequence[Element]) -> set[object]:
+    """Names of the inputs that act through elements which take no part."""
+    fields = [(one, _HELD.get(str(one.get("type")))) for one in elements]
+    return {one.get(field) for one, field in fields if field}
