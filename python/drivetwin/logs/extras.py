@@ -9,11 +9,16 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from importlib import import_module
-from io import StringIO
 from pathlib import Path
-from typing import Any
+from threading import RLock, get_ident
+from typing import Any, TextIO, cast
 
 from drivetwin.errors import DrivetwinError, FileFormatError, MissingExtraError, Where
+
+
+_one_at_a_time = RLock()
+"""Held while a foreign library is loaded or parses: standard output, hook and warnings are those of the process,
+and threads that change them out of turn would leave them changed."""
 
 
 def require(module: str, extra: str, kind: str, path: Path) -> Any:
@@ -23,7 +28,7 @@ def require(module: str, extra: str, kind: str, path: Path) -> Any:
     """
     logging.getLogger(module.partition(".")[0]).setLevel(logging.CRITICAL)
     try:
-        with warnings.catch_warnings():
+        with _one_at_a_time, warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return import_module(module)
     except ImportError as fault:
@@ -34,28 +39,51 @@ def require(module: str, extra: str, kind: str, path: Path) -> Any:
         ) from None
 
 
+class _Muted:
+    """Standard output without what the thread prints that made this."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out, self._thread = out, get_ident()
+
+    def write(self, text: str) -> int:
+        return len(text) if get_ident() == self._thread else self._out.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._out, name)
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """Let nothing be heard of what this thread's libraries print, warn of and cannot raise."""
+    with _one_at_a_time:
+        hook = sys.unraisablehook
+        try:
+            sys.unraisablehook = lambda _: None
+            with warnings.catch_warnings(), redirect_stdout(cast(TextIO, _Muted(sys.stdout))):
+                warnings.simplefilter("ignore")
+                yield
+        finally:
+            sys.unraisablehook = hook
+
+
 @contextmanager
 def foreign_parser(kind: str, path: Path) -> Iterator[None]:
     """Turn whatever a foreign parser raises on damaged bytes into FileFormatError.
 
     Such parsers check little: a flipped bit shows as any exception at all. What they print, warn
     of, and complain about when a half-built object is freed would reach the user without any use.
+    Of several threads one at a time goes on.
     """
-    hook = sys.unraisablehook
-    try:
-        sys.unraisablehook = lambda _: None
-        with warnings.catch_warnings(), redirect_stdout(StringIO()):
-            warnings.simplefilter("ignore")
+    with _unheard():
+        try:
             yield
-    except DrivetwinError:
-        raise
-    except (Exception, MemoryError) as fault:
-        fault.__traceback__ = None  # frees what the parser built, while nobody listens
-        text = " ".join(str(fault).split())[:120] or "no more is known"
-        raise FileFormatError(
-            f"{kind} cannot be read, it may be cut or damaged ({type(fault).__name__}: {text})",
-            "record or export the log again",
-            Where(file=str(path)),
-        ) from None
-    finally:
-        sys.unraisablehook = hook
+        except DrivetwinError:
+            raise
+        except Exception as fault:
+            fault.__traceback__ = None  # frees what the parser built, while nobody listens
+            text = " ".join(str(fault).split())[:120] or "no more is known"
+            raise FileFormatError(
+                f"{kind} cannot be read, it may be cut or damaged ({type(fault).__name__}: {text})",
+                "record or export the log again",
+                Where(file=str(path)),
+            ) from None
