@@ -322,6 +322,14 @@ def test_derivatives_by_nothing_known_are_refused(by: list[str]) -> None:
         batch_sensitivities(MODEL, [scenario()], TIME, by=by)
 
 
+def test_a_derivative_by_the_delay_of_a_jump_is_refused() -> None:
+    smooth = scenario()
+    jump = Signal(np.array([0.0, 0.4, 0.4, 1.0]), np.array([1400.0, 1400.0, 700.0, 700.0]))
+    scenarios = [smooth, dataclasses.replace(smooth, engine_torque=jump)]
+    with pytest.raises(InputError, match=r"'engine torque' jumps at 0\.4 s"):
+        batch_sensitivities(MODEL, scenarios, TIME, by=["delay.engine torque"])
+
+
 def test_times_too_far_from_zero_are_refused() -> None:
     with pytest.raises(InputError, match="too far for a simulation"):
         simulate_batch(MODEL, [scenario()], TIME + 1e9)

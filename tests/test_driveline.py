@@ -375,6 +375,15 @@ def test_the_derivative_by_a_delay_agrees_with_differences() -> None:
         assert np.abs(exact - difference).max() < 1e-3 * np.abs(difference).max()
 
 
+def test_a_derivative_by_the_delay_of_a_jump_is_refused() -> None:
+    _, pressures, start = held_second_gear()
+    jump = Signal(np.array([0.0, 0.4, 0.4, 1.0]), np.array([1500.0, 1500.0, 750.0, 750.0]))
+    given = (paper_model(), jump, pressures, start, np.linspace(0.0, 1.0, 11))
+    with pytest.raises(InputError, match=r"'engine torque' jumps at 0\.4 s"):
+        sensitivities(*given, ["eta", "delay.engine torque"])
+    assert sensitivities(*given, ["eta", "delay.B2"]).run.status == "completed"
+
+
 def test_derivatives_by_more_parameters_than_one_pass_takes_stand_under_their_names() -> None:
     torque, pressures, start, time = upshift()
     fields = ("J1", "J2e", "eta", "i_in", "J_out", "i_f", "J_v", "k_o", "c_o", "load.constant")

@@ -25,6 +25,7 @@ from drivetwin.driveline import (
     delayed_samples,
     inputs_of,
     plain_start,
+    require_delays,
     run_time,
 )
 from drivetwin.errors import InputError
@@ -140,6 +141,8 @@ def batch_sensitivities(
     """
     if not by:
         raise InputError("nothing to differentiate by", "name a parameter, or use simulate_batch")
+    for scenario in scenarios:
+        require_delays(inputs_of(scenario.engine_torque, scenario.pressures), by)
     asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
     try:
         ends, (values, derivatives, last_lock, grazing) = _native.batch_sensitivities(

@@ -174,7 +174,7 @@ class Signal:
     @property
     def arrival(self) -> FloatArray:
         """Times (n,) [s] at which the values act: those of the samples, later by `delay`."""
-        return self.time + self.delay
+        return np.asarray(self.time, dtype=np.float64) + self.delay
 
 
 @dataclass(frozen=True)
@@ -321,15 +321,17 @@ def sensitivities(
 
     Names are fields of the model (`eta`, `J1`, `k_o`, `load.constant`), of a shift element
     (`B3.P0`, `B3.mu_c`, `B3.mu.4` for a point of a table), of the start (`start.twist`), and delays
-    of inputs (`delay.engine torque`, `delay.B3`). Event times are differentiated implicitly; where
-    an event grazes no derivative exists.
-    Raises InputError for an unknown name or an inconsistent description.
+    of inputs without jumps (`delay.engine torque`, `delay.B3`). Event times are differentiated
+    implicitly; where an event grazes no derivative exists.
+    Raises InputError for an unknown name, the delay of an input that jumps, or an inconsistent
+    description.
     """
-    inputs = delayed_samples(inputs_of(engine_torque, pressures))
+    inputs = inputs_of(engine_torque, pressures)
+    require_delays(inputs, parameters)
     options = (Accuracy().tolerance, list(parameters))
     try:
         columns, events, status, derivatives, event_derivatives = _native.sensitivities(
-            as_json(model), inputs, plain_start(start), run_time(time), options
+            as_json(model), delayed_samples(inputs), plain_start(start), run_time(time), options
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
@@ -380,6 +382,21 @@ def delayed_samples(
     return [
         (name, as_array(one.time), as_array(one.values), one.delay) for name, one in inputs.items()
     ]
+
+
+def require_delays(inputs: Mapping[str, Signal], by: Sequence[str]) -> None:
+    """Raise InputError where `by` names the delay of an input that jumps.
+
+    The core moves values by their rates, and a jump has none: the derivative would lack it.
+    """
+    for name, one in inputs.items():
+        jumps = np.flatnonzero(np.diff(one.time) == 0.0)
+        if jumps.size and f"delay.{name}" in by:
+            raise InputError(
+                f"input {name!r} jumps at {one.time[jumps[0]]:.9g} s: there is no derivative by "
+                "its delay",
+                "give the jump a width, such as that of a sample",
+            )
 
 
 def plain_start(start: State) -> tuple[float, float, float, float, list[str]]:
