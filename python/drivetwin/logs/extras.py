@@ -15,10 +15,9 @@ from typing import Any, TextIO, cast
 
 from drivetwin.errors import DrivetwinError, FileFormatError, MissingExtraError, Where
 
-
 _one_at_a_time = RLock()
-"""Held while a foreign library is loaded or parses: standard output, hook and warnings are those of the process,
-and threads that change them out of turn would leave them changed."""
+"""Held while a foreign library is loaded or parses: standard output, hook and warnings are those
+of the process, and threads that change them out of turn would leave them changed."""
 
 
 def require(module: str, extra: str, kind: str, path: Path) -> Any:
