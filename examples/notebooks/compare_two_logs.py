@@ -6,8 +6,6 @@
 # other?
 
 # %%
-from pathlib import Path
-
 import drivetwin
 from drivetwin.cli import main
 from drivetwin.report.candidates import Candidate, agreements
@@ -16,8 +14,8 @@ from drivetwin.report.comparison import save_comparison, trials_of
 results, twins, logs = {}, {}, {}
 for name, seed in (("monday", "1"), ("tuesday", "2")):
     main(["synth", "-o", f"{name}.csv", "--seed", seed])
-    card = drivetwin.load_card(Path(f"{name}.card.toml"))
-    logs[name] = drivetwin.read_log(Path(f"{name}.csv"), card)
+    card = drivetwin.load_card(f"{name}.card.toml")
+    logs[name] = drivetwin.read_log(f"{name}.csv", card)
     found = drivetwin.find_shifts(logs[name], card)
     results[name] = drivetwin.identify_shifts(logs[name], card, found, drivetwin.Method.INTEGRAL)
     twins[name] = drivetwin.Twin.from_identification(results[name], card)
@@ -36,6 +34,6 @@ crossed.plot()
 
 # %% All of it on one page.
 save_comparison(
-    Path("comparison.html"), candidates, trials_of(twins, logs["tuesday"], [shift], "tuesday")
+    "comparison.html", candidates, trials_of(twins, logs["tuesday"], [shift], "tuesday")
 )
 assert crossed.fit["output_torque"]["all"].fit_percent > 85.0

@@ -6,8 +6,6 @@
 # notebook in Jupyter or an editor, or all at once: `python identify_a_shift.py`.
 
 # %%
-from pathlib import Path
-
 import drivetwin
 from drivetwin.cli import main
 
@@ -15,8 +13,8 @@ from drivetwin.cli import main
 main(["synth", "-o", "shift.csv"])
 
 # %% Read the log with the vehicle card, and look at it: the last line of a cell is shown.
-card = drivetwin.load_card(Path("shift.card.toml"))
-log = drivetwin.read_log(Path("shift.csv"), card)
+card = drivetwin.load_card("shift.card.toml")
+log = drivetwin.read_log("shift.csv", card)
 print(log.summary())
 log.plot()
 
@@ -32,9 +30,9 @@ result.plot()
 twin.plot()
 
 # %% The same as files: for people, for machines, and the model to simulate.
-drivetwin.save_report(Path("report.html"), result, log)
-drivetwin.save_result(Path("result.json"), result)
-twin.save(Path("twin.toml"))
+drivetwin.save_report("report.html", result, log)
+drivetwin.save_result("result.json", result)
+twin.save("twin.toml")
 
 # %% The truth of the synthetic log lies within the interval.
 low, high = result.estimates["J_vehicle"].ci95_total or (0.0, 0.0)

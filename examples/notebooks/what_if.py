@@ -6,8 +6,6 @@
 # linings? Here the identified shift is repeated with one parameter changed at a time.
 
 # %%
-from pathlib import Path
-
 import numpy as np
 import plotly.graph_objects as go
 
@@ -15,8 +13,8 @@ import drivetwin
 from drivetwin.cli import main
 
 main(["synth", "-o", "shift.csv"])
-card = drivetwin.load_card(Path("shift.card.toml"))
-log = drivetwin.read_log(Path("shift.csv"), card)
+card = drivetwin.load_card("shift.card.toml")
+log = drivetwin.read_log("shift.csv", card)
 found = drivetwin.find_shifts(log, card)
 result = drivetwin.identify_shifts(log, card, found, drivetwin.Method.INTEGRAL)
 twin = drivetwin.Twin.from_identification(result, card)

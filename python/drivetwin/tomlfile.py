@@ -32,10 +32,10 @@ class Fault:
         return f"{self.key}: {self.text}" if self.key else self.text
 
 
-def read_toml(path: Path, error: type[InputError]) -> dict[str, Any]:
+def read_toml(path: Path | str, error: type[InputError]) -> dict[str, Any]:
     """Return the document in `path`; raises `error` where it cannot be read or is no TOML."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as fault:
         raise error(
             f"cannot read the file: {fault.strerror}", "check the path", Where(file=str(path))

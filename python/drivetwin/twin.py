@@ -114,14 +114,14 @@ class Twin(Shown):
         return twin_of(found, card)
 
     @classmethod
-    def load(cls, path: Path) -> Twin:
+    def load(cls, path: Path | str) -> Twin:
         """Read `twin.toml`. Raises ResultFileError where it is damaged or of a newer schema."""
         from drivetwin.results.twin_build import twin_from_file
         from drivetwin.results.twin_file import read_twin_file
 
         return twin_from_file(read_twin_file(path))
 
-    def save(self, path: Path) -> None:
+    def save(self, path: Path | str) -> None:
         """Write `twin.toml`; the file appears whole or not at all."""
         from drivetwin.results.twin_build import file_of
         from drivetwin.results.twin_file import write_twin_file

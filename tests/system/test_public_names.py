@@ -5,10 +5,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 import drivetwin
+from drivetwin.results.result_file import load_result
+from tests.logs import made
+from tests.report import sample
 
 
 def test_every_public_name_resolves() -> None:
@@ -26,3 +30,20 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
     code = "import sys, drivetwin; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert not {"numpy", "scipy", "plotly", "pydantic"} & set(run.stdout.split())
+
+
+def test_files_may_be_named_by_text(tmp_path: Path) -> None:
+    made.card(tmp_path)
+    made.write(tmp_path)
+    (tmp_path / "map.toml").write_text("", encoding="utf-8")
+    place = str(tmp_path)
+    card = drivetwin.load_card(f"{place}/card.toml")
+    log = drivetwin.read_log(f"{place}/log.csv", card, f"{place}/map.toml")
+    assert log.source == f"{place}/log.csv"
+    found = sample.identification()
+    drivetwin.save_result(f"{place}/result.json", found)
+    assert load_result(f"{place}/result.json").parameters.keys() == found.estimates.keys()
+    drivetwin.Twin.from_identification(found, sample.card()).save(f"{place}/twin.toml")
+    assert drivetwin.Twin.load(f"{place}/twin.toml").parameters.keys() == found.estimates.keys()
+    drivetwin.save_report(f"{place}/report.html", found, sample.log())
+    assert (tmp_path / "report.html").stat().st_size > 0

@@ -39,9 +39,9 @@ from drivetwin.vehicle.card import VehicleCard
 
 
 def read_log(
-    path: Path,
+    path: Path | str,
     card: VehicleCard,
-    mapping: Path | None = None,
+    mapping: Path | str | None = None,
     needed: Iterable[str] = FOR_SHIFTS,
     window: Window | None = None,
 ) -> ShiftLog:
@@ -57,7 +57,8 @@ def read_log(
     FileFormatError, MissingExtraError, MissingChannelError, MappingError, UnitError, TimeError,
     DamagedChannelError, PlausibilityError; each says what to do.
     """
-    stated = read_mapping(mapping) if mapping is not None else Mapped({})
+    path = Path(path)
+    stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})
     kinds = {name: element.kind for name, element in card.elements.items()}
     channels: dict[str, Channel] = {}
     with open_recording(path, stated.options) as recording:

@@ -24,7 +24,9 @@ from drivetwin.twin import Twin
 from drivetwin.validate import Validation, validate
 
 
-def save_comparison(path: Path, candidates: Sequence[Candidate], trials: Sequence[Trial]) -> None:
+def save_comparison(
+    path: Path | str, candidates: Sequence[Candidate], trials: Sequence[Trial]
+) -> None:
     """Write the comparison; the file appears whole or not at all."""
     write_text(path, render_comparison(candidates, trials))
 

@@ -29,7 +29,7 @@ _BELOW_BUTTONS = 30
 """Room above the panels [px] where the page has the zoom buttons outside the figure."""
 
 
-def save_report(path: Path, found: Identification, log: ShiftLog) -> None:
+def save_report(path: Path | str, found: Identification, log: ShiftLog) -> None:
     """Write the report of an identification; the file appears whole or not at all."""
     write_text(path, render_report(found, log))
 

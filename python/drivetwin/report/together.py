@@ -21,7 +21,7 @@ from drivetwin.report.sections.trust import trust_section
 from drivetwin.results.atomic import write_text
 
 
-def save_together(path: Path, found: Identification, logs: Sequence[ShiftLog]) -> None:
+def save_together(path: Path | str, found: Identification, logs: Sequence[ShiftLog]) -> None:
     """Write the report; the file appears whole or not at all. `logs` are those fitted, in order."""
     write_text(path, render_together(found, logs))
 

@@ -48,7 +48,7 @@ def _identity(path: Path) -> _Identity | None:
     return None
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path | str, text: str) -> None:
     """Write `text` (UTF-8) beside `path` and rename it into place.
 
     A run that is stopped leaves the old file, never half of the new one. Raises OSError, and
@@ -57,11 +57,12 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+def write_bytes(path: Path | str, data: bytes) -> None:
     """Write `data` as `write_text` does; several machines may write the same file.
 
     Raises InputError where `path` is to be kept.
     """
+    path = Path(path)
     check_kept(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f"{path.name}.{platform.node()}.{os.getpid()}.partial")

@@ -157,13 +157,14 @@ def result_json_schema() -> dict[str, Any]:
     return ResultFile.model_json_schema(by_alias=True)
 
 
-def save_result(path: Path, identification: Identification) -> None:
+def save_result(path: Path | str, identification: Identification) -> None:
     """Write `result.json`; the file appears whole or not at all."""
     write_text(path, ResultFile.of(identification).to_json())
 
 
-def load_result(path: Path) -> ResultFile:
+def load_result(path: Path | str) -> ResultFile:
     """Read a `result.json`. Raises ResultFileError where it is damaged or of a newer schema."""
+    path = Path(path)
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
         check_schema(tree.get("schema"), RESULT_SCHEMA, path.name)

@@ -137,7 +137,7 @@ def twin_json_schema() -> dict[str, Any]:
     return TwinFile.model_json_schema(by_alias=True)
 
 
-def write_twin_file(path: Path, content: TwinFile) -> None:
+def write_twin_file(path: Path | str, content: TwinFile) -> None:
     """Write the records as TOML; the file appears whole or not at all."""
     document = tomlkit.document()
     for line in _HEADER:
@@ -147,11 +147,12 @@ def write_twin_file(path: Path, content: TwinFile) -> None:
     write_text(path, tomlkit.dumps(document))
 
 
-def read_twin_file(path: Path) -> TwinFile:
+def read_twin_file(path: Path | str) -> TwinFile:
     """Read and check `twin.toml`.
 
     Raises ResultFileError where the file is missing, damaged or of a newer schema.
     """
+    path = Path(path)
     try:
         tree = tomllib.loads(path.read_text(encoding="utf-8"))
         check_schema(tree.get("schema"), TWIN_SCHEMA, path.name)

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 
-def load_card(path: Path) -> VehicleCard:
+def load_card(path: Path | str) -> VehicleCard:
     """Read a vehicle card.
 
     Raises CardError that lists all faults by key path: unknown keys (with the nearest known one),
