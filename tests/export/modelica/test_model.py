@@ -92,7 +92,7 @@ def test_inputs_are_sampled_at_every_moment_that_any_of_them_has() -> None:
 
 
 def test_an_input_that_jumps_jumps_in_the_table() -> None:
-    elements = [
+    elements: list[Element] = [
         {"type": "inertia", "name": "J", "node": "n", "inertia": 1.0},
         {"type": "torque", "name": "T", "node": "n", "input": "a"},
     ]
