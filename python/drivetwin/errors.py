@@ -25,11 +25,12 @@ class Where:
         return ", ".join(part for part in parts if part)
 
 
-@dataclass
+@dataclass(eq=False)
 class DrivetwinError(Exception):
     """Base of all errors raised on purpose.
 
-    `what` states the fault with its numbers, `where` its place, `remedy` what to do.
+    `what` states the fault with its numbers, `where` its place, `remedy` what to do. Two errors are
+    never equal, and one made in another process comes back from it as it was.
     """
 
     what: str
@@ -37,6 +38,9 @@ class DrivetwinError(Exception):
     where: Where = field(default_factory=Where)
 
     exit_code = 2
+
+    def __post_init__(self) -> None:
+        super().__init__(self.what, self.remedy, self.where)  # what copy and pickle make it of
 
     def __str__(self) -> str:
         place = str(self.where)
