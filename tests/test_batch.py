@@ -250,6 +250,15 @@ def test_lengths_and_names_must_fit() -> None:
         simulate_batch(MODEL, [scenario()], TIME, sets(2), keep=[TIME[1:]])
     with pytest.raises(InputError, match="shaft_torque"):
         simulate_batch(MODEL, [scenario()], TIME, sets(2), outputs=["angle"])
+    uneven = {"eta": np.array([0.8, 0.9]), "k_o": np.array([1.8e5])}
+    with pytest.raises(InputError, match=r"parameters of \[1, 2\] values make no batch"):
+        simulate_batch(MODEL, [scenario()], TIME, uneven)
+    with pytest.raises(InputError, match=r"an array of shape \(1, 2\)"):
+        simulate_batch(MODEL, [scenario()], TIME, {"eta": np.full((1, 2), 0.9)})
+    with pytest.raises(InputError, match="columns, last"):
+        simulate_batch(MODEL, [scenario()], TIME, sets(2), keep="first")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="-1 threads"):
+        simulate_batch(MODEL, [scenario()], TIME, sets(2), threads=-1)
 
 
 BY = ("eta", "B3.mu_c", "start.twist", "delay.engine torque")

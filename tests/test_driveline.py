@@ -209,7 +209,7 @@ def test_a_fixed_order_is_less_exact() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        *(({"order": order}, "an integer from 1 to 14") for order in (-1, 0, 15)),
+        *(({"order": order}, "an integer from 1 to 14") for order in (-1, 0, 15, 2.0)),
         *(
             ({"tolerance": tolerance}, "a finite positive number")
             for tolerance in (0.0, -1e-9, float("nan"), float("inf"))
@@ -266,6 +266,16 @@ def test_a_missing_pressure_is_named() -> None:
     torque, pressures, start = held_second_gear()
     with pytest.raises(InputError, match='input "B3" has no signal'):
         simulate(paper_model(), torque, {"B2": pressures["B2"]}, start, np.array([0.0, 1.0]))
+
+
+def test_an_element_called_as_the_engine_torque_is_refused() -> None:
+    torque, pressures, start = held_second_gear()
+    model = paper_model()
+    off, on = model.elements
+    model = replace(model, elements=(off, replace(on, name="engine torque")))
+    named = {"B2": pressures["B2"], "engine torque": pressures["B3"]}
+    with pytest.raises(InputError, match="a shift element is called 'engine torque'"):
+        simulate(model, torque, named, start, np.linspace(0.0, 1.0, 3))
 
 
 def test_the_same_run_twice_is_bit_identical() -> None:

@@ -138,6 +138,47 @@ def test_a_faulty_description_is_refused_by_name(
         run(elements, start, ("speed", "a"), pressure=ONE)
 
 
+def test_a_number_that_is_none_is_named_with_its_element() -> None:
+    with pytest.raises(InputError, match=r"not a finite number: \[J b\]\.inertia"):
+        run([inertia("a"), inertia("b", math.nan)], AT_REST)
+
+
+def test_what_is_no_description_is_refused() -> None:
+    with pytest.raises(InputError, match="'radius'} in the description"):
+        run([inertia("a") | {"inertia": {"radius"}}], AT_REST)
+
+
+def test_numbers_and_arrays_of_numpy_describe_as_plain_ones_do() -> None:
+    table = {"slip": np.array([0.0, 5.0]), "mu": np.array([1.0, 0.8])}
+    rubbing = clutch("brake", "a", "ground") | {"friction": table, "gain": np.float32(8.0)}
+    plain = rubbing | {"friction": {k: v.tolist() for k, v in table.items()}, "gain": 8.0}
+    start = Start({"a": 9.0})
+    heavy = inertia("a") | {"inertia": np.int64(2)}
+    one = run([heavy, rubbing], start, ("speed", "a"), pressure=ONE)
+    other = run([inertia("a", 2.0), plain], start, ("speed", "a"), pressure=ONE)
+    assert one.status == "completed"
+    assert np.array_equal(one.columns["speed", "a"], other.columns["speed", "a"])
+
+
+def test_an_input_that_is_no_signal_is_named() -> None:
+    with pytest.raises(InputError, match="inputs torque are no signals"):
+        run([inertia("a"), torque("a")], Start({"a": 0.0}), torque=3.0)
+
+
+@pytest.mark.parametrize(
+    ("time", "values", "message"),
+    [
+        (np.zeros((2, 2)), np.zeros(4), r"an array of shape \(2, 2\)"),
+        (SECOND, np.array(["on"] * SECOND.size), "an array without numbers"),
+    ],
+)
+def test_an_input_that_is_no_column_of_numbers_is_refused(
+    time: Any, values: Any, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        run([inertia("a"), torque("a")], Start({"a": 0.0}), torque=Signal(time, values))
+
+
 @pytest.mark.parametrize(
     ("signal", "message"),
     [

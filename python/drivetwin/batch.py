@@ -21,6 +21,7 @@ from drivetwin.driveline import (
     FloatArray,
     Signal,
     State,
+    as_array,
     as_json,
     delayed_samples,
     inputs_of,
@@ -106,6 +107,8 @@ def simulate_batch(
     its samples that are not NaN. `threads` 0 takes all cores.
     Raises InputError for unknown names, differing lengths or an inconsistent description.
     """
+    if threads < 0:
+        raise InputError(f"{threads} threads", "give a number from 1, or 0 for all cores")
     asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
     values = np.empty(asked.shape)
     try:
@@ -189,9 +192,12 @@ class _Asked:
         outputs: Sequence[str],
         keep: Keep | Sequence[FloatArray],
     ) -> _Asked:
-        sets = {name: np.asarray(v, dtype=np.float64) for name, v in parameters.items()}
-        table = np.stack(list(sets.values()), axis=1) if sets else np.empty((0, 0))
+        if isinstance(keep, str) and keep not in tuple(Keep):
+            raise InputError(f"{keep!r} cannot be kept", f"choose from {', '.join(Keep)}")
+        keep = Keep(keep) if isinstance(keep, str) else keep
+        sets = {name: as_array(values) for name, values in parameters.items()}
         shape = (_runs(sets, scenarios), len(outputs), len(time))
+        table = np.stack(list(sets.values()), axis=1) if sets else np.empty((0, 0))
         wanted = np.empty((0, 0)) if isinstance(keep, Keep) else np.asarray(keep, dtype=np.float64)
         if not isinstance(keep, Keep) and wanted.shape != shape[1:]:
             raise InputError(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, is_dataclass
 from typing import Literal
 
 import numpy as np
@@ -24,6 +24,9 @@ LossLaw = Literal["paper", "dissipative"]
 LATEST = 1e6
 """Times farther from zero [s], 12 days, are too coarse for a run: what the core tells apart in time
 it takes relative to them, and stamps that count from 1970 give wrong results."""
+
+ENGINE_TORQUE = "engine torque"
+"""Name of that input of a dual clutch; the pressures have those of their elements."""
 
 ORDERS = range(1, 15)
 """Fixed orders of integration; a step of the core holds no more than 15 Taylor coefficients."""
@@ -174,7 +177,7 @@ class Signal:
     @property
     def arrival(self) -> FloatArray:
         """Times (n,) [s] at which the values act: those of the samples, later by `delay`."""
-        return np.asarray(self.time, dtype=np.float64) + self.delay
+        return as_array(self.time) + self.delay
 
 
 @dataclass(frozen=True)
@@ -200,7 +203,7 @@ class Accuracy:
             fault, remedy = f"tolerance is {self.tolerance!r}", "give a finite positive number"
         elif not self.max_step > 0.0:
             fault, remedy = f"max_step is {self.max_step!r}", "give a positive time [s], or inf"
-        elif self.order is not None and self.order not in ORDERS:
+        elif not (self.order is None or (type(self.order) is int and self.order in ORDERS)):
             fault = f"order is {self.order!r}"
             remedy = f"give an integer from {ORDERS[0]} to {ORDERS[-1]}, or None"
         else:
@@ -366,8 +369,16 @@ class _Derivatives(Mapping[str, Trajectory]):
 
 
 def inputs_of(engine_torque: Signal, pressures: Mapping[str, Signal]) -> dict[str, Signal]:
-    """The inputs of a dual clutch by the names that the core knows them by."""
-    return {"engine torque": engine_torque, **pressures}
+    """The inputs of a dual clutch by the names that the core knows them by.
+
+    Raises InputError where an element has the name of the engine's torque.
+    """
+    if ENGINE_TORQUE in pressures:
+        raise InputError(
+            f"a shift element is called {ENGINE_TORQUE!r}, as the engine's torque is",
+            "give the element another name",
+        )
+    return {ENGINE_TORQUE: engine_torque, **pressures}
 
 
 def samples(inputs: Mapping[str, Signal]) -> list[tuple[str, FloatArray, FloatArray]]:
@@ -432,15 +443,30 @@ def _trajectory(
 def as_json(description: object) -> str:
     """A description, of dataclasses too, as the core reads it.
 
-    JSON has no NaN, so numbers that are not finite are refused by name here: raises InputError.
+    Numbers and arrays of NumPy become plain ones. JSON has no NaN, so numbers that are not finite
+    are refused by name here: raises InputError, as for anything else that has no place in JSON.
     """
     try:
-        return json.dumps(description, default=vars, allow_nan=False)
+        return json.dumps(description, default=_plain, allow_nan=False)
     except ValueError:
-        plain = json.loads(json.dumps(description, default=vars))
+        plain = json.loads(json.dumps(description, default=_plain))
     bad = [key for key, value in _leaves("", plain) if not np.isfinite(value)]
     raise InputError(
         f"not a finite number: {', '.join(bad)}", "give every parameter of the model a value"
+    )
+
+
+def _plain(value: object) -> object:
+    """A value that JSON does not know, in others that it does."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if is_dataclass(value):
+        return vars(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise InputError(
+        f"{value!r} in the description of a driveline",
+        "describe it with numbers, texts, lists and mappings",
     )
 
 
@@ -450,7 +476,8 @@ def _leaves(path: str, value: object) -> Iterator[tuple[str, float]]:
             yield from _leaves(f"{path}.{key}" if path else str(key), item)
     elif isinstance(value, list | tuple):
         for i, item in enumerate(value):
-            yield from _leaves(f"{path}[{i}]", item)
+            name = item.get("name") if isinstance(item, Mapping) else None
+            yield from _leaves(f"{path}[{i if name is None else name}]", item)
     elif isinstance(value, float):
         yield path, value
 
@@ -460,15 +487,22 @@ def run_time(time: FloatArray) -> FloatArray:
 
     Raises InputError where it lies beyond LATEST.
     """
-    farthest = float(np.max(np.abs(time), initial=0.0))
+    grid = as_array(time)
+    farthest = float(np.max(np.abs(grid), initial=0.0))
     if LATEST < farthest < math.inf:
         raise InputError(
             f"time reaches {farthest:.6g} s from zero, too far for a simulation",
             f"let the time of run and inputs count from the start, or lie within {LATEST:g} s",
         )
-    return as_array(time)
+    return grid
 
 
 def as_array(values: FloatArray) -> FloatArray:
-    """Values as the core takes them: float64 without gaps."""
-    return np.ascontiguousarray(values, dtype=np.float64)
+    """Values (n,) as the core takes them: float64 without gaps. Raises InputError for others."""
+    try:
+        column = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"an array without numbers: {error}", "give numbers in SI") from error
+    if column.ndim != 1:
+        raise InputError(f"an array of shape {column.shape}", "give one with a single axis")
+    return column

@@ -80,6 +80,11 @@ def simulate(
     on the way returns its status.
     """
     accuracy = accuracy or Accuracy()
+    foreign = [name for name, one in inputs.items() if not isinstance(one, Signal | Sine)]
+    if foreign:
+        raise InputError(
+            f"inputs {', '.join(foreign)} are no signals", "give each a Signal or a Sine"
+        )
     sampled = {name: one for name, one in inputs.items() if isinstance(one, Signal)}
     sines = [
         (name, sine.offset, sine.amplitude, sine.frequency, sine.phase)
