@@ -75,6 +75,19 @@ def test_names_that_become_one_are_refused(kind: ParameterFormat) -> None:
         CODECS[kind].text(doubled)
 
 
+@pytest.mark.parametrize(
+    ("kind", "other"), [(ParameterFormat.SSV, "mu.B3.slip"), (ParameterFormat.M, "mu.B3_slip")]
+)
+def test_the_name_of_an_axis_is_nobody_elses(kind: ParameterFormat, other: str) -> None:
+    """Where the axis is written beside its curve, either would be read for the other."""
+    curves = tuple(
+        Curve(name, Axis(axis, (0.0, 1.0)), (2.0, 3.0))
+        for name, axis in (("mu.B3", "slip"), (other, "v"))
+    )
+    with pytest.raises(InputError, match=r"the axis of 'mu\.B3' are both written as"):
+        CODECS[kind].text(ParameterSet("t", (), curves))
+
+
 @EVERY_FORMAT
 @pytest.mark.parametrize("text", ["", "\n", "<a/>", "{}", "a,b\n1,2\n", "x = ;", "\u00e4 = \u00b5"])
 def test_what_is_no_parameter_file_is_refused(kind: ParameterFormat, text: str) -> None:

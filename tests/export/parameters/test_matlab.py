@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+from drivetwin.errors import InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.matlab import m_text, parse_m
 
@@ -33,3 +36,10 @@ def test_lines_by_hand_are_read_and_the_rest_is_named() -> None:
     found = parse_m(text, "by_hand.m")
     assert found.scalars == (Scalar("k_o", 1.8e5),)
     assert found.skipped == ("clear all", "v")
+
+
+def test_a_name_too_long_for_its_breakpoints_is_refused() -> None:
+    """Cut to 63 characters the breakpoints would have the name of the curve and be overwritten."""
+    curve = Curve("mu." + 60 * "x", Axis("slip", (0.0, 20.0)), (0.13, 0.12))
+    with pytest.raises(InputError, match="both written as"):
+        m_text(ParameterSet("t", (), (curve,)))

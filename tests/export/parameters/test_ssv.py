@@ -70,3 +70,14 @@ def test_indexed_scalars_without_an_axis_stay_scalars_and_other_types_are_named(
     found = parse_ssv(text, "t.ssv")
     assert found.scalars == (Scalar("x[1]", 1.5),)
     assert found.skipped == ("on",)
+
+
+def test_a_curve_is_read_by_its_indices_whatever_their_order_in_the_file() -> None:
+    """A tool that sorts by name puts [10] before [2]."""
+    points = tuple(float(k) for k in range(12))
+    content = ParameterSet("t", (), (Curve("mu", Axis("slip", points), points[::-1]),))
+    head, *parameters = ssv_text(content).split("    <ssv:Parameter ")
+    *parameters, last = parameters
+    last, tail = last.split("  </ssv:Parameters>")
+    shuffled = "".join(f"    <ssv:Parameter {one}" for one in sorted([*parameters, last]))
+    assert parse_ssv(f"{head}{shuffled}  </ssv:Parameters>{tail}", "t.ssv") == content

@@ -75,10 +75,13 @@ def legal(
     parameters: ParameterSet,
     spell: Callable[[str], str],
     line: Callable[[str], str] = lambda text: text,
+    axis_name: Callable[[Curve], str] | None = None,
 ) -> ParameterSet:
     """Return the set with names put through `spell` and texts through `line`.
 
-    A name that changes is kept in the text. Raises InputError where two names become one.
+    `axis_name` is the name under which a format writes the axis of a respelled curve, where it
+    does so beside the curve. A name that changes is kept in the text. Raises InputError where two
+    names become one.
     """
 
     def respelled(entry: Scalar | Curve) -> str:
@@ -107,20 +110,25 @@ def legal(
         ),
         notes=tuple(line(note) for note in parameters.notes),
     )
-    _refuse_twins(parameters, changed)
+    written = zip((repr(one.name) for one in parameters.entries), changed.entries, strict=True)
+    names = [(origin, one.name) for origin, one in written]
+    if axis_name is not None:
+        curves = zip(parameters.curves, changed.curves, strict=True)
+        names += [(f"the axis of {old.name!r}", axis_name(new)) for old, new in curves]
+    _refuse_twins(names)
     return changed
 
 
-def _refuse_twins(before: ParameterSet, after: ParameterSet) -> None:
-    origin: dict[str, str] = {}
-    old, new = ([one.name for one in each.entries] for each in (before, after))
-    for name, respelled in zip(old, new, strict=True):
-        if respelled in origin:
+def _refuse_twins(names: Iterable[tuple[str, str]]) -> None:
+    """Refuse what is written under one name; `names` are of pairs of origin and written name."""
+    origins: dict[str, str] = {}
+    for origin, name in names:
+        if name in origins:
             raise InputError(
-                f"{origin[respelled]!r} and {name!r} are both written as {respelled!r}",
-                "name the elements and gears of the vehicle card with letters and digits",
+                f"{origins[name]} and {origin} are both written as {name!r}",
+                "name the elements and gears of the vehicle card with few letters and digits",
             )
-        origin[respelled] = name
+        origins[name] = origin
 
 
 def number(value: float) -> str:

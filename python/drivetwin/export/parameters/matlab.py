@@ -29,7 +29,11 @@ _BREAKPOINTS = re.compile(r"breakpoints (\w+) of (\w+)")
 
 def legal_for_m(parameters: ParameterSet) -> ParameterSet:
     """The set as the format can hold it."""
-    return legal(parameters, flat_name, ascii_line)
+    return legal(parameters, flat_name, ascii_line, _breakpoints_name)
+
+
+def _breakpoints_name(curve: Curve) -> str:
+    return flat_name(f"{curve.name}_{curve.axis.name}")
 
 
 def m_text(parameters: ParameterSet) -> str:
@@ -39,8 +43,8 @@ def m_text(parameters: ParameterSet) -> str:
     for scalar in content.scalars:
         lines.append(_assignment(scalar.name, number(scalar.value), scalar.unit, scalar.text))
     for curve in content.curves:
-        over = flat_name(f"{curve.name}_{curve.axis.name}")
         text = f"breakpoints {curve.axis.name} of {curve.name}"
+        over = _breakpoints_name(curve)
         lines += ["", _assignment(over, _row(curve.axis.points), curve.axis.unit, text)]
         lines.append(_assignment(curve.name, _row(curve.values), curve.unit, curve.text))
     return "\n".join(lines) + "\n"

@@ -33,7 +33,11 @@ _INDEXED = re.compile(r"(.+)\[(\d+)\]")
 
 def legal_for_ssv(parameters: ParameterSet) -> ParameterSet:
     """The set as the format can hold it."""
-    return legal(parameters, dotted_name, one_line)
+    return legal(parameters, dotted_name, one_line, _axis_name)
+
+
+def _axis_name(curve: Curve) -> str:
+    return f"{curve.name}.{curve.axis.name}"
 
 
 def ssv_text(parameters: ParameterSet) -> str:
@@ -45,7 +49,7 @@ def ssv_text(parameters: ParameterSet) -> str:
     for scalar in content.scalars:
         _real(listed, scalar)
     for curve in content.curves:
-        over = f"{curve.name}.{curve.axis.name}"
+        over = _axis_name(curve)
         for index, (at, value) in enumerate(zip(curve.axis.points, curve.values, strict=True), 1):
             _real(listed, Scalar(f"{over}[{index}]", at, curve.axis.unit))
             text = curve.text if index == 1 else ""
@@ -92,15 +96,19 @@ def parse_ssv(text: str, source: str) -> ParameterSet:
 
 
 def _gathered(scalars: list[Scalar], source: str) -> tuple[tuple[Scalar, ...], tuple[Curve, ...]]:
-    """Scalars that stand alone, and the curves among the indexed ones."""
-    arrays: dict[str, list[Scalar]] = {}
+    """Scalars that stand alone, and the curves among the indexed ones, in the order of indices."""
+    indexed: dict[str, list[tuple[int, Scalar]]] = {}
     alone = []
     for scalar in scalars:
         found = _INDEXED.fullmatch(scalar.name)
         if found is None:
             alone.append(scalar)
         else:
-            arrays.setdefault(found[1], []).append(scalar)
+            indexed.setdefault(found[1], []).append((int(found[2]), scalar))
+    arrays = {
+        name: [scalar for _, scalar in sorted(members, key=lambda member: member[0])]
+        for name, members in indexed.items()
+    }
     within = {name: name.rpartition(".")[0] for name in arrays}
     # What has an axis of its own is a curve, also where its name begins like another's.
     ends = within.keys() - within.values()
