@@ -107,6 +107,45 @@ def test_a_curve_and_its_law_cannot_both_change() -> None:
         updated(twin(), both)
 
 
+def test_a_value_in_another_unit_is_refused() -> None:
+    """0.8 bar is not 0.8 Pa, and a slip in rpm not one in rad/s."""
+    content = parameters_of(twin())
+    in_bar = Scalar("P0.B3", 0.8, "bar")
+    with pytest.raises(InputError, match=r"gives P0\.B3 in bar, not in Pa"):
+        updated(twin(), ParameterSet("t", (in_bar,)))
+    (curve,) = content.curves
+    in_rpm = replace(curve, axis=replace(curve.axis, unit="rpm"))
+    with pytest.raises(InputError, match=r"gives mu\.B3 in rpm, not in rad/s"):
+        updated(twin(), ParameterSet("t", (), (in_rpm,)))
+    with pytest.raises(InputError, match="gives te_delay in ms, not in s"):
+        updated(twin(), ParameterSet("t", (Scalar("te_delay", 10.0, "ms"),)))
+
+
+def test_a_unit_that_a_tool_spells_otherwise_or_drops_is_the_same() -> None:
+    for unit in ("N/m^2", "1"):
+        given = ParameterSet("t", (Scalar("P0.B3", 9e4, unit),))
+        assert updated(twin(), given).twin.value("P0.B3", 0.0) == 9e4
+
+
+def test_a_name_that_is_given_twice_is_refused() -> None:
+    """Also where a format spells it otherwise."""
+    twice = ParameterSet("t", (Scalar("P0.B3", 9e4, "Pa"), Scalar("P0_B3", 8e4, "Pa")))
+    with pytest.raises(InputError, match=r"gives P0\.B3 twice"):
+        updated(twin(), twice)
+
+
+@pytest.mark.parametrize("name", ["k_o", "i_in", "i_f", "i_c.B3", "i_out.B3", "ratio_3"])
+def test_zero_is_refused_where_a_run_divides_by_it(name: str) -> None:
+    with pytest.raises(InputError, match=f"{name} = 0 is impossible"):
+        updated(twin(), ParameterSet("t", (Scalar(name, 0.0),)))
+
+
+def test_a_number_that_became_a_curve_is_refused() -> None:
+    (curve,) = parameters_of(twin()).curves
+    with pytest.raises(InputError, match="gives k_o as a curve, not as a number"):
+        updated(twin(), ParameterSet("t", (), (replace(curve, name="k_o"),)))
+
+
 def test_what_the_log_could_not_tell_may_be_given_and_other_names_are_told() -> None:
     given = ParameterSet("t", (Scalar("te_delay", 0.01, "s"), Scalar("wheel_colour", 3.0)))
     update = updated(twin(), given)

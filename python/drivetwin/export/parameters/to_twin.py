@@ -12,6 +12,7 @@ from drivetwin.errors import InputError
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, parameters_of
 from drivetwin.export.parameters.spelling import dotted_name, flat_name
+from drivetwin.export.parameters.units import is_same_unit
 from drivetwin.identify.result import OF_RATIO, Estimate, FrictionCurve, Verdict
 from drivetwin.parameters import spec_of
 from drivetwin.twin import SIMULATED
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from drivetwin.twin import Twin
 
 METHOD = "parameter file"
+_DIVISORS = ("k_o", "i_in", "i_f", "i_c", "i_out")
+"""What the start of a run divides by before the core can refuse it, besides the gears' ratios."""
+_KINDS = {Scalar: "number", Curve: "curve"}
 
 
 @dataclass(frozen=True)
@@ -40,20 +44,20 @@ def updated(twin: Twin, parameters: ParameterSet) -> Update:
     """Give a twin the values of a file that differ from its own, under drivetwin's own names.
 
     What changes counts as a design value without interval. A parameter that the log could not tell
-    may be given. Raises InputError where both a friction curve and the numbers of its law changed.
+    may be given. Raises InputError where both a friction curve and the numbers of its law changed,
+    where a name is given twice, in another unit than the twin's or as a curve instead of a number,
+    and for a ratio or a stiffness of zero.
     """
     own = parameters_of(twin)
-    spelled = _spellings(twin, own)
     values = {one.name: one for one in own.entries}
+    known, unknown = _known(parameters, _spellings(twin, own))
     changed: dict[str, Scalar | Curve] = {}
-    idle, unknown = [], []
-    for entry in parameters.entries:
-        name = spelled.get(entry.name)
-        if name is None:
-            unknown.append(entry.name)
-        elif _same(values.get(name), entry):
+    idle = []
+    for name, entry in known.items():
+        _check(name, values.get(name), entry)
+        if _same(values.get(name), entry):
             continue
-        elif name in twin.parameters and spec_of(name).stem not in SIMULATED:
+        if name in twin.parameters and spec_of(name).stem not in SIMULATED:
             idle.append(name)
         else:
             changed[name] = entry
@@ -74,6 +78,46 @@ def _spellings(twin: Twin, own: ParameterSet) -> dict[str, str]:
     names = [one.name for one in own.entries]
     names += [name for name in twin.parameters if name not in names]
     return {spell(name): name for spell in (flat_name, dotted_name, str) for name in names}
+
+
+def _known(
+    parameters: ParameterSet, spelled: dict[str, str]
+) -> tuple[dict[str, Scalar | Curve], list[str]]:
+    """The entries of a file by own name, and the names of the others."""
+    known: dict[str, Scalar | Curve] = {}
+    unknown = []
+    for entry in parameters.entries:
+        name = spelled.get(entry.name)
+        if name is None:
+            unknown.append(entry.name)
+        elif name in known:
+            raise InputError(f"the file gives {name} twice", "leave one of them")
+        else:
+            known[name] = entry
+    return known, unknown
+
+
+def _check(name: str, own: Scalar | Curve | None, given: Scalar | Curve) -> None:
+    """Refuse a value that would be read as something else than it says, or that is divided by."""
+    kind = Curve if isinstance(own, Curve) else Scalar
+    if not isinstance(given, kind):
+        raise InputError(
+            f"the file gives {name} as a {_KINDS[type(given)]}, not as a {_KINDS[kind]}",
+            "give it as it was exported",
+        )
+    unit = spec_of(name).unit if own is None else own.unit
+    pairs = [(given.unit, unit)]
+    if isinstance(own, Curve) and isinstance(given, Curve):
+        pairs.append((given.axis.unit, own.axis.unit))
+    for stated, expected in pairs:
+        if not is_same_unit(stated, expected):
+            raise InputError(
+                f"the file gives {name} in {stated}, not in {expected}",
+                f"convert its numbers to {expected} and state that",
+            )
+    divides = name.partition(".")[0] in _DIVISORS or name.startswith("ratio_")
+    if divides and isinstance(given, Scalar) and given.value == 0.0:
+        raise InputError(f"{name} = 0 is impossible", "give it a value other than zero")
 
 
 def _same(own: Scalar | Curve | None, given: Scalar | Curve) -> bool:

@@ -37,6 +37,19 @@ def base_units(unit: str) -> dict[str, int] | None:
     return {base: int(power) for base, power in powers.items() if power}
 
 
+def is_same_unit(stated: str, expected: str) -> bool:
+    """Whether a unit that a file states is `expected`; one it does not state, `1`, is taken to be.
+
+    Other spellings count where they are made of the same base units, as `Pa` and `N/m^2`.
+    """
+    if stated in ("1", expected):
+        return True
+    try:
+        return base_units(stated) == base_units(expected)
+    except InputError:
+        return False
+
+
 def _groups(unit: str) -> list[tuple[int, list[tuple[str, Fraction]]]]:
     numerators, *denominators = unit.replace("(", "").replace(")", "").split("/")
     return [
