@@ -118,6 +118,11 @@ def test_what_a_tool_writes_is_read_and_other_objects_are_named() -> None:
     assert found.skipped == ("FESTWERT K_Text", "KENNFELD KF_Any")
 
 
+def test_tabs_separate_as_blanks_do() -> None:
+    tabbed = re.sub(r"(?m)^ *(\S+) +", r"\t\1\t", FROM_A_TOOL)
+    assert parse_dcm(tabbed, "transmission.dcm") == parse_dcm(FROM_A_TOOL, "transmission.dcm")
+
+
 def test_an_object_without_end_is_refused_by_name() -> None:
     with pytest.raises(FileFormatError, match="K_P0"):
         parse_dcm(FROM_A_TOOL.replace("WERT  0.82\nEND", "WERT  0.82"), "cut.dcm")

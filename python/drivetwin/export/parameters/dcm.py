@@ -107,7 +107,7 @@ def _blocks(lines: list[str], source: str) -> Iterator[tuple[str, str, _Fields]]
     for line in lines:
         if line.startswith(_COMMENTS):
             continue
-        keyword, _, rest = line.partition(" ")
+        keyword, rest = (*line.split(maxsplit=1), "", "")[:2]  # blanks or tabs between them
         if keyword == "END" and open_block is not None:
             yield open_block
             open_block = None
