@@ -8,18 +8,31 @@ import unicodedata
 from collections.abc import Callable, Iterable
 
 _GREEK = {
-    "α": "alpha",
-    "δ": "delta",
-    "ζ": "zeta",
-    "η": "eta",
-    "μ": "mu",
-    "µ": "mu",
-    "ν": "nu",
-    "τ": "tau",
-    "φ": "phi",
-    "ω": "omega",
+    letter: unicodedata.name(letter).rpartition(" ")[2].lower()
+    for letter in map(chr, range(ord("α"), ord("ω") + 1))
 }
-_SIGNS = {"′": "'", "·": "*", "→": "->", "–": "-", "—": "-", "−": "-", "²": "^2", "³": "^3"}
+_SIGNS = {
+    "µ": "mu",
+    "λ": "lambda",
+    "Δ": "Delta",
+    "Σ": "Sigma",
+    "±": "+/-",
+    "×": "x",
+    "≈": "~",
+    "≤": "<=",
+    "≥": ">=",
+    "°": "deg ",
+    "′": "'",
+    "·": "*",
+    "→": "->",
+    "–": "-",
+    "—": "-",
+    "−": "-",
+    "⁻": "^-",
+    "²": "^2",
+    "³": "^3",
+    "ß": "ss",
+}
 _REPLACED = str.maketrans({**_GREEK, **_SIGNS})
 
 _MATLAB_NAME_LENGTH = 63
