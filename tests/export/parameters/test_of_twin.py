@@ -29,6 +29,14 @@ def test_every_value_has_its_unit_meaning_and_interval() -> None:
     assert "; weak, 95 %" in weak.text
 
 
+def test_a_value_of_the_card_states_no_interval() -> None:
+    """Its deviation is zero, and an interval without width would tell it as known exactly."""
+    known = Estimate("P0.B3", 8e4, 0.0, Verdict.DESIGN, "card")
+    given = twin()
+    told = parameters_of(replace(given, parameters={**given.parameters, "P0.B3": known}))["P0.B3"]
+    assert told.text == "pressure at which the clutch fill ends; design value"
+
+
 def test_what_the_log_could_not_tell_has_no_entry_but_a_reason() -> None:
     content = parameters_of(twin())
     with pytest.raises(KeyError):

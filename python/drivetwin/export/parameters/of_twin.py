@@ -88,10 +88,10 @@ def _estimates(twin: Twin) -> Iterator[Scalar]:
 
 
 def _told(estimate: Estimate) -> str:
-    """Meaning, verdict and interval."""
+    """Meaning, verdict and interval; that of a value of the card has no width and is left out."""
     text = f"{spec_of(estimate.id).meaning}; {estimate.verdict.value}"
-    interval = estimate.ci95_total
-    return text if interval is None else f"{text}, 95 %: {interval[0]:.5g} .. {interval[1]:.5g}"
+    low, high = estimate.ci95_total or (0.0, 0.0)
+    return f"{text}, 95 %: {low:.5g} .. {high:.5g}" if low < high else text
 
 
 def _load(twin: Twin) -> Iterator[Scalar]:
