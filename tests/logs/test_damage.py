@@ -147,6 +147,18 @@ def test_numbers_far_beyond_all_others_are_found(value: float, width: int, every
     assert "far beyond all other numbers" in found.text
 
 
+@pytest.mark.parametrize("value", [-9999.0, 8191.0])
+def test_numbers_far_beyond_all_others_are_found_at_the_ends(value: float) -> None:
+    """At the start nothing has been received yet."""
+    values = np.round(torque() / 5.0)
+    values[:100] = values[-70:] = value
+    found = beyond(TIME, values)
+    assert found is not None
+    assert runs(found.mask) == [(0, 100), (TIME.size - 70, TIME.size)]
+    released = np.where(TIME < 0.3, 14.0, np.round(5.0 * np.sin(TIME), 1))
+    assert beyond(TIME, released) is None
+
+
 def test_a_large_torque_that_was_measured_is_not_beyond() -> None:
     """What moves, passes through the numbers between, lasts or is sampled slowly may be true."""
     coast = np.random.default_rng(4).normal(-40.0, 3.0, TIME.size)

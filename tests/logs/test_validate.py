@@ -178,6 +178,9 @@ def test_an_engine_torque_at_its_limit_is_told() -> None:
     values = np.minimum(ramp(100.0, 900.0), 700.0)
     (text,) = check_channel(channel("engine_torque", values), "log.csv").warnings
     assert "at its largest number for 25 % of the log" in text
+    values = np.where(TIME < 0.6, -9999.0, ramp(100.0, 900.0))
+    (text,) = check_channel(channel("engine_torque", values), "log.csv").warnings
+    assert "at its largest number for 60 % of the log, -9999 N·m" in text
 
 
 def test_suction_asks_for_the_sign() -> None:
@@ -237,3 +240,17 @@ def test_all_samples_that_repeat_a_damaged_update_are_left_out(value: float, wor
     assert checked.channel.time.tolist() == np.delete(time, np.s_[1500:1520]).tolist()
     assert len(checked.warnings) == 1
     assert words in checked.warnings[0]
+
+
+@pytest.mark.parametrize("role", ["pressure.B2", "wheel_speed", "engine_torque"])
+@pytest.mark.parametrize("value", [-9999.0, 8191.0, 655.35])
+def test_numbers_that_stand_for_no_value_are_left_out(role: str, value: float) -> None:
+    """A coarse signal of a bus, in bar, rad/s or N·m."""
+    unit = 1e5 if role.startswith("pressure") else 1.0
+    sound = np.round(9.0 + 5.0 * np.sin(6.0 * TIME), 1)
+    put_in = (TIME > 0.395) & (TIME < 0.475)
+    checked = check_channel(channel(role, unit * np.where(put_in, value, sound)), "log.csv")
+    assert checked.channel.values.tolist() == (unit * sound[~put_in]).tolist()
+    assert checked.warnings[0].endswith(
+        "far beyond all other numbers from 0.400 s to 0.470 s, left out"
+    )

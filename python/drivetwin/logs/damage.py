@@ -68,7 +68,7 @@ _DROP_TIME = 0.25
 """Longest such dropout [s]."""
 
 _BEYOND = 2.0
-"""A torque is none if it is so many times as large as any other of the log ..."""
+"""A number is no measurement if it is so many times as large as any other of the log ..."""
 
 _BEYOND_STEP = 0.025
 """... and reached in one sample, with no more than so much time [s] for it, ..."""
@@ -76,6 +76,9 @@ _BEYOND_STEP = 0.025
 _BEYOND_TIME, _OTHERS = 0.5, 10
 """... left likewise, and one number for no longer than this [s], while the rest, which is more than
 half, takes so many numbers at least."""
+
+_BEYOND_AT_END = 3.0
+"""So many times as large at the start or end of a log, where it is only left or only reached."""
 
 _CLIPPED_SAMPLES = 3
 _CLIPPED_RUNS = 3
@@ -248,7 +251,8 @@ def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
 def beyond(time: FloatArray, values: FloatArray) -> Damage | None:
     """Short stretches of one number far beyond all others, entered and left in one step.
 
-    Numbers that stand for no value, as -9999, and those of a torque message that was not received.
+    Numbers that stand for no value, as -9999, and those of a message that was not received; at the
+    start of a log that of one that was not received yet.
     """
     if float(np.median(np.diff(time))) > _BEYOND_STEP:
         return None
@@ -257,19 +261,22 @@ def beyond(time: FloatArray, values: FloatArray) -> Damage | None:
     far = np.flatnonzero(sizes[1:] > _BEYOND * sizes[:-1])
     for largest in sizes[far[sizes[far] >= np.median(size)]]:
         mask = size > largest
-        if np.unique(values[~mask]).size >= _OTHERS and _is_put_in(time, values, mask):
+        others = values[~mask]
+        if np.unique(others).size >= _OTHERS and _is_put_in(time, values, mask, float(largest)):
             return Damage(
                 mask, f"far beyond all other numbers {_spans(time, runs(mask))}, left out"
             )
     return None
 
 
-def _is_put_in(time: FloatArray, values: FloatArray, mask: Mask) -> bool:
-    """Whether all stretches of `mask` are one number each, short and in the midst of others."""
+def _is_put_in(time: FloatArray, values: FloatArray, mask: Mask, largest: float) -> bool:
+    """Whether all stretches of `mask` are one number each, short, and in the midst of others.
+
+    At the ends of the log they must exceed the `largest` of the others by more.
+    """
     return all(
-        start > 0
-        and end < values.size
-        and time[end] - time[start] <= _BEYOND_TIME
+        ((start > 0 and end < values.size) or abs(values[start]) > _BEYOND_AT_END * largest)
+        and time[min(end, values.size - 1)] - time[start] <= _BEYOND_TIME
         and np.all(values[start:end] == values[start])
         for start, end in runs(mask)
     )

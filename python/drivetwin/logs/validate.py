@@ -138,12 +138,14 @@ def _gaps(channel: Channel) -> list[str]:
 
 def _at_limit(channel: Channel) -> list[str]:
     """Words for an engine torque that rests at its largest number; it may have reason to."""
-    share = float(np.mean(channel.values == channel.values.max()))
+    limit = float(channel.values[np.abs(channel.values).argmax()])
+    share = float(np.mean(channel.values == limit))
     if channel.role != "engine_torque" or not MAX_AT_LIMIT < share < 1.0:
         return []
     return [
         f"channel {channel.source_name!r}: at its largest number for {100 * share:.0f} % of the "
-        "log; if it is saturated there, results that rest on it are wrong"
+        f"log, {_show(limit, channel.quantity)}; if it is saturated there, or none was received, "
+        "results that rest on it are wrong"
     ]
 
 
@@ -195,7 +197,7 @@ def _stuck(channel: Channel) -> Damage | None:
 
 
 def _beyond(channel: Channel) -> Damage | None:
-    if channel.quantity is not Quantity.TORQUE:
+    if channel.quantity in AUXILIARY:
         return None
     return _of_updates(channel, lambda fresh: beyond(fresh.time, fresh.values))
 
