@@ -66,3 +66,54 @@ def test_table_fits_80_columns_without_colours(
     text = capsys.readouterr().out
     assert "\x1b" not in text
     assert max(len(line) for line in text.splitlines()) <= 80
+
+
+def _damaged(log: Path, path: Path, factor: float) -> Path:
+    """A copy of the log whose output torque is `factor` times as large, -9999 for a while."""
+    head, units, *rows = log.read_text().splitlines()
+    place = head.split(",").index("TrqOut")
+    cells = [row.split(",") for row in rows]
+    for number, row in enumerate(cells):
+        row[place] = "-9999" if 500 <= number < 510 else f"{factor * float(row[place]):.6g}"
+    path.write_text("\n".join([head, units, *(",".join(row) for row in cells)]) + "\n")
+    return path
+
+
+def test_what_shifts_warns_of_is_told_in_the_same_words(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = _damaged(bench_files.log, tmp_path / "log.csv", factor=0.1)
+    arguments = [str(log), "--vehicle", str(bench_files.card)]
+    found = _inspect(capsys, *arguments)
+    assert main(["shifts", *arguments, "--json"]) == 0
+    assert found["warnings"] == json.loads(capsys.readouterr().out)["warnings"]
+    assert any("'TrqOut': far beyond" in text for text in found["warnings"])
+    assert any("check scale and unit" in text for text in found["warnings"])
+    assert found["refusal"] is None
+    assert main(["inspect", *arguments]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert all(f"warning: {' '.join(text.split())}" in shown for text in found["warnings"])
+
+
+def test_without_a_card_channels_are_looked_at_by_themselves(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = _damaged(bench_files.log, tmp_path / "log.csv", factor=0.1)
+    (warning,) = _inspect(capsys, str(log))["warnings"]
+    assert "'TrqOut'" in warning
+    assert "left out" in warning
+
+
+def test_why_a_log_is_refused_is_told_and_the_columns_all_the_same(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text(bench_files.log.read_text().replace("\ns,", "\nms,", 1))
+    arguments = [str(log), "--vehicle", str(bench_files.card)]
+    found = _inspect(capsys, *arguments)
+    assert len(found["columns"]) == 7
+    assert found["refusal"]["type"] == "TimeError"
+    assert main(["shifts", *arguments, "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["error"] == found["refusal"]
+    assert main(["inspect", *arguments]) == 0
+    assert "shifts and identify refuse this log" in capsys.readouterr().out

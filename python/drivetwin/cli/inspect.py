@@ -9,10 +9,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile
-from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
+from drivetwin.cli.output import (
+    JsonFlag,
+    error_document,
+    note,
+    print_json,
+    say,
+    show,
+    step,
+    table_of,
+)
+from drivetwin.errors import DrivetwinError
 
 if TYPE_CHECKING:
     from rich.table import Table
+
+    from drivetwin.vehicle.card import VehicleCard
 
 
 def inspect(
@@ -30,7 +42,10 @@ def inspect(
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """List the columns of a log: unit, rate, range, gaps, and the role each would play."""
+    """List the columns of a log: unit, rate, range, gaps, and the role each would play.
+
+    And what `shifts` and `identify` would warn of in it, or refuse it for.
+    """
     from drivetwin.logs.mapping import Mapped
     from drivetwin.logs.profile import mapping_text, read_mapping
     from drivetwin.logs.survey import survey
@@ -39,19 +54,39 @@ def inspect(
 
     card = None if vehicle is None else load_card(vehicle)
     stated = Mapped({}) if channels is None else read_mapping(channels)
-    found = survey(log, card, stated)
+    with step(f"reading {log.name}"):
+        found = survey(log, card, stated)
+        warnings, refusal = _as_read(log, card, channels)
     if write_mapping is not None:
         write_text(write_mapping, mapping_text(found.mapping, found.options, found.unitless))
     if as_json:
-        print_json(found.document())
+        error = None if refusal is None else error_document(refusal)["error"]
+        print_json({**found.document(), "warnings": warnings, "refusal": error})
         return
     show(_table([column.document() for column in found.columns], log.name))
     for text in found.notes:
         note(text)
     if found.unitless:
         note(f"no unit for {', '.join(sorted(found.unitless))}: state it in a channel mapping")
+    for text in warnings:
+        if text not in found.notes:
+            note(f"warning: {text}")
+    if refusal is not None:
+        note(f"shifts and identify refuse this log: {refusal}")
     if write_mapping is not None:
         say(f"wrote {write_mapping}")
+
+
+def _as_read(
+    log: Path, card: VehicleCard | None, channels: Path | None
+) -> tuple[tuple[str, ...], DrivetwinError | None]:
+    """What reading a log for use warns of, whatever roles it lacks; or why it is refused."""
+    from drivetwin.logs.read import read_log
+
+    try:
+        return read_log(log, card, channels, needed=()).warnings, None
+    except DrivetwinError as fault:
+        return (), fault
 
 
 def _table(columns: list[dict[str, Any]], source: str) -> Table:

@@ -40,7 +40,7 @@ from drivetwin.vehicle.card import VehicleCard
 
 def read_log(
     path: Path | str,
-    card: VehicleCard,
+    card: VehicleCard | None,
     mapping: Path | str | None = None,
     needed: Iterable[str] = FOR_SHIFTS,
     window: Window | None = None,
@@ -50,7 +50,8 @@ def read_log(
     Columns come from the `mapping` file, else from the card's [channels], else by name. `needed`
     are the roles that must exist (or their stand-in: engine for input speed, wheel for output
     speed); what else there is comes along. Only mapped columns are read, in a `window` (first and
-    last time [s] as the log counts it, before any time_shift) only the samples inside.
+    last time [s] as the log counts it, before any time_shift) only the samples inside. Without a
+    `card` no column is a pressure, and nothing is compared with the gearing.
 
     What is damaged is left out and listed in `warnings`, also a pedal, gear or flag as a whole that
     nobody asked for; nothing is replaced. Raises
@@ -59,10 +60,11 @@ def read_log(
     """
     path = Path(path)
     stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})
-    kinds = {name: element.kind for name, element in card.elements.items()}
+    elements = {} if card is None else card.elements
+    kinds = {name: element.kind for name, element in elements.items()}
     channels: dict[str, Channel] = {}
     with open_recording(path, stated.options) as recording:
-        specs = {**card.channels, **stated.channels}
+        specs = {**({} if card is None else card.channels), **stated.channels}
         mapped = resolve(recording.columns, specs, kinds, needed, str(path))
         _refuse_unitless(recording, mapped.channels, specs, str(path))
         warnings = [*recording.warnings, *mapped.warnings]
@@ -80,11 +82,14 @@ def read_log(
             channels[role] = checked.channel
             warnings += checked.warnings
     check_common_span(channels, str(path))
-    check_gearing(channels, card, str(path))
+    if card is not None:
+        check_gearing(channels, card, str(path))
     check_torque_signs(channels, str(path))
-    warnings += [*partly_recorded(channels), *torque_balance(channels, card)]
-    warnings += final_drive_held(channels, card)
-    warnings += [*clock_warnings(channels, card), *torque_warnings(channels)]
+    warnings += partly_recorded(channels)
+    if card is not None:
+        warnings += [*torque_balance(channels, card), *final_drive_held(channels, card)]
+        warnings += clock_warnings(channels, card)
+    warnings += torque_warnings(channels)
     return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
 
 
