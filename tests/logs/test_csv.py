@@ -97,6 +97,15 @@ def test_a_text_column_is_set_aside_with_its_first_cell() -> None:
     assert log.unreadable == {"state": "line 3: 'D' is no number"}
 
 
+@pytest.mark.parametrize(
+    "cell", ["1'460.5", "1.460,5", '"1,460.5"', "1\u202f460,5", "1 460.5", "-1'234'460"]
+)
+def test_signs_between_thousands_are_told(cell: str) -> None:
+    log = read(f"time;x\ns;Nm\n0;1{',5' if ',5' in cell else '.5'}\n1;{cell}\n")
+    assert "line 4: " in log.unreadable["x"]
+    assert log.unreadable["x"].endswith("export without signs between thousands")
+
+
 def test_an_underscore_is_no_part_of_a_number() -> None:
     assert "'1_0'" in read("time,x\ns,Nm\n0,1_0\n1,2\n").unreadable["x"]
 

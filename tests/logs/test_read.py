@@ -185,6 +185,14 @@ def test_a_text_cell_in_a_needed_column_is_told_with_its_line(tmp_path: Path) ->
         read_log(path, card(tmp_path))
 
 
+def test_columns_of_cells_that_are_no_numbers_are_not_taken_for_unitless(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    text = path.read_text(encoding="utf-8").replace("1500.0", "1'500.0").replace("2500.0", "2'500")
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DamagedChannelError, match="is no number that can be read"):
+        read_log(path, card(tmp_path))
+
+
 def test_channels_without_common_time_are_told(tmp_path: Path) -> None:
     mapping = '[channels.output_torque]\nsource = "TrqOut"\ntime_shift_s = 100.0\n'
     with pytest.raises(TimeError, match=r"no common time span: 'TrqOut' starts at 100\.000 s"):

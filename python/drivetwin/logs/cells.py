@@ -18,6 +18,9 @@ _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 """A number with comma that may be a whole one from a thousand to a million."""
 
+_GROUPED = re.compile(r"[+-]?\d{1,3}([ .,'’\u00a0\u202f]\d{3})+([.,]\d*)?", re.ASCII)
+"""A number with signs between its thousands, in the manner of any country."""
+
 _NOT_A_NUMBER = frozenset(("nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"))
 
 
@@ -99,5 +102,8 @@ def _one_by_one(cells: Sequence[str], plain: Sequence[str], line_numbers: Sequen
         elif _NUMBER.fullmatch(text):
             values[row] = float(text)
         elif text.casefold() not in _NOT_A_NUMBER and fault is None:
-            fault = f"line {line_numbers[row]}: {cells[row].strip()[:40]!r} is no number"
+            cell = cells[row].strip()
+            fault = f"line {line_numbers[row]}: {cell[:40]!r} is no number"
+            if _GROUPED.fullmatch(cell):
+                fault += " that can be read: export without signs between thousands"
     return Numbers(values, present, fault)

@@ -99,12 +99,16 @@ def _refuse_unitless(
     stated: Mapping[str, ChannelSpec],
     file: str,
 ) -> None:
-    """Name all channels without a unit at once, but those that may be left out."""
+    """Name all channels without a unit at once, but those that may be left out.
+
+    Of a column without numbers that is not the fault to tell.
+    """
     without = {
         role: spec.source
         for role, spec in channels.items()
         if spec.unit is None
-        and not (recording.columns[_picked(recording, spec)].unit or "").strip()
+        and not (column := recording.columns[_picked(recording, spec)]).empty
+        and not (column.unit or "").strip()
         and quantity_of(role) is not Quantity.STATE
         and (role in stated or quantity_of(role) not in AUXILIARY)
     }
