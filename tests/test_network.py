@@ -138,16 +138,6 @@ def test_a_faulty_description_is_refused_by_name(
         run(elements, start, ("speed", "a"), pressure=ONE)
 
 
-def test_a_number_that_is_none_is_named_with_its_element() -> None:
-    with pytest.raises(InputError, match=r"not a finite number: \[J b\]\.inertia"):
-        run([inertia("a"), inertia("b", math.nan)], AT_REST)
-
-
-def test_what_is_no_description_is_refused() -> None:
-    with pytest.raises(InputError, match="'radius'} in the description"):
-        run([inertia("a") | {"inertia": {"radius"}}], AT_REST)
-
-
 def test_numbers_and_arrays_of_numpy_describe_as_plain_ones_do() -> None:
     table = {"slip": np.array([0.0, 5.0]), "mu": np.array([1.0, 0.8])}
     rubbing = clutch("brake", "a", "ground") | {"friction": table, "gain": np.float32(8.0)}

@@ -16,13 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin import _native
+from drivetwin.border import as_array, as_json
 from drivetwin.driveline import (
     DualClutch,
     FloatArray,
     Signal,
     State,
-    as_array,
-    as_json,
     delayed_samples,
     inputs_of,
     plain_start,

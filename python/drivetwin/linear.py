@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin import _native
-from drivetwin.driveline import DualClutch, FloatArray, as_json
+from drivetwin.border import as_json
+from drivetwin.driveline import DualClutch, FloatArray
 from drivetwin.errors import InputError
 
 Element = Mapping[str, object]

@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from drivetwin import _native
+from drivetwin.border import as_json
 from drivetwin.driveline import (
     Accuracy,
     EnergyAudit,
     Event,
     FloatArray,
     Signal,
-    as_json,
     run_time,
     samples,
 )

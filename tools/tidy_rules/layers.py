@@ -31,6 +31,7 @@ PYTHON_LAYERS = (
             "progress",
             "shown",
             "parameters",
+            "border",
             "driveline",
             "converter",
             "batch",

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from drivetwin.driveline import DualClutch, FrictionTable, State, as_json
+from drivetwin.border import as_json
+from drivetwin.driveline import DualClutch, FrictionTable, State
 from drivetwin.errors import InputError
 
 MAX_POINTS = 64

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""What crosses the border to the core: descriptions as JSON, arrays."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import is_dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+
+def as_json(description: object) -> str:
+    """A description, of dataclasses too, as the core reads it.
+
+    Numbers and arrays of NumPy become plain ones. JSON has no NaN, so numbers that are not finite
+    are refused by name here: raises InputError, as for anything else that has no place in JSON.
+    """
+    try:
+        return json.dumps(description, default=_plain, allow_nan=False)
+    except ValueError:
+        plain = json.loads(json.dumps(description, default=_plain))
+    bad = [key for key, value in _leaves("", plain) if not np.isfinite(value)]
+    raise InputError(
+        f"not a finite number: {', '.join(bad)}", "give every parameter of the model a value"
+    )
+
+
+def _plain(value: object) -> object:
+    """A value that JSON does not know, in others that it does."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if is_dataclass(value):
+        return vars(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise InputError(
+        f"{value!r} in the description of a driveline",
+        "describe it with numbers, texts, lists and mappings",
+    )
+
+
+def _leaves(path: str, value: object) -> Iterator[tuple[str, float]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _leaves(f"{path}.{key}" if path else str(key), item)
+    elif isinstance(value, list | tuple):
+        for i, item in enumerate(value):
+            name = item.get("name") if isinstance(item, Mapping) else None
+            yield from _leaves(f"{path}[{i if name is None else name}]", item)
+    elif isinstance(value, float):
+        yield path, value
+
+
+def as_array(values: FloatArray) -> FloatArray:
+    """Values (n,) as the core takes them: float64 without gaps. Raises InputError for others."""
+    try:
+        column = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"an array without numbers: {error}", "give numbers in SI") from error
+    if column.ndim != 1:
+        raise InputError(f"an array of shape {column.shape}", "give one with a single axis")
+    return column
