@@ -221,12 +221,17 @@ def _moved(channel: Channel, shift: float) -> Signal:
     return Signal(time, values)
 
 
-def _traces(model: DualClutch, log: ShiftLog, run: Trajectory) -> dict[str, SignalTrace]:
-    simulated = {
+def simulated_signals(model: DualClutch, run: Trajectory) -> dict[str, FloatArray]:
+    """What a run says of each of SIGNALS (n,) on its own time; SI."""
+    return {
         "output_torque": run.shaft_torque,
         "input_speed": run.engine_speed / model.i_in,
         "output_speed": run.output_speed,
     }
+
+
+def _traces(model: DualClutch, log: ShiftLog, run: Trajectory) -> dict[str, SignalTrace]:
+    simulated = simulated_signals(model, run)
     traces = {}
     for name in SIGNALS:
         if name not in log:

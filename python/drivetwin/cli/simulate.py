@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from drivetwin.twin import Twin
     from drivetwin.validate import Validation
 
-_SI = {"output_torque": "N*m", "input_speed": "rad/s", "output_speed": "rad/s"}
-
 
 def simulate(
     twin: Annotated[Path, typer.Argument(metavar="TWIN", help="Identified model (twin.toml).")],
@@ -121,15 +119,15 @@ def traces_text(runs: Sequence[Validation]) -> str:
     """
     import numpy as np
 
+    from drivetwin.report.labels import channel_unit
     from drivetwin.shifts.divided import own_samples
+    from drivetwin.validate import SIGNALS, simulated_signals
 
     own = own_samples([run.shift for run in runs], [run.trajectory.time for run in runs])
-    names = ["time", *_SI]
-    lines = [",".join(names), ",".join(["s", *_SI.values()])]
+    lines = [",".join(["time", *SIGNALS]), ",".join(["s", *map(channel_unit, SIGNALS)])]
     for run, kept in zip(runs, own, strict=True):
-        motion = run.trajectory
-        input_speed = motion.engine_speed / run.model.i_in
-        columns = (motion.time, motion.shaft_torque, input_speed, motion.output_speed)
+        simulated = simulated_signals(run.model, run.trajectory)
+        columns = (run.trajectory.time, *(simulated[name] for name in SIGNALS))
         rows = np.column_stack(columns)[kept].tolist()
         lines += [",".join(f"{value:.12g}" for value in row) for row in rows]
     return "\n".join(lines) + "\n"

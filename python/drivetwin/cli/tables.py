@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from drivetwin.cli.numbers import around, percent, quantity, shown
 from drivetwin.cli.output import table_of
+from drivetwin.report.labels import channel_unit
 from drivetwin.shifts.quality import QUALITY_UNITS
 
 if TYPE_CHECKING:
@@ -117,11 +118,11 @@ def friction_table(friction: Mapping[str, FrictionCurve]) -> Table:
 
 
 def fit_table(fit: Mapping[str, Mapping[str, SignalFit]], title: str) -> Table:
-    """Fit in percent by phase, and the root mean square error over all of it in SI."""
+    """Fit in percent by phase, and the root mean square error over all of it."""
     table = table_of(title, "fit %", *_PHASES, "rmse", right=(*_PHASES, "rmse"))
     for signal, phases in fit.items():
         cells = [percent(phases[name].fit_percent if name in phases else None) for name in _PHASES]
         rmse = phases["all"].rmse if "all" in phases else None
-        unit = "N*m" if signal.endswith("torque") else "rad/s"
+        unit = channel_unit(signal)
         table.add_row(signal, *cells, quantity(rmse, unit))
     return table

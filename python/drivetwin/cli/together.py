@@ -13,6 +13,7 @@ from drivetwin.cli.numbers import percent, quantity
 from drivetwin.cli.output import note, say, show, step, table_of
 from drivetwin.cli.pipeline import REPORT, RESULT, TWIN, digests, examined
 from drivetwin.cli.staging import refuse_alike, staged
+from drivetwin.report.labels import channel_unit
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -141,7 +142,7 @@ def _held_table(held: Sequence[HeldOut], found: Identification) -> Table:
         for place, (signal, phases) in enumerate(one.validation.fit.items()):
             fitted = found.fit.get(signal, {}).get("all")
             bound = one.bounds.get(signal)
-            unit = "N*m" if signal.endswith("torque") else "rad/s"
+            unit = channel_unit(signal)
             table.add_row(
                 one.name if place == 0 else "",
                 signal.replace("_", " "),

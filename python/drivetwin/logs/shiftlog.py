@@ -44,12 +44,25 @@ def pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
 class Quantity(StrEnum):
     """What a channel measures; decides its SI unit and how it may be interpolated."""
 
-    TORQUE = "torque"  # N*m
-    PRESSURE = "pressure"  # Pa
-    SPEED = "speed"  # rad/s
-    FRACTION = "fraction"  # 1 (pedal, percent torque)
-    TEMPERATURE = "temperature"  # K
+    TORQUE = "torque"
+    PRESSURE = "pressure"
+    SPEED = "speed"
+    FRACTION = "fraction"  # pedal, percent torque
+    TEMPERATURE = "temperature"
     STATE = "state"  # integers: gear, flags; held, never interpolated
+
+    @property
+    def unit(self) -> str:
+        """SI unit in ASCII, as parameters have it."""
+        return _SI.get(self, "1")
+
+
+_SI = {
+    Quantity.TORQUE: "N*m",
+    Quantity.PRESSURE: "Pa",
+    Quantity.SPEED: "rad/s",
+    Quantity.TEMPERATURE: "K",
+}
 
 
 @dataclass(frozen=True)

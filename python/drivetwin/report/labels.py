@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from drivetwin.logs.roles import PRESSURE, quantity_of
 from drivetwin.parameters import OVER_ETA, spec_of
 
 
@@ -30,11 +31,9 @@ _SYMBOLS = {
 
 def channel_symbol(role: str) -> str:
     """Role of a channel as a symbol, e.g. `T_o` or `P B2`; the role itself where it has none."""
-    return _SYMBOLS.get(role, role.replace("pressure.", "P "))
+    return _SYMBOLS.get(role, role.replace(PRESSURE, "P "))
 
 
 def channel_unit(role: str) -> str:
-    """SI unit of a channel by its role."""
-    if role.startswith("pressure."):
-        return "Pa"
-    return "N*m" if role.endswith("torque") else "rad/s"
+    """SI unit of a channel by its role. Raises KeyError for a role that does not exist."""
+    return quantity_of(role).unit

@@ -28,7 +28,7 @@ from drivetwin.app.views.parts import (
     tell,
     told,
 )
-from drivetwin.report.figures.channels import channels_figure
+from drivetwin.report.figures.recording import log_figure
 
 _SIGNS = {"+": "as recorded", "-": "reversed"}
 
@@ -106,7 +106,7 @@ def _content(opened: Opened) -> list[Component]:
         row(button("Apply the mapping", "apply-mapping", main=True)),
     ]
     if opened.log is not None:
-        figure = channels_figure(opened.log)
+        figure = log_figure(opened.log)
         content.append(graph("channels-plot", "All channels over time", figure))
     return content
 
