@@ -3,11 +3,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
 
-from drivetwin.drive import LockUp, Powertrain, ShiftTo, all_kinds, coast_down, launch
+from drivetwin.drive import (
+    Leg,
+    LockUp,
+    Powertrain,
+    ShiftTo,
+    Until,
+    Watched,
+    all_kinds,
+    coast_down,
+    launch,
+)
 from drivetwin.drive.plan import forward_gears
 from drivetwin.errors import InputError
 from drivetwin.gearbox import Gearbox, load_gearbox
@@ -38,3 +49,31 @@ def test_too_few_gears_are_refused(gearbox: Gearbox, truck: Powertrain) -> None:
     short = replace(gearbox, gears=gearbox.gears[:2])
     with pytest.raises(InputError, match="has 2 forward gears"):
         launch(short, truck.control)
+
+
+@pytest.mark.parametrize("time", [0.0, -1.0, 600.0, math.nan])
+def test_a_time_that_no_leg_takes_is_refused(time: float) -> None:
+    with pytest.raises(InputError, match="a leg of .*\n.*up to 240 s, or several legs"):
+        Until(Watched.TIME, time)
+
+
+def test_a_threshold_that_is_no_number_is_refused() -> None:
+    with pytest.raises(InputError, match="a leg until input speed is nan"):
+        Until(Watched.INPUT_SPEED, math.nan)
+
+
+@pytest.mark.parametrize(
+    ("pedal", "brake", "message"),
+    [
+        (1.1, 0.0, "a pedal at 1.1"),
+        (-0.1, 0.0, "a pedal at -0.1"),
+        (math.nan, 0.0, "a pedal at nan"),
+        (0.0, -5.0, "a service brake of -5 N m"),
+        (0.0, math.inf, "a service brake of inf N m"),
+    ],
+)
+def test_a_pedal_or_brake_that_there_is_not_is_refused(
+    pedal: float, brake: float, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        Leg(pedal, Until(Watched.TIME, 1.0), brake=brake)

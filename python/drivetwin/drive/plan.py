@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -19,13 +20,31 @@ class Watched(StrEnum):
     SPEED_RATIO = "speed ratio"
 
 
+LONGEST_LEG = 240.0
+"""Longest leg, s: a condition that is not met by then will hardly be."""
+
+
 @dataclass(frozen=True)
 class Until:
-    """A leg ends when `watched` has risen to `value`, or fallen to it."""
+    """A leg ends when `watched` has risen to `value`, or fallen to it.
+
+    Raises InputError for a value that is not finite, or a time that no leg takes.
+    """
 
     watched: Watched
     value: float
     falling: bool = False
+
+    def __post_init__(self) -> None:
+        if self.watched is Watched.TIME and not 0.0 < self.value <= LONGEST_LEG:
+            raise InputError(
+                f"a leg of {self.value:g} s",
+                f"give a time above 0 and up to {LONGEST_LEG:g} s, or several legs",
+            )
+        if not math.isfinite(self.value):
+            raise InputError(
+                f"a leg until {self.watched} is {self.value:g}", "give a finite number"
+            )
 
 
 @dataclass(frozen=True)
@@ -44,12 +63,23 @@ class LockUp:
 
 @dataclass(frozen=True)
 class Leg:
-    """Pedal (0 to 1) and service brake [N m at the wheel] until a condition; then the action."""
+    """Pedal (0 to 1) and service brake [N m at the wheel] until a condition; then the action.
+
+    Raises InputError for a pedal or a brake that there is not.
+    """
 
     pedal: float
     until: Until
     then: ShiftTo | LockUp | None = None
     brake: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.pedal <= 1.0:
+            raise InputError(f"a pedal at {self.pedal:g}", "give a number from 0 to 1")
+        if not 0.0 <= self.brake < math.inf:
+            raise InputError(
+                f"a service brake of {self.brake:g} N m", "give a finite torque from 0 on"
+            )
 
 
 Plan = tuple[Leg, ...]

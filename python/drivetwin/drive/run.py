@@ -24,7 +24,7 @@ from drivetwin.drive.network import (
     recorded,
     standstill,
 )
-from drivetwin.drive.plan import Leg, LockUp, Plan, ShiftTo, Watched, forward_gears
+from drivetwin.drive.plan import LONGEST_LEG, Leg, LockUp, Plan, ShiftTo, Watched, forward_gears
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.result import Action, DriveRun, observe
 from drivetwin.drive.schedule import Knots, Schedule
@@ -47,8 +47,6 @@ _LOCK_UP_HOLD = 0.3
 """Time that it is given to lock before main pressure, s."""
 _LOOK_AHEAD = 8.0
 """How far the drive is run at first in search of the end of a leg, s."""
-_PATIENCE = 240.0
-"""Longest leg, s."""
 _LONGEST_SHIFT = 3.0
 """Longest time from the begin of a shift to synchronism, s."""
 _NO_SLIP = 1e-6
@@ -139,7 +137,7 @@ class _Driver:
         """Time at which the leg's condition is met, and the motion then."""
         until = leg.until
         ahead = until.value if until.watched is Watched.TIME else _LOOK_AHEAD
-        while ahead <= _PATIENCE:
+        while ahead <= LONGEST_LEG:
             time, motion = self._look(state.schedule, state.time, ahead)
             value = self._watched(until.watched, time - state.time, motion)
             met = value <= until.value if until.falling else value >= until.value - 0.5 * STEP
@@ -149,7 +147,7 @@ class _Driver:
             ahead *= 2.0
         raise SimulationError(
             f"{until.watched} does not {'fall' if until.falling else 'rise'} to {until.value:.4g} "
-            f"within {_PATIENCE:g} s after {state.time:.1f} s",
+            f"within {LONGEST_LEG:g} s after {state.time:.1f} s",
             "change pedal, brake or threshold of the leg, or the road load",
         )
 
