@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.errors import FileFormatError, TimeError
+from drivetwin.errors import FileFormatError, TimeError, UnitError
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
-from drivetwin.logs.write import log_channels, write_log
+from drivetwin.logs.shiftlog import Channel, Quantity
+from drivetwin.logs.write import as_recorded, write_log
 from drivetwin.vehicle.card import load_card
 from tests.logs.made import card, columns, write
 
@@ -48,7 +49,7 @@ def test_columns_return_bit_by_bit(tmp_path: Path, suffix: str) -> None:
 def test_a_shift_log_is_the_same_in_every_format(tmp_path: Path, suffix: str) -> None:
     first = read_log(write(tmp_path, columns()), card(tmp_path))
     path = tmp_path / f"again{suffix}"
-    write_log(path, log_channels(first))
+    write_log(path, [as_recorded(channel) for channel in first.channels.values()])
     again = read_log(path, card(tmp_path))
     assert set(again.channels) == set(first.channels)
     for role, channel in first.channels.items():
@@ -56,6 +57,13 @@ def test_a_shift_log_is_the_same_in_every_format(tmp_path: Path, suffix: str) ->
         assert again[role].values == pytest.approx(channel.values, rel=1e-14)
         assert again[role].held == channel.held
     assert again.warnings == first.warnings
+
+
+def test_a_channel_in_a_unit_that_is_unknown_is_not_written_in_another() -> None:
+    time = np.array([0.0, 1.0])
+    channel = Channel("output_speed", Quantity.SPEED, time, time, "SpdOut", "furlong")
+    with pytest.raises(UnitError, match="channel 'SpdOut': unknown unit 'furlong'"):
+        as_recorded(channel)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -66,7 +74,7 @@ def test_a_recorded_log_is_the_same_in_every_format(tmp_path: Path, suffix: str)
     vehicle = load_card(ROOT / "examples" / "vehicles" / "truck_b.toml")
     first = read_log(source, vehicle)
     path = tmp_path / f"again{suffix}"
-    write_log(path, log_channels(first))
+    write_log(path, [as_recorded(channel) for channel in first.channels.values()])
     again = read_log(path, vehicle)
     for role, channel in first.channels.items():
         assert np.array_equal(again[role].time, channel.time)

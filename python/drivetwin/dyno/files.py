@@ -11,11 +11,10 @@ import tomlkit
 
 from drivetwin.dyno.dyno import DynoRun
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.errors import UnitError, Where
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.roles import PRESSURE
 from drivetwin.logs.shiftlog import Channel, FloatArray
-from drivetwin.logs.units import UNITS, lookup
+from drivetwin.logs.write import as_recorded
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.schema import BAR
 from drivetwin.vehicle.spec import brake_ratios
@@ -38,24 +37,12 @@ def log_text(run: DynoRun) -> str:
 def _column(channel: Channel, time: FloatArray) -> FloatArray:
     """The channel in its file unit at the rows' times; the last value before them is held."""
     held = np.searchsorted(channel.time, time + 1e-9, side="right") - 1
-    return _recorded(channel).values[np.clip(held, 0, None)]
+    return as_recorded(channel).values[np.clip(held, 0, None)]
 
 
 def recorded_channels(run: DynoRun) -> tuple[RawChannel, ...]:
     """Return all channels in the units of their file, each on its own time base."""
-    return tuple(_recorded(channel) for channel in run.channels)
-
-
-def _recorded(channel: Channel) -> RawChannel:
-    unit = lookup(channel.source_unit)
-    if unit is None:
-        raise UnitError(
-            f"unknown unit {channel.source_unit!r}",
-            f"give the sensor one of {', '.join(sorted(UNITS))}",
-            Where(channel=channel.source_name),
-        )
-    values = (channel.values - unit.offset) / unit.factor
-    return RawChannel(channel.source_name, channel.source_unit, channel.time, values)
+    return tuple(as_recorded(channel) for channel in run.channels)
 
 
 def truth_text(run: DynoRun) -> str:

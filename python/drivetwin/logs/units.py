@@ -38,6 +38,10 @@ class Unit:
         with np.errstate(over="ignore"):  # a damaged number may become infinite: no number then
             return self.factor * values + self.offset
 
+    def from_si(self, values: FloatArray) -> FloatArray:
+        """Return `values` (n,), in SI, in this unit."""
+        return (values - self.offset) / self.factor
+
 
 _SPELLINGS: dict[Quantity, dict[float, str]] = {
     Quantity.TORQUE: {

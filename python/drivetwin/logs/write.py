@@ -17,16 +17,21 @@ import numpy as np
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.extras import require
 from drivetwin.logs.raw import RawChannel
-from drivetwin.logs.shiftlog import Channel, FloatArray, ShiftLog
-from drivetwin.logs.units import Unit, lookup
+from drivetwin.logs.shiftlog import Channel, FloatArray
+from drivetwin.logs.units import channel_unit
 from drivetwin.logs.validate import check_order
 
 _TIME = "time"
 
 
-def log_channels(log: ShiftLog) -> tuple[RawChannel, ...]:
-    """Return the channels of a log under their names and in the units of its file."""
-    return tuple(_as_recorded(channel) for channel in log.channels.values())
+def as_recorded(channel: Channel) -> RawChannel:
+    """Return a channel of a log under the name and in the unit of its file.
+
+    Raises UnitError where that unit is unknown.
+    """
+    name, unit = channel.source_name, channel.source_unit
+    values = channel_unit(unit, channel.quantity, Where(channel=name)).from_si(channel.values)
+    return RawChannel(name, unit or None, channel.time, values)
 
 
 def write_log(path: Path, channels: Sequence[RawChannel]) -> None:
@@ -47,12 +52,6 @@ def write_log(path: Path, channels: Sequence[RawChannel]) -> None:
     for channel in channels:
         check_order(channel.time, Where(file=str(path), channel=channel.name))
     writer(path, channels)
-
-
-def _as_recorded(channel: Channel) -> RawChannel:
-    unit = lookup(channel.source_unit) or Unit(1.0, 0.0, channel.quantity)
-    values = (channel.values - unit.offset) / unit.factor
-    return RawChannel(channel.source_name, channel.source_unit or None, channel.time, values)
 
 
 def _table(channels: Sequence[RawChannel]) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
