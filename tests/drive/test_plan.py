@@ -53,7 +53,7 @@ def test_too_few_gears_are_refused(gearbox: Gearbox, truck: Powertrain) -> None:
 
 @pytest.mark.parametrize("time", [0.0, -1.0, 600.0, math.nan])
 def test_a_time_that_no_leg_takes_is_refused(time: float) -> None:
-    with pytest.raises(InputError, match="a leg of .*\n.*up to 240 s, or several legs"):
+    with pytest.raises(InputError, match=r"a leg of .*\n.*up to 240 s, or several legs"):
         Until(Watched.TIME, time)
 
 
