@@ -118,6 +118,12 @@ def python_function(body_lines: int, arguments: str = "", docstring: str = "") -
             1,
         ),
         (
+            units_at_the_edge,
+            {f"{PACKAGE}/vehicle/a.py": "x = 1e5"},
+            {f"{PACKAGE}/new.py": "x = 1e5", f"{PACKAGE}/drive/a.py": "x = n * math.pi / 30"},
+            2,
+        ),
+        (
             licence_line,
             {"a.sh": "#!/bin/sh\n# SPDX-License-Identifier: MIT", "__init__.py": ""},
             {"a.rs": "//! SPDX is missing"},

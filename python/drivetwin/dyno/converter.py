@@ -53,7 +53,7 @@ class OpenConverter:
         The engine speed of the trajectory is that of the turbine; the engine starts where its
         torque is steady. Raises InputError where the description is inconsistent.
         """
-        torque = float(np.interp(time[0], engine_torque.time, engine_torque.values))
+        torque = float(np.interp(time[0], engine_torque.arrival, engine_torque.values))
         crank, _ = self.steady(torque, start.engine_speed)
         names = [each.name for each in model.elements]
         run = simulate(

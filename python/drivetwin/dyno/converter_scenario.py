@@ -3,25 +3,22 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
-from drivetwin.converter import Converter
 from drivetwin.dyno.converter import OpenConverter
 from drivetwin.dyno.dual_scenarios import paper_steps
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.logs.shiftlog import Quantity
+from drivetwin.vehicle.converter import ConverterTable
 
-_PER_1000RPM = (1000.0 * math.pi / 30.0) ** 2
-_PUMP_TORQUE = (900.0, 870.0, 810.0, 740.0, 640.0, 570.0, 450.0, 250.0, 0.0, -150.0)
-"""N m at 1000 rpm over the speed ratio: an engine of 1545 N m holds 1650 rpm at 0.85."""
-_MAP = Converter(
-    speed_ratio=(0.0, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.1),
-    capacity=tuple(torque / _PER_1000RPM for torque in _PUMP_TORQUE),
-    torque_ratio=(1.9, 1.45, 1.28, 1.19, 1.09, 1.04, 1.0, 1.0, 1.0, 1.0),
-)
+_MAP = ConverterTable(
+    speed_ratio=[0.0, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.1],
+    torque_ratio=[1.9, 1.45, 1.28, 1.19, 1.09, 1.04, 1.0, 1.0, 1.0, 1.0],
+    pump_torque_at_1000rpm_Nm=[900.0, 870.0, 810.0, 740.0, 640.0, 570.0, 450.0, 250.0, 0.0, -150.0],
+).spec()
+"""An engine of 1545 N m holds 1650 rpm at a speed ratio of 0.85."""
 _ENGINE, _TURBINE = 16.0, 3.5
 """Inertias before and behind the converter [kg m^2]."""
 
