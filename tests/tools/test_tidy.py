@@ -120,7 +120,7 @@ def python_function(body_lines: int, arguments: str = "", docstring: str = "") -
         (
             units_at_the_edge,
             {f"{PACKAGE}/vehicle/a.py": "x = 1e5"},
-            {f"{PACKAGE}/new.py": "x = 1e5", f"{PACKAGE}/drive/a.py": "x = n * math.pi / 30"},
+            {f"{PACKAGE}/of_no_layer_yet.py": "\nx = n * math.pi / 30"},
             2,
         ),
         (
