@@ -16,6 +16,9 @@ _PER_1000RPM = 1000.0 * math.pi / 30.0  # rad/s
 
 Curve = Annotated[list[float], Field(min_length=2)]
 
+_MEASURED = 0.02
+"""Power that a measured map may give too much near synchronism, over that taken."""
+
 
 class ConverterTable(StrictModel):
     """`[converter]`: pump torque at 1000 rpm times `scale`, and torque ratio, over speed ratio."""
@@ -32,6 +35,18 @@ class ConverterTable(StrictModel):
             raise ValueError("torque_ratio and pump_torque go with the points of speed_ratio")
         if not all(a < b for a, b in pairwise(self.speed_ratio)):
             raise ValueError("speed_ratio must increase")
+        if min(self.torque_ratio) < 0.0:
+            raise ValueError("torque_ratio must not be negative")
+        points = zip(
+            self.speed_ratio, self.torque_ratio, self.pump_torque_at_1000rpm_Nm, strict=True
+        )
+        # Of the pump's power the share 1 - mν is lost; in overrun the pump gives the power.
+        creating = [
+            nu for nu, m, torque in points if torque * (1 - m * nu) < -_MEASURED * abs(torque)
+        ]
+        if creating:
+            at = ", ".join(f"{nu:g}" for nu in creating)
+            raise ValueError(f"more power leaves than enters at speed_ratio {at}")
         return self
 
     @classmethod
