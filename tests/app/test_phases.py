@@ -9,7 +9,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.app.phases import Boundary, dragged, moved, phase_figure, times_of
+from drivetwin.app.phases import (
+    Boundary,
+    dragged,
+    moved,
+    phase_figure,
+    shown_times,
+    times_of,
+    typed,
+)
 from drivetwin.app.session import Session
 from drivetwin.errors import InputError
 
@@ -39,6 +47,31 @@ def test_nothing_moved_is_the_same_shift(identified: Session) -> None:
     work = identified.work
     shift = work.shifts[0]
     assert moved(work.require_log(), work.require_card(), shift, times_of(shift)) is shift
+
+
+def test_a_typed_time_leaves_the_other_boundaries_as_detected(identified: Session) -> None:
+    work = identified.work
+    shift = work.shifts[0]
+    fields = {**shown_times(shift), Boundary.INERTIA: 2.50005}
+    assert fields[Boundary.TORQUE] != times_of(shift)[Boundary.TORQUE]
+    changes = typed(shift, list(fields.values()))
+    assert changes == {Boundary.INERTIA: 2.50005}
+    fresh = moved(work.require_log(), work.require_card(), shift, changes)
+    assert set(fresh.sigma) == set(shift.sigma) - {"inertia_start"}
+    assert typed(shift, list(shown_times(shift).values())) == {}
+
+
+def test_a_field_without_a_time_is_told(identified: Session) -> None:
+    with pytest.raises(InputError, match="'4 lock-up' has no time"):
+        typed(identified.work.shifts[0], [0.0, 2.2, 2.3, None, 5.0])
+
+
+def test_the_torque_phase_may_be_empty_but_not_negative(identified: Session) -> None:
+    work = identified.work
+    shift = work.shifts[0]
+    late = {Boundary.TORQUE: shift.inertia_phase[0] + 0.01}
+    with pytest.raises(InputError, match=r"'3 inertia phase starts' at .* lies before '2 torque"):
+        moved(work.require_log(), work.require_card(), shift, late)
 
 
 @given(st.lists(st.floats(-2.0, 12.0), min_size=5, max_size=5))

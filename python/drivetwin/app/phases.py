@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from itertools import pairwise
@@ -21,6 +21,8 @@ from drivetwin.vehicle.spec import VehicleCard
 LEAST_PHASE = 5e-3
 """Shortest phase [s] that can be set by hand; only the torque phase may be empty."""
 BY_HAND = "set by hand"
+_DECIMALS = 4
+"""Decimals of a time [s] in its field: finer than a boundary is known."""
 
 
 class Boundary(StrEnum):
@@ -51,6 +53,27 @@ def times_of(shift: Shift) -> dict[Boundary, float]:
         Boundary.LOCKUP: shift.lockup_time,
         Boundary.END: shift.after[1],
     }
+
+
+def shown_times(shift: Shift) -> dict[Boundary, float]:
+    """Time of each boundary [s] as its field shows it."""
+    return {one: round(time, _DECIMALS) for one, time in times_of(shift).items()}
+
+
+def typed(shift: Shift, times: Sequence[float | None]) -> dict[Boundary, float]:
+    """Boundaries whose field no longer holds the time it showed, with the one it holds [s].
+
+    `times` are those of the fields in the order of Boundary. One that was left alone keeps its
+    unrounded time, and so its uncertainty. Raises InputError where a field holds no time.
+    """
+    shown = shown_times(shift)
+    found: dict[Boundary, float] = {}
+    for one, time in zip(Boundary, times, strict=True):
+        if time is None:
+            raise InputError(f"{LABELS[one]!r} has no time", "type one in seconds")
+        if time != shown[one]:
+            found[one] = float(time)
+    return found
 
 
 def moved(
@@ -86,8 +109,9 @@ def _check(log: ShiftLog, times: Mapping[Boundary, float]) -> None:
     for one, other in pairwise(Boundary):
         least = 0.0 if one is Boundary.TORQUE else LEAST_PHASE
         if times[other] - times[one] < least:
+            place = f"is not {least:g} s after" if least else "lies before"
             raise InputError(
-                f"{LABELS[other]!r} at {times[other]:.4f} s is not {least:g} s after "
+                f"{LABELS[other]!r} at {times[other]:.4f} s {place} "
                 f"{LABELS[one]!r} at {times[one]:.4f} s",
                 "keep the boundaries in order",
             )

@@ -9,7 +9,13 @@ from typing import Any
 from dash import ALL, Dash, Input, Output, State, html
 from dash.development.base_component import Component
 
-from drivetwin.app.phases import LABELS, Boundary, dragged, phase_figure, times_of
+from drivetwin.app.phases import (
+    LABELS,
+    dragged,
+    phase_figure,
+    shown_times,
+    typed,
+)
 from drivetwin.app.session import Sessions
 from drivetwin.app.views.parts import (
     Topic,
@@ -96,8 +102,11 @@ def _register_fields(app: Dash, sessions: Sessions) -> None:
         if not clicks:
             return
         session = sessions.get(key)
-        pairs = zip(Boundary, times, strict=True)
-        session.move(session.work.shift, {one: float(t) for one, t in pairs if t is not None})
+        changes = typed(session.work.require_shift(), times)
+        if not changes:
+            tell("No time was changed")
+            return
+        session.move(session.work.shift, changes)
         announce(Topic.PHASES)
         tell("The phases are set")
 
@@ -129,16 +138,15 @@ def _register_fields(app: Dash, sessions: Sessions) -> None:
 def _content(work: Work) -> list[Component]:
     shift = work.require_shift()
     names = {str(k): f"{one.start_gear}→{one.end_gear}" for k, one in enumerate(work.shifts)}
-    times = times_of(shift)
     fields = [
         field(
             {"boundary": one.value},
             f"{LABELS[one]} [s]",
             type="number",
-            value=round(times[one], 4),
-            step=0.001,
+            value=time,
+            step="any",
         )
-        for one in Boundary
+        for one, time in shown_times(shift).items()
     ]
     return [
         row(choice("phases-shift", "Shift", names, str(work.shift)), *fields),
