@@ -16,7 +16,7 @@ from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.start_state import start_state
 from drivetwin.twin import Twin, TwinElement, TwinGear
-from drivetwin.validate import fit_of, validate, validated, with_fit
+from drivetwin.validate import compared, fit_of, validate, validated, with_fit
 from tests.report.sample import identification
 
 REFERENCE = Path(__file__).parents[2] / "shared" / "reference"
@@ -155,6 +155,31 @@ def test_leaving_the_validity_range_warns(twin: Twin, log: ShiftLog, shift: Shif
     narrow = replace(twin, validity={"slip": (0.0, 20.0), "speed": (0.0, 300.0)})
     (warning,) = validate(narrow, log, shift).warnings
     assert "range of slip" in warning
+
+
+def test_the_slip_of_an_open_element_leaves_no_range(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    run = validate(twin, log, shift).trajectory
+    seen = float(np.abs(run.slip[shift.oncoming]).max())
+    open_speed = 3.0 * seen
+    slip = {name: one.copy() for name, one in run.slip.items()}
+    slip[shift.offgoing][run.clutch_torque[shift.offgoing] == 0.0] = open_speed
+    assert (slip[shift.offgoing] == open_speed).any()
+    covered = replace(twin, validity={"slip": (0.0, seen)})
+    before = validate(covered, log, shift)
+    assert compared(before, covered, log, replace(run, slip=slip)).warnings == ()
+
+
+def test_the_log_behind_a_twin_leaves_no_range_of_it(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    narrow = replace(twin, validity={"slip": (0.0, 20.0)})
+    one = validate(narrow, log, shift)
+    assert one.warnings
+    assert with_fit(identification(), [one]).warnings == identification().warnings
+    failed = replace(one, trajectory=replace(one.trajectory, status="events too dense"))
+    assert "ended early" in with_fit(identification(), [failed]).warnings[-1]
 
 
 def test_start_state_keeps_the_gear_and_the_measured_twist(

@@ -26,6 +26,8 @@ from drivetwin.vehicle.spec import PriorValue
 SIGNALS = ("output_torque", "input_speed", "output_speed")
 _GRID = 1e-3
 """Output step [s] of the simulation: 80 points per period of a 12 Hz oscillation."""
+_CARRIES = 0.02
+"""Share of a run's largest clutch torque from which an element's slip asks for its friction."""
 
 
 @dataclass(frozen=True)
@@ -142,10 +144,13 @@ def compared(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) -> 
 
 
 def with_fit(found: Identification, validations: Sequence[Validation]) -> Identification:
-    """Identification with the fits of its validations entered: pooled over the shifts."""
+    """Identification with the fits of its validations entered: pooled over the shifts.
+
+    Of their warnings only a run that ended early counts: the ranges are those of these logs.
+    """
     if not validations:
         return found
-    warnings = tuple(text for one in validations for text in one.warnings)
+    warnings = tuple(text for one in validations for text in _ended(one.trajectory))
     return replace(
         found,
         fit=_pooled_fit(validations),
@@ -282,11 +287,9 @@ def _part(trace: SignalTrace, span: tuple[float, float] | None) -> tuple[FloatAr
 def _warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
     """Say where the run failed or left the range of the log behind the twin."""
     run = validation.trajectory
-    texts = []
-    if run.status != "completed":
-        texts.append(f"simulation of the validation ended early: {run.status}")
+    texts = _ended(run)
     seen = {
-        "slip": [np.abs(slip) for slip in run.slip.values()],
+        "slip": _slip_under_load(run),
         "pressure": [signal.values for signal in validation.pressures.values()],
         "torque": [validation.engine_torque.values],
         "speed": [run.engine_speed],
@@ -295,6 +298,19 @@ def _warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
         if name in twin.validity:
             texts += _outside(name, arrays, twin.validity[name])
     return tuple(texts)
+
+
+def _ended(run: Trajectory) -> list[str]:
+    if run.status == "completed":
+        return []
+    return [f"simulation of the validation ended early: {run.status}"]
+
+
+def _slip_under_load(run: Trajectory) -> list[FloatArray]:
+    """|slip| of each element while it carries torque [rad/s]; an open one may turn at any speed."""
+    torques = {name: np.abs(torque) for name, torque in run.clutch_torque.items()}
+    least = _CARRIES * max(float(np.nanmax(torque)) for torque in torques.values())
+    return [np.abs(slip[torques[name] > least]) for name, slip in run.slip.items()]
 
 
 _RANGES = {"slip": "rad/s", "pressure": "Pa", "torque": "N·m", "speed": "rad/s"}
