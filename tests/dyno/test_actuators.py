@@ -28,6 +28,12 @@ def test_pressure_rests_before_the_dead_time_is_over() -> None:
     assert pressure[-1] == pytest.approx(9e5)
 
 
+@pytest.mark.parametrize(("dead_time", "lag"), [(0.01, 0.0), (0.01, -0.1), (-0.01, 0.1)])
+def test_times_that_no_actuator_has_are_refused(dead_time: float, lag: float) -> None:
+    with pytest.raises(InputError, match="a dead time of"):
+        Actuator(Program(((0.0, 1.0),)), dead_time, lag)
+
+
 def test_vibration_is_added_only_in_its_window() -> None:
     steady = Program(((0.0, 5e5),))
     vibration = Vibration(amplitude=2e4, frequency=18.0, start=0.5, end=1.0)

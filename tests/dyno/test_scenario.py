@@ -20,3 +20,9 @@ def test_torque_comes_down_and_back_by_ramps() -> None:
 def test_fraction_must_be_a_share(fraction: float) -> None:
     with pytest.raises(InputError, match="share"):
         TorqueReduction(fraction, 1.0, 1.5)
+
+
+@pytest.mark.parametrize(("end", "ramp"), [(1.02, 0.05), (0.5, 0.05), (1.5, 0.0), (1.5, -0.1)])
+def test_a_reduction_that_goes_before_it_has_come_is_refused(end: float, ramp: float) -> None:
+    with pytest.raises(InputError, match="a ramp of"):
+        TorqueReduction(0.3, 1.0, end, ramp)

@@ -92,7 +92,7 @@ class Actuator:
     """Valve and clutch volume: a dead time, the fill, a first-order lag (times in s, lag > 0).
 
     `command` is the pressure asked for [Pa]; `vibration` is the unwanted part, as in the inertia
-    phase of Fig. 4. Without `fill` the piston is at its stop.
+    phase of Fig. 4. Without `fill` the piston is at its stop. Raises InputError for other times.
     """
 
     command: Program
@@ -100,6 +100,14 @@ class Actuator:
     lag: float
     vibration: Vibration | None = None
     fill: Fill | None = None
+
+    def __post_init__(self) -> None:
+        if not (self.dead_time >= 0.0 and self.lag > 0.0):
+            raise InputError(
+                f"a dead time of {self.dead_time:g} s and a lag of {self.lag:g} s",
+                "give a dead time from 0 on and a lag above 0",
+                Where(key="actuator"),
+            )
 
     def pressure(self, time: FloatArray) -> FloatArray:
         """Pressure at evenly spaced `time` (n,) [s], in Pa; at rest before `time[0]`.

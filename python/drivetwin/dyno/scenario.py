@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 class TorqueReduction:
     """Torque intervention of the TCU: the share `fraction` is taken from `start` to `end` [s].
 
-    It comes and goes within `ramp` [s].
+    It comes and goes within `ramp` [s]. Raises InputError for a share or times that there are not.
     """
 
     fraction: float
@@ -36,6 +36,12 @@ class TorqueReduction:
             raise InputError(
                 f"{self.fraction:g} is no share of the engine torque",
                 "give a number from 0 to below 1, such as 0.3",
+                Where(key="torque reduction"),
+            )
+        if not 0.0 < self.ramp <= self.end - self.start:
+            raise InputError(
+                f"a ramp of {self.ramp:g} s from {self.start:g} s to {self.end:g} s",
+                "let it come within a time above 0, before it goes again",
                 Where(key="torque reduction"),
             )
 
