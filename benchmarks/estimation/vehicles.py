@@ -18,7 +18,7 @@ from drivetwin.dyno.files import card_text
 from drivetwin.dyno.scenario import HeldGear, Scenario
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.logs.shiftlog import Quantity
-from drivetwin.vehicle.schema import BAR
+from drivetwin.logs.units import BAR
 
 GEARS = (HeldGear("2", "B2"), HeldGear("3", "B3"))
 SHIFT, FILL, MAIN = 3.5, 0.2, 1.5e6

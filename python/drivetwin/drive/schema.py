@@ -12,8 +12,8 @@ from pydantic import Field, model_validator
 
 from drivetwin.drive.powertrain import Control, Engine, Powertrain
 from drivetwin.driveline import RoadLoad, Stribeck
-from drivetwin.gearbox.schema import BAR, RPM
 from drivetwin.gearbox.spec import Capacity
+from drivetwin.logs.units import BAR, RPM
 from drivetwin.tomlfile import StrictModel
 from drivetwin.vehicle.converter import ConverterTable, Curve
 

@@ -14,9 +14,9 @@ from drivetwin.dyno.scenario import Scenario
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.roles import PRESSURE
 from drivetwin.logs.shiftlog import Channel, FloatArray
+from drivetwin.logs.units import BAR
 from drivetwin.logs.write import as_recorded
 from drivetwin.vehicle.converter import ConverterTable
-from drivetwin.vehicle.schema import BAR
 from drivetwin.vehicle.spec import brake_ratios
 
 _J_OUT_TOLERANCE = 0.1

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -19,10 +18,8 @@ from drivetwin.gearbox.spec import (
     PlanetarySet,
     ShiftMember,
 )
+from drivetwin.logs.units import BAR, RPM
 from drivetwin.tomlfile import StrictModel
-
-BAR = 1e5  # Pa
-RPM = math.pi / 30.0  # rad/s
 
 Name = Annotated[str, Field(min_length=1)]
 Teeth = Annotated[int, Field(ge=1)]

@@ -17,7 +17,10 @@ import numpy as np
 from drivetwin.errors import UnitError, Where
 from drivetwin.logs.shiftlog import FloatArray, Quantity
 
-_RPM = math.pi / 30.0
+BAR = 1e5
+"""One bar [Pa]."""
+RPM = math.pi / 30.0
+"""One revolution per minute [rad/s]."""
 _REV = 2.0 * math.pi
 _DEG = math.pi / 180.0
 _PSI = 6894.757293168361
@@ -56,7 +59,7 @@ _SPELLINGS: dict[Quantity, dict[float, str]] = {
     },
     Quantity.SPEED: {
         1.0: "rad/s rad·s-1 rad.s-1 rad*s-1 rads-1 rad/sec",
-        _RPM: "rpm 1/min /min U/min min-1 min^-1 r/min rev/min Upm r.p.m. rot/min U·min-1 tr/min",
+        RPM: "rpm 1/min /min U/min min-1 min^-1 r/min rev/min Upm r.p.m. rot/min U·min-1 tr/min",
         _REV: "U/s rev/s r/s rps",
         _DEG: "deg/s °/s deg/sec grad/s",
     },
@@ -64,7 +67,7 @@ _SPELLINGS: dict[Quantity, dict[float, str]] = {
         1.0: "Pa Pascal N/m2 N/m^2",
         1e2: "hPa mbar",
         1e3: "kPa kN/m2 kN/m^2",
-        1e5: "bar barg bar(g) bar_g",
+        BAR: "bar barg bar(g) bar_g",
         1e6: "MPa N/mm2 N/mm^2",
         _PSI: "psi psig lbf/in2 lbf/in^2",
         98066.5: "kgf/cm2 kgf/cm^2 kp/cm2 kp/cm^2",

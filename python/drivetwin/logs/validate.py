@@ -24,7 +24,7 @@ from drivetwin.logs.damage import (
 from drivetwin.logs.held import find_raster, fresh_samples
 from drivetwin.logs.roles import AUXILIARY
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
-from drivetwin.logs.units import usual_units
+from drivetwin.logs.units import BAR, RPM, usual_units
 
 MIN_SAMPLES = 10
 """Fewer samples cannot show a shift."""
@@ -51,7 +51,7 @@ bus have 1 % of their reference torque."""
 MAX_AT_LIMIT = 0.1
 """Share of samples at the largest number above which an engine torque may be saturated."""
 
-LEAST_SUCTION = 1e5
+LEAST_SUCTION = BAR
 """A gauge pressure below -1 bar [Pa] does not exist."""
 
 MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
@@ -62,8 +62,6 @@ WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
 
 WRAP_BESIDE, WRAP_DRIFT = 5, 0.02
 """So many samples before and after an overflow move against the jump by this share at least."""
-
-BAR = 1e5
 
 _PLAUSIBLE: dict[Quantity, tuple[float, float]] = {
     Quantity.PRESSURE: (1e-3 * BAR, 100 * BAR),
@@ -404,7 +402,7 @@ def _show(value: float, quantity: Quantity) -> str:
     """Value in the unit an engineer reads: bar, rpm, N·m."""
     factor, unit = {
         Quantity.PRESSURE: (1.0 / BAR, "bar"),
-        Quantity.SPEED: (30.0 / np.pi, "rpm"),
+        Quantity.SPEED: (1.0 / RPM, "rpm"),
         Quantity.TORQUE: (1.0, "N·m"),
     }.get(quantity, (1.0, ""))
     return f"{value * factor:.4g} {unit}".rstrip()

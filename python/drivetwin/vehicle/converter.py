@@ -3,16 +3,16 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from drivetwin.converter import Converter
+from drivetwin.logs.units import RPM
 from drivetwin.tomlfile import StrictModel
 
-_PER_1000RPM = 1000.0 * math.pi / 30.0  # rad/s
+_PER_1000RPM = 1000.0 * RPM
 
 Curve = Annotated[list[float], Field(min_length=2)]
 

@@ -3,19 +3,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from drivetwin.driveline import LossLaw
 from drivetwin.logs.profile import ByRole, ChannelTable
+from drivetwin.logs.units import BAR, RPM
 from drivetwin.tomlfile import StrictModel
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.spec import ElementSpec, PriorValue, SensorTolerance
-
-BAR = 1e5  # Pa
-RPM = math.pi / 30.0  # rad/s
 
 
 class PriorTable(StrictModel):

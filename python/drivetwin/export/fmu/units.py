@@ -8,8 +8,9 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
 from drivetwin.export.parameters.units import base_units
+from drivetwin.logs.units import BAR, RPM
 
-_DISPLAY = {"rad/s": ("rpm", 30.0 / math.pi), "Pa": ("bar", 1e-5), "rad": ("deg", 180.0 / math.pi)}
+_DISPLAY = {"rad/s": ("rpm", 1.0 / RPM), "Pa": ("bar", 1.0 / BAR), "rad": ("deg", 180.0 / math.pi)}
 """SI unit -> display unit and its factor: displayed = factor · value."""
 
 
