@@ -76,6 +76,20 @@ def test_a_part_that_is_none_is_not_taken_for_one(tmp_path: Path, content: bytes
         parts.read_rows(tmp_path / "x.parquet")
 
 
+def test_no_flipped_bit_becomes_another_number(tmp_path: Path) -> None:
+    path = tmp_path / "x.parquet"
+    parts.write_part(path, _key(0), Outcome(State.DONE), 50 * ROWS)
+    whole, rows = path.read_bytes(), parts.read_rows(path)
+    for place in range(0, len(whole), 7):
+        damaged = bytearray(whole)
+        damaged[place] ^= 4
+        path.write_bytes(damaged)
+        try:
+            assert parts.read_rows(path) == rows
+        except StoreError:
+            continue
+
+
 def test_a_table_of_other_columns_is_no_part(tmp_path: Path) -> None:
     pq.write_table(schema().empty_table().drop(["free_std"]), tmp_path / "x.parquet")
     with pytest.raises(StoreError, match="columns"):

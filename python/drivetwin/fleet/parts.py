@@ -73,7 +73,7 @@ def read_rows(path: Path, kinds: Sequence[RowKind] = ()) -> Any:
 
     try:
         # Not read_table, which brings the whole of Arrow's data sets along for one small file.
-        with pq.ParquetFile(path) as file:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
             rows = file.read(use_threads=False).replace_schema_metadata()
         if rows.schema != schema():
             raise pa.ArrowInvalid("its columns are not those of a part")
@@ -133,7 +133,8 @@ def _bytes(whole: Any) -> bytes:
     import pyarrow.parquet as pq
 
     buffer = BytesIO()
-    pq.write_table(whole, buffer, compression="zstd")
+    # Without checksums nearly every flipped bit would come back as another number.
+    pq.write_table(whole, buffer, compression="zstd", write_page_checksum=True)
     return buffer.getvalue()
 
 
