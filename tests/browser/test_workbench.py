@@ -15,7 +15,7 @@ from typing import Literal
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, FloatRect, Locator, Page, expect
+from playwright.sync_api import Browser, BrowserContext, FloatRect, Locator, Page, Route, expect
 
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
@@ -310,6 +310,33 @@ def test_bad_uploads_are_refused_with_a_message(refusing: Page, bench: Bench) ->
         expect(message, kind).to_contain_text("->")
     _open(page, bench)
     _message(page, "is open")
+
+
+def test_a_typed_time_of_any_detail_counts(shown: Page, bench: Bench) -> None:
+    page = shown
+    _open(page, bench)
+    _correct_unit(page, bench)
+    _view(page, "phases")
+    field = page.get_by_label("3 inertia phase starts [s]")
+    typed = f"{float(field.input_value()) + 0.01234:.5f}"
+    field.fill(typed)
+    page.get_by_role("button", name="Apply times").click()
+    _message(page, "The phases are set")
+    expect(field).to_have_value(f"{float(typed):.4f}")
+    about = page.locator("#phases-content .notes")
+    expect(about).to_contain_text("boundary 3 inertia phase starts: set by hand")
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"), [(None, "does not answer"), (500, "met a fault of its own")]
+)
+def test_a_server_that_fails_is_told(refusing: Page, answer: int | None, told: str) -> None:
+    def fail(route: Route) -> None:
+        route.abort() if answer is None else route.fulfill(status=answer)
+
+    refusing.route("**/_dash-update-component*", fail)
+    _view(refusing, "phases")
+    _message(refusing, told)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Selects hand over their value; upload buttons send a file. */
+/* Selects hand over their value; upload buttons send a file; a server that is silent is told. */
 "use strict";
 (() => {
   const idOf = (element) => (element.id.startsWith("{") ? JSON.parse(element.id) : element.id);
@@ -11,10 +11,27 @@
     }
   });
 
-  /* Uploads: bytes go as they are, counted by the server while they come in. */
   const say = (text, fault) =>
     set("message", { children: text, className: `message ${fault ? "fault" : "good"}` });
 
+  /* All that the page asks passes here: without an answer it would stand still without a word. */
+  const ask = window.fetch;
+  window.fetch = async (...request) => {
+    try {
+      const answer = await ask(...request);
+      if (answer.status >= 500) {
+        say("the workbench met a fault of its own -> its terminal has the details", true);
+      }
+      return answer;
+    } catch (fault) {
+      if (fault.name !== "AbortError") {
+        say("the workbench does not answer -> start it again, then load the page again", true);
+      }
+      throw fault;
+    }
+  };
+
+  /* Uploads: bytes go as they are, counted by the server while they come in. */
   async function send(button, file) {
     const limit = Number(button.dataset.limit);
     if (file.size > limit) {
