@@ -251,6 +251,58 @@ fn break_away_is_at_the_static_peak_and_slip_at_the_kinetic_level() {
 }
 
 #[test]
+fn what_is_let_go_beside_redundant_locks_has_overcome_its_static_capacity() {
+    let network = compile(vec![
+        inertia("a", 1.0),
+        inertia("b", 1.0),
+        torque("a", "T"),
+        Element::Clutch(Clutch { peak: 1.25, ..clutch("between", "a", "b") }),
+        Element::Clutch(clutch("strong", "b", "ground")),
+        Element::Clutch(clutch("weak", "b", "ground")),
+    ]);
+    // Both brakes hold 9; the clutch holds 10 until it slips, and only 8 from then on.
+    let signals = [
+        ("T", vec![0.0, 1.0], vec![0.0, 9.9]),
+        constant("P between", 8.0, 1.0),
+        constant("P strong", 8.99, 1.0),
+        constant("P weak", 0.01, 1.0),
+    ];
+    let rest = start(&[("a", 0.0), ("b", 0.0)], &[]);
+    let run = simulate(&network, &signals, &rest, &grid(1.0, 101), &[speed("a"), speed("b")]);
+    let let_go = run.events.iter().filter(|event| event.kind == EventKind::BreakAway);
+    let let_go: Vec<_> = let_go.map(|event| (event.element, event.time)).collect();
+    assert_eq!(let_go.iter().map(|&(element, _)| element).collect::<Vec<_>>(), [1, 2]);
+    assert!(let_go.iter().all(|(_, time)| (time - 9.0 / 9.9).abs() < 1e-9), "{let_go:?}");
+    assert!((run.columns[0][100] - run.columns[1][100]).abs() < 1e-9);
+}
+
+#[test]
+fn a_load_that_ends_at_nothing_is_vented_there() {
+    let brake = clutch("brake", "shaft", "ground");
+    for (p0, knots) in [(0.0, 5), (0.0, 101), (0.0, 1001), (7.1, 5), (7.1, 101), (7.1, 1001)] {
+        let network = compile(vec![
+            inertia("shaft", 1.0),
+            torque("shaft", "T"),
+            Element::Clutch(Clutch { gain: 0.37, p0, ..brake.clone() }),
+        ]);
+        let time = grid(1.0, knots);
+        // Down to the fill pressure at 0.5 s, up again from 0.75 s on.
+        let pressure = |t: &f64| p0 + 80.0 * (0.5 - t).max(0.0) + 160.0 * (t - 0.75).max(0.0);
+        let pressure = ("P brake", time.clone(), time.iter().map(pressure).collect());
+        let signals = [constant("T", 1.0, 1.0), pressure];
+        let start = start(&[("shaft", 20.0)], &[]);
+        for settings in [Settings::default(), Settings::exact()] {
+            let how = (settings, false);
+            let run = simulate_by(how, &network, &signals, &start, &time, &[speed("shaft")]);
+            let kinds: Vec<_> = run.events.iter().map(|event| event.kind).collect();
+            assert_eq!(kinds, [EventKind::Vent, EventKind::Fill], "{p0} {knots} {settings:?}");
+            assert!((run.events[0].time - 0.5).abs() < 1e-12, "{p0} {knots} {settings:?}");
+            assert!((run.events[1].time - 0.75).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
 fn a_brake_too_weak_to_hold_lets_the_slip_pass_through_zero() {
     let network = compile(vec![
         inertia("shaft", 1.0),

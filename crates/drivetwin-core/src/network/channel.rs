@@ -10,7 +10,7 @@ use crate::model::converter_map::ConverterMap;
 use crate::model::friction::{Decay, FrictionLaw};
 use crate::model::mechanism::{Normal, Region, TwistForm};
 use crate::model::torque_map::TorqueMap;
-use crate::number::{Number, Series, TERMS, product_term};
+use crate::number::{Number, Series, TERMS, Values, product_term};
 
 /// A law over one or two linear forms of the state, and the inputs.
 #[derive(Clone, Debug)]
@@ -84,6 +84,9 @@ impl<T: Number> Default for ChannelSeries<T> {
     }
 }
 
+/// Round-off of a normal load, relative to what it is the difference of.
+const ROUND_OFF: f64 = 4.0 * f64::EPSILON;
+
 impl<T: Number> Normal<T> {
     /// Coefficient `k` of the normal load (capacity over μ), not cut at zero.
     pub fn term(&self, inputs: &[Series<T>], k: usize) -> T {
@@ -100,6 +103,24 @@ impl<T: Number> Normal<T> {
                 }
             }
         }
+    }
+
+    /// What is left of the load by round-off where the pressure is the fill pressure; above zero.
+    pub fn nothing(&self) -> T {
+        let size = match self {
+            Self::Pressure { gain, p0, .. } => (*gain * *p0).re().magnitude(),
+            Self::Constant(_) => T::Values::zero_(),
+        };
+        T::lifted(size * ROUND_OFF + T::Values::of(f64::MIN_POSITIVE))
+    }
+
+    /// Runs, as bits, of which the load is gone from an instant on, by the values of inputs there and their
+    /// rates.
+    pub fn is_gone(&self, inputs: impl Fn(usize) -> [T::Values; 2]) -> u32 {
+        let Self::Pressure { input, gain, p0 } = self else { return 0 };
+        let [pressure, rate] = inputs(*input).map(|value| value * gain.re());
+        let left = pressure - (*gain * *p0 + self.nothing()).re();
+        left.those(|left| left <= 0.0) & rate.those(|rate| rate <= 0.0)
     }
 
     /// All coefficients of the normal load.

@@ -2,6 +2,7 @@
 //! Who stays stuck (THEORY section 1): the box-constrained programme over all friction elements at
 //! zero slip, together with the states of lossy gears.
 
+use super::assignment::Assignment;
 use super::regime::{Regime, RowState, sign_of};
 use super::status::Status;
 use crate::network::channel::form;
@@ -9,15 +10,6 @@ use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::{Cell, GearState, Mode, ModeKey, Row};
 use crate::number::{Number, Values, evaluate};
 use std::sync::Arc;
-
-/// A trial: the state of every friction element and of every lossy gear.
-#[derive(Clone, PartialEq)]
-pub(super) struct Assignment {
-    /// Friction elements.
-    pub rows: Vec<RowState>,
-    /// Lossy gears.
-    pub gears: Vec<GearState>,
-}
 
 /// What counts as zero in a sum, relative to the size of its terms.
 pub(super) const ROUND_OFF: f64 = 1e-10;
@@ -101,7 +93,8 @@ impl<T: Number> Regime<'_, T> {
     /// move off: what can hold holds. Adopts the first without fault, if there is one.
     ///
     /// Torques that have been taken to their bounds one by one need not be those with which everything
-    /// holds: with `moving`, only assignments count that let fewer than so many go, and that last.
+    /// holds: with `moving`, only assignments count that let fewer than so many go, that last, and in which
+    /// all that go have overcome their static capacities.
     fn decide_exhaustively(&mut self, candidates: &[Row], moving: Option<usize>) -> bool {
         let gears = self.gears.len();
         let choices = 3usize.pow(candidates.len().min(MAX_EXHAUSTIVE) as u32) << gears.min(4);
@@ -117,13 +110,27 @@ impl<T: Number> Regime<'_, T> {
             }
             let Ok(mode) = self.mode(self.key_of(&trial)) else { continue };
             let basis = self.basis_now(&trial, candidates);
-            let lasts = |regime: &Self| moving.is_none() || regime.has_room(&mode, &basis);
-            if self.fault(&trial, candidates, (&mode, &basis)).is_none() && lasts(self) {
+            let is_right = self.fault(&trial, candidates, (&mode, &basis)).is_none()
+                && (moving.is_none()
+                    || self.has_room(&mode, &basis) && self.is_let_go(&trial, candidates, &mode));
+            if is_right {
                 self.adopt(trial, candidates, mode);
                 return true;
             }
         }
         false
+    }
+
+    /// Whether what moves off would also do so against static friction.
+    fn is_let_go(&mut self, trial: &Assignment, candidates: &[Row], mode: &Mode<T>) -> bool {
+        let mut at_capacity = trial.clone();
+        for &row in candidates {
+            if let (Row::Friction(j), Some(sign)) = (row, trial.direction(row)) {
+                at_capacity.rows[j] = RowState::Saturated { sign };
+            }
+        }
+        let basis = self.basis_now(&at_capacity, candidates);
+        self.returning(trial, candidates, (mode, &basis)).is_none()
     }
 
     /// Whether everything at rest carries less than its bounds allow.
@@ -245,21 +252,29 @@ impl<T: Number> Regime<'_, T> {
         (mode, basis): (&Mode<T>, &[T]),
     ) -> Option<Fault> {
         self.overload(mode, basis)
-            .or_else(|| {
-                let returning = |&&row: &&Row| {
-                    trial.direction(row).is_some_and(|sign| {
-                        let (a, scale) = self.acceleration(row, mode, basis);
-                        (a * sign).decide_with(scale, |a, scale| {
-                            a < -(ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION)
-                        })
-                    })
-                };
-                candidates.iter().find(returning).map(|&row| Fault::Returning(row))
-            })
+            .or_else(|| self.returning(trial, candidates, (mode, basis)).map(Fault::Returning))
             .or_else(|| {
                 let reversed = |&i: &usize| self.is_reversed(trial.gears[i], i, (mode, basis));
                 (0..trial.gears.len()).find(reversed).map(Fault::Reversed)
             })
+    }
+
+    /// A row that moves off from zero speed and accelerates back.
+    fn returning(
+        &self,
+        trial: &Assignment,
+        candidates: &[Row],
+        (mode, basis): (&Mode<T>, &[T]),
+    ) -> Option<Row> {
+        let returns = |&row: &Row| {
+            trial.direction(row).is_some_and(|sign| {
+                let (a, scale) = self.acceleration(row, mode, basis);
+                (a * sign).decide_with(scale, |a, scale| {
+                    a < -(ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION)
+                })
+            })
+        };
+        candidates.iter().copied().find(returns)
     }
 
     /// The row at rest that exceeds its bounds most, relative to their size.
@@ -422,57 +437,6 @@ impl<T: Number> Regime<'_, T> {
             };
         }
         self.mode = mode;
-    }
-}
-
-impl Assignment {
-    fn rest(&mut self, row: Row) {
-        match row {
-            Row::Friction(j) => self.rows[j] = RowState::Stuck,
-            Row::Gear(i) => self.gears[i] = GearState::Held,
-        }
-    }
-
-    fn move_off(&mut self, row: Row, sign: f64) {
-        match row {
-            Row::Friction(j) => self.rows[j] = RowState::Slipping { sign },
-            Row::Gear(i) => self.gears[i] = GearState::Rolling { sign, backward: false },
-        }
-    }
-
-    /// Whether a row at zero speed carries all it can.
-    fn is_at_capacity(&self, row: Row) -> bool {
-        match row {
-            Row::Friction(j) => self.rows[j].is_saturated(),
-            Row::Gear(i) => matches!(self.gears[i], GearState::Rolling { .. }),
-        }
-    }
-
-    /// How many of the friction elements move off, and how many do not rest.
-    fn moving_off(&self, candidates: &[Row]) -> (usize, usize) {
-        let rows = || candidates.iter().filter(|row| matches!(row, Row::Friction(_)));
-        let moving = rows().filter(|&&row| self.direction(row).is_some()).count();
-        (moving, moving + rows().filter(|&&row| self.is_at_capacity(row)).count())
-    }
-
-    fn reverse_power(&mut self, i: usize) {
-        if let GearState::Rolling { backward, .. } = &mut self.gears[i] {
-            *backward = !*backward;
-        }
-    }
-
-    /// Direction in which a row moves, none at rest or without capacity.
-    pub(super) fn direction(&self, row: Row) -> Option<f64> {
-        match row {
-            Row::Friction(j) => match self.rows[j] {
-                RowState::Slipping { sign } => Some(sign),
-                _ => None,
-            },
-            Row::Gear(i) => match self.gears[i] {
-                GearState::Rolling { sign, .. } => Some(sign),
-                GearState::Held => None,
-            },
-        }
     }
 }
 

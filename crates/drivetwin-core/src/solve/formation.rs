@@ -230,6 +230,7 @@ impl Formation<'_> {
 
     /// Pass samples with those that stand before some; false where there are none.
     fn pass_samples(&mut self, record: &mut impl Record) -> bool {
+        self.vent();
         let ahead = self.those(|member| member.standing == Standing::Ahead);
         let Some(first) = each(ahead).map(|run| self.members[run].segment).min() else {
             return false;
@@ -256,6 +257,22 @@ impl Formation<'_> {
         };
         each(arrived).for_each(|run| self.settle(run));
         true
+    }
+
+    /// Let what has no load from the sample on that a run stands before vent there.
+    fn vent(&mut self) {
+        let line = |run: usize, input: usize| match self.members.get(run) {
+            Some(member) if member.standing == Standing::Ahead => {
+                member.inputs.lines(member.segment)[input]
+            }
+            // Others are loaded.
+            _ => [f64::INFINITY, 0.0],
+        };
+        let inputs = |input| [0, 1].map(|k| Lanes::gathered(|run| line(run, input)[k]));
+        if let Some((j, runs)) = self.regime.gone(inputs) {
+            let standing = Standing::Event(Cause::Pressed(j));
+            each(runs).for_each(|run| self.members[run].standing = standing);
+        }
     }
 
     /// Expand the motion of runs, each to its next event or to the end of its segment.

@@ -111,7 +111,11 @@ fn friction_guards<T: Number>(
     let row = &regime.network.frictions[j];
     let normal = row.normal.series(&regime.expansion.inputs);
     let pressed = regime.pressed[j];
-    consider(if pressed { normal } else { scaled(&normal, T::of(-1.0)) }, Cause::Pressed(j));
+    let mut load = if pressed { normal } else { negative(normal) };
+    if !pressed {
+        load[0] += row.normal.nothing();
+    }
+    consider(load, Cause::Pressed(j));
     match regime.rows[j] {
         RowState::Open | RowState::Saturated { .. } => {}
         RowState::Slipping { sign } => {

@@ -190,10 +190,25 @@ impl<'a, T: Real> Integrator<'a, T> {
         // Where a prescribed acceleration jumps, everything that holds against it is decided anew.
         if jumped || (entered && !self.regime.network.prescribed.is_empty()) {
             self.regime.refresh()?;
-        } else if entered && self.regime.is_split() {
-            self.regime.decide(None)?;
+        } else {
+            self.vent()?;
+            if entered && self.regime.is_split() {
+                self.regime.decide(None)?;
+            }
         }
         Ok(true)
+    }
+
+    /// Vent what has no load from here on.
+    fn vent(&mut self) -> Result<(), Status> {
+        loop {
+            let inputs = &self.regime.expansion.inputs;
+            let gone = self.regime.gone(|input| [inputs[input][0].re(), inputs[input][1].re()]);
+            match gone {
+                Some((j, _)) => self.regime.change(Cause::Pressed(j))?,
+                None => return Ok(()),
+            }
+        }
     }
 
     /// Inputs about the present instant.

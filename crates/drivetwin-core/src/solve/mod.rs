@@ -5,6 +5,7 @@
 //! of the whole state; guards are polynomials of the same expansion and their first roots are the
 //! events. Who stays stuck is decided by the box-constrained programme of THEORY section 1.
 
+mod assignment;
 mod decide;
 mod expansion;
 mod first_fall;

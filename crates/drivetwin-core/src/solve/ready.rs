@@ -48,6 +48,9 @@ pub fn can_march<T: Number>(network: &Network<T>) -> bool {
         && network.channels.iter().all(smooth)
 }
 
+/// Normal load [N·m] below which that at the end of a sample may be round-off.
+const LITTLE: f64 = 1e-9;
+
 /// What operators belong to: mode, active channels with their branches, and step length.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key {
@@ -155,7 +158,9 @@ impl<T: Number> Regime<'_, T> {
         for (j, row) in self.network.frictions.iter().enumerate() {
             let side = if self.pressed[j] { 1.0 } else { -1.0 };
             let load = line_of(&row.normal);
-            operators.loads.push(load.map(|v| v * side));
+            let nothing = row.normal.nothing() + if self.pressed[j] { LITTLE } else { 0.0 };
+            let above = Line { offset: load.offset - nothing, ..load };
+            operators.loads.push(above.map(|v| v * side));
             match self.rows[j] {
                 RowState::Stuck => {
                     let mu = if self.pressed[j] {

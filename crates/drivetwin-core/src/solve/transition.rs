@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Changes of mode at events and at jumps of the inputs.
 
-use super::decide::Assignment;
+use super::assignment::Assignment;
 use super::guard::Cause;
 use super::regime::{Event, EventKind, Regime, RowState, self_locking, sign_of};
 use super::status::Status;
@@ -78,6 +78,15 @@ impl<T: Number> Regime<'_, T> {
         now.decide_with(rate, |now, rate| now <= -rate * 1e-11)
     }
 
+    /// The first element of which the normal load is gone from an instant on in some runs, as bits, by the values
+    /// of inputs there and their rates: a load that ends at nothing falls through nothing.
+    pub(super) fn gone(&self, inputs: impl Fn(usize) -> [T::Values; 2]) -> Option<(usize, u32)> {
+        let pressed = (0..self.rows.len()).filter(|&j| self.pressed[j]);
+        pressed
+            .map(|j| (j, self.network.frictions[j].normal.is_gone(&inputs)))
+            .find(|&(_, runs)| runs != 0)
+    }
+
     /// Start of a run: prescribed speeds, elements at rest, directions of gears, cells.
     pub(super) fn take_up(&mut self, locked: &[usize]) -> Result<(), Status> {
         let locked: Vec<Row> = locked.iter().map(|&j| Row::Friction(j)).collect();
@@ -99,9 +108,9 @@ impl<T: Number> Regime<'_, T> {
         for j in 0..self.rows.len() {
             let normal = &self.network.frictions[j].normal;
             let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
-            let pressed =
-                now.decide_with(rate, |now, rate| now > 0.0 || (now == 0.0 && rate > 0.0));
-            self.press(j, pressed);
+            let there = now.decide_with(normal.nothing().re(), |now, nothing| now > nothing);
+            let sets_in = now.decide_with(rate, |now, rate| now >= 0.0 && rate > 0.0);
+            self.press(j, there || sets_in);
         }
         for i in self.rows.len()..self.network.channels.len() {
             if self.network.channels[i].follows_inputs() {

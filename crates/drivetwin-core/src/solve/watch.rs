@@ -259,10 +259,8 @@ impl<L: Lane> Line<L> {
         ends: &[V; W],
         fallen: &mut [L::Values; W],
     ) {
-        // A load of -0 is none that has fallen.
-        let none = L::Values::all(0.0);
         for k in 0..W {
-            let load = ends[k].onto::<F>(self.gain.values(), self.offset.values()) + none;
+            let load = ends[k].onto::<F>(self.gain.values(), self.offset.values());
             fallen[k] = fallen[k].negative_with(load);
         }
     }

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+//! Who rests, slips or moves off: what a decision tries and then makes the state of a run.
+
+use super::regime::RowState;
+use crate::network::{GearState, Row};
+
+/// A trial: the state of every friction element and of every lossy gear.
+#[derive(Clone, PartialEq)]
+pub(super) struct Assignment {
+    /// Friction elements.
+    pub rows: Vec<RowState>,
+    /// Lossy gears.
+    pub gears: Vec<GearState>,
+}
+
+impl Assignment {
+    /// Let a row rest.
+    pub fn rest(&mut self, row: Row) {
+        match row {
+            Row::Friction(j) => self.rows[j] = RowState::Stuck,
+            Row::Gear(i) => self.gears[i] = GearState::Held,
+        }
+    }
+
+    /// Let a row move off in a direction.
+    pub fn move_off(&mut self, row: Row, sign: f64) {
+        match row {
+            Row::Friction(j) => self.rows[j] = RowState::Slipping { sign },
+            Row::Gear(i) => self.gears[i] = GearState::Rolling { sign, backward: false },
+        }
+    }
+
+    /// Whether a row at zero speed carries all it can.
+    pub fn is_at_capacity(&self, row: Row) -> bool {
+        match row {
+            Row::Friction(j) => self.rows[j].is_saturated(),
+            Row::Gear(i) => matches!(self.gears[i], GearState::Rolling { .. }),
+        }
+    }
+
+    /// How many of the friction elements move off, and how many do not rest.
+    pub fn moving_off(&self, candidates: &[Row]) -> (usize, usize) {
+        let rows = || candidates.iter().filter(|row| matches!(row, Row::Friction(_)));
+        let moving = rows().filter(|&&row| self.direction(row).is_some()).count();
+        (moving, moving + rows().filter(|&&row| self.is_at_capacity(row)).count())
+    }
+
+    /// Let power through a rolling gear flow the other way.
+    pub fn reverse_power(&mut self, i: usize) {
+        if let GearState::Rolling { backward, .. } = &mut self.gears[i] {
+            *backward = !*backward;
+        }
+    }
+
+    /// Direction in which a row moves, none at rest or without capacity.
+    pub fn direction(&self, row: Row) -> Option<f64> {
+        match row {
+            Row::Friction(j) => match self.rows[j] {
+                RowState::Slipping { sign } => Some(sign),
+                _ => None,
+            },
+            Row::Gear(i) => match self.gears[i] {
+                GearState::Rolling { sign, .. } => Some(sign),
+                GearState::Held => None,
+            },
+        }
+    }
+}
