@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """How much work a search may do before what it has found must do.
 
-Counted in passes over the log and never timed: a result is then the same on every machine.
+Counted in passes over the log and never timed: a slow machine then gives the result of a fast one.
 """
 
 from __future__ import annotations
