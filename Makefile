@@ -112,8 +112,8 @@ several: $(venv)/.native ## pairs=40 of logs fitted together and predicted, over
 .PHONY: fmt
 fmt: $(venv)/.dev ## format Rust and Python sources
 	cargo fmt --all
-	$(bin)/ruff format
 	$(bin)/ruff check --fix
+	$(bin)/ruff format
 
 .PHONY: clean
 clean: ## remove everything that was built
