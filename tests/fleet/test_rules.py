@@ -48,6 +48,12 @@ def test_the_first_rule_that_fits_decides(rules_file: Path) -> None:
     assert rule.channels == str(rules_file.parent / "channels.toml")
 
 
+def test_a_rule_without_a_name_is_one_of_its_own(rules_file: Path) -> None:
+    rule = '[[rules]]\nvehicle = "truck_a.toml"\n'
+    rules_file.write_text(rule + rule.replace("_a", "_b") + 'name = "trucks"\n' + rule)
+    assert [rule.name for rule in read_rules(rules_file).rules] == ["rule 1", "trucks", "rule 3"]
+
+
 def test_fields_come_from_path_and_list_and_name_channels(rules_file: Path) -> None:
     rules = read_rules(rules_file)
     told = {"recorded": "2025-03-31", "other": "x"}

@@ -40,7 +40,8 @@ class RuleTable(StrictModel):
     """`[[rules]]`: the first that fits decides. A condition that is not stated always holds.
 
     `path` is a glob over the whole path (`*` crosses folders), `units` are unit ids, `contains`
-    channel names that the file must have. `skip` leaves such files out.
+    channel names that the file must have. `skip` leaves such files out. Logs of rules of one name
+    are taken together; a rule without one is called after its place, `rule 2`.
     """
 
     name: str = ""
@@ -171,12 +172,15 @@ def read_rules(path: Path) -> RulesFile:
     remedy = "correct these keys of the rules; docs/howto/fleet.md shows a complete file"
     raise_faults(schema_faults(document, RulesFile), RulesError, str(path), remedy)
     rules = RulesFile.model_validate(document)
-    return rules.model_copy(update={"rules": [_placed(each, path) for each in rules.rules]})
+    placed = [_placed(each, number, path) for number, each in enumerate(rules.rules, start=1)]
+    return rules.model_copy(update={"rules": placed})
 
 
-def _placed(rule: RuleTable, file: Path) -> RuleTable:
-    """The rule with paths from the rules file's folder; a card that is missing is told at once."""
-    changed: dict[str, str] = {}
+def _placed(rule: RuleTable, number: int, file: Path) -> RuleTable:
+    """The rule with a name of its own, and with paths from the rules file's folder; a card that is
+    missing is told at once.
+    """
+    changed = {"name": rule.name or f"rule {number}"}
     for key in ("vehicle", "channels"):
         if (name := getattr(rule, key)) is not None:
             target = (file.parent / name).absolute()
