@@ -18,14 +18,14 @@ static dt_event event_of(dt_cause cause, int row, int sign) {
 
 /* What is released at this instant starts from exact zero, and where static and kinetic capacity
  * agree also from zero acceleration: what is left of these is round-off and would look like an
- * immediate return. */
+ * immediate return. One that outlasts what a decision looks ahead is a true one. */
 static void depart(dt_real *guard, int order, int released) {
     if (!released) {
         return;
     }
     guard[0] = DT_C(0);
     if (order >= 2 &&
-        dt_abs(guard[1]) <= DT_C(10) * DT_ROUND_OFF * dt_larger(dt_abs(guard[2]), DT_C(1))) {
+        dt_abs(guard[1]) <= DT_C(10) * DT_LOOK_AHEAD * dt_larger(dt_abs(guard[2]), DT_C(1))) {
         guard[1] = DT_C(0);
     }
 }
@@ -73,13 +73,26 @@ static void stuck_guards(dt_event *best, const dt_expansion *e, const dt_params 
     }
 }
 
+/* Whether what enters the input gear is round-off, whose sign would change at every look: nothing
+ * behind the gear takes up torque. */
+static int nothing_passes(const dt_expansion *e) {
+    int nothing = 1;
+    for (int k = 0; k <= e->order; ++k) {
+        const dt_real drive = k < 2 ? dt_abs(e->engine_torque[k]) : DT_C(0);
+        nothing = nothing && dt_abs(e->through[k]) <= DT_ROUND_OFF * drive;
+    }
+    return nothing;
+}
+
 static void power_guards(dt_event *best, const dt_expansion *e, const dt_state *s) {
     dt_series guard;
     for (int k = 0; k <= e->order; ++k) {
         guard[k] = s->power_backward ? -e->through[k] : e->through[k];
     }
     depart(guard, e->order, s->released[DT_ROWS]);
-    consider(best, guard, e->order, event_of(DT_POWER_REVERSAL, 0, 0));
+    if (!nothing_passes(e)) {
+        consider(best, guard, e->order, event_of(DT_POWER_REVERSAL, 0, 0));
+    }
     consider(best, e->x[DT_ENGINE], e->order, event_of(DT_STALL, 0, 0));
 }
 

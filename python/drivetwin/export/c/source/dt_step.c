@@ -75,6 +75,7 @@ static int is_about_to_vent(const dt_expansion *e, int row) {
 /* Carry out what an event caused. */
 static dt_status change_mode(dt_state *s, const dt_params *p, dt_expansion *e, dt_event event,
                              dt_real remaining) {
+    const int backward = s->power_backward;
     dt_mechanism m;
     dt_mechanism_of(&m, p, s->power_backward);
     switch (event.cause) {
@@ -94,7 +95,6 @@ static dt_status change_mode(dt_state *s, const dt_params *p, dt_expansion *e, d
         break;
     case DT_POWER_REVERSAL:
         s->power_backward = !s->power_backward;
-        s->released[DT_ROWS] = 1;
         break;
     case DT_CELL:
         s->cell[event.row] += event.sign;
@@ -107,7 +107,11 @@ static dt_status change_mode(dt_state *s, const dt_params *p, dt_expansion *e, d
     case DT_NOTHING:
         return DT_OK;
     }
-    return dt_decide(s, p, e, event, remaining);
+    const dt_status status = dt_decide(s, p, e, event, remaining);
+    if (event.cause == DT_POWER_REVERSAL) { /* unless decided otherwise */
+        s->released[DT_ROWS] = s->power_backward != backward;
+    }
+    return status;
 }
 
 /* State at t after the start of the expansion, without losing what rounding cuts off. */
