@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from drivetwin.cli import main
+from drivetwin.identify.result import Z95
 from tests.cli.conftest import Files
 
 
@@ -39,6 +41,34 @@ def test_quality_figures_are_shown_in_units_of_engineers(
     rows = {line.split("  ")[0].strip(): line for line in capsys.readouterr().out.splitlines()}
     assert rows["friction work"].rstrip().endswith("kJ")
     assert rows["torque hole depth"].rstrip().endswith("Nm")
+
+
+def test_the_start_of_each_phase_has_its_95_percent_interval(
+    bench_files: Files, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["shifts", str(bench_files.log), "--vehicle", str(bench_files.card)]
+    assert main(command) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if "inertia phase  " in line]
+    assert main([*command, "--json"]) == 0
+    (shift,) = json.loads(capsys.readouterr().out)["shifts"]
+    half = 1e3 * Z95 * shift["sigma"]["inertia_start"]
+    assert f"± {half:.1f} ms" in rows[0]
+
+
+def test_a_resonance_has_the_digits_of_its_interval(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [line.split(",") for line in bench_files.log.read_text().splitlines()]
+    torque = rows[0].index("TrqOut")
+    part = tmp_path / "without_torque.csv"
+    part.write_text("\n".join(",".join(r[:torque] + r[torque + 1 :]) for r in rows) + "\n")
+    assert main(["shifts", str(part), "--vehicle", str(bench_files.card)]) == 0
+    captured = capsys.readouterr()
+    said = " ".join((captured.out + captured.err).split())
+    found = re.search(r"damping ratio (0\.\d+) ± (0\.\d+) \(95 %\)", said)
+    assert found
+    assert len(found[1]) == len(found[2])
+    assert 0.0 < float(found[2]) < float(found[1])
 
 
 def test_a_log_without_a_shift_says_which_gear_is_held(

@@ -63,7 +63,7 @@ def shifts(
         show(table)
     for closing in closings:
         text = f"; {closing.warning}" if closing.warning else ""
-        note(f"converter lock-up at {closing.time:.3f} s ± {1e3 * closing.sigma:.0f} ms{text}")
+        note(f"converter lock-up at {_spread(closing.time, closing.sigma)} s (95 %){text}")
     if gears:
         show(_gear_table(gears))
     for gear in gears:
@@ -86,14 +86,18 @@ def _name(shift: Shift) -> str:
 
 
 def _said(swing: Resonance | str) -> str:
-    from drivetwin.identify.result import Z95
-
     if isinstance(swing, str):
         return swing
-    return (
-        f"resonance at {swing.f_d:.2f} ± {Z95 * swing.f_d_std:.2f} Hz, damping ratio "
-        f"{swing.zeta:.2f} ± {Z95 * swing.zeta_std:.2f} (95 %)"
-    )
+    frequency, damping = _spread(swing.f_d, swing.f_d_std), _spread(swing.zeta, swing.zeta_std)
+    return f"resonance at {frequency} Hz, damping ratio {damping} (95 %)"
+
+
+def _spread(value: float, std: float) -> str:
+    """A value ± the half width of its 95 % interval."""
+    from drivetwin.identify.result import Z95
+    from drivetwin.report.units import with_uncertainty
+
+    return " ± ".join(filter(None, with_uncertainty(value, Z95 * std)))
 
 
 def _swing(shift: Shift, swing: Resonance | str) -> dict[str, Any]:

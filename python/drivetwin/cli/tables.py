@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from drivetwin.cli.numbers import around, percent, quantity, shown
 from drivetwin.cli.output import table_of
+from drivetwin.identify.result import Z95
 from drivetwin.report.labels import channel_unit
 from drivetwin.shifts.quality import QUALITY_UNITS
 
@@ -25,10 +26,10 @@ _PHASES = ("all", "before", "torque", "inertia", "after")
 
 
 def shift_table(shifts: Sequence[Shift], source: str) -> Table:
-    """One row for each phase boundary pair of each shift."""
+    """One row for each phase of each shift, with the 95 % interval of its start."""
     table = table_of(
-        f"Shifts in {source}", "shift", "phase", "from s", "to s", "± ms",
-        right=("from s", "to s", "± ms"),
+        f"Shifts in {source}", "shift", "phase", "from s", "95 %", "to s",
+        right=("from s", "95 %", "to s"),
     )  # fmt: skip
     for shift in shifts:
         phases = (
@@ -43,8 +44,8 @@ def shift_table(shifts: Sequence[Shift], source: str) -> Table:
                 f"{shift.start_gear}→{shift.end_gear} {shift.kind}" if index == 0 else "",
                 phase,
                 f"{start:.3f}",
+                "" if sigma is None else f"± {1e3 * Z95 * sigma:.1f} ms",
                 f"{end:.3f}",
-                "" if sigma is None else f"{1e3 * sigma:.1f}",
             )
     return table
 
