@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,6 @@ from drivetwin.driveline import (
     DualClutch,
     FrictionTable,
     RoadLoad,
-    ShiftElement,
     Signal,
     State,
     Stribeck,
@@ -27,22 +25,9 @@ from drivetwin.driveline import (
     simulate,
 )
 from drivetwin.errors import InputError
+from tests.export.cases import SHARED, given, paper_model
 
-REFERENCE = Path(__file__).resolve().parents[2] / "shared" / "reference"
 CASES = ["dual_clutch_upshift", "dual_clutch_drum_inertia", "dual_clutch_weak_then_catch"]
-
-
-def paper_model() -> DualClutch:
-    """The coherent parameter set of the paper's driveline."""
-    mu = Stribeck(0.110, 0.135, 15.0, 1e-4)
-    elements = tuple(
-        ShiftElement(name, i - 1.0, i / (i - 1.0), gain, 80e3, mu)
-        for name, i, gain in (("B2", 1.91, 0.0378), ("B3", 1.43, 0.027))
-    )
-    load = RoadLoad(2300.0 * 5.38)
-    return DualClutch(
-        20.3, 0.0, 0.85, "paper", 1.0, 0.9, 5.38, 6056.0, 1.76e5, 280.0, load, elements
-    )
 
 
 def held_second_gear(seconds: float = 1.0) -> tuple[Signal, dict[str, Signal], State]:
@@ -54,39 +39,11 @@ def held_second_gear(seconds: float = 1.0) -> tuple[Signal, dict[str, Signal], S
 
 
 def reference_case(name: str) -> tuple[DualClutch, Any, Any, State]:
-    if not REFERENCE.is_dir():
-        pytest.skip("the solver references are not beside this checkout")
-    case = json.loads((REFERENCE / f"{name}.json").read_text())
-    rows = np.genfromtxt(REFERENCE / f"{name}.csv", delimiter=",", names=True)
-    d, start = case["driveline"], case["initial"]
-    elements = tuple(
-        ShiftElement(
-            f"B{k}",
-            c["i_c"],
-            c["i_out"],
-            c["gain_m3"],
-            c["P0_Pa"],
-            Stribeck(c["mu_c"], c["mu_s"], c["v_s"], c["mu_v"]),
-            drum_inertia=c["drum_inertia"],
-        )
-        for k, c in zip((2, 3), case["clutches"], strict=True)
-    )
-    model = DualClutch(
-        d["J1"],
-        d["J2_at_engine"],
-        d["eta"],
-        "paper",
-        d["i_in"],
-        d["J_out"],
-        d["i_f"],
-        d["J_v"],
-        d["k_o"],
-        d["c_o"],
-        RoadLoad(d["T_v_over_i_f"] * d["i_f"]),
-        elements,
-    )
-    speeds = (start["omega_e"], start["omega_out"], start["omega_w"])
-    return model, case, rows, State(*speeds, start["twist"], ("B2",))
+    """Model, statement, table and start of a problem; skipped where it does not stand beside."""
+    subject = given(name).subject
+    case = json.loads((SHARED / f"{name}.json").read_text())
+    rows = np.genfromtxt(SHARED / f"{name}.csv", delimiter=",", names=True)
+    return subject.model, case, rows, subject.start
 
 
 @pytest.mark.parametrize("speed", [178.0, -178.0])
