@@ -18,7 +18,7 @@ from drivetwin.identify.likelihood.limits import at_limits
 from drivetwin.identify.likelihood.null_space import null_directions
 from drivetwin.identify.likelihood.other_law import other_law_in_words
 from drivetwin.identify.likelihood.priors import over_eta
-from drivetwin.identify.likelihood.residuals import residual_tests
+from drivetwin.identify.likelihood.residuals import against, residual_tests
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
 from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw, Verdict
@@ -74,16 +74,18 @@ def conclude(
         )
         for name, value, variance in zip(values, values.values(), np.diag(covariance), strict=True)
     }
-    against = contradictions(
+    contradicted = contradictions(
         tuple(values), np.array(list(values.values())), covariance, designs, spread
     )
-    estimates = held_against(estimates, against, WITH_PRIOR)
+    estimates = held_against(estimates, contradicted, WITH_PRIOR)
     limits = {
         name: text
         for name, text in at_limits(fit, tuple(values), matrix).items()
         if estimates[name].verdict is not Verdict.DESIGN
     }
     estimates |= {name: doubted(estimates[name], text) for name, text in limits.items()}
+    if why := against(fit):
+        estimates = {name: doubted(one, why) for name, one in estimates.items()}
     estimates |= _of_what_is_fixed(fit, signals, drivelines, estimates)
     return Conclusions(
         estimates,
@@ -92,7 +94,7 @@ def conclude(
         correlation(covariance),
         (
             *dict.fromkeys(notes.values()),
-            *(one.text for one in against),
+            *(one.text for one in contradicted),
             *(f"{name}: {text}" for name, text in limits.items()),
             *_warnings(fit, signals),
             *other_law_in_words(fit, values, matrix, np.sqrt(np.diag(covariance))),

@@ -12,6 +12,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.newton import Found, minimise
 from drivetwin.identify.likelihood.output_error import staged
 from drivetwin.identify.likelihood.problem import Normal, Problem
+from drivetwin.identify.likelihood.slow import beyond_white
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import OutOfWork
 from drivetwin.identify.signals import FloatArray
@@ -54,7 +55,7 @@ class LikelihoodFit:
 
     `mean` is the minimum, or the average with minima that the log hardly tells from it (kinds.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
-    the expansion of Q there. The covariance is widened where chi2 exceeds 1.
+    the expansion of Q there. The covariance is that of `spread_of`.
     """
 
     problem: Problem
@@ -191,10 +192,20 @@ def nearest(problem: Problem, start: Point, most: float = FAR) -> LikelihoodFit 
     chi2 = (found.normal.cost - problem.prior.cost(found.point.values)) / problem.size
     if chi2 > PLAUSIBLE:
         return None
-    covariance = max(chi2, 1.0) * covariance_of(found.normal.information)
+    covariance = spread_of(found.problem, found.normal, chi2)
     iterations += found.iterations
     point = found.point
     return LikelihoodFit(found.problem, point, point, covariance, found.normal, chi2, iterations)
+
+
+def spread_of(problem: Problem, normal: Normal, chi2: float) -> FloatArray:
+    """Covariance (p, p) of the unknowns at a minimum, with what its residual has beyond noise.
+
+    The whole is widened where `chi2` exceeds 1, and by slow errors where an output shows them, as
+    far as the unknowns hang on that output.
+    """
+    inverse, counted = covariance_of(normal.information), max(chi2, 1.0)
+    return counted * inverse + inverse @ beyond_white(problem, normal, counted) @ inverse
 
 
 def covariance_of(matrix: FloatArray) -> FloatArray:

@@ -14,20 +14,21 @@ import numpy as np
 
 from drivetwin.driveline import Signal
 from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.slow import BLOCK, block_means, white_of
 from drivetwin.identify.signals import FloatArray
 
-BLOCK = 0.02
-"""Length of a block [s]: a quarter of a period of a driveline oscillation."""
 EXCESS = 1.6
 """Power of block means over that of white noise above which a warning is due."""
 SIGNIFICANT = 5.0
-"""Correlation with an input, in standard deviations of that of white noise, worth a warning."""
+"""Correlation with an input, in standard deviations of that of noise, from which it is no chance:
+a warning is due, and the model does not hold."""
 
 
 @dataclass(frozen=True)
 class ResidualTest:
     """Residual of one output: `excess` power of its block means over white noise's, and its
-    correlation with each input in units of the standard deviation that white noise would give."""
+    correlation with each input in units of the standard deviation that noise of that power would
+    give."""
 
     output: str
     excess: float
@@ -41,7 +42,8 @@ class ResidualTest:
         if self.excess > EXCESS:
             texts.append(
                 f"the residual of the {name} is not white: over {1e3 * BLOCK:.0f} ms it has "
-                f"{self.excess:.1f} times the power of noise; some effect is not in the model"
+                f"{self.excess:.1f} times the power of noise, which widens intervals; the noise of "
+                "the sensor is slow, as behind a filter, or some effect is not in the model"
             )
         texts += [
             f"the residual of the {name} goes with the {source} ({size:+.0f} standard deviations)"
@@ -56,24 +58,13 @@ def white_residuals(fit: LikelihoodFit) -> dict[str, dict[str, tuple[FloatArray,
 
     Of a right model they are white with variance one.
     """
-    found: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
-    for part, residual in zip(fit.problem.parts, fit.normal.residuals, strict=True):
-        white = (residual - part.weighting.driven(residual)) / part.record.sigma
-        first, outputs = 0, {}
-        for out in part.record.outputs:
-            e = white[first : first + out.values.size]
-            first += out.values.size
-            outputs[out.name] = (part.record.time[out.place], e)
-        found[part.structure.label] = outputs
-    return found
-
-
-def block_means(time: FloatArray, white: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Middle times and means over blocks of `BLOCK`, scaled: white noise gives variance one."""
-    size = max(2, round(BLOCK / float(np.median(np.diff(time)))))
-    count = white.size // size
-    means = white[: count * size].reshape(count, size).mean(axis=1)
-    return time[: count * size].reshape(count, size).mean(axis=1), np.sqrt(size) * means
+    return {
+        part.structure.label: {
+            out.name: (part.record.time[out.place], white)
+            for out, _, white in white_of(part, residual)
+        }
+        for part, residual in zip(fit.problem.parts, fit.normal.residuals, strict=True)
+    }
 
 
 def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
@@ -89,6 +80,25 @@ def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
     return found
 
 
+def against(fit: LikelihoodFit) -> str:
+    """What the residuals say against every value of the fit; empty where nothing.
+
+    Noise, however slow, goes with no input. What does is missing in the model, and moves the
+    parameters by as much as it likes: no interval counts that.
+    """
+    found = {
+        (test.output, source): abs(size)
+        for tests in residual_tests(fit).values()
+        for test in tests
+        for source, size in test.correlation.items()
+    }
+    (output, source), size = max(found.items(), key=lambda one: one[1])
+    if size <= SIGNIFICANT:
+        return ""
+    name = output.replace("_", " ")
+    return f"the residual of the {name} goes with the {source}: some effect is not in the model"
+
+
 def _test(
     name: str, time: FloatArray, white: FloatArray, inputs: dict[str, Signal]
 ) -> ResidualTest:
@@ -98,6 +108,6 @@ def _test(
     for source, signal in inputs.items():
         x = np.interp(time, signal.time, signal.values)
         x = x - x.mean()
-        norm = float(np.linalg.norm(x) * np.sqrt(np.mean(white**2)))
+        norm = float(np.linalg.norm(x) * np.sqrt(np.mean(white**2) * max(excess, 1.0)))
         correlation[source] = float(x @ white) / norm if norm > 0.0 else 0.0
     return ResidualTest(name, excess, correlation)

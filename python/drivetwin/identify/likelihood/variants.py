@@ -22,8 +22,8 @@ from drivetwin.identify.likelihood.fit import (
     Hopeless,
     LikelihoodFit,
     checked,
-    covariance_of,
     fit,
+    spread_of,
 )
 from drivetwin.identify.likelihood.kinds import averaged, in_words, likely_kinds, with_kinds
 from drivetwin.identify.likelihood.priors import problem_of
@@ -131,12 +131,13 @@ def _without_growth(best: LikelihoodFit, narrower: Problem) -> LikelihoodFit:
         data=_without(normal.data, k),
         regressors=tuple(np.delete(one, k, axis=1) for one in normal.regressors),
     )
+    problem = replace(narrower, parts=tuple(parts))
     return replace(
         best,
-        problem=replace(narrower, parts=tuple(parts)),
+        problem=problem,
         point=point,
         mean=_taken_out(best.mean, k),
-        covariance=max(best.chi2, 1.0) * covariance_of(normal.information),
+        covariance=spread_of(problem, normal, best.chi2),
         normal=normal,
     )
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.residuals import (
-    BLOCK,
     EXCESS,
     SIGNIFICANT,
     ResidualTest,
@@ -15,6 +14,7 @@ from drivetwin.identify.likelihood.residuals import (
     white_residuals,
 )
 from drivetwin.identify.likelihood.sensitivity import sensitivity
+from drivetwin.identify.likelihood.slow import BLOCK
 from drivetwin.identify.result import Identification
 from drivetwin.identify.signals import ShiftSignals
 from drivetwin.report.figures.residuals import residual_figure, residual_panels

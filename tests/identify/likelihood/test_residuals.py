@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: MIT
+"""What residuals say against a model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin.identify.likelihood.covariance import sensor_noise
+from drivetwin.identify.likelihood.residuals import against
+from tests.identify.likelihood.made import fitted
+
+
+def test_a_residual_that_goes_with_an_input_speaks_against_every_value() -> None:
+    fit = fitted()
+    assert against(fit) == ""
+    (part,), (residual,) = fit.problem.parts, fit.normal.residuals
+    drive = part.record.engine_torque
+    torque = part.record.outputs[0]
+    missing = np.zeros_like(residual)
+    shown = np.interp(part.record.time[torque.place], drive.time, drive.values)
+    missing[: torque.values.size] = torque.sigma * (shown - shown.mean()) / shown.std()
+    plain = replace(fit.problem, parts=(replace(part, weighting=sensor_noise(part.record)),))
+    wrong = replace(fit, problem=plain, normal=replace(fit.normal, residuals=(residual + missing,)))
+    assert "the residual of the output torque goes with the engine torque" in against(wrong)
