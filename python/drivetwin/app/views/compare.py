@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compare: what the paper's, the linear and the likelihood method found, side by side."""
+"""Compare: what the paper's, the integral and the likelihood method found, side by side."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from drivetwin.app.session import Sessions
 from drivetwin.app.views.blocks import shown
 from drivetwin.app.views.parts import button, due_id, hint, notes, told
 from drivetwin.app.work import Work
-from drivetwin.identify.method import Method
 from drivetwin.report.candidates import Candidate
 from drivetwin.report.comparison import trials_of
 from drivetwin.report.sections.comparison import (
@@ -20,8 +19,6 @@ from drivetwin.report.sections.comparison import (
     friction_overlay_section,
     trial_sections,
 )
-
-NAMES = {Method.PAPER: "paper", Method.INTEGRAL: "linear", Method.LIKELIHOOD: "likelihood"}
 
 
 def layout() -> list[Component]:
@@ -50,7 +47,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         """The parameters side by side, as soon as there are two results."""
         work = sessions.get(key).work
         refusals = [
-            notes(f"The {NAMES[method]} method found nothing", [text])
+            notes(f"The {method.value} method found nothing", [text])
             for method, text in work.refusals.items()
         ]
         candidates = _candidates(work)
@@ -72,7 +69,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         candidates = _candidates(work)
         log = work.require_log()
         work.require_outcome()
-        twins = {NAMES[method]: one.twin for method, one in work.results.items()}
+        twins = {method.value: one.twin for method, one in work.results.items()}
         trials = trials_of(twins, log, work.shifts, log.source)
         sections = [
             *([agreement_section(candidates)] if len(candidates) > 1 else []),
@@ -90,7 +87,7 @@ def register(app: Dash, sessions: Sessions) -> None:
 def _candidates(work: Work) -> list[Candidate]:
     return [
         replace(
-            Candidate.of_twin(NAMES[method], one.twin),
+            Candidate.of_twin(method.value, one.twin),
             fit=one.found.fit if one.found is not None else {},
         )
         for method, one in work.results.items()

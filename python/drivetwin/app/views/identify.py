@@ -34,8 +34,8 @@ from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.trust import trust_section
 
 _UP_TO = {
-    "likelihood": "paper, linear and likelihood",
-    "integral": "paper and linear (quick)",
+    "likelihood": "paper, integral and likelihood",
+    "integral": "paper and integral (quick)",
     "paper": "paper alone",
 }
 _POLL = 300
@@ -46,7 +46,7 @@ def layout() -> list[Component]:
     """Run, cancel, progress, outcome."""
     return [
         hint(
-            "Runs in a process of its own; the page stays free. The linear and the likelihood "
+            "Runs in a process of its own; the page stays free. The integral and the likelihood "
             "method take phases and locks as set; the paper's procedure knows no locks."
         ),
         row(

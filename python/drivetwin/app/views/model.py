@@ -13,7 +13,6 @@ from dash.development.base_component import Component
 from drivetwin.app.locks import Lock, LockKind, lockable
 from drivetwin.app.replay import Slider, changes_of, display_for, sliders_of
 from drivetwin.app.session import Live, Session, Sessions
-from drivetwin.app.views.compare import NAMES
 from drivetwin.app.views.parts import (
     Topic,
     acted,
@@ -218,7 +217,7 @@ def _same(one: Lock, other: Lock) -> bool:
 
 
 def _choices(work: Work) -> Component:
-    methods = {method.value: NAMES[method] for method in work.results}
+    methods = {method.value: method.value for method in work.results}
     shifts = {str(k): f"{one.start_gear}→{one.end_gear}" for k, one in enumerate(work.shifts)}
     shown = work.require_outcome().method.value
     return row(
