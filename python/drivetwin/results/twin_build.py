@@ -37,7 +37,7 @@ def twin_of(found: Identification, card: VehicleCard) -> Twin:
     if "J_out" not in parameters and card.J_out is not None:
         parameters["J_out"] = designed("J_out", card.J_out.value, card.J_out.std, KNOWN)
         assumptions.append("Jo′ is the vehicle card's value")
-    assumptions += _borrowed_friction(found)
+    assumptions += borrowed_friction(found)
     friction, load = _absolute(found)
     ids, covariance = _covariance(found)
     loss_law: LossLaw = "dissipative" if found.loss_law == "dissipative" else "paper"
@@ -87,7 +87,7 @@ def _absolute(found: Identification) -> tuple[dict[str, FrictionCurve], LoadLaw 
     return friction, load.times(*by) if load is not None and load.over_eta else load
 
 
-def _borrowed_friction(found: Identification) -> list[str]:
+def borrowed_friction(found: Identification) -> list[str]:
     """Say which elements run on their partner's curve because they never slipped under load."""
     pairs = {
         (a, b)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin.report.sections.blocks import TableBlock
+from drivetwin.report.sections.blocks import NotesBlock, TableBlock
 from drivetwin.report.sections.provenance import provenance_section
 from tests.report.sample import identification
 
@@ -29,3 +29,11 @@ def test_inputs_and_range_of_validity_are_stated() -> None:
     blocks = provenance_section(identification()).blocks
     assert _rows(blocks, "Inputs") == {"sample <1>.csv": "ab" * 32}
     assert _rows(blocks, "Range")["pressure"] == "bar"
+
+
+def test_friction_that_the_simulation_borrows_is_among_what_is_assumed() -> None:
+    (assumed,) = (
+        block for block in provenance_section(identification()).blocks
+        if isinstance(block, NotesBlock)
+    )  # fmt: skip
+    assert "friction of B2 is taken to be that of B3" in assumed.items

@@ -16,6 +16,7 @@ from drivetwin.report.sections.blocks import (
 )
 from drivetwin.report.units import BAR, NM, RAD_PER_S, RPM, Display, significant
 from drivetwin.results.result_file import plain
+from drivetwin.results.twin_build import borrowed_friction
 from drivetwin.results.version import program_version
 
 _RANGES: dict[str, tuple[str, Display]] = {
@@ -29,8 +30,9 @@ _RANGES: dict[str, tuple[str, Display]] = {
 def provenance_section(found: Identification) -> Section:
     """Assumptions, range of validity, settings, versions, hashes."""
     blocks: list[Block] = []
-    if found.assumptions:
-        blocks.append(NotesBlock("Assumed", found.assumptions))
+    assumed = (*found.assumptions, *borrowed_friction(found))
+    if assumed:
+        blocks.append(NotesBlock("Assumed", assumed))
     blocks.append(_validity_table(found))
     blocks.append(
         TableBlock(
