@@ -99,6 +99,24 @@ teeth = [[20, 40], [30, 45]]
         ("ratio = 3.5", "ratio = 3.5\nrevers = true", "gears[0].revers", "unknown key"),
         ("[elements.C]", "[elements.P]", "elements.P", "already that of sets.P"),
         ("[[gears]]", "[inertia_kgm2]\nfoo = 1.0\n[[gears]]", "inertia_kgm2.foo", "this member"),
+        ("[[gears]]", "[inertia_kgm2]\nground = 1.0\n[[gears]]", "inertia_kgm2.ground", "not turn"),
+        ('output = "output"', 'output = "input"', "output", "the same member"),
+        ('output = "output"', 'output = "ground"', "output", "the ground does not turn"),
+        ('carrier = "output"', 'carrier = "input"', "sets.P", "three members"),
+        (
+            "[[gears]]",
+            "[pairs.G]\na = 'ring'\nb = 'ring'\nratio = 2.0\n[[gears]]",
+            "pairs.G",
+            "same",
+        ),
+        ('elements = ["B"]', 'elements = ["B", "B"]', "gears[0].elements", "given twice"),
+        ("ratio = 3.5", "ratio = 0.0", "gears[0]", "must not be 0"),
+        (
+            'kind = "brake"',
+            'kind = "dog"\nsurfaces = 8\narea_m2 = 0.01\nradius_m = 0.1',
+            "elements.B",
+            "never slips",
+        ),
     ],
 )
 def test_faults_are_told_by_key(tmp_path: Path, old: str, new: str, key: str, text: str) -> None:

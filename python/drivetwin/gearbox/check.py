@@ -17,7 +17,7 @@ def gearbox_faults(document: Mapping[str, Any]) -> list[Fault]:
     if faults:
         return faults
     file = GearboxFile.model_validate(document)
-    return [*_names(file), *_members(file), *_gears(file)]
+    return [*_names(file), *_ends(file), *_members(file), *_gears(file)]
 
 
 def _names(file: GearboxFile) -> Iterator[Fault]:
@@ -28,6 +28,21 @@ def _names(file: GearboxFile) -> Iterator[Fault]:
             if name in seen:
                 yield Fault(f"{table}.{name}", f"the name is already that of {seen[name]}.{name}")
             seen[name] = table
+
+
+def _ends(file: GearboxFile) -> Iterator[Fault]:
+    """Input and output are two shafts; shafts that one set or pair joins are different ones."""
+    if file.input == file.output:
+        yield Fault("output", "input and output are the same member")
+    for key, member in (("input", file.input), ("output", file.output)):
+        if member == GROUND:
+            yield Fault(key, "the ground does not turn; name a shaft")
+    for name, each in file.sets.items():
+        if len({each.sun, each.ring, each.carrier}) < 3:
+            yield Fault(f"sets.{name}", "sun, ring and carrier must be three members, or it locks")
+    for name, pair in file.pairs.items():
+        if pair.a == pair.b:
+            yield Fault(f"pairs.{name}", "both wheels are on the same member")
 
 
 def _members(file: GearboxFile) -> Iterator[Fault]:
@@ -41,7 +56,9 @@ def _members(file: GearboxFile) -> Iterator[Fault]:
             yield Fault(key, f"no set, pair or element has a member {member!r}"
                         f"{did_you_mean(member, known)}")  # fmt: skip
     for member in file.inertia_kgm2:
-        if member not in known:
+        if member == GROUND:
+            yield Fault(f"inertia_kgm2.{member}", "the ground does not turn; name a shaft")
+        elif member not in known:
             text = f"no set, pair or element has this member{did_you_mean(member, known)}"
             yield Fault(f"inertia_kgm2.{member}", text)
     for name, element in file.elements.items():
@@ -56,12 +73,14 @@ def _members(file: GearboxFile) -> Iterator[Fault]:
 
 
 def _gears(file: GearboxFile) -> Iterator[Fault]:
-    """Gears have different names and engage elements of the card."""
+    """Gears have different names and engage elements of the card, each once."""
     seen: set[str] = set()
     for index, gear in enumerate(file.gears):
         if gear.name in seen:
             yield Fault(f"gears[{index}].name", f"gear {gear.name!r} is given twice")
         seen.add(gear.name)
+        if len(set(gear.elements)) < len(gear.elements):
+            yield Fault(f"gears[{index}].elements", "an element is given twice")
         for name in gear.elements:
             if name not in file.elements:
                 text = f"no [elements.{name}]{did_you_mean(name, file.elements)}"

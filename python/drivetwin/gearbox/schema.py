@@ -134,6 +134,8 @@ class ElementTable(StrictModel):
         if self.kind == "clutch" and len(self.members) != 2:
             raise ValueError("a clutch joins two members")
         geometry = (self.surfaces, self.area_m2, self.radius_m)
+        if self.kind == "dog" and any(part is not None for part in geometry):
+            raise ValueError("a dog never slips under load and has no surfaces, area or radius")
         if None in geometry and any(part is not None for part in geometry):
             raise ValueError("surfaces, area_m2 and radius_m belong together")
         return self
@@ -161,6 +163,12 @@ class GearTable(StrictModel):
     decimals: int = Field(default=2, ge=0)
     final_drive: float = Field(default=1.0, gt=0)
     tolerance: float | None = Field(default=None, gt=0, lt=1)
+
+    @model_validator(mode="after")
+    def _turns(self) -> GearTable:
+        if self.ratio == 0.0:
+            raise ValueError("the ratio must not be 0")
+        return self
 
     def spec(self) -> GearEntry:
         """Return the gear; the rounding errors of ratio and final drive add up."""
