@@ -10,6 +10,7 @@ import pytest
 
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox import Comparison, compare, load_gearbox, reduce
+from drivetwin.gearbox.spec import ElementKind
 
 QUIET = {"input": 2.0, "main": 0.06, "output": 0.9}
 
@@ -58,3 +59,12 @@ def test_gears_of_opposite_sense_have_no_reference_shift() -> None:
     box = load_gearbox("ravigneaux-4")
     with pytest.raises(ReductionError, match="no reference shift"):
         compare(reduce(box, "1", "R"))
+
+
+def test_a_shift_from_a_clutch_to_a_dog_is_not_simulated() -> None:
+    box = load_gearbox("ravigneaux-4")
+    dog = replace(box.elements["band"], kind=ElementKind.DOG)
+    mixed = replace(box, elements={**box.elements, "band": dog})
+    for gears in (("1", "2"), ("2", "1")):
+        with pytest.raises(ReductionError, match="element band of Ford AOD is a dog"):
+            compare(reduce(mixed, *gears))

@@ -97,6 +97,10 @@ class GearEntry:
     published: float
     tolerance: float
 
+    def agrees(self, ratio: float) -> bool:
+        """Whether a computed ratio is the published one within its rounding."""
+        return abs(ratio - self.published) <= self.tolerance * (1.0 + 1e-9)
+
 
 @dataclass(frozen=True)
 class Gearbox:
@@ -138,8 +142,16 @@ class Gearbox:
         )
 
     def capacity(self, element: str) -> Capacity:
-        """Return what an element transmits; raises ReductionError where the card does not say."""
+        """Return what an element transmits; raises ReductionError where the card does not say, and
+        for a dog.
+        """
         capacity = self.elements[element].capacity
+        if element in self.dogs:
+            raise ReductionError(
+                f"element {element} of {self.name} is a dog: it states no capacity and never slips "
+                "under load",
+                "choose a shift between clutches and brakes",
+            )
         if capacity is None:
             raise ReductionError(
                 f"element {element} of {self.name} states no capacity",
