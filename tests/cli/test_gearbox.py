@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import drivetwin.gearbox
 from drivetwin.cli import main
 
 
@@ -21,6 +22,25 @@ def test_a_card_lists_its_gears(capsys: pytest.CaptureFixture[str]) -> None:
     gears = json.loads(capsys.readouterr().out)["gears"]
     assert [gear["gear"] for gear in gears] == [*"12345678R"]
     assert gears[0]["ratio"] == pytest.approx(gears[0]["published"], abs=5e-5)
+
+
+def test_a_ratio_that_is_not_the_published_one_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "box.toml"
+    path.write_text(wrong_teeth("zf-8hp70"), encoding="utf-8")
+    assert main(["gearbox", str(path)]) == 0
+    assert "gear 3: the computed ratio" in capsys.readouterr().out
+    assert main(["gearbox", str(path), "--gear", "6", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["warnings"] == []
+    assert main(["reduce", str(path), "--shift", "2-3", "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["warnings"]) == 1
+
+
+def wrong_teeth(name: str) -> str:
+    """A built-in card with a wrong tooth count."""
+    text = (Path(drivetwin.gearbox.__file__).parent / "cards" / f"{name}.toml").read_text("utf-8")
+    return text.replace("ring_teeth = 96", "ring_teeth = 69", 1)
 
 
 def test_one_gear_is_shown_in_full(capsys: pytest.CaptureFixture[str]) -> None:

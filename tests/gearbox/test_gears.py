@@ -8,7 +8,13 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.gearbox import Gearbox, builtin_gearboxes, gear_statics, load_gearbox
+from drivetwin.gearbox import (
+    Gearbox,
+    builtin_gearboxes,
+    gear_statics,
+    load_gearbox,
+    ratio_remarks,
+)
 
 ALL_GEARS = [(name, gear.name) for name in builtin_gearboxes() for gear in load_gearbox(name).gears]
 
@@ -50,6 +56,13 @@ def test_held_members_stand_and_open_elements_carry_nothing() -> None:
     assert solved.torque("C4", "R2-C1") == pytest.approx(solved.ratio - 1.0, rel=1e-9)
     assert solved.torque("C3", "R1") == 0.0
     assert solved.power("P3", "output") == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_ratio_that_is_not_the_published_one_is_told() -> None:
+    box = load_gearbox("zf-8hp70")
+    assert not ratio_remarks(box, {each.name: each.published for each in box.gears})
+    (remark,) = ratio_remarks(box, {"6": 1.0, "R": -box.gear("R").published})
+    assert remark.startswith("gear R: the computed ratio 3.2968 is not the published -3.2968 ")
 
 
 def test_an_idle_shaft_has_no_speed() -> None:

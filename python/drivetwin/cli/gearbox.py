@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.output import JsonFlag, print_json, say, show, table_of
+from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -36,7 +36,7 @@ def gearbox(
     With --gear: speed of every member per input speed, torque of every element on every member per
     input torque, and the power that flows there.
     """
-    from drivetwin.gearbox import builtin_gearboxes, gear_statics, load_gearbox
+    from drivetwin.gearbox import builtin_gearboxes, gear_statics, load_gearbox, ratio_remarks
 
     if card is None:
         names = builtin_gearboxes()
@@ -50,10 +50,14 @@ def gearbox(
         _write_modelica(box, modelica)
     names = (gear,) if gear is not None else tuple(each.name for each in box.gears)
     gears = [gear_statics(box, name) for name in names]
+    warnings = ratio_remarks(box, {each.gear: each.ratio for each in gears})
     if as_json:
-        print_json({"gearbox": box.name, "gears": [_document(box, each) for each in gears]})
+        documents = [_document(box, each) for each in gears]
+        print_json({"gearbox": box.name, "gears": documents, "warnings": warnings})
         return
     show(_ratios(box, gears))
+    for warning in warnings:
+        note(f"warning: {warning}")
     if gear is not None:
         show(_speeds(gears[0]))
         show(_torques(gears[0]))

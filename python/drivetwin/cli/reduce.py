@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.output import JsonFlag, print_json, say, show, table_of
+from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
 from drivetwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -33,18 +33,23 @@ def reduce(
     Ratios of both elements, mass matrix, condition (1) with the members that violate it, the error
     of leaving their coupling out: estimated first, then simulated.
     """
-    from drivetwin.gearbox import load_gearbox
+    from drivetwin.gearbox import load_gearbox, ratio_remarks
     from drivetwin.gearbox import reduce as reduce_shift
 
     old, dash, new = shift.rpartition("-")
     if not dash or not old or not new:
         raise InputError(f"{shift!r} is no shift", "write two gears with a hyphen, such as 2-3")
-    reduction = reduce_shift(load_gearbox(card), old, new)
+    box = load_gearbox(card)
+    reduction = reduce_shift(box, old, new)
+    ratios = {old: reduction.off_going.ratio, new: reduction.on_coming.ratio}
+    warnings = ratio_remarks(box, ratios)
     errors = _errors(reduction)
     if as_json:
-        print_json(_document(reduction, errors))
+        print_json(_document(reduction, errors) | {"warnings": warnings})
         return
     show(_elements(reduction))
+    for warning in warnings:
+        note(f"warning: {warning}")
     say("slip = ω_in/i_c - i_out·ω_out (eq. 15)")
     say("")
     show(_matrix(reduction))

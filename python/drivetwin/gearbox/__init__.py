@@ -7,7 +7,7 @@ from drivetwin.gearbox.card import builtin_gearboxes, gearbox_schema, load_gearb
 from drivetwin.gearbox.compare import Comparison, compare
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.estimate import estimate
-from drivetwin.gearbox.gears import GearStatics, gear_statics
+from drivetwin.gearbox.gears import GearStatics, gear_statics, ratio_remarks
 from drivetwin.gearbox.network import network_elements
 from drivetwin.gearbox.reduction import Reduction, reduce
 from drivetwin.gearbox.spec import Gearbox
@@ -27,5 +27,6 @@ __all__ = [
     "gearbox_schema",
     "load_gearbox",
     "network_elements",
+    "ratio_remarks",
     "reduce",
 ]

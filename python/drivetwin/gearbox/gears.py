@@ -47,6 +47,18 @@ class GearStatics:
         return self.torque(element, member) * (self.speeds[member] or 0.0)
 
 
+def ratio_remarks(gearbox: Gearbox, ratios: Mapping[str, float]) -> list[str]:
+    """One sentence for each gear whose computed ratio, by its name, is not the published one."""
+    entries = ((gearbox.gear(name), ratio) for name, ratio in ratios.items())
+    return [
+        f"gear {entry.name}: the computed ratio {ratio:.4f} is not the published "
+        f"{entry.published:.6g} ± {entry.tolerance:.2g}: check teeth and elements, or state a "
+        "tolerance"
+        for entry, ratio in entries
+        if not entry.agrees(ratio)
+    ]
+
+
 def gear_statics(gearbox: Gearbox, gear: str) -> GearStatics:
     """Solve one gear. Raises InputError where its elements do not make one ratio."""
     entry = gearbox.gear(gear)
