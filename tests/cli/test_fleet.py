@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -104,6 +107,17 @@ def test_estimates_are_told(fleet: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "too few logs tell a value of their own" in out
     assert main(["fleet", "estimate", store, "--parameter", "mu.X9", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"estimates": [], "untold": ["mu.X9"]}
+
+
+def test_logs_of_other_settings_are_told(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = tmp_path / "store"
+    shutil.copytree(fleet / "store", store, ignore=shutil.ignore_patterns("reports", "traces"))
+    with closing(sqlite3.connect(store / "index.sqlite")) as index, index:
+        index.execute("UPDATE logs SET settings = 'older' WHERE log = (SELECT min(log) FROM logs)")
+    assert main(["fleet", "estimate", str(store)]) == 0
+    assert "2 different settings" in " ".join(capsys.readouterr().out.split())
 
 
 def test_questions_are_answered(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:

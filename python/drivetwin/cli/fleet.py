@@ -208,16 +208,23 @@ def _print_estimates(found: list[JointEstimate]) -> None:
     from drivetwin.cli.numbers import shown
     from drivetwin.report.units import display_of, significant
 
+    rules = {one.rule for one in found}
     table = table_of(
-        "Fleet", "parameter", "value", "95 %", "unit", "spread", "drift", "95 % of it", "per",
+        "Fleet", *(("rule",) if len(rules) > 1 else ()), "parameter", "value", "95 %", "unit",
+        "spread", "drift", "95 % of it", "per",
         right=("value", "95 %", "spread", "drift", "95 % of it"),
     )  # fmt: skip
     for one in found:
+        whose = (one.rule,) if len(rules) > 1 else ()
         value, interval, unit = shown(one.value, one.ci95, one.si_unit)
         factor = display_of(one.si_unit).factor
         spread = "" if one.spread is None else significant(one.spread * factor, 2)
-        table.add_row(one.parameter, value, interval, unit, spread, *_drift(one))
+        table.add_row(*whose, one.parameter, value, interval, unit, spread, *_drift(one))
     show(table)
+    for text in dict.fromkeys(text for one in found for text in one.notes):
+        names = dict.fromkeys(one.parameter for one in found if text in one.notes)
+        note(text if len(names) == len({one.parameter for one in found}) else
+             f"{', '.join(names)}: {text}")  # fmt: skip
     for one in found:
         for change in one.changes:
             note(_change(one, change))

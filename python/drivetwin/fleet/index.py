@@ -52,6 +52,14 @@ that holds a log's rows, empty while it has one of its own. `files.log` is the l
 when it was last looked at; `files.run` counts the calls of `fleet`.
 """
 
+ONE_FILE_EACH = (
+    "NOT EXISTS (SELECT 1 FROM files AS other WHERE other.log = files.log AND (other.run > "
+    "files.run OR (other.run = files.run AND other.path < files.path)))"
+)
+"""What holds of one file of each log: the first of those seen last. A file that was moved leaves
+its old path in the index; a log that stands at two places counts once.
+"""
+
 RUN_COLUMNS = frozenset({"attempts", "seconds", "modified", "run"})
 """What tells of the runs rather than of the logs: it differs where all else is equal."""
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin.errors import QueryError
-from drivetwin.fleet.index import Index
+from drivetwin.fleet.index import ONE_FILE_EACH, Index
 from drivetwin.fleet.readings import moment
 from drivetwin.fleet.rows import RowKind, schema
 from drivetwin.fleet.rules import FILE_COLUMNS, is_date
@@ -20,6 +20,8 @@ from drivetwin.logs.extras import require
 
 _VIEWS = (RowKind.PARAMETER, RowKind.FRICTION, RowKind.FIT, RowKind.QUALITY, RowKind.WARNING)
 _TABLES = ("logs", "shifts", "settings")
+_PLACED = "placed"
+"""The file that stands for each log, as a table: `files` has all of them."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,9 @@ def ask(store: Store, sql: str) -> Answer:
     """Answer a question in SQL. The tables are
 
     `rows`, all numbers of all logs; `files`, with a column for each field; `logs`, `shifts` and
-    `settings` of the index; and, with path, unit and fields of the file beside each row,
-    `parameters`, `frictions`, `fits`, `qualities` and `warnings`. Raises QueryError for a question
-    that DuckDB does not take, MissingExtraError without DuckDB.
+    `settings` of the index; and, with path, unit and fields of one file of the log beside each
+    row, `parameters`, `frictions`, `fits`, `qualities` and `warnings`. Raises QueryError for a
+    question that DuckDB does not take, MissingExtraError without DuckDB.
     """
     duckdb = require("duckdb", "query", "a query", store.folder)
     with duckdb.connect(config={"autoinstall_known_extensions": "false"}) as database:
@@ -62,13 +64,14 @@ def _make_tables(database: Any, store: Store) -> None:
         database.register("rows", schema().empty_table())
     for table in _TABLES:
         database.register(table, _table(store.index, f"SELECT * FROM {table}"))
-    files = _files(store.index)
-    database.register("files", pa.Table.from_pylist(files) if files else _table(store.index, _NO))
+    for name, condition in (("files", "1"), (_PLACED, ONE_FILE_EACH)):
+        files = _files(store.index, condition)
+        database.register(name, pa.Table.from_pylist(files) if files else _table(store.index, _NO))
     for kind in _VIEWS:
         plural = {"quality": "qualities"}.get(kind.value, f"{kind.value}s")
         database.execute(
-            f"CREATE VIEW {plural} AS SELECT files.* EXCLUDE (log), rows.* EXCLUDE (kind) "
-            f"FROM rows JOIN files USING (log) WHERE kind = '{kind.value}'"
+            f"CREATE VIEW {plural} AS SELECT {_PLACED}.* EXCLUDE (log), rows.* EXCLUDE (kind) "
+            f"FROM rows JOIN {_PLACED} USING (log) WHERE kind = '{kind.value}'"
         )
 
 
@@ -84,11 +87,14 @@ def _table(index: Index, sql: str) -> Any:
     return pa.table({name: [row[k] for row in rows] for k, name in enumerate(names)})
 
 
-def _files(index: Index) -> list[dict[str, Any]]:
-    """One row for each file, with its fields as columns; a field may be absent."""
+def _files(index: Index, condition: str) -> list[dict[str, Any]]:
+    """One row for each file of which the condition holds, with its fields as columns; a field may
+    be absent.
+    """
+    sql = f"{_FILES}, fields FROM files WHERE {condition} ORDER BY path"
     found = [
         {**dict(zip(FILE_COLUMNS, known, strict=True)), **_readings(fields)}
-        for *known, fields in index.select(f"{_FILES}, fields FROM files ORDER BY path")
+        for *known, fields in index.select(sql)
     ]
     columns = dict.fromkeys(name for row in found for name in row)
     return [{name: row.get(name) for name in columns} for row in found]

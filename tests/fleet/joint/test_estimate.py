@@ -12,7 +12,8 @@ import pytest
 
 from drivetwin.fleet import parts
 from drivetwin.fleet.index import FileRow
-from drivetwin.fleet.joint.estimate import joint_estimates
+from drivetwin.fleet.joint.estimate import estimate, joint_estimates
+from drivetwin.fleet.joint.observed import facts, observed
 from drivetwin.fleet.joint.result import JointEstimate
 from drivetwin.fleet.rows import Row, RowKind
 from drivetwin.fleet.store import Store
@@ -130,6 +131,19 @@ def test_an_estimate_is_a_document(found: dict[str, JointEstimate]) -> None:
     document = found["mu.B3"].document()
     assert document["changes"][0]["unit"] == "T7"
     assert "points" not in document
+
+
+def test_settings_that_differ_are_told(store: Store) -> None:
+    known = facts(store)
+    (seen,) = [one for one in observed(store, known) if one.parameter == "eta"]
+    plain = {log: fact for log, (_, fact) in known.items()}
+    one = estimate(seen, plain)
+    assert one is not None
+    assert not one.notes
+    older = {seen.logs[0]: replace(plain[seen.logs[0]], settings="older")}
+    mixed = estimate(seen, {**plain, **older})
+    assert mixed is not None
+    assert mixed.notes[0].startswith("logs identified with 2 different settings")
 
 
 def test_too_few_logs_give_no_estimate(tmp_path: Path) -> None:

@@ -35,6 +35,10 @@ _LOGS_PER_UNIT = 4.0
 _ALIKE = 0.98
 """Correlation of two fields beyond which their effects cannot be told apart."""
 _ROUNDS = 5
+_MIXED = (
+    "logs identified with {} different settings are taken together (card, channel mapping, method "
+    "or version of the program; the tables `logs` and `settings` tell them apart)"
+)
 
 
 def joint_estimates(store: Store, wanted: Sequence[str] = ()) -> list[JointEstimate]:
@@ -134,6 +138,9 @@ def _data(seen: Observed, known: Mapping[str, LogFacts]) -> _Data | None:
         return None
     readings = np.array([[every[k].fields[name] for name in common] for k in kept], dtype=float)
     fields, notes = _usable_fields(common, readings.reshape(len(kept), len(common)))
+    settings = {every[k].settings for k in kept}
+    if len(settings) > 1:
+        notes = (*notes, _MIXED.format(len(settings)))
     units = sorted({every[k].unit for k in kept})
     place = {name: k for k, name in enumerate(units)}
     return _Data(

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin.fleet.index import ONE_FILE_EACH
 from drivetwin.fleet.joint.mixed import FloatArray
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
@@ -17,11 +18,14 @@ from drivetwin.identify.result import Verdict
 
 @dataclass(frozen=True)
 class LogFacts:
-    """What is known of a log: a file of it, its unit, and its fields, channel means included."""
+    """What is known of a log: a file of it, its unit, its fields, channel means included, and the
+    hash of the settings it was identified with.
+    """
 
     path: str
     unit: str
     fields: Mapping[str, float]
+    settings: str = ""
 
 
 @dataclass(frozen=True)
@@ -40,16 +44,19 @@ class Observed:
 
 
 def facts(store: Store) -> dict[str, tuple[str, LogFacts]]:
-    """Rule and facts of each log as its files were last seen; a log at several places once."""
+    """Rule and facts of each log as its file was seen last; a log at several places once."""
     means: dict[str, dict[str, float]] = {}
     columns = store.rows(RowKind.FIELD).select(["log", "name", "value"]).to_pydict()
     for log, name, value in zip(columns["log"], columns["name"], columns["value"], strict=True):
         means.setdefault(log, {})[name] = value
     found: dict[str, tuple[str, LogFacts]] = {}
-    sql = "SELECT log, path, rule, unit, fields FROM files ORDER BY path DESC"
-    for log, path, rule, unit, fields in store.index.select(sql):
+    sql = (
+        "SELECT log, path, rule, unit, fields, settings FROM files JOIN logs USING (log) "
+        f"WHERE {ONE_FILE_EACH}"
+    )
+    for log, path, rule, unit, fields, settings in store.index.select(sql):
         known = {**json.loads(fields), **means.get(log, {})}
-        found[log] = (rule, LogFacts(path, unit, known))
+        found[log] = (rule, LogFacts(path, unit, known, settings))
     return found
 
 
