@@ -11,8 +11,11 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.cli.observe import observed_channels
+from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.formats import open_recording
+from drivetwin.observer.observe import observed
 from drivetwin.observer.observed import Band, Observation, Observer
+from drivetwin.shifts.find import FoundShifts
 from tests.observer.conftest import Bench, bench
 from tests.shifts.test_divided import CHAIN
 
@@ -52,6 +55,36 @@ def test_json_and_figure(bench: Bench, tmp_path: Path, capsys: pytest.CaptureFix
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
     assert shift["torques"]["output_torque"]["highest"] > 4000.0
     assert "95 % low" in page.read_text(encoding="utf-8")
+
+
+def test_a_shift_with_a_gap_is_left_out_and_told(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of several shifts; a log whose only shift has one is refused."""
+    whole = observed(bench.twin, bench.log, bench.shift)
+    refusal = DamagedChannelError("a gap", "record it again")
+    shifts = [bench.shift] * 2
+    answers: list[DamagedChannelError | Observation] = [refusal, whole]
+
+    def told(*_: object) -> Observation:
+        answer = answers.pop(0)
+        if isinstance(answer, DamagedChannelError):
+            raise answer
+        return answer
+
+    monkeypatch.setattr("drivetwin.observer.observe.observed", told)
+    monkeypatch.setattr(
+        "drivetwin.shifts.usable.usable_shifts", lambda *_: FoundShifts(tuple(shifts), ())
+    )
+    command = ["observe", *map(str, bench.files), "--json"]
+    assert main(command) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert len(document["shifts"]) == 1
+    assert list(document["left_out"].values()) == ["a gap"]
+    shifts.pop()
+    answers.append(refusal)
+    assert main(command) == 2
+    assert json.loads(capsys.readouterr().out)["error"]["what"] == "a gap"
 
 
 def test_time_increases_from_shift_to_shift() -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.errors import MissingChannelError, MissingParameterError
+from drivetwin.errors import DamagedChannelError, MissingChannelError, MissingParameterError
 from drivetwin.identify.result import Verdict
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.kind import Observer
@@ -20,6 +20,13 @@ from tests.observer.conftest import Bench, brief
 def _without(log: ShiftLog, *roles: str) -> ShiftLog:
     kept = {k: v for k, v in log.channels.items() if not k.startswith(roles)}
     return replace(log, channels=kept)
+
+
+def _with_gap(log: ShiftLog, role: str, start: float, end: float) -> ShiftLog:
+    channel = log.channels[role]
+    kept = (channel.time < start) | (channel.time > end)
+    torn = replace(channel, time=channel.time[kept], values=channel.values[kept])
+    return replace(log, channels={**log.channels, role: torn})
 
 
 def _deviates(band: Band, truth: FloatArray) -> float:
@@ -77,6 +84,26 @@ def test_a_twin_without_scale_is_refused(bench: Bench) -> None:
 def test_a_log_without_engine_torque_is_refused(bench: Bench) -> None:
     with pytest.raises(MissingChannelError, match="engine_torque"):
         observed(bench.twin, _without(bench.log, "engine_torque"), bench.shift)
+
+
+@pytest.mark.parametrize("by", Observer)
+@pytest.mark.parametrize("role", ["engine_torque", "pressure.B3"])
+def test_what_is_missing_in_the_shift_is_never_bridged(
+    bench: Bench, by: Observer, role: str
+) -> None:
+    start = bench.shift.inertia_phase[0]
+    log = _with_gap(bench.log, role, start, start + 0.2)
+    with pytest.raises(DamagedChannelError, match="during the shift"):
+        observed(bench.twin, log, bench.shift, by)
+
+
+def test_a_gear_counts_as_far_as_its_torque_was_recorded(bench: Bench) -> None:
+    end = bench.shift.before[1]
+    log = _with_gap(bench.log, "engine_torque", end - 0.8, end - 0.5)
+    one = observed(bench.twin, log, bench.shift)
+    assert end - 0.5 < one.time[0] < end - 0.4
+    assert "counts from there on" in one.notes[0]
+    assert _deviates(one.output_torque, bench.truth(one)["output_torque"]) < 2.0
 
 
 def test_simulation_repeats_with_its_seed(bench: Bench) -> None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,6 +12,7 @@ import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
 from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step, table_of
+from drivetwin.errors import DamagedChannelError
 from drivetwin.observer.kind import Observer
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from drivetwin.logs.raw import RawChannel
     from drivetwin.observer.observed import Observation
+    from drivetwin.shifts.shift import Shift
 
 
 def observe(
@@ -62,24 +64,42 @@ def observe(
         card = model.card() if vehicle is None else load_card(vehicle)
         recording = read_log(log, card, channels)
         shifts = usable_shifts(recording, card)
-    found = []
-    for shift in shifts.shifts:
-        with step(f"observing shift {shift.start_gear}-{shift.end_gear} by {by}"):
-            found.append(observed(model, recording, shift, by))
+    found, left_out = _each(shifts.shifts, lambda shift: observed(model, recording, shift, by), by)
     if output is not None:
         _write(output, found)
     if figure is not None:
         write_text(figure, render_observations(found, recording))
     if as_json:
-        print_json({"observer": by, "shifts": [_document(one) for one in found]})
+        shown = [_document(one) for one in found]
+        print_json({"observer": by, "shifts": shown, "left_out": left_out})
         return
     for one in found:
         show(_table(one))
         for text in one.notes:
             note(text)
+    for name, reason in left_out.items():
+        note(f"shift {name} is left out: {reason}")
     for file in (output, figure):
         if file is not None:
             say(f"wrote {file}")
+
+
+def _each(
+    shifts: Sequence[Shift], look: Callable[[Shift], Observation], by: Observer
+) -> tuple[list[Observation], dict[str, str]]:
+    """What is observed of each shift, and why others of several are left out, by their name."""
+    found: list[Observation] = []
+    left_out: dict[str, str] = {}
+    for shift in shifts:
+        name = f"{shift.start_gear}-{shift.end_gear}"
+        try:
+            with step(f"observing shift {name} by {by}"):
+                found.append(look(shift))
+        except DamagedChannelError as refusal:
+            left_out[f"{name} at {shift.torque_phase[0]:.3f} s"] = refusal.what
+            if len(left_out) == len(shifts):
+                raise
+    return found, left_out
 
 
 def _write(path: Path, found: Sequence[Observation]) -> None:

@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.ensemble import simulate_observed
 from drivetwin.observer.observed import Observation, Observer
 from drivetwin.observer.smooth import smooth
 from drivetwin.shifts.converter import behind_converter
+from drivetwin.shifts.recorded import recorded
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin import Twin
+from drivetwin.vehicle.spec import PriorValue
 
 
 def observed(
@@ -17,11 +21,15 @@ def observed(
 ) -> Observation:
     """Torques of one shift of a log with 95 % bands; an output torque in the log is not used.
 
-    Where the converter is open and the twin has its map, its turbine stands for the engine.
+    Where the converter is open and the twin has its map, its turbine stands for the engine. The
+    gears before and after the shift count as far as its inputs were recorded, which the notes say.
     Raises MissingParameterError where the twin is incomplete, MissingChannelError and InputError
-    where the log is, SimulationError where the twin's own run fails.
+    where the log is, DamagedChannelError where an input has a gap in the shift, SimulationError
+    where the twin's own run fails.
     """
     log = behind_converter(log, twin.card(), shift)
-    return (
-        smooth(twin, log, shift) if by is Observer.SMOOTHER else simulate_observed(twin, log, shift)
-    )
+    fills = {one.name: PriorValue(one.P0) for one in twin.dual_clutch(shift).elements}
+    whole = recorded(log, shift, fills)
+    found = (smooth if by is Observer.SMOOTHER else simulate_observed)(twin, log, whole)
+    cuts = whole.warnings[len(shift.warnings) :]
+    return replace(found, notes=(*cuts, *found.notes))
