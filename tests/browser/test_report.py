@@ -142,3 +142,14 @@ def test_a_long_log_zooms_at_once_into_every_sample(page: Page, long_report: Pat
     found = zoom(page, "shift", "torque phase")[0]
     seen = 1e3 * (found["span"][1] - found["span"][0])
     assert found["points"] == pytest.approx(2.0 * seen, abs=3.0)
+
+
+def test_on_a_phone_figures_and_tables_keep_a_readable_size(report: Path, page: Page) -> None:
+    page.set_viewport_size({"width": 375, "height": 800})
+    opened(page, report)
+    sizes = """(tag) => [...document.querySelectorAll(tag)].map(
+        (one) => {const box = one.getBoundingClientRect(); return [box.width, box.height]})"""
+    assert min(width for width, _ in page.evaluate(sizes, ".plot")) >= 640
+    assert max(height for _, height in page.evaluate(sizes, "tr")) < 200
+    assert max(width for width, _ in page.evaluate(sizes, "figcaption, caption")) <= 375
+    assert page.evaluate("document.documentElement.scrollWidth") == 375
