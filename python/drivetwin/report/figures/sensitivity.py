@@ -17,6 +17,8 @@ _FULL_COLOUR = 3.0
 """Change [% of the value] at which the colour is full; the number stands in the cell."""
 _DOT = 0.05
 """Change below which a dot stands in place of a number."""
+_UPRIGHT = 9
+"""Letters of a sensor's name that fit above its column; longer ones are turned."""
 _TIMES = ("te_delay",)
 """Results whose value may be zero: their change is told in ms, not in per cent."""
 
@@ -25,6 +27,8 @@ def sensitivity_figure(found: Sensitivity) -> go.Figure:
     """Change of each result [%] by sensor: gain errors on the left, offsets on the right."""
     names = [_label(one, found) for one in found.ids]
     change = _shown(found)
+    symbols = [channel_symbol(error.rsplit(" ", 1)[0]) for error in found.errors]
+    angle = -90 if max(map(len, symbols)) > _UPRIGHT else 0
     figure = make_subplots(cols=2, shared_yaxes=True, horizontal_spacing=0.02)
     for column, kind in enumerate(("gain", "offset"), start=1):
         chosen = [k for k, error in enumerate(found.errors) if error.endswith(kind)]
@@ -46,11 +50,11 @@ def sensitivity_figure(found: Sensitivity) -> go.Figure:
         )
     figure.update_layout(layout(170 + 27 * len(names)))
     figure.update_layout(
-        xaxis=axis(f"gain + {100 * SIZE:g} %", side="top", tickangle=0, ticks=""),
+        xaxis=axis(f"gain + {100 * SIZE:g} %", side="top", tickangle=angle, ticks=""),
         xaxis2=axis(
             f"offset of {100 * SIZE:g} % of the largest reading",
             side="top",
-            tickangle=0,
+            tickangle=angle,
             ticks="",
         ),
         yaxis=axis("", autorange="reversed", ticks=""),
