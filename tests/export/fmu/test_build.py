@@ -19,6 +19,7 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from drivetwin.driveline import FloatArray
+from drivetwin.errors import InputError
 from drivetwin.export.compiler import compile_library, native_platform
 from drivetwin.export.entries import entries_of, start_entries
 from drivetwin.export.fmu.build import BuildOptions, build_fmu, identifier
@@ -27,9 +28,10 @@ from drivetwin.export.fmu.variables import INPUTS as FIRST_INPUT
 from drivetwin.export.fmu.variables import LOCKED, MODES, OUTPUTS, PARAMETERS, START
 from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.files import read_parameters
+from drivetwin.export.platforms import Platform
 from drivetwin.stepped import stepped_run
 from drivetwin.stepping import InputKind
-from tests.export.cases import CASES, STEP, Case
+from tests.export.cases import CASES, STEP, Case, paper_subject
 
 pytestmark = pytest.mark.skipif(
     native_platform() is None, reason="FMI names no platform like this one"
@@ -54,6 +56,14 @@ def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     path = tmp_path_factory.mktemp("fmu") / f"shift_{request.param.name}.fmu"
     build_fmu(case.subject, path, options(request.param, case))
     return Built(path, case)
+
+
+def test_a_platform_without_a_place_in_the_version_is_refused(tmp_path: Path) -> None:
+    """FMI 2.0 names no folder for macOS on ARM: the FMU would hold no binary at all."""
+    path = tmp_path / "shift.fmu"
+    with pytest.raises(InputError, match=r"FMI 2\.0 has no place for a binary of macos-arm"):
+        build_fmu(paper_subject(), path, BuildOptions(platforms=(Platform.MACOS_ARM,)))
+    assert not path.exists()
 
 
 def options(version: FmiVersion, case: Case) -> BuildOptions:

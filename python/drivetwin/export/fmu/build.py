@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
+from drivetwin.errors import InputError
 from drivetwin.export.c.write import model_sources, twin_source
 from drivetwin.export.compiler import compile_library, native_platform
 from drivetwin.export.entries import entries_of
@@ -56,9 +57,11 @@ class BuildOptions:
 def build_fmu(subject: Subject, path: Path, options: BuildOptions | None = None) -> None:
     """Write the FMU of a twin to `path`; the same twin gives the same bytes.
 
-    Raises InputError for a model that C cannot hold, CompilerError, MissingExtraError, OSError.
+    Raises InputError for a model that C cannot hold and for a platform that the version does not
+    know, CompilerError, MissingExtraError, OSError.
     """
     options = options or BuildOptions()
+    _check_platforms(options)
     header, sources = _sources(subject, options)
     files = {
         "modelDescription.xml": description(options.version, header, variables_of(subject)),
@@ -69,6 +72,15 @@ def build_fmu(subject: Subject, path: Path, options: BuildOptions | None = None)
     if options.version is FmiVersion.FMI3:
         files["sources/buildDescription.xml"] = _build_description(header)
     write_bytes(path, _archive(files))
+
+
+def _check_platforms(options: BuildOptions) -> None:
+    folders = _FOLDERS[options.version]
+    if unknown := [each.value for each in options.platforms if each not in folders]:
+        raise InputError(
+            f"FMI {options.version} has no place for a binary of {', '.join(unknown)}",
+            f"choose among {', '.join(each.value for each in folders)}, or FMI {FmiVersion.FMI3}",
+        )
 
 
 def identifier(name: str) -> str:
@@ -128,7 +140,7 @@ def _binaries(name: str, sources: Mapping[str, bytes], options: BuildOptions) ->
     here = native_platform()
     wanted: Sequence[tuple[Platform, Platform | None]]
     if options.platforms:
-        wanted = [(each, each) for each in options.platforms if each in folders]
+        wanted = [(each, each) for each in options.platforms]
     else:
         wanted = [(here, None)] if here in folders else []
     built = {}
