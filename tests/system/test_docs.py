@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 
@@ -43,6 +43,16 @@ def test_the_documented_channel_mapping_loads(tmp_path: Path) -> None:
     mapping = read_mapping(path)
     assert set(mapping.channels) == {"engine_torque", "output_torque", "pressure.B2"}
     assert mapping.channels["output_torque"].sign == -1
+
+
+def test_the_documented_network_runs() -> None:
+    (text,) = blocks(REFERENCE / "elements.md", "python")
+    names: dict[str, Any] = {}
+    exec(text, names)
+    run = names["run"]
+    assert run.status == "completed"
+    assert [(event.element, event.kind) for event in run.events] == [("C1", "fill"), ("C1", "lock")]
+    assert abs(run.audit.error) < 1e-6
 
 
 def row(spec: ParameterSpec) -> str:
