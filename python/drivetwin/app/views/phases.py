@@ -35,7 +35,7 @@ from drivetwin.app.views.parts import (
 )
 from drivetwin.app.work import Work
 from drivetwin.report.sections.story import PHASE_KEY
-from drivetwin.report.units import significant
+from drivetwin.report.units import display_of, significant
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift
 
@@ -167,8 +167,9 @@ def _content(work: Work) -> list[Component]:
 
 
 def _quality(shift: Shift) -> Component:
-    rows = [
-        (name.replace("_", " "), f"{significant(value)} {QUALITY_UNITS[name]}")
-        for name, value in shift.quality.items()
-    ]
+    rows = []
+    for name, value in shift.quality.items():
+        display = display_of(QUALITY_UNITS[name])
+        text = f"{significant(value * display.factor, 3)} {display.label}"
+        rows.append((name.replace("_", " "), text))
     return table(("figure", "value"), rows, "Shift quality")
