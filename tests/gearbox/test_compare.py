@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox import Comparison, compare, load_gearbox, reduce
-from drivetwin.gearbox.spec import ElementKind
+from drivetwin.gearbox.spec import ElementKind, PlanetarySet, ShiftMember
 
 QUIET = {"input": 2.0, "main": 0.06, "output": 0.9}
 
@@ -44,6 +44,22 @@ def test_drums_that_carry_the_coupling_make_the_form_exact(name: str, old: str, 
 
 def test_a_dual_clutch_gearbox_is_its_own_form() -> None:
     assert relative(compare(reduce(load_gearbox("dual-clutch-7"), "2", "3"))) < 1e-9
+
+
+def test_members_that_idle_throughout_stand_still() -> None:
+    box = load_gearbox("three-set-3000")
+    shift = reduce(box, "2", "3")
+    idle = PlanetarySet("P4", "S4", "R4", "C4", 2.0)
+    joined = ShiftMember("C6", ElementKind.CLUTCH, "input", "S4", box.elements["C1"].capacity)
+    more = replace(
+        box,
+        sets=(*box.sets, idle),
+        elements={**box.elements, "C6": joined},
+        inertias={**box.inertias, "S4": 0.1, "R4": 0.2, "C4": 0.3},
+    )
+    assert compare(reduce(more, "2", "3")).error.shaft_torque == pytest.approx(
+        compare(shift).error.shaft_torque, rel=1e-6
+    )
 
 
 def test_the_shift_changes_gear() -> None:

@@ -91,9 +91,12 @@ def whole_gearbox(reduction: Reduction, maneuver: Maneuver) -> WholeGearbox:
     inputs = {ENGINE_TORQUE: torque} | {name: pressures.get(name, zero) for name in names}
     output, wheel, twist = _start(reduction, maneuver, reduction.M12)
     friction = [name for name in reduction.common if name in names]
-    in_gear = gear_statics(gearbox, reduction.from_gear).speeds
+    # Dogs of the new gear turn some of what idles in the old one; what idles even so stands still.
+    engaged = (reduction.off_going.element, *reduction.common)
+    old = replace(gearbox.gear(reduction.from_gear), elements=engaged)
+    in_gear = gear_statics(replace(gearbox, gears=(old,)), old.name).speeds
     speed_in = maneuver.old_ratio * output
-    speeds = {member: speed_in * each for member, each in in_gear.items() if each is not None}
+    speeds = {member: speed_in * (each or 0.0) for member, each in in_gear.items()}
     start = Start(
         speeds=speeds | {WHEEL: wheel},
         twists={SHAFT: twist},
