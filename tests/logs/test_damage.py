@@ -16,6 +16,7 @@ from drivetwin.logs.damage import (
     missing,
     runs,
     spikes,
+    staircase,
     stuck,
 )
 from drivetwin.logs.shiftlog import FloatArray, Quantity
@@ -269,3 +270,11 @@ def test_a_calculated_torque_without_jitter_may_rest() -> None:
     time = np.linspace(0.0, 4.99, 500)
     steps = np.repeat([200.0, 900.0, 500.0, 700.0, 300.0], 100)
     assert longest_rest(time, steps) is None
+
+
+def test_a_signal_in_stairs_has_less_noise_than_its_rounding() -> None:
+    rough, calm = speed(noise=0.8), speed(noise=0.1)
+    assert staircase(np.round(calm)) == 1.0
+    assert staircase(np.round(rough)) == 0.0
+    assert staircase(calm) == 0.0
+    assert staircase(speed(noise=0.0)) == 0.0

@@ -93,6 +93,28 @@ def test_sigma_covers_the_errors_of_many_shifts() -> None:
     assert np.mean(np.abs(scores) > 3.0) <= 0.01
 
 
+@pytest.mark.parametrize("step", [1e-3, 1e-2])
+@pytest.mark.parametrize("rpm", [5.0, 10.0])
+def test_sigma_covers_the_errors_of_speeds_in_coarse_steps(rpm: float, step: float) -> None:
+    """Rounding errors stay alike over many samples: no curve through them tells a boundary."""
+    unit = rpm * np.pi / 30.0
+    scores = []
+    for seed in range(5):
+        start = 1.5 + 0.013 * seed
+        plan = replace(_UP, break_aways=(start,), noise=0.02, step=step, seed=seed)
+        log = plan.log()
+        rounded = {
+            role: replace(log[role], values=unit * np.round(log[role].values / unit))
+            for role in ("input_speed", "output_speed")
+        }
+        log = replace(log, channels={**log.channels, **rounded})
+        (shift,) = find_shifts(log, plan.card()).shifts
+        assert shift.sigma["lockup"] < 0.05
+        scores.append((shift.inertia_phase[0] - start) / shift.sigma["inertia_start"])
+        scores.append((shift.lockup_time - start - plan.duration) / shift.sigma["lockup"])
+    assert np.abs(scores).max() < 3.0
+
+
 def test_phases_join_and_are_named() -> None:
     shift = _only(replace(_UP, noise=0.05))
     assert (shift.offgoing, shift.oncoming) == ("B2", "B3")

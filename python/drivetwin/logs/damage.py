@@ -57,6 +57,10 @@ _NOISES = (0.0, 0.4, 0.5, 0.6, 0.8, 1.0, 2.0, 5.0)
 """Share of steps that turn over more than two neighbouring codes, by the deviation of normal noise
 in codes: simulated, and within a tenth the same wherever the true value lies."""
 
+_DITHER, _REPEATING = 0.3, 0.5
+"""Deviation of the noise in codes below which rounding errors stay alike from sample to sample, and
+the least share of samples that then repeat the one before."""
+
 _UNLIKELY = float(np.log(1e-9))
 """Logarithm of the chance below which a rest is none of the jitter's own."""
 
@@ -213,6 +217,14 @@ def resolution(values: FloatArray) -> float:
     """Smallest step between two samples in a row; 0 where there is none."""
     steps = np.abs(np.diff(values))
     return float(steps[steps > 0.0].min()) if steps.any() else 0.0
+
+
+def staircase(values: FloatArray) -> float:
+    """Resolution of a signal that goes in stairs, being rounded beyond its noise; else 0."""
+    step = resolution(values)
+    if step == 0.0 or np.mean(np.diff(values) == 0.0) < _REPEATING:
+        return 0.0
+    return step if _noise(values / step) < _DITHER else 0.0
 
 
 def _noise(codes: FloatArray) -> float:

@@ -56,7 +56,7 @@ def break_away(
     slip = _slip(speeds, ratio, rest)
     part = slice(first, stop + 1)
     seen = begun(slip.time[part], slip.error[part] - slip.level, slip.noise)
-    if _is_sparse(speeds, settings):
+    if slip.stairs or _is_sparse(speeds, settings):
         return _boundary(seen)
     run = speeds.samples(_QUIET, 3)
     still = _runs_of_true(slip.departure[: last + 1] < _LIMIT, run)
@@ -82,7 +82,7 @@ def lock_up(
     first, last = held
     rest = slice(first, min(last + 1, first + speeds.samples(_REST, 8)))
     slip = _slip(speeds, ratio, rest)
-    if _is_sparse(speeds, settings):
+    if slip.stairs or _is_sparse(speeds, settings):
         part = slice(start, last + 1)
         return _boundary(ended(slip.time[part], slip.error[part] - slip.level, slip.noise))
     run = speeds.samples(_QUIET, 3)
@@ -109,7 +109,8 @@ class _Slip:
 
     `level` is the error at rest. `noise` [rad/s] is that of one sample at rest, at least `floor`.
     `departure` (n,) is the distance, smoothed over _SMOOTH, in standard deviations of the smoothed
-    error; divided by `root` in those of a sample.
+    error; divided by `root` in those of a sample. `stairs`: the noise is that of rounding, alike
+    over many samples, so that no curve can be fitted.
     """
 
     time: FloatArray
@@ -119,6 +120,7 @@ class _Slip:
     noise: float
     departure: FloatArray
     root: float
+    stairs: bool
 
 
 def _slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
@@ -128,11 +130,19 @@ def _slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
     level = float(np.median(error[rest]))
     noise = 1.4826 * float(np.median(np.abs(error[rest] - level)))
     floor = _ROUNDING * float(np.median(np.abs(speeds.input[rest])))
-    noise = max(noise, floor)
+    rounding = speeds.rounding(ratio)
+    noise = max(noise, floor, rounding)
     root = float(np.sqrt(width))
     mean = np.convolve(np.pad(error - level, width // 2, mode="edge"), np.ones(width), "same")
     mean = np.abs(mean[width // 2 : width // 2 + len(error)]) / width
-    return _Slip(speeds.time, error, level, floor, noise, mean * root / noise, root)
+    stairs = rounding > _white(error[rest])
+    return _Slip(speeds.time, error, level, floor, noise, mean * root / noise, root, stairs)
+
+
+def _white(error: FloatArray) -> float:
+    """White noise of a slip at rest, from second differences: mostly zero between stairs."""
+    bend = np.abs(np.diff(error, 2))
+    return 1.4826 * float(np.median(bend)) / float(np.sqrt(6.0)) if len(bend) else 0.0
 
 
 def _first_window(slip: _Slip, anchor: int, moving: Moving, shortest: int) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.errors import MissingChannelError, TimeError, Where
+from drivetwin.logs.damage import staircase
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.vehicle.spec import VehicleCard
@@ -21,12 +22,17 @@ _LEAST = 8
 
 @dataclass(frozen=True)
 class GearboxSpeeds:
-    """Input and output speed of the gearbox [rad/s], (n,) on `time` [s]; no NaN."""
+    """Input and output speed of the gearbox [rad/s], (n,) on `time` [s]; no NaN.
+
+    `stairs` are the steps [rad/s] of input and output speed where they are rounded beyond their
+    noise, else 0.
+    """
 
     time: FloatArray
     input: FloatArray
     output: FloatArray
     warnings: tuple[str, ...] = ()
+    stairs: tuple[float, float] = (0.0, 0.0)
 
     @property
     def step(self) -> float:
@@ -40,6 +46,11 @@ class GearboxSpeeds:
         zeros of the slip whatever the element's own ratios and signs are.
         """
         return self.input - ratio * self.output
+
+    def rounding(self, ratio: float) -> float:
+        """Standard deviation [rad/s] that stairs of the speeds leave in `sync_error`."""
+        inlet, outlet = self.stairs
+        return float(np.hypot(inlet, ratio * outlet) / np.sqrt(12.0))
 
     def samples(self, seconds: float, at_least: int) -> int:
         """Number of samples in a span, but no fewer than `at_least`."""
@@ -77,7 +88,8 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
         warnings.append("output speed taken from the wheel speed: shaft twist adds to the slip")
     else:
         raise _missing("output_speed", "wheel_speed", log)
-    outlet = _finite(sink).at(inlet.time)
+    slow = _finite(sink)
+    outlet = slow.at(inlet.time)
     known = np.isfinite(outlet)
     count = int(np.count_nonzero(known))
     if count < _LEAST:
@@ -88,7 +100,11 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
             Where(file=log.source),
         )
     return GearboxSpeeds(
-        inlet.time[known], scale * inlet.values[known], factor * outlet[known], tuple(warnings)
+        inlet.time[known],
+        scale * inlet.values[known],
+        factor * outlet[known],
+        tuple(warnings),
+        (scale * staircase(inlet.values), factor * staircase(slow.values)),
     )
 
 

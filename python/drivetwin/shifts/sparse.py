@@ -90,14 +90,31 @@ def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
     if not len(moving):
         return None
     last = int(moving[-1])
-    pace = float(slip[last] - slip[last + 1])
     step = float(time[last + 1] - time[last])
+    hidden = _to_rest(time[: last + 1], np.abs(slip[: last + 1]), limit)
+    if hidden > step:
+        return Crossing(
+            float(time[last]) + hidden, float(np.hypot(0.5 * hidden, _step_error(time, last)))
+        )
+    pace = float(slip[last] - slip[last + 1])
     share = float(np.clip(slip[last] / pace, 0.0, 1.0)) if pace != 0.0 else 1.0
     # Half of what the limit of rest hides, at the pace of the last step.
     reach = min(0.5 * limit / abs(pace), 1.0) if pace != 0.0 else 1.0
     return Crossing(
         float(time[last]) + share * step, float(np.hypot(reach * step, _step_error(time, last)))
     )
+
+
+def _to_rest(time: FloatArray, moved: FloatArray, limit: float) -> float:
+    """Time [s] that a slip takes from its last number to zero, at its pace down to the limit.
+
+    Zero where it comes down in a few samples, which tell no pace.
+    """
+    high = int(np.flatnonzero(moved >= min(_STEEP * limit, 0.5 * float(moved.max())))[-1])
+    fall = float(moved[high] - moved[-1])
+    if len(moved) - 1 - high < _LASTING or fall <= 0.0:
+        return 0.0
+    return float(time[-1] - time[high]) * float(moved[-1]) / fall
 
 
 def _step_error(time: FloatArray, index: int) -> float:
