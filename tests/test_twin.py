@@ -255,8 +255,10 @@ def test_round_trip(twin: Twin, tmp_path: Path) -> None:
     [
         ("schema = 'drivetwin/twin-3'", "newer"),
         ("schema = 'other'", "expected 'drivetwin/twin-2'"),
-        ("schema = 'drivetwin/twin-1'", "cannot be read as a twin"),
-        ("not toml", "cannot be read as a twin"),
+        ("schema = 'drivetwin/twin-1'", "transmission: this key is required and missing"),
+        ("schema = 'drivetwin/twin-2'\nparameters = 1", "parameters: the value should be"),
+        ("schema = 'drivetwin/twin-2'\nparameters.eta = 1", "parameters.eta: the value should be"),
+        ("not toml", "cannot be read: "),
     ],
 )
 def test_damaged_or_newer_files_are_refused(tmp_path: Path, text: str, says: str) -> None:
@@ -264,3 +266,18 @@ def test_damaged_or_newer_files_are_refused(tmp_path: Path, text: str, says: str
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ResultFileError, match=says):
         Twin.load(path)
+
+
+def test_faults_of_a_file_are_told_by_key_and_path(twin: Twin, tmp_path: Path) -> None:
+    path = tmp_path / "twin.toml"
+    twin.save(path)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("i_in = ", "i_in = 'x' # ", 1), encoding="utf-8")
+    with pytest.raises(ResultFileError, match=r"twin\.toml, key 'transmission.i_in': ") as found:
+        Twin.load(path)
+    assert "pydantic" not in str(found.value)
+    with pytest.raises(ResultFileError, match="cannot read the file: No such file") as absent:
+        Twin.load(tmp_path / "absent.toml")
+    assert (absent.value.remedy, absent.value.where.file) == (
+        "check the path", str(tmp_path / "absent.toml"),
+    )  # fmt: skip

@@ -98,7 +98,7 @@ def test_round_trip(tmp_path: Path) -> None:
         ("{}", "schema is None"),
         ('{"schema": "drivetwin/result-4"}', "newer"),
         ('{"schema": "drivetwin/twin-1"}', "expected 'drivetwin/result-3'"),
-        ('{"schema": "drivetwin/result-1"}', "cannot be read"),
+        ('{"schema": "drivetwin/result-1"}', "shifts: this key is required and missing"),
     ],
 )
 def test_damaged_or_newer_files_are_refused(tmp_path: Path, content: str, says: str) -> None:

@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Records shared by `result.json` and `twin.toml`: parameters, friction curves, schema check."""
+"""Records shared by `result.json` and `twin.toml`: parameters, friction curves."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
 
-from drivetwin.errors import ResultFileError, Where
 from drivetwin.identify.result import (
     Estimate,
     FloatArray,
@@ -200,23 +198,3 @@ def _finite_interval(interval: tuple[float, float] | None) -> tuple[float, float
 
 
 SchemaName = Annotated[str, Field(alias="schema")]
-
-
-def check_schema(found: object, known: str, file: str) -> None:
-    """Raise ResultFileError unless `found` names the family of `known` in a version not newer.
-
-    `known` reads like `drivetwin/twin-1`: family, dash, version. Older versions stay readable.
-    """
-    family, _, version = known.rpartition("-")
-    match = re.fullmatch(rf"{re.escape(family)}-(\d+)", found) if isinstance(found, str) else None
-    where = Where(file=file, key="schema")
-    if match is None:
-        raise ResultFileError(
-            f"schema is {found!r}, expected {known!r}", "give a file written by drivetwin", where
-        )
-    if int(match[1]) > int(version):
-        raise ResultFileError(
-            f"schema {found!r} is newer than this program's {known!r}",
-            "update drivetwin, or write the file again with this version",
-            where,
-        )

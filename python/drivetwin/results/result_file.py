@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, FiniteFloat, ValidationError
+from pydantic import Field, FiniteFloat
 
-from drivetwin.errors import ResultFileError, Where
 from drivetwin.identify.result import Identification, Method
 from drivetwin.results.atomic import write_text
+from drivetwin.results.reading import read_record
 from drivetwin.results.records import (
     FitRecord,
     FrictionRecord,
@@ -23,7 +23,6 @@ from drivetwin.results.records import (
     ParameterRecord,
     Record,
     SchemaName,
-    check_schema,
     finite_or_none,
     fit_records,
 )
@@ -163,15 +162,8 @@ def save_result(path: Path | str, identification: Identification) -> None:
 
 
 def load_result(path: Path | str) -> ResultFile:
-    """Read a `result.json`. Raises ResultFileError where it is damaged or of a newer schema."""
-    path = Path(path)
-    try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
-        check_schema(tree.get("schema"), RESULT_SCHEMA, path.name)
-        return ResultFile.model_validate(tree)
-    except (OSError, ValueError, AttributeError, ValidationError) as fault:
-        raise ResultFileError(
-            f"cannot be read as a result: {fault}",
-            "write it again with `drivetwin identify`",
-            Where(file=path.name),
-        ) from fault
+    """Read a `result.json`.
+
+    Raises ResultFileError where it is missing, damaged or of a newer schema.
+    """
+    return read_record(path, json.loads, RESULT_SCHEMA, ResultFile)

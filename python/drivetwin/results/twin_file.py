@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 import tomlkit
-from pydantic import Field, FiniteFloat, ValidationError, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from drivetwin.converter import Converter
-from drivetwin.errors import ResultFileError, Where
 from drivetwin.identify.result import Method
 from drivetwin.results.atomic import write_text
+from drivetwin.results.reading import read_record
 from drivetwin.results.records import (
     FrictionRecord,
     Interval,
@@ -21,7 +21,6 @@ from drivetwin.results.records import (
     ParameterRecord,
     Record,
     SchemaName,
-    check_schema,
 )
 from drivetwin.vehicle.spec import ElementKind
 
@@ -152,19 +151,17 @@ def read_twin_file(path: Path | str) -> TwinFile:
 
     Raises ResultFileError where the file is missing, damaged or of a newer schema.
     """
-    path = Path(path)
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8"))
-        check_schema(tree.get("schema"), TWIN_SCHEMA, path.name)
-        for parameter in tree.get("parameters", {}).values():
+    return read_record(path, _parsed, TWIN_SCHEMA, TwinFile)
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    """The document with the null values that TOML does not know."""
+    tree = tomllib.loads(text)
+    parameters = tree.get("parameters")
+    for parameter in parameters.values() if isinstance(parameters, dict) else ():
+        if isinstance(parameter, dict):
             parameter.setdefault("value", None)
-        return TwinFile.model_validate(tree)
-    except (OSError, ValueError, AttributeError, ValidationError) as fault:
-        raise ResultFileError(
-            f"cannot be read as a twin: {fault}",
-            "write it again with `drivetwin identify`",
-            Where(file=path.name),
-        ) from fault
+    return tree
 
 
 def _without_null(value: Any) -> Any:
