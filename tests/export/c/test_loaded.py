@@ -486,3 +486,14 @@ def test_observer_refuses_what_is_not_finite(loaded: CModel) -> None:
         observer.observe((np.nan, 1e6, 0.0), (150.0, 80.0), 1e-2)
     with pytest.raises(InputError, match="bad state or input"):
         observer.observe((1000.0, 1e6, 0.0), (150.0, 80.0), 1.0)
+
+
+def test_an_observer_begun_at_no_speed_says_so_until_it_is_begun_anew(loaded: CModel) -> None:
+    """The first message of a bus may be none; its NaN would stay in every later estimate."""
+    inputs = (1000.0, 1e6, 0.0)
+    observer = CObserver(loaded, inputs, (np.nan, 80.0))
+    for _ in range(2):
+        with pytest.raises(InputError, match="bad state or input"):
+            observer.observe(inputs, (150.0, 80.0), 1e-2)
+    observer.resume(inputs, (150.0, 80.0))
+    assert np.isfinite(observer.observe(inputs, (150.0, 80.0), 1e-2).output_torque)

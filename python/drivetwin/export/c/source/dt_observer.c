@@ -312,6 +312,17 @@ void dt_observer_resume(dt_observer *observer, const dt_params *params, const dt
     }
 }
 
+static int is_finite(const dt_observer *o) {
+    int finite = 1;
+    for (int i = 0; i < N; ++i) {
+        finite = finite && dt_is_finite(o->x[i]);
+        for (int j = 0; j < N; ++j) {
+            finite = finite && dt_is_finite(o->P[i][j]);
+        }
+    }
+    return finite;
+}
+
 dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tuning *tuning,
                      const dt_measured *now, dt_real h, dt_estimates *estimates) {
     const dt_real limit = DT_C(DT_OBSERVER_SUBSTEP) * DT_C(DT_OBSERVER_SUBSTEPS);
@@ -322,6 +333,7 @@ dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tu
     if (!sound || !(h > DT_C(0)) || h > limit) {
         return DT_BAD_STATE;
     }
+    const dt_observer before = *observer;
     dt_mechanism m;
     dt_mechanism_of(&m, params,
                     params->loss_law == DT_DISSIPATIVE && now->inputs.engine_torque < DT_C(0));
@@ -340,6 +352,10 @@ dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tu
     correct(observer, output, now->output_speed, tuning->output_speed);
     if (observer->locked >= 0) {
         correct(observer, m.row[observer->locked], DT_C(0), NO_SLIP);
+    }
+    if (!is_finite(observer)) {
+        *observer = before;
+        return DT_BAD_STATE;
     }
     fill_estimates(estimates, observer, &m, params, &now->inputs);
     return DT_OK;

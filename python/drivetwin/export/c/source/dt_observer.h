@@ -74,7 +74,8 @@ void dt_observer_begin(dt_observer *observer, const dt_params *params, const dt_
 void dt_observer_resume(dt_observer *observer, const dt_params *params, const dt_measured *now);
 
 /** Take in what is measured `h` [s] after the last call. Returns DT_BAD_STATE, and leaves the
- *  observer as it is, where a value is not finite or h is not in range. */
+ *  observer as it is, where a value is not finite or h is not in range; also where what it holds
+ *  would not be finite, as after a start at speeds that were not: begin anew. */
 dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tuning *tuning,
                      const dt_measured *now, dt_real h, dt_estimates *estimates);
 
