@@ -14,6 +14,7 @@ from drivetwin.logs.damage import (
     dropouts,
     longest_rest,
     missing,
+    pulses,
     runs,
     spikes,
     staircase,
@@ -69,6 +70,31 @@ def test_torque_may_move_for_longer_than_a_spike() -> None:
     values = torque()
     values[300] -= 2000.0
     assert spikes(time, values, Quantity.TORQUE) is None
+
+
+@pytest.mark.parametrize("height", [3000.0, -700.0])
+@pytest.mark.parametrize("width", [4, 12])
+def test_a_torque_that_jumps_and_jumps_back_is_found(height: float, width: int) -> None:
+    values = torque()
+    for start in (300, 700, 1600):
+        values[start : start + width] += height
+    found = pulses(TIME, values)
+    assert found is not None
+    assert runs(found.mask) == [(start, start + width) for start in (300, 700, 1600)]
+
+
+def test_a_torque_that_knocks_steps_or_stays_away_is_no_pulse() -> None:
+    """Pulses that a driveline has: rounded ones, long ones, steps, codes to and fro."""
+    knock = (
+        2000.0
+        * np.clip(np.cos(np.pi * (TIME - 1.0) / 0.02), 0.0, None)
+        * (np.abs(TIME - 1.0) < 0.01)
+    )
+    long = np.where((TIME > 1.0) & (TIME < 1.04), 2000.0, 0.0)
+    step = np.where(TIME > 1.0, 2000.0, 0.0)
+    codes = 50.0 * np.round((torque() + 30.0 * np.sin(40.0 * TIME)) / 50.0)
+    for values in (torque(), torque() + knock, torque() + long, torque() + step, codes):
+        assert pulses(TIME, values) is None
 
 
 def test_a_stuck_signal_is_found_until_it_jumps() -> None:

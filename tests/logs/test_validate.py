@@ -254,3 +254,14 @@ def test_numbers_that_stand_for_no_value_are_left_out(role: str, value: float) -
     assert checked.warnings[0].endswith(
         "far beyond all other numbers from 0.400 s to 0.470 s, left out"
     )
+
+
+def test_a_pulse_is_left_out_of_a_measured_torque_only() -> None:
+    """An engine may be cut for 10 ms."""
+    time = np.round(np.arange(2000) * 0.001, 3)
+    values = 900.0 + 50.0 * np.sin(9.0 * time) + np.random.default_rng(4).normal(size=time.size)
+    values[800:810] -= 700.0
+    checked = check_channel(channel("output_torque", values, "Nm", time), "log.csv")
+    assert checked.channel.time.tolist() == np.delete(time, np.s_[800:810]).tolist()
+    assert "jumped up or down and back from 0.800 s to 0.809 s" in checked.warnings[0]
+    assert check_channel(channel("engine_torque", values, "Nm", time), "log.csv").warnings == ()

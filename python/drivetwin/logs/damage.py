@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,9 @@ _SPIKE_SHARE = 0.05
 
 _SPIKE_TIME = 5e-3
 """Longest spike [s] of a torque or pressure, which may truly change that fast; speeds may not."""
+
+_PULSE_TIME = 0.025
+"""Longest stretch [s] that a shaft's torque may have jumped to and back from by a disturbance."""
 
 _STUCK_TIME = 0.25
 """Shortest time [s] of one repeated number that may be a stuck signal."""
@@ -155,6 +159,36 @@ def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: floa
     around = np.maximum(np.maximum(lefts, rights), apart)
     found = (height > least) & (height > _SPIKE_CONTRAST * around)
     return (np.flatnonzero(found) + 1).tolist()
+
+
+def pulses(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Stretches, longer than spikes, that a calm torque jumps to and back from in one sample each.
+
+    In between it goes on as it would have without the jump, as where an amplifier is disturbed. A
+    knock in the backlash of a driveline rises and falls over several samples.
+    """
+    steps = np.diff(values)
+    size = np.abs(steps)
+    if values.size < 4 * _SURROUNDINGS or not size.any():
+        return None
+    least = max(
+        _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
+        _SPIKE_CONTRAST * float(np.median(size[size > 0.0])),
+    )
+    mask = np.zeros(values.size, np.bool_)
+    for first, last in pairwise(np.flatnonzero(size > least)):
+        width = int(last - first)
+        if width <= _SPIKE_WIDTH or time[last] - time[first] > _PULSE_TIME:
+            continue
+        beside = (size[max(0, first - _SURROUNDINGS) : first], size[first + 1 : last],
+                  size[last + 1 :][:_SURROUNDINGS])  # fmt: skip
+        calm = max(part.max(initial=0.0) for part in beside)
+        drift = abs(float(steps[first] + steps[last]))
+        if min(size[first], size[last]) > _SPIKE_CONTRAST * max(calm, drift):
+            mask[first + 1 : last + 1] = True
+    if not mask.any():
+        return None
+    return Damage(mask, f"jumped up or down and back {_spans(time, runs(mask))}, left out")
 
 
 def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:

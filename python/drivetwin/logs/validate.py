@@ -17,6 +17,7 @@ from drivetwin.logs.damage import (
     dropouts,
     longest_rest,
     missing,
+    pulses,
     resolution,
     spikes,
     stuck,
@@ -112,7 +113,7 @@ def check_channel(channel: Channel, file: str) -> Checked:
     channel = _without(channel, found, warnings)
     _check_count(channel, total, where)
     _check_variation(channel, where)
-    for look in (_dropouts, _spikes, _stuck, _beyond, _clipped):
+    for look in (_dropouts, _spikes, _pulses, _stuck, _beyond, _clipped):
         channel = _without(channel, look(channel), warnings)
         _check_count(channel, total, where)
     _check_magnitude(channel, where)
@@ -185,6 +186,13 @@ def _dropouts(channel: Channel) -> Damage | None:
 
 def _spikes(channel: Channel) -> Damage | None:
     return spikes(channel.time, channel.values, channel.quantity)
+
+
+def _pulses(channel: Channel) -> Damage | None:
+    """Of a measured torque: an engine's may be cut that shortly, in the number that it sends."""
+    if channel.role != "output_torque":
+        return None
+    return _of_updates(channel, lambda fresh: pulses(fresh.time, fresh.values))
 
 
 def _stuck(channel: Channel) -> Damage | None:
