@@ -276,6 +276,21 @@ _BUSY_CLICKS = """ids => ids.forEach((id) => {
 """Clicks, 5 ms apart, on a page that is busy until after the last."""
 
 
+def test_the_way_back_and_loading_again_keep_to_the_views(shown: Page) -> None:
+    page = shown
+    for name in ("channels", "phases"):
+        _view(page, name)
+    page.go_back()
+    expect(page.locator("#view-channels")).to_be_visible()
+    page.reload()
+    expect(page.locator("#view-channels")).to_be_visible()
+    expect(page.locator("#nav-channels")).to_have_attribute("aria-current", "page")
+    page.go_back()
+    expect(page.locator("#view-log")).to_be_visible()
+    page.go_forward()
+    expect(page.locator("#view-channels")).to_be_visible()
+
+
 def test_of_clicks_in_a_row_the_last_one_counts(shown: Page) -> None:
     for names in (("channels", "model"), ("export", "log"), ("model", "channels", "gearbox")):
         shown.evaluate(_BUSY_CLICKS, [f"nav-{name}" for name in names])

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Selects hand over their value; upload buttons send a file; a server that is silent is told. */
+/* Selects hand over their value; upload buttons send a file; the browser's way back changes the
+   view; a server that is silent is told. */
 "use strict";
 (() => {
   const idOf = (element) => (element.id.startsWith("{") ? JSON.parse(element.id) : element.id);
@@ -13,6 +14,11 @@
 
   const say = (text, fault) =>
     set("message", { children: text, className: `message ${fault ? "fault" : "good"}` });
+
+  window.addEventListener("popstate", () => {
+    const view = location.hash.slice(1) || "log";
+    document.getElementById(`nav-${view}`)?.click();
+  });
 
   /* All that the page asks passes here: without an answer it would stand still without a word. */
   const ask = window.fetch;

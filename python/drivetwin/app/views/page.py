@@ -61,12 +61,18 @@ _INDEX = """<!DOCTYPE html>
 _SWITCH = """(...clicked) => {
   const names = NAMES;
   const times = clicked.map((time) => time ?? -1);
-  const id = names[times.indexOf(Math.max(...times))];
+  const last = Math.max(...times);
+  const at = names.includes(location.hash.slice(1)) ? location.hash.slice(1) : names[0];
+  const id = last < 0 ? at : names[times.indexOf(last)];
+  if (id !== at) history.pushState(null, "", `#${id}`);
   setTimeout(() => window.dispatchEvent(new Event("resize")), 0);
   const current = names.map((name) => (name === id ? "page" : "false"));
   return [...names.map((name) => name !== id), ...current];
 }"""
-"""By the times of clicks: of several that a busy page answers together the last one counts."""
+"""By the times of clicks: of several that a busy page answers together the last one counts.
+
+The view stands in the address, for the browser's way back and for loading the page again.
+"""
 
 
 def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
