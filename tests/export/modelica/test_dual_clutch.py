@@ -19,6 +19,7 @@ from drivetwin.driveline import (
     Stribeck,
     simulate,
 )
+from drivetwin.errors import InputError
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.modelica.dual_clutch import ENGINE_TORQUE, modelica_text, write_modelica
 from drivetwin.export.subject import Subject
@@ -64,6 +65,16 @@ def test_slipping_driveline_agrees_to_the_solvers_tolerance(
 ) -> None:
     found = _deviation(_model(loss_law), SLIPPING, 0.2, tmp_path)
     assert max(found.values()) < 1e-6, found
+
+
+@pytest.mark.parametrize("name", ["engine", "load", "B2 drum", "u_B2"])
+def test_an_element_named_as_another_part_is_refused(name: str) -> None:
+    """One of the two would be missing from the model, or what is declared twice not compile."""
+    model = _model()
+    off, on = (replace(one, drum_inertia=0.1) for one in model.elements)
+    renamed = replace(model, elements=(off, replace(on, name=name)))
+    with pytest.raises(InputError, match="would stand for two parts of the Modelica model"):
+        modelica_text(Subject("truck 2-3", renamed, SLIPPING))
 
 
 def test_loads_of_the_road_agree(tmp_path: Path) -> None:

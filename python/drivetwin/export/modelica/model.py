@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
 
 from drivetwin.driveline import FloatArray, Signal
+from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import ROTATIONAL, Component, Names, Part
 from drivetwin.export.modelica.elements import part_of
 from drivetwin.export.modelica.friction import GROUND
@@ -46,9 +48,10 @@ def package_text(
     """Modelica package `name` with the model `Driveline` and, for a run, the model `Shift`.
 
     Inputs of the driveline are `u_<input>`, in SI; the nodes `ends` get flanges `flange_<node>` to
-    connect it by. Raises InputError for an element that has no
-    Modelica form.
+    connect it by. Raises InputError for an element that has no Modelica form and for a name that
+    would stand for two things.
     """
+    _refuse_doubles(str(element["name"]) for element in elements)
     names = _names(elements)
     parts = {str(element["name"]): part_of(element, names) for element in elements}
     helpers = sorted(frozenset().union(*(part.helpers for part in parts.values())))
@@ -63,6 +66,15 @@ def package_text(
         f"end {plain};",
     ]
     return "\n".join(texts) + "\n"
+
+
+def _refuse_doubles(names: Iterable[str]) -> None:
+    doubled = [name for name, count in Counter(names).items() if count > 1]
+    if doubled:
+        raise InputError(
+            f"{', '.join(map(repr, doubled))} would stand for two parts of the Modelica model",
+            "give the shift element or the node another name",
+        )
 
 
 def _names(elements: Sequence[Element]) -> Names:
@@ -88,6 +100,8 @@ def _driveline(parts: Mapping[str, Part], names: Names, ends: tuple[str, ...]) -
     ]
     nodes = _flanges(components)
     fixed = Component(f"{ROTATIONAL}.Components.Fixed", "ground_")
+    declared = (one.name for one in (*components, fixed))
+    _refuse_doubles((*declared, *flanges.values(), *names.inputs.values()))
     lines = [
         "model Driveline",
         *ports_of_nodes,
