@@ -11,6 +11,7 @@ it is first asked for, so that `import drivetwin` costs nothing.
     twin = drivetwin.Twin.from_identification(result, card)      the model
     run = drivetwin.validate_shift(twin, log, found.shifts[0])   simulation over measurement
     result = drivetwin.validated(result, twin, log)              the same of all shifts, into result
+    result = drivetwin.examined(result)                          what would tell more, into result
     drivetwin.save_result(path, result)                          result.json
     drivetwin.save_report(path, result, log)                     report.html
 
@@ -25,6 +26,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from drivetwin.driveline import DualClutch, simulate
     from drivetwin.errors import DrivetwinError
+    from drivetwin.identify.experiment.suggest import examined
     from drivetwin.identify.method import Method
     from drivetwin.identify.pipeline import identify as identify_shifts
     from drivetwin.logs.read import read_log
@@ -41,6 +43,7 @@ _HOME = {
     "DualClutch": ("driveline", "DualClutch"),
     "Method": ("identify.method", "Method"),
     "Twin": ("twin", "Twin"),
+    "examined": ("identify.experiment.suggest", "examined"),
     "find_shifts": ("shifts.find", "find_shifts"),
     "identify_shifts": ("identify.pipeline", "identify"),
     "load_card": ("vehicle.card", "load_card"),
@@ -59,6 +62,7 @@ __all__ = [
     "DualClutch",
     "Method",
     "Twin",
+    "examined",
     "find_shifts",
     "identify_shifts",
     "load_card",

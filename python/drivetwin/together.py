@@ -94,6 +94,8 @@ def identify_together(
         held = _predicted(found, card, sources, [late.shifts for _, late in splits], numbers)
     if held:
         found = replace(found, evidence={**found.evidence, "held_out": held})
+    read = [*(source.log.inputs for source in sources), card.inputs]
+    found = replace(found, inputs={name: sha for one in read for name, sha in one.items()})
     return Together(found, tuple(logs), twins)
 
 

@@ -17,6 +17,8 @@ FIXED = LockKind.FIXED
 def test_fixed_and_prior_are_known_beforehand(identified: Session, name: str) -> None:
     card = identified.work.require_card()
     assert locked(card, {name: Lock(FIXED, 0.9)}).known == {name: PriorValue(0.9)}
+    assert locked(card, {name: Lock(FIXED, 0.9)}).inputs == {}
+    assert locked(card, {}).inputs == card.inputs != {}
     prior = Lock(LockKind.PRIOR, 0.9, 0.1)
     assert locked(card, {name: prior}).known == {name: PriorValue(0.9, 0.1)}
     assert locked(locked(card, {name: prior}), {name: Lock(LockKind.FREE)}).known == {}

@@ -46,6 +46,7 @@ def test_channels_are_in_si_by_role(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     assert log.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert log.source == str(path)
+    assert log.inputs == {"log.csv": log.sha256}
     assert log.warnings == ()
 
 
@@ -79,6 +80,11 @@ def test_a_mapping_asserts_unit_sign_scale_offset_and_time(tmp_path: Path) -> No
     torque = log["output_torque"]
     assert torque.values == pytest.approx(columns()["TrqOut"])
     assert torque.time == pytest.approx(columns()["time"] + 0.02)
+    content = (tmp_path / "map.toml").read_bytes()
+    assert log.inputs == {
+        "log.csv": log.sha256,
+        "map.toml": hashlib.sha256(content).hexdigest(),
+    }
     assert log.warnings == ()
 
 
@@ -161,6 +167,7 @@ def test_bad_units(tmp_path: Path, unit: str, words: str) -> None:
         (b"PAR1", "a Parquet file cannot be read, it may be cut"),
         (b"LOGG", "a BLF bus log cannot be read, it may be cut"),
         (b"PK\x03\x04...", "zip archive or Excel workbook"),
+        (b";$FILEVERSION=2.1\n;$STARTTIME=45000.5\n", "a PCAN trace"),
     ],
 )
 def test_files_that_are_no_text_log(tmp_path: Path, data: bytes, words: str) -> None:

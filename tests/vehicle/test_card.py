@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,8 @@ def test_values_are_si_and_defaults_stand(tmp_path: Path) -> None:
     assert card.J_prime_range == (4.0, 20.0)
     assert card.J_vehicle_range == (2500.0, 6500.0)
     assert card.J_out is None
+    content = (tmp_path / "card.toml").read_bytes()
+    assert card.inputs == {"card.toml": hashlib.sha256(content).hexdigest()}
     element = card.elements["B2"]
     assert (element.P0.value, element.P0.std) == (0.8e5, 0.0)
     assert (element.gain, element.peak, element.drum_inertia) == (0.03, 1.0, PriorValue(0.0))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from drivetwin.app.jobs import Emit
 from drivetwin.errors import IdentificationError
+from drivetwin.identify.experiment.suggest import examined
 from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import identify
 from drivetwin.identify.result import Identification
@@ -73,7 +74,7 @@ def identify_all(emit: Emit, task: Task) -> None:
 def _outcome(task: Task, shifts: FoundShifts, method: Method) -> Outcome:
     found = identify(task.log, task.card, shifts, method)
     twin = Twin.from_identification(found, task.card)
-    return Outcome(method, twin, validated(found, twin, task.log))
+    return Outcome(method, twin, examined(validated(found, twin, task.log)))
 
 
 def report_of(emit: Emit, found: Identification, log: ShiftLog) -> None:

@@ -93,7 +93,7 @@ def locked(card: VehicleCard, locks: Mapping[str, Lock]) -> VehicleCard:
             card = replace(card, known=known)
         else:
             card = replace(card, known={**card.known, name: lock.prior()})
-    return card
+    return replace(card, sha256="") if locks else card
 
 
 def _on_card(card: VehicleCard, parameter_id: str) -> PriorValue | None:

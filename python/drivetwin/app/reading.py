@@ -70,14 +70,15 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     labels = {request.log: request.label, request.card: request.card_label}
     with _labelled(labels):
         refuse_expansion(request.log, request.label, MEMORY)
-        card = load_card(request.card)
+        card = replace(load_card(request.card), source=request.card_label)
         stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
         stated = replace(stated, channels={**stated.channels, **request.channels})
         looked = survey(request.log, card, stated)
     try:
         with _labelled(labels):
             mapping = _written(scratch, stated.channels, stated.options)
-            log = replace(read_log(request.log, card, mapping), source=request.label)
+            read = read_log(request.log, card, mapping)
+            log = replace(read, source=request.label, mappings={})
             found = find_shifts(log, card)
     except InputError as error:
         emit(Opened(looked, card, fault=str(error)))

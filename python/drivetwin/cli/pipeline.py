@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,7 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
 
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
+    from drivetwin.identify.experiment.suggest import examined
     from drivetwin.identify.pipeline import identify
     from drivetwin.shifts.usable import usable_shifts
     from drivetwin.twin import Twin
@@ -46,24 +47,12 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
         shifts = usable_shifts(recording, card)
     with step(f"identifying by the {method} method"):
         found = identify(recording, card, shifts, method)
-        found = replace(found, inputs={**found.inputs, **digests(vehicle, channels)})
         twin = Twin.from_identification(found, card)
     with step("simulating the shifts"):
         found = validated(found, twin, recording)
     with step("comparing experiments"):
         found = examined(found)
     return Outcome(recording, card, found, twin)
-
-
-def digests(*files: Path | None) -> dict[str, str]:
-    """File name -> SHA-256 of card and mapping."""
-    import hashlib
-
-    return {
-        file.name: hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in files
-        if file is not None
-    }
 
 
 def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
@@ -76,21 +65,3 @@ def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
         outcome.twin.save(beside / TWIN)
         save_report(beside / REPORT, outcome.found, outcome.log)
     return tuple(folder / name for name in (RESULT, TWIN, REPORT))
-
-
-def examined(found: Identification) -> Identification:
-    """The identification with the experiments that would tell what its log leaves open.
-
-    `evidence["suggestions"]` holds them; unchanged where nothing is open, or by another method.
-    """
-    from drivetwin.identify.experiment.suggest import suggest
-    from drivetwin.identify.method import Method
-    from drivetwin.identify.result import Verdict
-
-    verdicts = {one.verdict for one in found.estimates.values()}
-    if found.method is not Method.LIKELIHOOD or not verdicts & {
-        Verdict.WEAK,
-        Verdict.NOT_IDENTIFIABLE,
-    }:
-        return found
-    return replace(found, evidence={**found.evidence, "suggestions": suggest(found)})

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from drivetwin.cli.holding import held_numbers
 from drivetwin.cli.numbers import percent, quantity
 from drivetwin.cli.output import note, say, show, step, table_of
-from drivetwin.cli.pipeline import REPORT, RESULT, TWIN, digests, examined
+from drivetwin.cli.pipeline import REPORT, RESULT, TWIN
 from drivetwin.cli.staging import refuse_alike, staged
 from drivetwin.report.labels import channel_unit
 
@@ -59,6 +59,7 @@ def run(
 
     Raises the typed errors of each stage.
     """
+    from drivetwin.identify.experiment.suggest import examined
     from drivetwin.logs.read import read_log
     from drivetwin.shifts.usable import usable_shifts
     from drivetwin.together import Source, identify_together
@@ -75,10 +76,8 @@ def run(
     ]
     with step(f"identifying by the {method} method"):
         made = identify_together(sources, card, method)
-    inputs = {log.name: one.sha256 for log, one in zip(logs, read, strict=True)}
-    inputs |= digests(vehicle, channels)
     with step("comparing experiments"):
-        found = examined(replace(made.found, inputs=inputs))
+        found = examined(made.found)
     return Joined(read, replace(made, found=found))
 
 

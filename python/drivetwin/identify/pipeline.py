@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -107,7 +106,7 @@ def identify(
         method=method,
         loss_law=card.loss_law,
         validity=_validity(signals, found),
-        inputs={Path(log.source).name: log.sha256},
+        inputs={**log.inputs, **card.inputs},
         settings=_settings(card, method),
         evidence={**evidence, "signals": tuple(signals)},
         warnings=(*log.warnings, *found.warnings, *ranges),

@@ -90,7 +90,8 @@ def read_log(
         warnings += [*torque_balance(channels, card), *final_drive_held(channels, card)]
         warnings += clock_warnings(channels, card)
     warnings += torque_warnings(channels)
-    return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
+    mappings = {} if mapping is None else {Path(mapping).name: _digest(Path(mapping))}
+    return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)), mappings)
 
 
 def _refuse_unitless(

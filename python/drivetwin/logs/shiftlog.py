@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +116,8 @@ class Channel:
 class ShiftLog(Shown):
     """All mapped channels of one recording, by role.
 
+    `source` is its file and `sha256` that of the content, `mappings` the SHA-256 by name of the
+    mapping file that it was read with.
     Raises TimeError where the time of a channel reaches beyond LATEST, as stamps from 1970 do.
     """
 
@@ -122,6 +125,12 @@ class ShiftLog(Shown):
     source: str
     sha256: str
     warnings: tuple[str, ...] = field(default=())
+    mappings: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def inputs(self) -> dict[str, str]:
+        """SHA-256 by name of all files that the channels come from."""
+        return {Path(self.source).name: self.sha256, **self.mappings}
 
     def __post_init__(self) -> None:
         for channel in self.channels.values():

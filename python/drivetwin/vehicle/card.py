@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 from drivetwin.errors import CardError
@@ -61,6 +62,7 @@ def load_card(path: Path | str) -> VehicleCard:
         source=str(path),
         known={} if file.eta is None else {"eta": file.eta.prior()},
         converter=None if file.converter is None else file.converter.spec(),
+        sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 from drivetwin.converter import Converter
@@ -78,6 +79,8 @@ class VehicleCard:
     is the inertia of the output side before the shaft (Jo' without drums), None if unknown.
     `sensors` and `channels` go by channel role. `known` is what else is known, by parameter id (see
     parameters.py). `converter` is the map of the torque converter, None where the card has none.
+    `source` is the file that it was read from and `sha256` that of its content; both empty where
+    it is from none, the latter also where it was changed since.
     """
 
     name: str
@@ -94,6 +97,12 @@ class VehicleCard:
     source: str = ""
     known: Mapping[str, PriorValue] = field(default_factory=dict)
     converter: Converter | None = None
+    sha256: str = ""
+
+    @property
+    def inputs(self) -> dict[str, str]:
+        """SHA-256 by name of the file that the card was read from; empty without one."""
+        return {Path(self.source).name: self.sha256} if self.sha256 else {}
 
     def gear(self, name: str) -> Gear:
         """Return the gear of this name; raises CardError if the card has none."""

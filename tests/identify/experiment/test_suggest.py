@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.experiment.catalogue import Experiment
-from drivetwin.identify.experiment.suggest import LEAST_KNOWN, suggest
+from drivetwin.identify.experiment.suggest import LEAST_KNOWN, examined, suggest
 from drivetwin.identify.result import Verdict
 from tests.identify.asked import by_the_paper, stepped, still
 
@@ -63,3 +63,12 @@ def test_what_sensors_decide_no_experiment_narrows() -> None:
 def test_other_methods_have_no_information_to_compare() -> None:
     with pytest.raises(IdentificationError, match="likelihood"):
         suggest(by_the_paper())
+
+
+def test_an_identification_takes_up_what_would_tell_it_more() -> None:
+    told = examined(still())
+    assert [one.parameter for one in told.evidence["suggestions"]][:1] == ["te_delay"]
+    assert examined(by_the_paper()) is by_the_paper()
+    known = {n: e for n, e in still().estimates.items() if e.verdict is Verdict.IDENTIFIED}
+    sure = replace(still(), estimates=known)
+    assert examined(sure) is sure

@@ -13,7 +13,7 @@ leave open no experiment narrows.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from drivetwin.identify.experiment.catalogue import Base, Experiment, Planned, p
 from drivetwin.identify.likelihood.derived import parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.method import Method
 from drivetwin.identify.momentum import MomentumSettings
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Z95, Estimate, Identification, Verdict
@@ -85,6 +86,18 @@ def suggest(found: Identification) -> tuple[Suggestion, ...]:
     with part(0.0, 0.9, "experiments"):
         gains = _gains(fit, signals)
     return tuple(_suggestion(one, fit, signals, gains) for one in (*open_, *least))
+
+
+def examined(found: Identification) -> Identification:
+    """The identification with the experiments that would tell what its log leaves open.
+
+    `evidence["suggestions"]` holds them, as `suggest` gives them; unchanged where nothing is open,
+    or by another method than the likelihood.
+    """
+    is_open = any(one.verdict in _OPEN for one in found.estimates.values())
+    if found.method is not Method.LIKELIHOOD or not is_open:
+        return found
+    return replace(found, evidence={**found.evidence, "suggestions": suggest(found)})
 
 
 def _relative_width(one: Estimate) -> float:
