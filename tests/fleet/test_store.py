@@ -126,6 +126,20 @@ def test_what_is_no_store_is_told(tmp_path: Path) -> None:
         Store(tmp_path)
 
 
+def test_a_damaged_index_may_be_removed(tmp_path: Path) -> None:
+    with Store(tmp_path / "a", write=True) as store:
+        _fill(store, range(3))
+    index = tmp_path / "a" / "index.sqlite"
+    index.write_bytes(index.read_bytes()[:3000])
+    for write in (True, False):
+        with pytest.raises(StoreError, match="is damaged") as told:
+            Store(tmp_path / "a", write=write)
+        assert "remove the file" in told.value.remedy
+    index.unlink()
+    with Store(tmp_path / "a", write=True) as store:
+        assert store.index.count(State.DONE) == 0
+
+
 def test_a_store_of_another_format_is_told(tmp_path: Path) -> None:
     with Store(tmp_path / "a", write=True):
         pass

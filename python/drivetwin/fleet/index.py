@@ -22,6 +22,7 @@ from drivetwin.fleet.task import GO_ON, Outcome, ShiftRow, State
 
 INDEX = "index.sqlite"
 _FORMAT = 1
+_ANEW = "remove the file and run the same command again: all logs are then done anew"
 _AFTER_HEX = "g"
 """Sorts behind every key that goes on with a hexadecimal digit."""
 _SCHEMA = """
@@ -241,6 +242,8 @@ class Index:
             text = str(fault)
             if "readonly" in text or "full" in text:
                 text, remedy = f"the store cannot be written: {text}", GO_ON
+            elif "malformed" in text:
+                text, remedy = f"the index is damaged: {text}", _ANEW
             else:
                 text = f"the index cannot be used: {text}"
                 remedy = "check its permissions and that it is an index of drivetwin"

@@ -40,9 +40,13 @@ class Store:
                 "this is no store of a fleet", "make one with `drivetwin fleet LOGS -o STORE`",
                 Where(file=str(folder)),
             )  # fmt: skip
-        self.index = Index(self.folder / INDEX, write=write)
-        if write:
-            self._repair()
+        try:
+            self.index = Index(self.folder / INDEX, write=write)
+            if write:
+                self._repair()
+        except BaseException:
+            self._release()
+            raise
 
     def __enter__(self) -> Self:
         return self
@@ -56,8 +60,11 @@ class Store:
         try:
             self.index.close()
         finally:
-            if self._lock is not None:
-                self._lock.close()
+            self._release()
+
+    def _release(self) -> None:
+        if self._lock is not None:
+            self._lock.close()
 
     def _claim(self) -> None:
         """Become the only writer. The lock is SQLite's: it ends with the process, however it ends,
