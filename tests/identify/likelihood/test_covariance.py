@@ -57,6 +57,15 @@ def test_without_input_noise_the_sensors_weigh_alone() -> None:
     assert not np.any(sensor_noise(part.record).driven(residual))
 
 
+def test_pressures_count_beside_a_still_engine_torque_and_no_output_torque() -> None:
+    part, point = _short()
+    speeds = tuple(one for one in part.record.outputs if one.name.endswith("speed"))
+    silent = {**part.record.input_sigma, TORQUE: 0.0}
+    record = replace(part.record, outputs=speeds, input_sigma=silent)
+    weighted = Part.unweighted(part.structure, record).weighted_by(point)
+    assert weighted.weighting.path is not None
+
+
 def test_expected_inputs_move_back_towards_the_truth() -> None:
     found = fitted(0)
     part = found.problem.parts[0]

@@ -122,10 +122,15 @@ def _power(record: Record, response: Response) -> dict[str, FloatArray]:
 def _process(
     model: DualClutch, record: Record, response: Response, power: dict[str, FloatArray]
 ) -> FloatArray:
-    """Process noise (N, 4, 4) that enters between a grid point and the one before; first: start."""
+    """Process noise (N, 4, 4) that enters between a grid point and the one before; first: start.
+
+    Where the log has no output torque, its noise counts as that which the shaft turns the noise of
+    the output speed into.
+    """
     sigma = {out.name: out.sigma for out in record.outputs}
     wheel = sigma.get("wheel_speed", sigma["output_speed"] / model.i_f)
-    torque = sigma.get("output_torque", record.input_sigma["engine torque"])
+    impedance = float(np.sqrt(model.k_o * model.J_out))
+    torque = sigma.get("output_torque", impedance * sigma["output_speed"])
     quiet = QUIET * np.array(
         [sigma["engine_speed"], sigma["output_speed"], wheel, torque / model.k_o]
     )
