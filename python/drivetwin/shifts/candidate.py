@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.logs.shiftlog import Channel, ShiftLog, open_ends
+from drivetwin.logs.units import BAR
 from drivetwin.shifts.boundaries import Boundary, break_away, lock_up
 from drivetwin.shifts.flags import flag_before
 from drivetwin.shifts.held import Run
@@ -205,7 +206,7 @@ def _pressure_start(
     if grip.max() < P0.value - margin:
         raise CandidateRefusedError(
             f"pressures contradict the speeds: {oncoming} locks, but its pressure is only "
-            f"{grip.max():.4g} Pa then, below P0 = {P0.value:.4g} Pa"
+            f"{grip.max() / BAR:.3g} bar then, below P0 = {P0.value / BAR:.3g} bar"
         )
     onset = pressure_onset(pressure, (P0.value, P0.std), begin.time)
     if onset is not None:
@@ -214,8 +215,8 @@ def _pressure_start(
     if len(rest) and rest.min() > P0.value + margin:
         raise CandidateRefusedError(
             f"pressures contradict the speeds: {offgoing} holds the gear, but the pressure of "
-            f"{oncoming} is never below {rest.min():.4g} Pa from {earliest:.3f} s on, above "
-            f"P0 = {P0.value:.4g} Pa; is it absolute, or in another unit?"
+            f"{oncoming} is never below {rest.min() / BAR:.3g} bar from {earliest:.3f} s on, above "
+            f"P0 = {P0.value / BAR:.3g} bar; is it absolute, or in another unit?"
         )
     if onset is not None and onset.time <= begin.time:
         return onset, ()
