@@ -38,6 +38,7 @@ _REFUSED = {
     b"\x89HDF": "an HDF5 file without MATLAB header",
     b"PK\x03\x04": "a zip archive or Excel workbook",
     b"\x1f\x8b": "a gzip archive",
+    b";$FILEVERSION": "a PCAN trace",
 }
 """First bytes of formats that are told by name instead of `binary`."""
 
@@ -67,7 +68,8 @@ def _opener(head: bytes, path: Path) -> Opener:
         if head.startswith(magic):
             raise FileFormatError(
                 f"this is {name}, for which there is no reader",
-                "export the channels as CSV with a row of units, MDF 4, MATLAB or Parquet",
+                "export the channels as CSV with a row of units, MDF 4, MATLAB or Parquet, frames of "
+                "a bus as ASC, BLF or candump",
                 Where(file=str(path)),
             )
     return open_bus_text if is_bus_text(head) else _open_csv
