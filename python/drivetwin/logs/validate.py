@@ -259,7 +259,10 @@ def check_order(time: FloatArray, where: Where) -> None:
 
 
 def _time_remedy(time: FloatArray, backward: NDArray[np.intp]) -> str:
-    """What to do about stamps that run backward; a counter that starts again goes on from there."""
+    """What to do about stamps that run backward; a counter that starts again goes on from there.
+
+    Where many repeat the one before and none lies behind it, they were rounded.
+    """
     later = np.minimum(backward + MIN_SAMPLES, time.size - 1)
     if backward.size <= MAX_WRAPS and np.all(time[later] < time[backward]):
         index = int(backward[0])
@@ -268,6 +271,8 @@ def _time_remedy(time: FloatArray, backward: NDArray[np.intp]) -> str:
             f"a time counter that starts again after {wrapped:.6g} s, or two recordings in one "
             "file: export with a running clock, or cut the file there"
         )
+    if backward.size > MAX_WRAPS and np.all(time[backward + 1] == time[backward]):
+        return "export the stamps with more decimals, or remove the repeated samples"
     return (
         "remove the repeated or misplaced samples, or map the right time column: "
         'time = { source = "...", unit = "s" }'
