@@ -167,7 +167,6 @@ def test_bad_units(tmp_path: Path, unit: str, words: str) -> None:
         (b"PAR1", "a Parquet file cannot be read, it may be cut"),
         (b"LOGG", "a BLF bus log cannot be read, it may be cut"),
         (b"PK\x03\x04...", "zip archive or Excel workbook"),
-        (b";$FILEVERSION=2.1\n;$STARTTIME=45000.5\n", "a PCAN trace"),
     ],
 )
 def test_files_that_are_no_text_log(tmp_path: Path, data: bytes, words: str) -> None:

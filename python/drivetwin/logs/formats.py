@@ -68,8 +68,8 @@ def _opener(head: bytes, path: Path) -> Opener:
         if head.startswith(magic):
             raise FileFormatError(
                 f"this is {name}, for which there is no reader",
-                "export the channels as CSV with a row of units, MDF 4, MATLAB or Parquet, frames of "
-                "a bus as ASC, BLF or candump",
+                "export the channels as CSV with a row of units, MDF 4, MATLAB or Parquet, frames "
+                "of a bus as ASC, BLF or candump",
                 Where(file=str(path)),
             )
     return open_bus_text if is_bus_text(head) else _open_csv
