@@ -277,6 +277,33 @@ fn what_is_let_go_beside_redundant_locks_has_overcome_its_static_capacity() {
 }
 
 #[test]
+fn a_member_heavier_than_the_others_beyond_measure_is_held_like_them() {
+    for inertia_of_c in [1.0, 1e6, 1e12, 1e18] {
+        let network = compile(vec![
+            inertia("a", 1.0),
+            inertia("b", 1.0),
+            inertia("c", inertia_of_c),
+            torque("a", "T"),
+            Element::Clutch(clutch("brake", "c", "ground")),
+            Element::Clutch(clutch("one", "b", "c")),
+            Element::Clutch(clutch("other", "c", "a")),
+        ]);
+        let pressures = ["P brake", "P one", "P other"].map(|name| constant(name, 9.0, 1.0));
+        let [brake, one, other] = pressures;
+        let signals = [constant("T", 5.0, 1.0), brake, one, other];
+        let outputs = ["brake", "one", "other"].map(friction_torque);
+        let rest = start(&[("a", 0.0), ("b", 0.0), ("c", 0.0)], &[]);
+        let run = simulate(&network, &signals, &rest, &grid(1.0, 11), &outputs);
+        assert_eq!(run.status, Status::Completed);
+        assert!(run.events.is_empty(), "{:?}", run.events);
+        let held = run.columns.iter().map(|column| column[5].abs());
+        for (held, expected) in held.zip([5.0, 0.0, 5.0]) {
+            assert!((held - expected).abs() < 1e-9, "{held} at {inertia_of_c} kg m²");
+        }
+    }
+}
+
+#[test]
 fn a_load_that_ends_at_nothing_is_vented_there() {
     let brake = clutch("brake", "shaft", "ground");
     for (p0, knots) in [(0.0, 5), (0.0, 101), (0.0, 1001), (7.1, 5), (7.1, 101), (7.1, 1001)] {

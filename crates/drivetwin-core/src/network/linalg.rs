@@ -6,6 +6,7 @@
 
 use crate::number::{Number, Values};
 use smallvec::SmallVec;
+use std::ops::Range;
 
 /// A dense row-major matrix.
 #[derive(Clone, Debug, PartialEq)]
@@ -166,22 +167,23 @@ impl<T> std::ops::IndexMut<(usize, usize)> for Matrix<T> {
 }
 
 /// Solve `a x = b` for a square matrix; `Err(column)` where the matrix is singular to `1e-12`
-/// of its row scale: of each row by itself, as some members have next to no mass. Sparse matrices are solved
-/// in fewer operations.
+/// of its row scale: of each row by itself, as some members have next to no mass. Pivots are the largest by
+/// the same measure. Sparse matrices are solved in fewer operations.
 pub fn solve<T: Number>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usize> {
     let mut x = b;
     let largest = |row: &[T]| {
         let floor = T::Values::of(f64::MIN_POSITIVE);
         row.iter().fold(floor, |largest, v| v.re().magnitude().larger(largest))
     };
-    let mut scales: SmallVec<[_; 8]> = (0..a.rows).map(|i| largest(a.row(i))).collect();
+    let one = T::Values::of(1.0);
+    let mut weights: SmallVec<[_; 8]> = (0..a.rows).map(|i| one / largest(a.row(i))).collect();
     for c in 0..a.rows {
-        let pivot = largest_in_column(&a, c, c);
-        let size = a[(pivot, c)].re().magnitude();
-        if size.decide_with(scales[pivot], |size, scale| size <= 1e-12 * scale) {
+        let size = |i: usize| a[(i, c)].re().magnitude() * weights[i];
+        let pivot = largest_of(size, c..a.rows);
+        if size(pivot).decide(|size| size <= 1e-12) {
             return Err(c);
         }
-        scales.swap(c, pivot);
+        weights.swap(c, pivot);
         a.swap_rows(c, pivot);
         x.swap_rows(c, pivot);
         let inverse = a[(c, c)].recip();
@@ -211,8 +213,9 @@ pub fn eliminate<T: Number>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
         if row == a.rows {
             break;
         }
-        let pivot = largest_in_column(a, column, row);
-        if a[(pivot, column)].re().magnitude().decide_with(least, |entry, least| entry <= least) {
+        let size = |i: usize| a[(i, column)].re().magnitude();
+        let pivot = largest_of(size, row..a.rows);
+        if size(pivot).decide_with(least, |entry, least| entry <= least) {
             continue;
         }
         a.swap_rows(row, pivot);
@@ -329,12 +332,12 @@ fn orthogonalised<T: Number>(a: &Matrix<T>) -> Orthogonalised<T> {
     Orthogonalised { kept, q, l }
 }
 
-fn largest_in_column<T: Number>(a: &Matrix<T>, c: usize, from: usize) -> usize {
-    let size = |i: usize| a[(i, c)].re().magnitude();
+/// The row of the largest size; of equal ones the last.
+fn largest_of<V: Values>(size: impl Fn(usize) -> V, rows: Range<usize>) -> usize {
     let larger = |i: usize, j: usize| {
         if size(j).decide_with(size(i), |of_j, of_i| of_j >= of_i) { j } else { i }
     };
-    (from + 1..a.rows).fold(from, larger)
+    (rows.start + 1..rows.end).fold(rows.start, larger)
 }
 
 /// Subtract a multiple of row `source` from row `target`, from column `from` on.

@@ -379,8 +379,10 @@ fn holding_torque<T: Number>(
     weights: impl FnOnce() -> Vec<T>,
     stuck: usize,
 ) -> (Matrix<T>, bool) {
-    if independent_rows(&w).len() == w.rows {
-        return (solve(w, b).expect("independent rows"), false);
+    if independent_rows(&w).len() == w.rows
+        && let Ok(torque) = solve(w.clone(), b.clone())
+    {
+        return (torque, false);
     }
     let weights = weights();
     let order: Vec<usize> = (stuck..w.rows).chain(0..stuck).collect();
