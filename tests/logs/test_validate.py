@@ -39,7 +39,7 @@ def test_time_must_increase() -> None:
         check_channel(channel("input_speed", ramp(100, 150), time=time), "log.csv")
     assert "sample 40 repeats the stamp before it" in caught.value.what
     assert caught.value.where.time == 0.39
-    rounded = np.arange(100) // 10 * 0.1
+    rounded: FloatArray = np.repeat(np.linspace(0.0, 0.9, 10), 10)
     with pytest.raises(TimeError) as caught:
         check_channel(channel("input_speed", ramp(100, 150), time=rounded), "log.csv")
     assert "more decimals" in caught.value.remedy

@@ -113,7 +113,7 @@ def check_channel(channel: Channel, file: str) -> Checked:
     channel = _without(channel, found, warnings)
     _check_count(channel, total, where)
     _check_variation(channel, where)
-    for look in (_dropouts, _spikes, _pulses, _stuck, _beyond, _clipped):
+    for look in (_dropouts, _spikes, _stuck, _beyond, _pulses, _clipped):
         channel = _without(channel, look(channel), warnings)
         _check_count(channel, total, where)
     _check_magnitude(channel, where)
