@@ -32,7 +32,8 @@ GRID = 1e-3
 SLOW = 1.5 * GRID
 """Distance of outputs' stamps [s] above which there are points of the grid between them."""
 FLOOR = 2e-5
-"""Least noise of a compared signal as a share of its range: what an ideal sensor is given."""
+"""Least noise of a compared signal as a share of its range, and of an input as a share of its
+largest value: what an ideal sensor is given. With none at all the weighting loses its digits."""
 
 
 @dataclass(frozen=True)
@@ -247,9 +248,14 @@ def record_of(signals: ShiftSignals, span: Span) -> Record:
         outputs,
         _held(replace(torque, values=local_mean(torque))),
         np.pad(bend_of(torque.time, torque.values), 1),
-        {TORQUE: torque.sigma} | {n: p.sigma for n, p in signals.pressures.items()},
+        {TORQUE: _noise(torque)} | {n: _noise(p) for n, p in signals.pressures.items()},
         {name: p.values - smooth[name] for name, p in signals.pressures.items()},
     )
+
+
+def _noise(of_input: Sampled) -> float:
+    """Noise of an input's samples, no less than an ideal sensor's."""
+    return max(of_input.sigma, FLOOR * float(np.max(np.abs(of_input.values))))
 
 
 def _filled(time: FloatArray) -> FloatArray:

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: MIT
+"""What a fit sees of a shift."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from drivetwin.identify.likelihood.record import FLOOR, TORQUE, record_of
+from tests.identify.likelihood.made import bench
+
+
+@pytest.mark.parametrize("level", [0.0, 1500.0])
+def test_an_input_without_noise_has_that_of_an_ideal_sensor(level: float) -> None:
+    signals = bench().signals
+    torque = signals.engine_torque
+    values = torque.values if level == 0.0 else 0.0 * torque.values + level
+    exact = replace(signals, engine_torque=replace(torque, values=values, sigma=0.0))
+    record = record_of(exact, (signals.shift.before[0], signals.shift.after[1]))
+    assert record.input_sigma[TORQUE] == pytest.approx(FLOOR * abs(values).max())
+    for name, pressure in signals.pressures.items():
+        assert record.input_sigma[name] == pressure.sigma
