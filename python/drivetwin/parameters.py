@@ -45,7 +45,7 @@ _SPECS = (
     ),
     ParameterSpec("J_out", "Jo′", "kg*m^2", "output side before the shaft (eq. 7)", 0.0, 1e4),
     ParameterSpec("J_vehicle", "J3", "kg*m^2", "vehicle inertia at the wheel (eq. 9, 11)", 0, 1e7),
-    ParameterSpec("Tv_over_if", "Tv/if", "N*m", "load torque over final drive", -1e6, 1e6, "log"),
+    ParameterSpec("Tv_over_if", "T_v/i_f", "N*m", "load torque over final drive", -1e6, 1e6, "log"),
     ParameterSpec("k_o", "k_o", "N*m/rad", "output shaft stiffness (eq. 8, 14)", 0.0, 1e9),
     ParameterSpec("c_o", "c_o", "N*m*s/rad", "output shaft damping (eq. 8, 14)", 0.0, 1e7),
     ParameterSpec("f_d", "f_d", "Hz", "frequency of the lock-up oscillation", 0.0, 1e3, "gear"),
