@@ -69,7 +69,15 @@ def test_without_pressures_the_bands_widen_and_hold(bench: Bench) -> None:
     assert _deviates(one.clutch_torque["B3"], truth["torque.B3"]) < 2.0
     slipping = (one.time > shift.inertia_phase[0]) & (one.time < shift.lockup_time)
     assert one.clutch_torque["B3"].std[slipping].mean() > full.clutch_torque["B3"].std.mean()
-    assert "no pressures" in one.notes[0]
+    assert one.notes[0].startswith("no pressure of B2 and B3:")
+
+
+def test_a_single_pressure_is_not_used_and_the_missing_one_is_named(bench: Bench) -> None:
+    """The split of the torque between the elements needs both."""
+    single = observed(bench.twin, _without(bench.log, "pressure.B2"), bench.shift)
+    none = observed(bench.twin, _without(bench.log, "pressure."), bench.shift)
+    assert single.notes[0].startswith("no pressure of B2:")
+    assert np.array_equal(single.output_torque.value, none.output_torque.value)
 
 
 def test_a_twin_without_scale_is_refused(bench: Bench) -> None:

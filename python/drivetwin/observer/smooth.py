@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.driveline import DualClutch
+from drivetwin.logs.roles import PRESSURE
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.course import Recorded, course_of, recorded, slip_of
 from drivetwin.observer.mechanics import (
@@ -98,14 +99,16 @@ def smooth(twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
         time,
         bands.pop("output_torque"),
         bands,
-        _notes(setting.seen),
+        _notes(setting.seen, log),
     )
 
 
-def _notes(seen: Recorded) -> tuple[str, ...]:
+def _notes(seen: Recorded, log: ShiftLog) -> tuple[str, ...]:
     texts = []
     if not seen.pressures:
-        texts.append("no pressures: clutch torques follow from the speeds alone")
+        elements = seen.shift.offgoing, seen.shift.oncoming
+        missing = " and ".join(name for name in elements if PRESSURE + name not in log)
+        texts.append(f"no pressure of {missing}: clutch torques follow from the speeds alone")
     if "wheel_speed" not in seen.speeds:
         texts.append("no wheel speed: what lies behind the shaft follows from the model")
     return tuple(texts)
