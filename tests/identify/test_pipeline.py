@@ -16,7 +16,7 @@ from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.likelihood.conclude import WITH_ETA, conclude
 from drivetwin.identify.literal import PaperShift
 from drivetwin.identify.method import Method
-from drivetwin.identify.pipeline import identify
+from drivetwin.identify.pipeline import ALL_BEFORE_LOSS, identify
 from drivetwin.identify.result import Identification, Verdict
 from drivetwin.logs.read import read_log
 from drivetwin.logs.shiftlog import ShiftLog
@@ -171,6 +171,13 @@ def test_sensor_tolerances_widen_the_total_interval_only() -> None:
         assert wide.std_systematic == pytest.approx(0.01 * wide.value, rel=0.1)
     curve, before = found.friction["B3"], strict.friction["B3"]
     assert np.all(curve.mu_hi - curve.mu_lo > before.mu_hi - before.mu_lo)
+
+
+def test_the_law_that_could_tell_the_gearbox_side_apart_says_that_it_is_not() -> None:
+    log, card, shifts = recording("truck_a")
+    other = identify(log, replace(card, loss_law="dissipative"), shifts, Method.INTEGRAL)
+    assert ALL_BEFORE_LOSS in other.assumptions
+    assert ALL_BEFORE_LOSS not in identified("truck_a", Method.INTEGRAL).assumptions
 
 
 def test_refusals() -> None:

@@ -46,6 +46,11 @@ GAVE_UP = (
     "of the integral method: no simulation with such parameters follows the log within its noise"
 )
 """Why a value is not identified where the likelihood method has found no plausible minimum."""
+ALL_BEFORE_LOSS = (
+    "all of J′ but Jo′ turns before the loss of the gears: an input side of the gearbox J2e makes "
+    "J′ wrong by up to J2e·(1/η² - 1) where the log both drives and overruns"
+)
+"""What the law `dissipative` could tell apart and the unknowns do not (THEORY section 3)."""
 LOADS = {
     False: "is constant over the log",
     True: "grows with the square of the wheel speed and else is constant over the log",
@@ -306,6 +311,8 @@ def _assumptions(card: VehicleCard, method: Method, growing: bool) -> tuple[str,
         texts.append("T_c = T_o/i_out in the inertia phase (eq. 16), P0 as on the card")
     else:
         texts.append("sensor noise is white, at the level found in the log")
+    if card.loss_law == "dissipative":
+        texts.append(ALL_BEFORE_LOSS)
     if not card.sensors:
         texts.append("no sensor gain or offset tolerance is stated: intervals cover noise only")
     texts += [
