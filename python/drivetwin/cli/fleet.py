@@ -16,7 +16,7 @@ from drivetwin.identify.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
     from drivetwin.fleet.events import Summary
-    from drivetwin.fleet.joint.result import Change, JointEstimate
+    from drivetwin.fleet.joint.result import Change, JointEstimate, UnitValue
 
 RUN = "run"
 
@@ -228,20 +228,40 @@ def _print_estimates(found: list[JointEstimate]) -> None:
     for one in found:
         for change in one.changes:
             note(_change(one, change))
+        for member in one.units:
+            if member.odd:
+                note(_odd(one, member))
         for outlier in one.outliers:
             note(f"{one.parameter}: {Path(outlier.path).name}: {outlier.reason}")
 
 
 def _change(one: JointEstimate, change: Change) -> str:
     """What happened to a unit, in words."""
-    from drivetwin.cli.numbers import shown
     from drivetwin.fleet.readings import span_text
-    from drivetwin.identify.result import Z95
 
-    ends = (change.size - Z95 * change.std, change.size + Z95 * change.std)
-    step = " ".join(shown(change.size, ends, one.si_unit)).removesuffix(" –")
+    step = _with_error(one, change.size, change.std)
     where = span_text(change.field, change.before, change.after)
     return f"{one.parameter}: unit {change.unit} changed by {step} between {where}"
+
+
+def _odd(one: JointEstimate, unit: UnitValue) -> str:
+    """How far a unit is from the others, in words."""
+    from drivetwin.fleet.figures import unit_label
+
+    return (
+        f"{one.parameter}: unit {unit_label(one, unit)} is "
+        f"{_with_error(one, unit.deviation, unit.std)} off, {abs(unit.score or 0.0):.1f} standard "
+        "deviations of the units; it counts in value and spread"
+    )
+
+
+def _with_error(one: JointEstimate, size: float, std: float) -> str:
+    """A difference with its 95 % interval and unit."""
+    from drivetwin.cli.numbers import shown
+    from drivetwin.identify.result import Z95
+
+    ends = (size - Z95 * std, size + Z95 * std)
+    return " ".join(shown(size, ends, one.si_unit)).removesuffix(" –")
 
 
 def _drift(one: JointEstimate) -> tuple[str, str, str]:

@@ -282,7 +282,8 @@ def _odd(store: Store, found: Sequence[JointEstimate], folder: Path) -> Section:
     ]  # fmt: skip
     if units:
         head = cells("unit", "parameter", "deviation ± 95 %", "standard deviations of the units")
-        blocks.append(TableBlock("Units beyond what chance makes.", head, units))
+        caption = "Units beyond what chance makes. They count in shared value and spread."
+        blocks.append(TableBlock(caption, head, units))
     logs = [
         (
             Cell(Path(outlier.path).name, href=single(store, outlier.log, folder)),

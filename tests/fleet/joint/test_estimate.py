@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivetwin.cli import main
 from drivetwin.fleet import parts
 from drivetwin.fleet.index import FileRow
 from drivetwin.fleet.joint.estimate import estimate, joint_estimates
@@ -112,6 +113,15 @@ def test_a_unit_beyond_the_others_is_odd(found: dict[str, JointEstimate]) -> Non
     odd = [(unit.unit, unit.since is None) for unit in found["mu.B3"].units if unit.odd]
     assert odd == [("T4", True), ("T7", False)]
     assert not any(unit.odd for unit in found["eta"].units)
+
+
+def test_an_odd_unit_is_told_by_the_command(
+    store: Store, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fleet", "estimate", str(store.folder), "--parameter", "mu.B3"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "mu.B3: unit T4 is 0.0" in told
+    assert "it counts in value and spread" in told
 
 
 def test_a_stray_log_is_named_with_the_reason(found: dict[str, JointEstimate]) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drivetwin.fleet.joint.changes import Step, find_steps
 from drivetwin.fleet.joint.mixed import FloatArray, IntArray, MixedFit, Observations, fit
 from drivetwin.fleet.joint.observed import LogFacts, Observed, facts, observed
-from drivetwin.fleet.joint.outliers import limit, roughly_sound, unit_scores
+from drivetwin.fleet.joint.outliers import limit, roughly_sound, unit_limit, unit_scores
 from drivetwin.fleet.joint.reasons import reasons
 from drivetwin.fleet.joint.result import (
     Change,
@@ -290,7 +290,7 @@ def _units(end: _Settled) -> tuple[UnitValue, ...]:
         return ()
     deviation = end.fit.deviation[:, 0]
     scores = unit_scores(deviation)
-    bound = limit(deviation.size)
+    bound = unit_limit(deviation.size)
     owner = {int(g): int(u) for g, u in zip(end.group, end.data.unit, strict=True)}
     return tuple(
         UnitValue(
