@@ -3,12 +3,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from drivetwin.identify.several.consistency import Consistency, Pull, homogeneity
+from drivetwin.identify.several.consistency import (
+    Consistency,
+    Pull,
+    homogeneity,
+    noise_power,
+    shared_of,
+)
 from drivetwin.identify.several.fit import Several
 from tests.identify.several.made import loaded, together
 
@@ -51,6 +61,19 @@ def test_logs_that_tell_different_things_cannot_disagree() -> None:
 def _tested(several: object) -> Consistency:
     assert isinstance(several, Several)
     return several.consistency
+
+
+def test_slow_noise_of_a_sensor_counts_before_logs_disagree() -> None:
+    fit = together().found.evidence["likelihood"]
+    shared = shared_of(fit)
+    assert noise_power(fit, shared) == pytest.approx(max(fit.chi2, 1.0), rel=1e-6)
+    rng = np.random.default_rng(1)
+    slow = []
+    for part in fit.problem.parts:
+        noise = rng.standard_normal(part.record.size)
+        slow.append(part.record.sigma * lfilter([np.sqrt(0.19)], [1.0, -0.9], noise))
+    loud = replace(fit, normal=replace(fit.normal, residuals=tuple(slow)))
+    assert noise_power(loud, shared) > 2.0
 
 
 def test_logs_of_one_vehicle_agree() -> None:
