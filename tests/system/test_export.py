@@ -151,12 +151,14 @@ def test_an_edited_parameter_file_drives_the_simulation(
         place = lines.index(f"FESTWERT {name}") + 4
         assert lines[place].startswith("  WERT ")
         lines[place] = f"  WERT {value}"
+    lines += ["TEXTSTRING remark", '  TEXT "softer shaft"', "END"]
     exported.write_text("\n".join(lines), "ascii")
     capsys.readouterr()
     softer = traces(given, tmp_path / "softer.csv")
     told = capsys.readouterr().err
     assert "twin.dcm changes k_o\n" in told
     assert "no simulation depends on f_d_3\n" in told
+    assert "neither number nor curve: TEXTSTRING remark\n" in told
     assert np.abs(softer[:, 1] - plain[:, 1]).max() > 50.0
 
 

@@ -90,12 +90,15 @@ def _edited(twin: Twin, parameters: Path) -> Twin:
     from drivetwin.export.parameters.files import read_parameters
     from drivetwin.export.parameters.to_twin import updated
 
-    update = updated(twin, read_parameters(parameters))
+    content = read_parameters(parameters)
+    update = updated(twin, content)
     typer.echo(f"{parameters.name} changes {', '.join(update.changed) or 'nothing'}", err=True)
     if update.idle:
         typer.echo(f"no simulation depends on {', '.join(update.idle)}", err=True)
     if update.unknown:
         typer.echo(f"not of this twin: {', '.join(update.unknown)}", err=True)
+    if content.skipped:
+        typer.echo(f"neither number nor curve: {', '.join(content.skipped)}", err=True)
     return update.twin
 
 
