@@ -186,6 +186,25 @@ def test_numbers_far_beyond_all_others_are_found_at_the_ends(value: float) -> No
     assert beyond(TIME, released) is None
 
 
+@pytest.mark.parametrize("every", [1, 10])
+@pytest.mark.parametrize("noise", [0.0, 0.03])
+def test_a_fill_pulse_is_a_pressure(every: int, noise: float) -> None:
+    """In bar: 6 for 120 ms, held at 0.9, raised to 2.5; and another that begins before the log."""
+    time = np.linspace(0.0, 4.0, 4001)[::every]
+    course = np.interp(time, [1.4, 2.0], [0.9, 2.5]) * (time >= 1.12)
+    course += np.random.default_rng(5).normal(0.0, noise, time.size)
+    filled = np.where((time >= 1.0) & (time < 1.12), 6.0, course)
+    assert beyond(time, filled, possible=100.0) is None
+    released = np.where(time < 0.2, 14.0, course)
+    assert beyond(time, released, possible=100.0) is None
+    # No value was there at rest, on the way up, or no such pressure exists.
+    for moment, number in ((0.5, 65.5), (1.6, 65.5), (1.0, 655.0), (0.5, -9.0)):
+        lost = (time >= moment) & (time < moment + 0.12)
+        found = beyond(time, np.where(lost, number, course), possible=100.0)
+        assert found is not None
+        assert found.mask.tolist() == lost.tolist()
+
+
 def test_a_large_torque_that_was_measured_is_not_beyond() -> None:
     """What moves, passes through the numbers between, lasts or is sampled slowly may be true."""
     coast = np.random.default_rng(4).normal(-40.0, 3.0, TIME.size)

@@ -88,6 +88,10 @@ half, takes so many numbers at least."""
 _BEYOND_AT_END = 3.0
 """So many times as large at the start or end of a log, where it is only left or only reached."""
 
+_LIFT = 3.0
+"""A fill pulse leaves a pressure higher by so many times what it moved by before, in the same time,
+or by so many of its steps."""
+
 _CLIPPED_SAMPLES = 3
 _CLIPPED_RUNS = 3
 """A limit is reached in so many runs of so many equal samples."""
@@ -294,11 +298,12 @@ def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
     return Damage(mask, f"fell to zero {_spans(time, runs(mask))}, left out")
 
 
-def beyond(time: FloatArray, values: FloatArray) -> Damage | None:
+def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damage | None:
     """Short stretches of one number far beyond all others, entered and left in one step.
 
     Numbers that stand for no value, as -9999, and those of a message that was not received; at the
-    start of a log that of one that was not received yet.
+    start of a log that of one that was not received yet. What is positive and not above `possible`
+    may have been commanded: at the ends of the log, and where it is a fill pulse, it stays.
     """
     if float(np.median(np.diff(time))) > _BEYOND_STEP:
         return None
@@ -307,16 +312,20 @@ def beyond(time: FloatArray, values: FloatArray) -> Damage | None:
     far = np.flatnonzero(sizes[1:] > _BEYOND * sizes[:-1])
     for largest in sizes[far[sizes[far] >= np.median(size)]]:
         mask = size > largest
-        others = values[~mask]
-        if np.unique(others).size >= _OTHERS and _is_put_in(time, values, mask, float(largest)):
-            return Damage(
-                mask, f"far beyond all other numbers {_spans(time, runs(mask))}, left out"
-            )
+        found = runs(mask)
+        if (
+            np.unique(values[~mask]).size >= _OTHERS
+            and _are_put_in(time, values, found, float(largest))
+            and not any(_may_be_commanded(values, run, possible) for run in found)
+        ):
+            return Damage(mask, f"far beyond all other numbers {_spans(time, found)}, left out")
     return None
 
 
-def _is_put_in(time: FloatArray, values: FloatArray, mask: Mask, largest: float) -> bool:
-    """Whether all stretches of `mask` are one number each, short, and in the midst of others.
+def _are_put_in(
+    time: FloatArray, values: FloatArray, found: Sequence[tuple[int, int]], largest: float
+) -> bool:
+    """Whether all stretches are one number each, short, and in the midst of others.
 
     At the ends of the log they must exceed the `largest` of the others by more.
     """
@@ -324,8 +333,24 @@ def _is_put_in(time: FloatArray, values: FloatArray, mask: Mask, largest: float)
         ((start > 0 and end < values.size) or abs(values[start]) > _BEYOND_AT_END * largest)
         and time[min(end, values.size - 1)] - time[start] <= _BEYOND_TIME
         and np.all(values[start:end] == values[start])
-        for start, end in runs(mask)
+        for start, end in found
     )
+
+
+def _may_be_commanded(values: FloatArray, run: tuple[int, int], possible: float) -> bool:
+    """Whether a stretch of one number is a pulse that fills a clutch, or cut off by the log's ends.
+
+    A fill pulse comes from rest and leaves the pressure higher; where a number stands for no value,
+    the signal is in the end where its own course has brought it.
+    """
+    start, end = run
+    if not 0.0 < values[start] <= possible:
+        return False
+    if start == 0 or end == values.size:
+        return True
+    before = values[max(0, start - max(end - start, _SURROUNDINGS)) : start]
+    usual = max(float(np.ptp(before)), resolution(values))
+    return float(values[end] - values[start - 1]) > _LIFT * usual
 
 
 def clipped(time: FloatArray, values: FloatArray) -> Damage | None:

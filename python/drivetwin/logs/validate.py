@@ -203,9 +203,11 @@ def _stuck(channel: Channel) -> Damage | None:
 
 
 def _beyond(channel: Channel) -> Damage | None:
+    """Numbers that stand for no value; what a pressure can be may be the pulse of a valve."""
     if channel.quantity in AUXILIARY:
         return None
-    return _of_updates(channel, lambda fresh: beyond(fresh.time, fresh.values))
+    possible = _PLAUSIBLE[Quantity.PRESSURE][1] if channel.quantity is Quantity.PRESSURE else 0.0
+    return _of_updates(channel, lambda fresh: beyond(fresh.time, fresh.values, possible))
 
 
 def _of_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> Damage | None:
