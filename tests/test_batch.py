@@ -204,6 +204,15 @@ def test_in_any_company_a_run_is_what_it_is_alone(
         assert one.failed.get(0) == together.failed.get(int(run))
 
 
+def test_runs_with_impossible_gains_end_like_each_alone() -> None:
+    gains = 4.7e-2 * np.array([1.0, -1.0, 1.1, 0.0, -0.5, 0.9, 1.2, -2.0])
+    together = simulate_batch(MODEL, [scenario()], TIME, {"B3.gain": gains})
+    for run, gain in enumerate(gains):
+        one = simulate_batch(MODEL, [scenario()], TIME, {"B3.gain": np.array([gain])})
+        np.testing.assert_array_equal(one.values[0], together.values[run])
+        assert one.failed.get(0) == together.failed.get(run)
+
+
 def test_scenarios_on_one_model_are_what_they_are_alone() -> None:
     scenarios = [scenario(seed) for seed in range(10)]
     batch = simulate_batch(MODEL, scenarios, TIME, outputs=["engine_speed", "torque.B3"])

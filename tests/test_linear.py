@@ -11,6 +11,7 @@ import pytest
 from drivetwin.driveline import (
     Accuracy,
     DualClutch,
+    FrictionTable,
     RoadLoad,
     ShiftElement,
     Signal,
@@ -52,6 +53,33 @@ def test_the_lock_up_oscillation_has_the_frequency_of_two_inertias_on_a_shaft() 
     assert mode.frequency == pytest.approx(
         natural * np.sqrt(1 - damping**2) / (2 * np.pi), rel=1e-9
     )
+
+
+@pytest.mark.parametrize("slip", [3.0, -13.0])
+@pytest.mark.parametrize("law", [FRICTION, FrictionTable((0.0, 10.0, 20.0), (0.1, 0.2, 0.1))])
+def test_the_slope_of_friction_is_that_of_its_law(
+    slip: float, law: Stribeck | FrictionTable
+) -> None:
+    """A clutch's torque over slip and pressure, by differences of μ itself."""
+    model = dataclasses.replace(MODEL, elements=(B2, dataclasses.replace(B3, friction=law)))
+    outputs = [("friction_torque", "B3"), ("slip", "B3")]
+    system = linearise(model, [], {"B3": Slip(slip, 5e5)}, outputs)
+    before, at, after = law.at(np.array([slip - 1e-4, slip, slip + 1e-4]))
+    sign = np.sign(slip)
+    slope = sign * B3.gain * (5e5 - B3.P0) * (after - before) / 2e-4
+    assert system.C[0] == pytest.approx(slope * system.C[1], rel=1e-6, abs=1e-9)
+    by_pressure = system.D[0, system.inputs.index("B3")]
+    assert by_pressure == pytest.approx(sign * at * B3.gain, rel=1e-9)
+
+
+def test_the_slope_of_a_bearing_is_that_of_its_table() -> None:
+    drag = {"speed": [0.0, 20.0, 100.0], "torque": [1.0, 3.0, 4.0], "peak": 1.0}
+    elements: list[Element] = [
+        {"type": "inertia", "name": "J", "node": "a", "inertia": 1.0},
+        {"type": "bearing", "name": "drag", "a": "a", "b": "ground", **drag},
+    ]
+    system = linearise(elements, [], {"drag": Slip(10.0, 0.0)}, [("speed", "a")])
+    assert system.A[0, 0] == pytest.approx(-0.1, rel=1e-9)
 
 
 def test_the_eigenfrequency_agrees_with_the_ring_down_in_time() -> None:

@@ -258,6 +258,20 @@ def test_a_prescribed_speed_tears_a_resting_brake_loose() -> None:
     assert result.events[0].time == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("speeds", [{"a": 1.0}, {"a": 1.0, "b": 3.0}])
+def test_a_prescribed_speed_goes_before_a_lock_that_contradicts_it(
+    speeds: dict[str, float],
+) -> None:
+    members = [part for node in speeds for part in (inertia(node), driven(node, f"speed {node}"))]
+    inputs = {f"speed {node}": line((0.0, at), (1.0, at)) for node, at in speeds.items()}
+    elements = [*members, clutch("c", "a", "b" if "b" in speeds else "ground")]
+    outputs: list[Output] = [("speed", node) for node in speeds]
+    result = run(elements, Start(speeds, locked=("c",)), *outputs, **inputs, pressure=ONE)
+    assert result.status == "completed"
+    for node, at in speeds.items():
+        assert np.abs(result.columns["speed", node] - at).max() < 1e-12
+
+
 def test_a_prescribed_speed_may_not_jump() -> None:
     jump = line((0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (1.0, 1.0))
     with pytest.raises(InputError, match=r"prescribes a speed and must not jump \(at 0\.5 s\)"):

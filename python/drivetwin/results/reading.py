@@ -27,7 +27,8 @@ def read_record(path: Path | str, parse: Callable[[str], Any], schema: str, mode
         tree = parse(Path(path).read_text(encoding="utf-8"))
     except OSError as fault:
         what = f"cannot read the file: {fault.strerror}"
-        raise ResultFileError(what, "check the path", where) from None
+        remedy = "check the path, or write it with `drivetwin identify`"
+        raise ResultFileError(what, remedy, where) from None
     except (ValueError, RecursionError) as fault:
         raise ResultFileError(f"cannot be read: {fault}", _AGAIN, where) from None
     if not isinstance(tree, dict):

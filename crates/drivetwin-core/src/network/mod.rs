@@ -28,4 +28,5 @@ pub use cell::Cell;
 pub use channel::Channel;
 pub use compile::{FrictionRow, LossyGear, Network};
 pub use error::CompileError;
+pub(crate) use mode::held_by;
 pub use mode::{GearBounds, GearState, Mode, ModeKey, Row};

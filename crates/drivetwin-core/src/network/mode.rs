@@ -305,7 +305,7 @@ impl<T: Number> Network<T> {
         let motion = self.motion_of(key)?;
         let (speeds, nodes) = self.held_speeds(rows);
         let response = motion.mobility.times_columns(&nodes);
-        let impulses = least_norm(&speeds.times(&response), excess);
+        let impulses = held_by(&speeds.times(&response), excess, rows.len());
         let change = response.times(&impulses);
         let mut residual = self.inertia.times(&self.coordinates.speeds).times(&change);
         subtract_held(&mut residual, &nodes, &impulses);
@@ -370,9 +370,15 @@ fn subtract_held<T: Number>(
     }
 }
 
+/// Least-norm solution of `W x = b` for what holds speeds; those prescribed, from row `stuck` on, win where the
+/// rows contradict each other.
+pub fn held_by<T: Number>(w: &Matrix<T>, b: &Matrix<T>, stuck: usize) -> Matrix<T> {
+    let order: Vec<usize> = (stuck..w.rows).chain(0..stuck).collect();
+    least_norm(&w.select_rows(&order), &b.select_rows(&order))
+}
+
 /// Solve `W τ = b` for the torques that hold the speeds. For redundant locks the torques are those of
-/// least `Σ (τ_j / weight_j)²`. Prescribed speeds, from row `stuck` on, win where the rows contradict
-/// each other.
+/// least `Σ (τ_j / weight_j)²`.
 fn holding_torque<T: Number>(
     w: Matrix<T>,
     b: Matrix<T>,
@@ -385,14 +391,13 @@ fn holding_torque<T: Number>(
         return (torque, false);
     }
     let weights = weights();
-    let order: Vec<usize> = (stuck..w.rows).chain(0..stuck).collect();
-    let (mut scaled, b) = (w.select_rows(&order), b.select_rows(&order));
-    for r in 0..w.rows {
-        for c in 0..w.cols {
+    let mut scaled = w;
+    for r in 0..scaled.rows {
+        for c in 0..scaled.cols {
             scaled[(r, c)] *= weights[c];
         }
     }
-    let mut torque = least_norm(&scaled, &b);
+    let mut torque = held_by(&scaled, &b, stuck);
     for i in 0..torque.rows {
         torque.row_mut(i).iter_mut().for_each(|t| *t *= weights[i]);
     }

@@ -115,10 +115,10 @@ fn channel_slopes(
         };
         let cell = Cell::Moving { sign, piece: piece_of(network, j, point.slip.abs()) };
         let law = Law::of(&network.channels[j], cell).expect("friction is smooth in a cell");
-        let m = point.slip.abs();
+        let m = point.slip.abs() * law.unit;
         let torque = law.about::<false>(m, law.stiction::<false>(m)).here(normal);
         for (entry, &c) in channels.row_mut(j).iter_mut().zip(&row.slip) {
-            *entry += torque.by_argument * c;
+            *entry += torque.by_argument * law.unit * c;
         }
         if let Some((input, gain)) = input.filter(|_| normal > 0.0) {
             channels[(j, network.first_input() + input)] += sign * torque.by_normal * gain;

@@ -265,8 +265,8 @@ impl Formation<'_> {
             Some(member) if member.standing == Standing::Ahead => {
                 member.inputs.lines(member.segment)[input]
             }
-            // Others are loaded.
-            _ => [f64::INFINITY, 0.0],
+            // Of the others nothing is gone, whatever the gain.
+            _ => [f64::NAN; 2],
         };
         let inputs = |input| [0, 1].map(|k| Lanes::gathered(|run| line(run, input)[k]));
         if let Some((j, runs)) = self.regime.gone(inputs) {

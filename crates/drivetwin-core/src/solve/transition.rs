@@ -6,8 +6,8 @@ use super::guard::Cause;
 use super::regime::{Event, EventKind, Regime, RowState, self_locking, sign_of};
 use super::status::Status;
 use crate::network::channel::form;
-use crate::network::linalg::{Matrix, least_norm, solve};
-use crate::network::{GearState, ModeKey, Row};
+use crate::network::linalg::{Matrix, solve};
+use crate::network::{GearState, ModeKey, Row, held_by};
 use crate::number::{Number, Values};
 
 /// Speed of what is to rest that is no more than round-off of a start, relative to the fastest.
@@ -160,7 +160,9 @@ impl<T: Number> Regime<'_, T> {
         let excess = self.excess(rows);
         let speed = |largest: T::Values, v: &T| v.re().magnitude().larger(largest);
         let fastest = self.x[..network.speeds()].iter().fold(T::Values::zero_(), speed);
-        if excess.max_abs().decide_with(fastest, |excess, fastest| excess <= ROUND_OFF * fastest) {
+        let is_round_off =
+            excess.max_abs().decide_with(fastest, |excess, fastest| excess <= ROUND_OFF * fastest);
+        if is_round_off && !T::DERIVATIVES {
             return Ok(());
         }
         self.turn_gears();
@@ -172,6 +174,7 @@ impl<T: Number> Regime<'_, T> {
             for (i, gear) in self.gears.iter_mut().enumerate() {
                 if let GearState::Rolling { sign, backward } = gear
                     && network.losses[i].loss.is_directional()
+                    && !is_round_off
                 {
                     *backward = entering[(i, 0)].re().decide(|impulse| impulse * *sign < 0.0);
                 }
@@ -223,7 +226,7 @@ impl<T: Number> Regime<'_, T> {
         }
         let excess = self.excess(&rows);
         let response = solve(network.mass.clone(), g.transposed()).expect("the mass is regular");
-        let change = response.times(&least_norm(&g.times(&response), &excess));
+        let change = response.times(&held_by(&g.times(&response), &excess, rows.len()));
         for i in 0..network.speeds() {
             self.x[i] -= change[(i, 0)];
         }
