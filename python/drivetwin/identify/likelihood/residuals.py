@@ -56,7 +56,7 @@ class ResidualTest:
 def white_residuals(fit: LikelihoodFit) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
     """Times (n,) and residuals (n,) over their noise, input noise taken out, by shift and output.
 
-    Of a right model they are white with variance one.
+    Of a right model they are white with variance one, or less where input noise explains a part.
     """
     return {
         part.structure.label: {

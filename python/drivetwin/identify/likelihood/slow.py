@@ -27,7 +27,8 @@ shows, from which it is no chance."""
 
 def white_of(part: Part, residual: FloatArray) -> Iterator[tuple[Output, slice, FloatArray]]:
     """Each output of a part, its rows among the samples (n,), and there the `residual` (n,) over
-    the sensor's noise, input noise taken out. Of a right model that is white, of variance 1.
+    the sensor's noise, input noise taken out. Of a right model that is white, of variance 1, or
+    less at frequencies at which input noise explains a part of it.
     """
     white = (residual - part.weighting.driven(residual)) / part.record.sigma
     first = 0
@@ -72,7 +73,8 @@ def slow_power(part: Part, out: Output, rows: slice, white: FloatArray) -> float
     means of its residual `white` (n,) may as well be those of white noise.
 
     Input noise that explains a part of any residual takes it from slow errors too. How much is
-    told by probes: one of random sign for each block, weighted as the residual was.
+    told by probes: one of random sign for each block, weighted as the residual was. What is slower
+    than a block, as a drift, counts with its power over a block, which is less than it does.
     """
     _, means = block_means(part.record.time[out.place], white)
     if means.size == 0:
