@@ -104,6 +104,17 @@ def test_without_a_card_channels_are_looked_at_by_themselves(
     assert "left out" in warning
 
 
+def test_a_log_in_which_nothing_is_recognised_is_listed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "log.csv"
+    rows = "".join(f"{0.01 * k:.2f},{k % 7},{k}\n" for k in range(100))
+    log.write_text(f"time,Foo,Bar\ns,Nm,rpm\n{rows}")
+    found = _inspect(capsys, str(log))
+    assert [column["name"] for column in found["columns"]] == ["Foo", "Bar"]
+    assert (found["warnings"], found["refusal"]) == ([], None)
+
+
 def test_why_a_log_is_refused_is_told_and_the_columns_all_the_same(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -48,6 +48,8 @@ OPPOSED = -0.5
 
 def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
     """Raise TimeError where no time belongs to all channels: then a time base is wrong."""
+    if not channels:
+        return
     latest = max(channels.values(), key=lambda channel: float(channel.time[0]))
     earliest = min(channels.values(), key=lambda channel: float(channel.time[-1]))
     if latest.time[0] >= earliest.time[-1]:
