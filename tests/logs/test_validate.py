@@ -187,6 +187,17 @@ def test_an_engine_torque_at_its_limit_is_told() -> None:
     assert "at its largest number for 60 % of the log, -9999 N·m" in text
 
 
+def test_a_pedal_that_is_held_is_no_limit() -> None:
+    """The torque is held at other numbers too, or its last code is crossed to and fro."""
+    held = np.round(np.interp(TIME, [0.3, 0.5], [800.0, 900.0]))
+    noisy = 5.0 * np.round(180.0 + np.random.default_rng(6).normal(0.0, 0.4, TIME.size))
+    for values in (held, -held, noisy):
+        assert check_channel(channel("engine_torque", values), "log.csv").warnings == ()
+    lost = np.where(TIME > 0.6, 8191.0, held)
+    (text,) = check_channel(channel("engine_torque", lost), "log.csv").warnings
+    assert "8191 N·m" in text
+
+
 def test_suction_asks_for_the_sign() -> None:
     with pytest.raises(PlausibilityError, match="goes down to -14 bar") as caught:
         check_channel(channel("pressure.B2", ramp(-14e5, 0.1e5), "bar"), "log.csv")

@@ -75,7 +75,7 @@ where the signal is calm before or after, and goes on from where it fell."""
 _DROP_TIME = 0.25
 """Longest such dropout [s]."""
 
-_BEYOND = 2.0
+BEYOND = 2.0
 """A number is no measurement if it is so many times as large as any other of the log ..."""
 
 _BEYOND_STEP = 0.025
@@ -309,7 +309,7 @@ def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damag
         return None
     size = np.abs(values)
     sizes = np.unique(size)
-    far = np.flatnonzero(sizes[1:] > _BEYOND * sizes[:-1])
+    far = np.flatnonzero(sizes[1:] > BEYOND * sizes[:-1])
     for largest in sizes[far[sizes[far] >= np.median(size)]]:
         mask = size > largest
         found = runs(mask)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
 from drivetwin.logs.damage import (
+    BEYOND,
     Damage,
     beyond,
     clipped,
@@ -19,6 +20,7 @@ from drivetwin.logs.damage import (
     missing,
     pulses,
     resolution,
+    runs,
     spikes,
     stuck,
 )
@@ -50,7 +52,11 @@ COARSE = 0.03
 bus have 1 % of their reference torque."""
 
 MAX_AT_LIMIT = 0.1
-"""Share of samples at the largest number above which an engine torque may be saturated."""
+"""Share of samples at the largest number above which an engine torque may be saturated, ..."""
+
+HELD, LONGER = 0.25, 4.0
+"""... unless it holds other numbers too, for this time [s] or one that the longest there is so many
+times as long as: a pedal that is held still makes such a torque."""
 
 LEAST_SUCTION = BAR
 """A gauge pressure below -1 bar [Pa] does not exist."""
@@ -136,10 +142,19 @@ def _gaps(channel: Channel) -> list[str]:
 
 
 def _at_limit(channel: Channel) -> list[str]:
-    """Words for an engine torque that rests at its largest number; it may have reason to."""
+    """Words for an engine torque that rests at its largest number alone; it may have reason to."""
     limit = float(channel.values[np.abs(channel.values).argmax()])
-    share = float(np.mean(channel.values == limit))
+    at_limit = channel.values == limit
+    share = float(np.mean(at_limit))
     if channel.role != "engine_torque" or not MAX_AT_LIMIT < share < 1.0:
+        return []
+    rests = runs(np.diff(channel.values) == 0.0)
+    there, elsewhere = (
+        max((channel.time[b] - channel.time[a] for a, b in rests if at_limit[a] == at), default=0.0)
+        for at in (True, False)
+    )
+    far = abs(limit) > BEYOND * float(np.abs(channel.values[~at_limit]).max())
+    if elsewhere > min(HELD, there / LONGER) and not far:
         return []
     return [
         f"channel {channel.source_name!r}: at its largest number for {100 * share:.0f} % of the "
