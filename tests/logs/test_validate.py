@@ -193,7 +193,7 @@ def test_a_pedal_that_is_held_is_no_limit() -> None:
     noisy = 5.0 * np.round(180.0 + np.random.default_rng(6).normal(0.0, 0.4, TIME.size))
     for values in (held, -held, noisy):
         assert check_channel(channel("engine_torque", values), "log.csv").warnings == ()
-    lost = np.where(TIME > 0.6, 8191.0, held)
+    lost = np.where(TIME > 0.3, 8191.0, held)
     (text,) = check_channel(channel("engine_torque", lost), "log.csv").warnings
     assert "8191 N·m" in text
 
