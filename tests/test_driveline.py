@@ -181,7 +181,7 @@ def test_impossible_accuracies_are_refused_with_what_is_allowed(
         Accuracy(**given)
 
 
-@pytest.mark.parametrize("order", [ORDERS[0], ORDERS[-1]])
+@pytest.mark.parametrize("order", [ORDERS[0], ORDERS[-1], np.int64(4)])
 def test_the_orders_allowed_are_those_of_the_core(order: int) -> None:
     torque, pressures, start = held_second_gear(0.01)
     time, accuracy = np.linspace(0.0, 0.01, 3), Accuracy(order=order, max_step=1e-4)

@@ -203,7 +203,9 @@ class Accuracy:
             fault, remedy = f"tolerance is {self.tolerance!r}", "give a finite positive number"
         elif not self.max_step > 0.0:
             fault, remedy = f"max_step is {self.max_step!r}", "give a positive time [s], or inf"
-        elif not (self.order is None or (type(self.order) is int and self.order in ORDERS)):
+        elif self.order is not None and not (
+            isinstance(self.order, int | np.integer) and self.order in ORDERS
+        ):
             fault = f"order is {self.order!r}"
             remedy = f"give an integer from {ORDERS[0]} to {ORDERS[-1]}, or None"
         else:
