@@ -26,9 +26,8 @@ from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.held_out import HeldOut, Outcome
+from drivetwin.held_out import Outcome
 from drivetwin.identify.result import Identification
-from drivetwin.identify.several.fit import Several
 from drivetwin.parameters import log_of
 from drivetwin.shifts.usable import usable_shifts
 from drivetwin.together import Source, Together, identify_together
@@ -92,8 +91,8 @@ def _truth(made: Scenario) -> dict[str, float]:
 
 def _outcomes(made: Together, truth: dict[str, float]) -> Outcomes:
     found: Identification = made.found
-    several: Several = found.evidence["several"]
-    held: tuple[HeldOut, ...] = found.evidence["held_out"]
+    several, held = found.evidence.several, found.evidence.held_out
+    assert several is not None
     z, narrower = {}, {}
     for name, value in truth.items():
         one, number = found.estimates[name], log_of(name)[1] or 1

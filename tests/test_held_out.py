@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.held_out import HeldOut, Outcome, hold_out
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification
 from drivetwin.logs.shiftlog import ShiftLog
 from tests.identify.asked import by_the_paper
@@ -15,8 +16,7 @@ from tests.identify.several.made import LOADS, card, pair, scenario, source, tog
 
 
 def _held() -> HeldOut:
-    (one,) = together().found.evidence["held_out"]
-    assert isinstance(one, HeldOut)
+    (one,) = together().found.evidence.held_out
     return one
 
 
@@ -81,10 +81,11 @@ def test_a_law_of_another_element_is_said_and_not_judged() -> None:
     found: Identification = together().found
     (law,) = found.friction.values()
     log = pair()[0]
-    fit = found.evidence["likelihood"]
+    fit, _ = likelihood_of(found)
     names = tuple(name.replace("B3.", "B9.") for name in fit.point.names)
     unseen = replace(fit, point=replace(fit.point, names=names))
-    found = replace(found, friction={"B9": law}, evidence={**found.evidence, "likelihood": unseen})
+    evidence = replace(found.evidence, likelihood=unseen)
+    found = replace(found, friction={"B9": law}, evidence=evidence)
     (one,) = hold_out(found, card(), log.log, log.shifts.shifts, 1)
     assert one.outcome is Outcome.NOT_JUDGED
     assert "friction law of B9 stands in for it" in one.notes[0]

@@ -16,7 +16,8 @@ from tests.identify.several.made import LOADS, card, pair, together
 
 def test_each_log_is_simulated_with_its_own_load() -> None:
     made = together()
-    several = made.found.evidence["several"]
+    several = made.found.evidence.several
+    assert several is not None
     for share, load in zip(several.logs, LOADS, strict=True):
         twin = made.twins[share.source]
         assert twin.value("Tv_over_if", 0.0) == pytest.approx(load, rel=2e-3)
@@ -26,7 +27,7 @@ def test_each_log_is_simulated_with_its_own_load() -> None:
 
 def test_the_fit_of_all_is_pooled_about_the_mean_of_each_log() -> None:
     found = together().found
-    runs = found.evidence["validation"]
+    runs = found.evidence.validation
     traces = [run.traces["output_torque"] for run in runs]
     left = sum(float(np.sum((t.measured - t.simulated) ** 2)) for t in traces)
     spread = sum(float(np.sum((t.measured - t.log_mean) ** 2)) for t in traces)
@@ -36,9 +37,10 @@ def test_the_fit_of_all_is_pooled_about_the_mean_of_each_log() -> None:
 
 def test_what_was_held_out_is_no_input_of_the_fit() -> None:
     found = together().found
-    held = found.evidence["held_out"][0]
+    held, several = found.evidence.held_out[0], found.evidence.several
     assert len(found.shifts) == 2
-    assert all(share.source != held.source for share in found.evidence["several"].logs)
+    assert several is not None
+    assert all(share.source != held.source for share in several.logs)
 
 
 def test_nothing_left_to_fit_is_refused() -> None:

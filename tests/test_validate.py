@@ -211,7 +211,7 @@ def test_fits_of_several_shifts_are_pooled(twin: Twin, log: ShiftLog, shift: Shi
     found = with_fit(identification(), [one, one])
     pooled = found.fit["output_torque"]["inertia"]
     assert pooled.rmse == pytest.approx(one.fit["output_torque"]["inertia"].rmse)
-    assert len(found.evidence["validation"]) == 2
+    assert len(found.evidence.validation) == 2
 
 
 def test_incomplete_model_leaves_a_warning_and_no_fit(

@@ -46,7 +46,7 @@ def identified(folder: Path) -> Outcome:
 
 def figure_page(outcome: Outcome, folder: Path) -> Path:
     """A page of the validation figure alone."""
-    (validation,) = outcome.found.evidence["validation"]
+    (validation,) = outcome.found.evidence.validation
     figure = validation_figure(validation)
     figure.update_layout(width=WIDTH, height=HEIGHT, paper_bgcolor="white", margin={"t": 30})
     figure.layout.updatemenus = ()

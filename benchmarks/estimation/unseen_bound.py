@@ -21,6 +21,7 @@ from drivetwin.identify.likelihood.priors import spans
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import TORQUE, record_of
 from drivetwin.identify.likelihood.unknowns import AERO, LAW, TE_OFFSET, Point
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import FrictionCurve, Identification
 from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals
 
@@ -43,8 +44,7 @@ def slips_of(curve: FrictionCurve) -> FloatArray:
 
 def bounds_of(found: Identification, recorded: DynoRun) -> dict[str, tuple[float, float]]:
     """Stated standard deviation from noise and its bound, by parameter; 0 where it is known."""
-    fit: LikelihoodFit = found.evidence["likelihood"]
-    (signals,) = found.evidence["signals"]
+    fit, (signals,) = likelihood_of(found)
     (curve,) = found.friction.values()
     slips = slips_of(curve)
     ideal = run(recorded.scenario, recorded.seed, noise=0.0)

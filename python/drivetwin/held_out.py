@@ -98,7 +98,7 @@ def hold_out(
 def _one(
     found: Identification, card: VehicleCard, log: ShiftLog, shift: Shift, number: int
 ) -> HeldOut:
-    fit = found.evidence.get("likelihood")
+    fit = found.evidence.likelihood
     try:
         require_closed(log, card, shift)
         log = behind_converter(log, card, shift)
@@ -133,11 +133,11 @@ def _of_log(
 
     Raises IdentificationError for a log that the fit has not seen, by another method.
     """
-    several = found.evidence.get("several")
+    several = found.evidence.several
     if number == 0:
         return found
     if several is not None and number <= len(several.logs):
-        return of_one_log(found, number)
+        return of_one_log(found, several.logs[number - 1])
     if told is None:
         raise IdentificationError(
             "load and age of the engine torque of a log that was not fitted are told by the "
@@ -145,7 +145,7 @@ def _of_log(
             "use --method likelihood, or hold out a shift of a log whose other shifts are fitted",
             Where(file=log.source),
         )
-    base = found if several is None else of_one_log(found, 1)
+    base = found if several is None else of_one_log(found, several.logs[0])
     load = None if base.load is None else replace(base.load, mean_speed=told.mean_speed)
     return replace(base, estimates={**base.estimates, **_own(base, told)}, load=load)
 

@@ -11,7 +11,7 @@ from drivetwin.held_out import HeldOut, hold_out
 from drivetwin.identify.method import DEFAULT_METHOD, Method
 from drivetwin.identify.pipeline import identify
 from drivetwin.identify.result import Identification
-from drivetwin.identify.several.fit import Several, identify_several, of_one_log
+from drivetwin.identify.several.fit import identify_several, of_one_log
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.progress import part
 from drivetwin.shifts.divided import apart
@@ -67,10 +67,10 @@ def identify_together(
 ) -> Together:
     """Identify one driveline from the shifts of all `sources` that are not held out.
 
-    The identification is simulated over the logs (`fit`); `evidence["held_out"]` holds a HeldOut
-    for every shift that was predicted. Of several logs `evidence["several"]` is a Several, and
-    only the likelihood method joins them. Raises InputError where nothing is left to fit or
-    several logs are asked of another method, and what `identify` and `identify_several` raise.
+    The identification is simulated over the logs (`fit`); `evidence.held_out` has every shift
+    that was predicted. Only the likelihood method joins several logs (`evidence.several`).
+    Raises InputError where nothing is left to fit or several logs are asked of another method,
+    and what `identify` and `identify_several` raise.
     """
     splits = [source.split() for source in sources]
     fitted = [k for k, (kept, _) in enumerate(splits) if kept.shifts]
@@ -93,7 +93,7 @@ def identify_together(
     with part(0.92, 1.0, "predicting what was held out"):
         held = _predicted(found, card, sources, [late.shifts for _, late in splits], numbers)
     if held:
-        found = replace(found, evidence={**found.evidence, "held_out": held})
+        found = replace(found, evidence=replace(found.evidence, held_out=held))
     read = [*(source.log.inputs for source in sources), card.inputs]
     found = replace(found, inputs={name: sha for one in read for name, sha in one.items()})
     return Together(found, tuple(logs), twins)
@@ -111,22 +111,22 @@ def _simulated(
     found: Identification, card: VehicleCard, logs: Sequence[ShiftLog]
 ) -> tuple[Identification, dict[str, Twin]]:
     """The identification with the fit over all logs, each with what it has of its own."""
-    several: Several | None = found.evidence.get("several")
+    several = found.evidence.several
     if several is None:
         twin = Twin.from_identification(found, card)
         return validated(found, twin, logs[0]), {logs[0].source: twin}
     twins, views = {}, []
     for share, log in zip(several.logs, logs, strict=True):
-        mine = of_one_log(replace(found, warnings=()), share.number)
+        mine = of_one_log(replace(found, warnings=()), share)
         twins[log.source] = Twin.from_identification(mine, card)
         views.append(validated(mine, twins[log.source], log))
     shares = tuple(
         replace(share, fit=view.fit) for share, view in zip(several.logs, views, strict=True)
     )
-    runs = [run for view in views for run in view.evidence.get("validation", ())]
+    runs = [run for view in views for run in view.evidence.validation]
     missing = [text for view in views if not view.fit for text in view.warnings]
     found = with_fit(replace(found, warnings=(*found.warnings, *missing)), runs)
-    evidence = {**found.evidence, "several": replace(several, logs=shares)}
+    evidence = replace(found.evidence, several=replace(several, logs=shares))
     return replace(found, evidence=evidence), twins
 
 

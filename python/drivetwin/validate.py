@@ -154,7 +154,7 @@ def with_fit(found: Identification, validations: Sequence[Validation]) -> Identi
     return replace(
         found,
         fit=_pooled_fit(validations),
-        evidence={**found.evidence, "validation": tuple(validations)},
+        evidence=replace(found.evidence, validation=tuple(validations)),
         warnings=found.warnings + warnings,
     )
 

@@ -8,29 +8,30 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.identify.conclude import MISFIT, Conclusions, conclude, low_gear_notes
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Verdict
 from drivetwin.vehicle.spec import PriorValue
 from tests.identify.asked import stepped, still
 
 
 def test_a_gear_with_still_torque_is_named() -> None:
-    notes = low_gear_notes(still().evidence["signals"])
+    notes = low_gear_notes(still().evidence.signals)
     assert set(notes) == {"eta", "J_prime_2", "J_prime_3"}
     assert "gear 2 alone" in notes["eta"]
 
 
 def test_another_shift_from_that_gear_with_steps_tells_it() -> None:
-    both = (*still().evidence["signals"], *stepped().evidence["signals"])
+    both = (*still().evidence.signals, *stepped().evidence.signals)
     assert low_gear_notes(both) == {}
 
 
 def _with_J_out(value: float, known: PriorValue | None) -> Conclusions:
     """The conclusions of the linear fit of a log as if it had found Jo′ to be `value`."""
     found = stepped()
-    (shift,), signals = found.evidence["integral"], found.evidence["signals"]
+    (shift,), signals = found.evidence.integral, found.evidence.signals
     values = shift.values.copy()
     values[shift.ids.index("J_out")] = value
-    driveline = found.evidence["likelihood"].problem.parts[0].structure.driveline
+    driveline = likelihood_of(found)[0].problem.parts[0].structure.driveline
     driveline = replace(driveline, J_out=known)
     return conclude([replace(shift, values=values)], signals, [driveline], {})
 
@@ -56,8 +57,8 @@ def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identifi
     stage: str, touched: str, spared: str
 ) -> None:
     found = stepped()
-    (shift,), signals = found.evidence["integral"], found.evidence["signals"]
-    driveline = found.evidence["likelihood"].problem.parts[0].structure.driveline
+    (shift,), signals = found.evidence.integral, found.evidence.signals
+    driveline = likelihood_of(found)[0].problem.parts[0].structure.driveline
     before = getattr(shift, stage)
     for chi2, verdict in ((0.9 * MISFIT, Verdict.IDENTIFIED), (1.1 * MISFIT, Verdict.WEAK)):
         after = replace(before, fit=replace(before.fit, chi2=chi2))
@@ -69,8 +70,8 @@ def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identifi
 
 def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> None:
     found = stepped()
-    (shift,), signals = found.evidence["integral"], found.evidence["signals"]
-    driveline = found.evidence["likelihood"].problem.parts[0].structure.driveline
+    (shift,), signals = found.evidence.integral, found.evidence.signals
+    driveline = likelihood_of(found)[0].problem.parts[0].structure.driveline
     name, design = f"P0.{driveline.oncoming.name}", PriorValue(8e4, 5e3)
     coupling = replace(driveline.oncoming, P0=design)
     couplings = {**driveline.couplings, coupling.name: coupling}

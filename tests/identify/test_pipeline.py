@@ -17,6 +17,7 @@ from drivetwin.identify.likelihood.conclude import WITH_ETA, conclude
 from drivetwin.identify.literal import PaperShift
 from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import ALL_BEFORE_LOSS, identify
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification, Verdict
 from drivetwin.logs.read import read_log
 from drivetwin.logs.shiftlog import ShiftLog
@@ -84,8 +85,8 @@ def test_a_log_with_throttle_steps_tells_everything() -> None:
     assert {"k_o", "c_o", "f_d_3", "zeta_3", "P0.B3"} <= told
     assert found.correlation is not None
     assert found.correlation.shape == (len(found.correlation_ids),) * 2
-    assert isinstance(found.evidence["integral"][0], IntegralShift)
-    assert isinstance(found.evidence["paper"][0], PaperShift)
+    assert isinstance(found.evidence.integral[0], IntegralShift)
+    assert isinstance(found.evidence.paper[0], PaperShift)
 
 
 def test_the_papers_method_claims_no_interval_and_doubts_the_constant_torque() -> None:
@@ -122,7 +123,7 @@ def test_the_default_method_agrees_with_the_linear_one_and_knows_more() -> None:
         assert new.std_noise < old.std_noise
         assert abs(new.value - old.value) < 4.0 * old.std_noise, name
     assert found.estimates["J_out"].method == "likelihood with design prior"
-    assert found.evidence["likelihood"].chi2 == pytest.approx(1.0, abs=0.05)
+    assert likelihood_of(found)[0].chi2 == pytest.approx(1.0, abs=0.05)
 
 
 def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
@@ -213,7 +214,7 @@ def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> N
     """With η on the card the absolute values are told, and η's spread is their systematic part."""
     known = replace(card, known={"eta": PriorValue(0.9, 0.02)})
     driveline = driveline_of(known, found.shifts[0])
-    fit, signals = found.evidence["likelihood"], found.evidence["signals"]
+    fit, signals = likelihood_of(found)
     told = conclude(fit, signals, [driveline], {}, {}).estimates
     ratio = found.estimates["J_vehicle_over_eta"]
     assert ratio.value is not None

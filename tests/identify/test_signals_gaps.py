@@ -95,7 +95,7 @@ def test_what_starts_late_or_ends_early_costs_precision_only(
 def test_no_window_reaches_beyond_what_was_recorded() -> None:
     """A window that the output torque covers in part would be taken for a whole one."""
     late = identified(without("output_torque", ENDS[0]), Method.INTEGRAL)
-    (shift,) = late.evidence["integral"]
+    (shift,) = late.evidence.integral
     assert min(shift.momentum.time) > ENDS[0][1] + 0.19
 
 

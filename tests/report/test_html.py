@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.result import Identification
 from drivetwin.report.html import render_report, report_sections, save_report
 from drivetwin.report.sections.blocks import FigureBlock
@@ -89,7 +90,7 @@ def test_stays_small_for_long_logs(found: Identification, tmp_path: Path) -> Non
 
 def test_sparse_identification_leaves_sections_out(found: Identification) -> None:
     sparse = replace(
-        found, estimates={}, friction={}, fit={}, evidence={}, correlation=None, warnings=()
+        found, estimates={}, friction={}, fit={}, evidence=Evidence(), correlation=None, warnings=()
     )
     titles = [section.anchor for section in report_sections(sparse, log())]
     assert "friction" not in titles

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.result import Identification
 from drivetwin.logs.shiftlog import Channel, Quantity
 from drivetwin.report.notebook import figure_of, summary_of
@@ -44,7 +45,7 @@ def test_the_rich_representation_escapes_names() -> None:
 
 
 def test_an_identification_without_simulation_shows_its_intervals() -> None:
-    bare = replace(identification(), evidence={})
+    bare = replace(identification(), evidence=Evidence())
     assert "95 % interval" in bare.plot().layout.xaxis.title.text
     assert "fit %" not in str(bare.summary())
 

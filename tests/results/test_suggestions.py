@@ -15,7 +15,7 @@ from tests.identify.asked import still
 def test_what_would_narrow_an_open_parameter_stands_in_the_result() -> None:
     found = still()
     told = suggest(found)
-    made = ResultFile.of(replace(found, evidence={**found.evidence, "suggestions": told}))
+    made = ResultFile.of(replace(found, evidence=replace(found.evidence, suggestions=told)))
     assert [one.parameter for one in made.suggestions] == [one.parameter for one in told]
     (age,) = (one for one in made.suggestions if one.parameter == "te_delay")
     assert age.half_width is None

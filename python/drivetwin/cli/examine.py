@@ -116,7 +116,7 @@ def _answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
 
     found = outcome.found
     with step("comparing experiments"):
-        suggestions = found.evidence.get("suggestions") or suggest(found)
+        suggestions = found.evidence.suggestions or suggest(found)
     yield Answer(
         SUGGESTIONS,
         doubts.suggestions_text(suggestions),

@@ -160,7 +160,7 @@ def _print(found: Identification, shifts: Mapping[str, Sequence[Shift]]) -> None
         say("")
     if found.friction:
         show(friction_table(found.friction))
-    suggestions = found.evidence.get("suggestions", ())
+    suggestions = found.evidence.suggestions
     if suggestions:
         show(suggestion_table(suggestions, found.estimates))
     if found.fit:

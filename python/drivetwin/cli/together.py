@@ -42,7 +42,7 @@ class Joined:
     @property
     def shifts(self) -> dict[str, tuple[Shift, ...]]:
         """The shifts that were fitted, by name of their log."""
-        several: Several | None = self.found.evidence.get("several")
+        several = self.found.evidence.several
         if several is None:
             return {Path(self.made.fitted[0].source).name: self.found.shifts}
         return {Path(one.source).name: one.shifts for one in several.logs}
@@ -103,12 +103,12 @@ def write(outcome: Joined, folder: Path) -> tuple[Path, ...]:
 
 def print_together(found: Identification) -> None:
     """What several logs say together, and how what was held out was predicted."""
-    several: Several | None = found.evidence.get("several")
+    several = found.evidence.several
     if several is not None:
         show(_log_table(several))
         note(several.consistency.text)
         say("")
-    held = found.evidence.get("held_out", ())
+    held = found.evidence.held_out
     if held:
         show(_held_table(held, found))
     for one in held:

@@ -57,14 +57,14 @@ def free_friction(
 
 def _posterior(found: Identification, element: str) -> tuple[FloatArray, FloatArray] | None:
     """Friction law and P0 (5,) of an element, and their covariance, by either linear method."""
-    fit = found.evidence.get("likelihood")
+    fit = found.evidence.likelihood
     if fit is not None:
         wanted = [f"{element}.{key}" for key in (*LAW, "P0")]
         if not set(wanted) <= set(fit.point.names):
             return None
         place = [fit.point.names.index(name) for name in wanted]
         return fit.mean.values[place], fit.covariance[np.ix_(place, place)]
-    for shift in found.evidence.get("integral", ()):
+    for shift in found.evidence.integral:
         if shift.friction is not None and shift.friction.element == element:
             size = _LAW_SIZE + 1
             return shift.friction.fit.theta[:size], shift.friction.fit.covariance[:size, :size]

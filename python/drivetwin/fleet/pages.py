@@ -33,7 +33,7 @@ def save_traces(path: Path, found: Identification) -> None:
     numbers: dict[str, list[np.ndarray[tuple[int], np.dtype[np.float64]]]] = {
         "time": [], "measured": [], "simulated": [],
     }  # fmt: skip
-    for number, validation in enumerate(found.evidence.get("validation", ())):
+    for number, validation in enumerate(found.evidence.validation):
         for signal, trace in validation.traces.items():
             columns["shift"] += [number] * trace.time.size
             columns["signal"] += [signal] * trace.time.size

@@ -17,6 +17,7 @@ from drivetwin.errors import (
 )
 from drivetwin.identify.conclude import Conclusions, conclude, with_systematic_band
 from drivetwin.identify.design import outside_ranges
+from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.friction import FrictionSettings, stribeck_at
 from drivetwin.identify.inputs import driveline_of, signals_of
 from drivetwin.identify.integral import IntegralShift, identify_shift
@@ -74,10 +75,9 @@ def identify(
 ) -> Identification:
     """Identify the driveline from all usable shifts of a log.
 
-    `evidence["paper"]` holds a PaperShift and `evidence["integral"]` an IntegralShift per shift;
-    the paper's stages run beside the other methods for comparison. The likelihood method starts
-    from the integral one, adds `evidence["likelihood"]` (a LikelihoodFit), and leaves the integral
-    result with a warning where it does not converge. `evidence["signals"]` are the ShiftSignals.
+    The paper's stages run beside the other methods for comparison. The likelihood method starts
+    from the integral one, and leaves the integral result with a warning where it does not
+    converge. What each stage found is in `evidence`.
     Raises NoShiftError without a shift, IdentificationError where the data cannot carry it,
     MissingChannelError for a missing channel, DamagedChannelError where the inputs of the only
     shift have gaps; of several such shifts are refused and the others used.
@@ -113,7 +113,7 @@ def identify(
         validity=_validity(signals, found),
         inputs={**log.inputs, **card.inputs},
         settings=_settings(card, method),
-        evidence={**evidence, "signals": tuple(signals)},
+        evidence=replace(evidence, signals=tuple(signals)),
         warnings=(*log.warnings, *found.warnings, *ranges),
         assumptions=(
             *((BEHIND_CONVERTER,) if is_open else ()),
@@ -157,7 +157,7 @@ def _recorded(
     return closed, tuple(refused)
 
 
-_Stage = tuple[Conclusions, Method, dict[str, Any]]
+_Stage = tuple[Conclusions, Method, Evidence]
 
 
 def _with_torque(
@@ -167,26 +167,25 @@ def _with_torque(
     method: Method,
 ) -> _Stage:
     """Conclusions, the method that they are from, and the evidence."""
-    evidence: dict[str, Any] = {}
     if method is Method.PAPER:
-        evidence["paper"] = _paper_shifts(signals, drivelines, card)
-        return paper_conclusions(evidence["paper"], signals, drivelines), method, evidence
+        paper = _paper_shifts(signals, drivelines, card)
+        return paper_conclusions(paper, signals, drivelines), method, Evidence(paper=paper)
     with part(0.0, 0.3, "linear method"):
-        found, evidence["integral"] = _integral(signals, drivelines, card)
+        found, integral = _integral(signals, drivelines, card)
+    evidence = Evidence(integral=integral)
     if method is Method.LIKELIHOOD:
         try:
-            linear = (found, evidence["integral"])
             with part(0.3, 0.95, "likelihood"):
-                found, evidence["likelihood"] = likelihood(signals, drivelines, linear, card)
+                found, fit = likelihood(signals, drivelines, (found, integral), card)
+            evidence = replace(evidence, likelihood=fit)
         except IdentificationError as error:
             method = Method.INTEGRAL
             text = f"likelihood: {error.what}; the values are those of the integral method"
             estimates = {name: doubted(one, GAVE_UP) for name, one in found.estimates.items()}
             found = replace(found, estimates=estimates, warnings=(text, *found.warnings))
     try:
-        evidence["paper"] = _paper_shifts(signals, drivelines, card)
+        evidence = replace(evidence, paper=_paper_shifts(signals, drivelines, card))
     except IdentificationError as error:
-        evidence["paper"] = ()
         found = replace(found, warnings=(*found.warnings, f"paper's method: {error.what}"))
     return found, method, evidence
 
@@ -197,7 +196,7 @@ def _without_torque(
     drivelines: Sequence[Driveline],
     card: VehicleCard,
     method: Method,
-) -> tuple[Conclusions, dict[str, Any]]:
+) -> tuple[Conclusions, Evidence]:
     """What a log without an output torque tells: only the likelihood method does without it.
 
     Raises IdentificationError for the other methods.
@@ -210,7 +209,7 @@ def _without_torque(
             Where(file=log.source),
         )
     found, best = likelihood_alone(signals, drivelines, card)
-    return found, {"integral": (), "paper": (), "likelihood": best}
+    return found, Evidence(likelihood=best)
 
 
 def _paper_shifts(

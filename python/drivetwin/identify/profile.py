@@ -91,13 +91,13 @@ def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftS
 
     Raises IdentificationError where it is by another method.
     """
-    fit: LikelihoodFit | None = found.evidence.get("likelihood")
+    fit = found.evidence.likelihood
     if fit is None:
         raise IdentificationError(
             f"the {found.method} method has no likelihood to work on",
             "identify with --method likelihood",
         )
-    return fit, found.evidence["signals"]
+    return fit, found.evidence.signals
 
 
 @dataclass(frozen=True)

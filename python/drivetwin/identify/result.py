@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.driveline import RoadLoad
+from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.method import Method as Method
 from drivetwin.parameters import spec_of
 from drivetwin.shifts.shift import RejectedShift, Shift
@@ -169,9 +170,9 @@ class Identification(Shown):
     """Everything one `identify` run found. Immutable; the twin, report and exports read it.
 
     `fit[signal][phase]` with signals `output_torque`, `input_speed`, `output_speed` and phases
-    `all`, `before`, `torque`, `inertia`, `after`. `evidence[stage]` is the stage's own dataclass
-    (see the estimator files); the report draws from it. `correlation` is over `correlation_ids`.
-    `load` is None where the load torque is constant.
+    `all`, `before`, `torque`, `inertia`, `after`. `evidence` holds the results of each stage; the
+    report draws from it. `correlation` is over `correlation_ids`. `load` is None where the load
+    torque is constant.
     """
 
     estimates: dict[str, Estimate]
@@ -185,7 +186,7 @@ class Identification(Shown):
     inputs: dict[str, str]
     """File name -> SHA-256 of every input."""
     settings: dict[str, Any]
-    evidence: dict[str, Any] = field(default_factory=dict)
+    evidence: Evidence = field(default_factory=Evidence)
     warnings: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
     correlation_ids: tuple[str, ...] = ()

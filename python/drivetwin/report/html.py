@@ -49,11 +49,10 @@ def render_report(found: Identification, log: ShiftLog, library: str | None = No
 
 def report_sections(found: Identification, log: ShiftLog) -> list[Section]:
     """All sections in reading order; those without content are left out."""
-    validations = tuple(found.evidence.get("validation", ()))
     sections = [
         trust_section(found),
         shift_section(found, log),
-        validation_section(validations),
+        validation_section(found.evidence.validation),
         *evidence_sections(found),
         friction_section(found),
         *likelihood_sections(found),

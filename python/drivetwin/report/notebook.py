@@ -108,7 +108,7 @@ def _(log: ShiftLog) -> go.Figure:
 
 @figure_of.register
 def _(found: Identification) -> go.Figure:
-    validations = found.evidence.get("validation", ())
+    validations = found.evidence.validation
     return validation_figure(validations[0]) if validations else interval_figure(found.estimates)
 
 

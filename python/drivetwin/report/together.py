@@ -28,8 +28,8 @@ def save_together(path: Path | str, found: Identification, logs: Sequence[ShiftL
 
 def render_together(found: Identification, logs: Sequence[ShiftLog]) -> str:
     """HTML text of the report; equal inputs give equal text."""
-    several: Several | None = found.evidence.get("several")
-    held = found.evidence.get("held_out", ())
+    several = found.evidence.several
+    held = found.evidence.held_out
     with part(0.0, 0.5):
         if several is None:
             sections = report_sections(found, logs[0])
@@ -53,9 +53,9 @@ def _of_several(
     """The sections of all logs in reading order; stages of single shifts are in their reports."""
     yield trust_section(found)
     yield several_section(found, several)
-    runs = iter(found.evidence.get("validation", ()))
+    runs = iter(found.evidence.validation)
     for share, log in zip(several.logs, logs, strict=True):
-        yield of_log(shift_section(of_one_log(found, share.number), log), share)
+        yield of_log(shift_section(of_one_log(found, share), log), share)
         mine = tuple(run for _, run in zip(share.shifts, runs, strict=False))
         yield of_log(validation_section(mine), share)
     yield friction_section(found)

@@ -111,11 +111,9 @@ class ResultFile(Record):
                 "inputs": found.inputs,
                 "settings": plain(found.settings),
                 "correlation": _correlation(found),
-                "several": SeveralRecord.of(found.evidence.get("several")),
-                "held_out": [HeldOutRecord.of(one) for one in found.evidence.get("held_out", ())],
-                "suggestions": [
-                    SuggestionRecord.of(one) for one in found.evidence.get("suggestions", ())
-                ],
+                "several": SeveralRecord.of(found.evidence.several),
+                "held_out": [HeldOutRecord.of(one) for one in found.evidence.held_out],
+                "suggestions": [SuggestionRecord.of(one) for one in found.evidence.suggestions],
                 "warnings": list(found.warnings),
                 "assumptions": list(found.assumptions),
             }

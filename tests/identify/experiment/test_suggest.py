@@ -67,7 +67,7 @@ def test_other_methods_have_no_information_to_compare() -> None:
 
 def test_an_identification_takes_up_what_would_tell_it_more() -> None:
     told = examined(still())
-    assert [one.parameter for one in told.evidence["suggestions"]][:1] == ["te_delay"]
+    assert [one.parameter for one in told.evidence.suggestions][:1] == ["te_delay"]
     assert examined(by_the_paper()) is by_the_paper()
     known = {n: e for n, e in still().estimates.items() if e.verdict is Verdict.IDENTIFIED}
     sure = replace(still(), estimates=known)

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+from drivetwin.identify.profile import likelihood_of
+from drivetwin.identify.result import Identification
 from drivetwin.identify.several.consistency import (
     Consistency,
     Pull,
@@ -19,7 +21,6 @@ from drivetwin.identify.several.consistency import (
     noise_power,
     shared_of,
 )
-from drivetwin.identify.several.fit import Several
 from tests.identify.several.made import loaded, together
 
 DRAWS = 120
@@ -58,13 +59,13 @@ def test_logs_that_tell_different_things_cannot_disagree() -> None:
     assert homogeneity([one, other]) == (0.0, 0)
 
 
-def _tested(several: object) -> Consistency:
-    assert isinstance(several, Several)
-    return several.consistency
+def _tested(found: Identification) -> Consistency:
+    assert found.evidence.several is not None
+    return found.evidence.several.consistency
 
 
 def test_slow_noise_of_a_sensor_counts_before_logs_disagree() -> None:
-    fit = together().found.evidence["likelihood"]
+    fit, _ = likelihood_of(together().found)
     shared = shared_of(fit)
     assert noise_power(fit, shared) == pytest.approx(max(fit.chi2, 1.0), rel=1e-6)
     rng = np.random.default_rng(1)
@@ -77,7 +78,7 @@ def test_slow_noise_of_a_sensor_counts_before_logs_disagree() -> None:
 
 
 def test_logs_of_one_vehicle_agree() -> None:
-    tested = _tested(together().found.evidence["several"])
+    tested = _tested(together().found)
     assert tested.agree
     assert tested.freedom >= 8
     assert tested.doubtful == {}
@@ -85,7 +86,7 @@ def test_logs_of_one_vehicle_agree() -> None:
 
 
 def test_a_payload_is_named_with_its_log_and_sign() -> None:
-    tested = _tested(loaded().found.evidence["several"])
+    tested = _tested(loaded().found)
     assert not tested.agree
     first = max(tested.moves, key=lambda one: abs(one.z))
     assert first.parameter == "J_vehicle"
@@ -95,5 +96,5 @@ def test_a_payload_is_named_with_its_log_and_sign() -> None:
 
 
 def test_friction_is_among_what_is_compared() -> None:
-    tested = _tested(together().found.evidence["several"])
+    tested = _tested(together().found)
     assert "mu.B3" in {one.parameter for one in tested.moves}

@@ -12,6 +12,7 @@ from drivetwin.errors import IdentificationError, InputError
 from drivetwin.identify.likelihood.fit import covariance_of
 from drivetwin.identify.likelihood.unknowns import OWN
 from drivetwin.identify.pipeline import identify
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.several.consistency import shared_of
 from drivetwin.identify.several.fit import (
     Several,
@@ -27,19 +28,19 @@ from tests.identify.several.made import LOADS, card, loaded, pair, scenario, sou
 
 
 def _several() -> Several:
-    found = together().found.evidence["several"]
-    assert isinstance(found, Several)
+    found = together().found.evidence.several
+    assert found is not None
     return found
 
 
 def test_the_common_covariance_is_that_of_the_summed_information() -> None:
     """Each log alone counts the design prior; of two logs one of them is one too many."""
-    fit = together().found.evidence["likelihood"]
+    fit, _ = likelihood_of(together().found)
     shared = shared_of(fit)
     names = [fit.point.names[k] for k in shared]
     summed = -fit.problem.prior.precision[np.ix_(shared, shared)]
     for log, number in zip(pair(), (1, 2), strict=True):
-        alone = identify(log.log, card(), log.shifts).evidence["likelihood"]
+        alone, _ = likelihood_of(identify(log.log, card(), log.shifts))
         place = [alone.point.names.index(name) for name in names]
         assert len(place) == len(shared), number
         summed = summed + covariance_of(alone.covariance[np.ix_(place, place)])
@@ -73,7 +74,7 @@ def test_the_truth_of_shared_and_of_own_values_is_within_the_intervals() -> None
 
 
 def test_a_design_prior_counts_once() -> None:
-    fit = together().found.evidence["likelihood"]
+    fit, _ = likelihood_of(together().found)
     known = card().J_out
     assert known is not None
     place = fit.point.names.index("J_out")
@@ -81,14 +82,14 @@ def test_a_design_prior_counts_once() -> None:
 
 
 def test_each_log_has_its_own_and_nothing_else() -> None:
-    names = together().found.evidence["likelihood"].point.names
+    names = likelihood_of(together().found)[0].point.names
     assert not set(OWN) & set(names)
     assert {f"log{k}.{name}" for k in (1, 2) for name in OWN[:2]} <= set(names)
 
 
 def test_what_is_told_of_one_log_has_plain_ids() -> None:
     found = together().found
-    second = of_one_log(found, 2)
+    second = of_one_log(found, _several().logs[1])
     assert second.estimates["Tv_over_if"].value == found.estimates["Tv_over_if.2"].value
     assert second.estimates["Tv_over_if"].id == "Tv_over_if"
     assert set(second.estimates) == set(_several().logs[1].alone)
@@ -99,7 +100,7 @@ def test_what_is_told_of_one_log_has_plain_ids() -> None:
 
 def test_the_start_is_the_mean_by_information() -> None:
     found = still()
-    fit = found.evidence["likelihood"]
+    fit, _ = likelihood_of(found)
     start = start_of([found, found])
     for name, value in zip(fit.point.names, fit.point.values, strict=True):
         if not name.startswith("start") and name not in OWN:

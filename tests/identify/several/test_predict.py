@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 
 from drivetwin.identify.inputs import signals_of
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.several.predict import Expected, expected
 from tests.identify.several.made import LOADS, card, pair, together
 
@@ -18,7 +19,7 @@ def _of_second() -> Expected:
     """The second log of the pair as if it were unknown to a fit that it took part in."""
     second = pair()[1]
     signals = replace(signals_of(second.log, card(), second.shifts.shifts[0]), log=9)
-    return expected(together().found.evidence["likelihood"], [signals], card())[0]
+    return expected(likelihood_of(together().found)[0], [signals], card())[0]
 
 
 def test_load_and_age_come_from_the_gear_before_the_shift() -> None:
@@ -46,13 +47,13 @@ def test_no_error_is_allowed_below_the_sensor_noise() -> None:
 def test_a_log_of_the_fit_keeps_its_own() -> None:
     second = pair()[1]
     signals = replace(signals_of(second.log, card(), second.shifts.shifts[0]), log=2)
-    fit = together().found.evidence["likelihood"]
+    fit = likelihood_of(together().found)[0]
     assert expected(fit, [signals], card())[0].own == {}
 
 
 def test_equal_seeds_give_equal_bounds() -> None:
     second = pair()[1]
     signals = replace(signals_of(second.log, card(), second.shifts.shifts[0]), log=9)
-    again = expected(together().found.evidence["likelihood"], [signals], card())[0]
+    again = expected(likelihood_of(together().found)[0], [signals], card())[0]
     assert again.bounds == _of_second().bounds
     assert np.isclose(again.mean_speed, _of_second().mean_speed)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.pipeline import identify
 from drivetwin.identify.result import Identification
 from drivetwin.logs.read import read_log
@@ -63,9 +64,9 @@ def test_a_doubtful_grid_is_not_marked_as_good(given: tuple[Identification, Shif
 
 def test_a_refused_stage_says_why(given: tuple[Identification, ShiftLog]) -> None:
     found = given[0]
-    (one,) = found.evidence["integral"]
+    (one,) = found.evidence.integral
     refused = replace(one, ring=None, refusals={"shaft": "no oscillation"})
-    shaft = evidence_sections(replace(found, evidence={"integral": (refused,)}))[2]
+    shaft = evidence_sections(replace(found, evidence=Evidence(integral=(refused,))))[2]
     assert [block.items for block in shaft.blocks if isinstance(block, NotesBlock)] == [
         ["Integral method: no oscillation"]
     ]

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.likelihood.curves import curves_of
 from drivetwin.identify.result import Identification
 from drivetwin.report.html import render_report
@@ -25,7 +26,7 @@ def found() -> Identification:
         identification(),
         shifts=(signals.shift,),
         friction=curves_of(fit, {}, np.zeros_like(fit.covariance)),
-        evidence={"likelihood": fit, "signals": (signals,)},
+        evidence=Evidence(likelihood=fit, signals=(signals,)),
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.experiment.catalogue import Experiment
 from drivetwin.identify.experiment.suggest import Prospect, Suggestion
 from drivetwin.identify.result import Verdict
@@ -59,7 +60,7 @@ def test_simulated_experiments_take_the_place_of_the_general_advice() -> None:
         Suggestion("eta", Verdict.IDENTIFIED, 0.02, (), "the gain of the torque sensor"),
     )
     found = identification()
-    found = replace(found, evidence={**found.evidence, "suggestions": told})
+    found = replace(found, evidence=Evidence(suggestions=told))
     tables = [one for one in limits_section(found).blocks if isinstance(one, TableBlock)]
     rows = [[cell.text for cell in row] for row in tables[1].rows]
     assert rows == [

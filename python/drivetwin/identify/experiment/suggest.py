@@ -91,13 +91,13 @@ def suggest(found: Identification) -> tuple[Suggestion, ...]:
 def examined(found: Identification) -> Identification:
     """The identification with the experiments that would tell what its log leaves open.
 
-    `evidence["suggestions"]` holds them, as `suggest` gives them; unchanged where nothing is open,
+    `evidence.suggestions` holds them, as `suggest` gives them; unchanged where nothing is open,
     or by another method than the likelihood.
     """
     is_open = any(one.verdict in _OPEN for one in found.estimates.values())
     if found.method is not Method.LIKELIHOOD or not is_open:
         return found
-    return replace(found, evidence={**found.evidence, "suggestions": suggest(found)})
+    return replace(found, evidence=replace(found.evidence, suggestions=suggest(found)))
 
 
 def _relative_width(one: Estimate) -> float:

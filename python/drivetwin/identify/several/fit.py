@@ -15,13 +15,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.identify.conclude import Conclusions
 from drivetwin.identify.design import outside_ranges
+from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.inputs import driveline_of
 from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import PLAUSIBLE, LikelihoodFit, covariance_of
@@ -29,6 +29,7 @@ from drivetwin.identify.likelihood.unknowns import AERO, OWN, START, own_of
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import Shifts, identify
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Estimate, Identification, SignalFit
 from drivetwin.identify.several.consistency import FAR, Consistency, consistency
 from drivetwin.identify.several.judge import judged, pooled_curves
@@ -76,7 +77,7 @@ def identify_several(
 ) -> Identification:
     """Identify one driveline from two or more logs, by the likelihood of all their shifts.
 
-    `evidence["several"]` holds a Several; ids of what a log has of its own end in its number.
+    `evidence.several` holds the logs; ids of what a log has of its own end in its number.
     Raises InputError for logs that cannot be joined (the same twice, channels that do not fit),
     IdentificationError where one log alone, or all together, cannot be fitted, and what `identify`
     raises.
@@ -86,7 +87,7 @@ def identify_several(
     for k, (log, found) in enumerate(zip(logs, shifts, strict=True)):
         with part(ALONE * k / len(logs), ALONE * (k + 1) / len(logs), f"log {k + 1} alone"):
             alone.append(_by_itself(log, card, found))
-    signals = [replace(s, log=k) for k, one in enumerate(alone, 1) for s in one.evidence["signals"]]
+    signals = [replace(s, log=k) for k, one in enumerate(alone, 1) for s in one.evidence.signals]
     drivelines = [driveline_of(card, s.shift) for s in signals]
     with part(ALONE, 0.95, "all logs together"):
         try:
@@ -105,11 +106,16 @@ def identify_several(
     )
     read = [f"{Path(log.source).name}: {text}" for log in logs for text in log.warnings]
     ranges = outside_ranges(told.estimates, card)
-    return _joined(
-        alone,
-        replace(told, warnings=(*read, *told.warnings, *notes, *ranges)),
-        {"likelihood": fit, "signals": tuple(signals), "several": Several(shares, tested)},
+    told = replace(told, warnings=(*read, *told.warnings, *notes, *ranges))
+    several = Several(shares, tested)
+    evidence = Evidence(
+        signals=tuple(signals),
+        paper=tuple(one for each in alone for one in each.evidence.paper),
+        integral=tuple(one for each in alone for one in each.evidence.integral),
+        likelihood=fit,
+        several=several,
     )
+    return replace(_joined(alone, told, several), evidence=evidence)
 
 
 def _refuse_unlike(logs: Sequence[ShiftLog]) -> None:
@@ -161,7 +167,7 @@ def start_of(alone: Sequence[Identification]) -> dict[str, float]:
     What a log has of its own stands under its number, and what no log left free is as fixed in the
     first that has it.
     """
-    fits: list[LikelihoodFit] = [one.evidence["likelihood"] for one in alone]
+    fits = [likelihood_of(one)[0] for one in alone]
     values: dict[str, float] = {}
     for k, fit in enumerate(fits, 1):
         structures = [part.structure for part in fit.problem.parts]
@@ -180,7 +186,7 @@ def _refuse_apart(alone: Sequence[Identification]) -> None:
 
     To first order the common Q exceeds that of the logs alone by Σ (θ_k - θ)ᵀ F_k (θ_k - θ).
     """
-    fits: list[LikelihoodFit] = [one.evidence["likelihood"] for one in alone]
+    fits = [likelihood_of(one)[0] for one in alone]
     told = [_shared(fit) for fit in fits]
     mean, excess = _mean(told), 0.0
     for names, values, information in told:
@@ -235,16 +241,11 @@ def _share(number: int, log: ShiftLog, alone: Identification, fit: LikelihoodFit
     )
 
 
-def _joined(
-    alone: Sequence[Identification], told: Conclusions, evidence: dict[str, Any]
-) -> Identification:
-    """One identification of all logs; what stands behind each log by itself is joined."""
-    several: Several = evidence["several"]
+def _joined(alone: Sequence[Identification], told: Conclusions, several: Several) -> Identification:
+    """One identification of all logs, but for its evidence."""
     told = judged(told, several.consistency)
     names = [Path(share.source).name for share in several.logs]
     agreed = (several.consistency.text,) if several.consistency.agree else ()
-    paper = tuple(one for each in alone for one in each.evidence["paper"])
-    integral = tuple(one for each in alone for one in each.evidence["integral"])
     first = alone[0]
     return replace(
         first,
@@ -254,7 +255,6 @@ def _joined(
         rejected=tuple(one for each in alone for one in each.rejected),
         validity=_covered(alone),
         inputs={name: digest for one in alone for name, digest in one.inputs.items()},
-        evidence={"paper": paper, "integral": integral, **evidence},
         warnings=told.warnings,
         assumptions=(
             f"{', '.join(names)} are of one vehicle in one state: they share all parameters but "
@@ -278,18 +278,16 @@ def _covered(alone: Sequence[Identification]) -> dict[str, tuple[float, float]]:
     }
 
 
-def of_one_log(found: Identification, number: int) -> Identification:
+def of_one_log(found: Identification, share: LogShare) -> Identification:
     """What a fit of several logs says of one of them: its own values under their plain ids.
 
     For a twin that is to simulate this log; of the shifts only its own are in it.
     """
-    several: Several = found.evidence["several"]
-    share = several.logs[number - 1]
     mine = {
         name: plain
         for name in dict.fromkeys((*found.estimates, *found.correlation_ids))
         for plain, log in (log_of(name),)
-        if log in (0, number)
+        if log in (0, share.number)
     }
     place = [k for k, name in enumerate(found.correlation_ids) if name in mine]
     correlation = None if found.correlation is None else found.correlation[np.ix_(place, place)]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -25,7 +25,6 @@ from drivetwin.report.sections.blocks import (
     Tone,
 )
 from drivetwin.report.units import significant
-from drivetwin.validate import Validation
 
 INERTIA_LABELS = WlseLabels(
     grid="η",
@@ -57,8 +56,8 @@ _AnyStages = _Stages[IntegralShift] | _Stages[PaperShift]
 
 def evidence_sections(found: Identification) -> list[Section]:
     """One section per question: inertia and efficiency, load, output shaft."""
-    integral = _stages(found, IntegralShift, "integral method")
-    paper = _stages(found, PaperShift, "the paper's method")
+    integral = _stages(found, found.evidence.integral, "integral method")
+    paper = _stages(found, found.evidence.paper, "the paper's method")
     return [
         Section(
             "inertia",
@@ -104,17 +103,8 @@ def evidence_sections(found: Identification) -> list[Section]:
     ]
 
 
-def _of_kind(found: Identification, kind: type[_Kind]) -> list[_Kind]:
-    """All evidence of one kind, given singly or one per shift."""
-    items: list[object] = []
-    for entry in found.evidence.values():
-        items += entry if isinstance(entry, tuple | list) else [entry]
-    return [item for item in items if isinstance(item, kind)]
-
-
-def _stages(found: Identification, kind: type[_Kind], method: str) -> list[_Stages[_Kind]]:
+def _stages(found: Identification, stages: Sequence[_Kind], method: str) -> list[_Stages[_Kind]]:
     """Evidence of one method, each with the shift it is of where there are several."""
-    stages = _of_kind(found, kind)
     names = [f"Shift {one.start_gear}→{one.end_gear}, {method}" for one in found.shifts]
     if len(stages) < 2 or len(stages) != len(names):
         names = [method[0].upper() + method[1:]] * len(stages)
@@ -139,7 +129,7 @@ def _without_age(shift: IntegralShift) -> str:
 
 
 def _load_blocks(found: Identification, shifts: Iterable[_Stages[IntegralShift]]) -> list[Block]:
-    validations = _of_kind(found, Validation)
+    validations = found.evidence.validation
     final_drive = validations[0].model.i_f if validations else None
     return [
         FigureBlock(

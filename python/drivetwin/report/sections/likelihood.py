@@ -35,14 +35,14 @@ from drivetwin.report.units import significant
 
 def likelihood_sections(found: Identification) -> list[Section]:
     """How well the fit explains the log, and its sensitivity to each sensor; empty without one."""
-    fit = found.evidence.get("likelihood")
-    if not isinstance(fit, LikelihoodFit):
+    fit = found.evidence.likelihood
+    if fit is None:
         return []
     return [_fit_section(found, fit), _sensor_section(found, fit)]
 
 
 def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
-    labels = [_label(s) for s in found.evidence["signals"]]
+    labels = [_label(s) for s in found.evidence.signals]
     tests = residual_tests(fit).values()
     blocks: list[Block] = [_test_table(list(zip(labels, tests, strict=True)))]
     for label, shift, residuals in zip(
@@ -117,7 +117,7 @@ def _judged(text: str, *, good: bool) -> Cell:
 
 
 def _sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
-    change = sensitivity(fit, found.evidence["signals"], found.friction)
+    change = sensitivity(fit, found.evidence.signals, found.friction)
     text = (
         "Change of each result, in per cent of its value, by an error of one sensor: on the left "
         "a gain error of 1 %, on the right an offset of 1 % of the sensor's largest reading. "

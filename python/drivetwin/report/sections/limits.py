@@ -38,7 +38,7 @@ _LEAST_KNOWN = 5
 
 def limits_section(found: Identification) -> Section:
     """What the log cannot tell, and which experiment would help."""
-    suggestions = found.evidence.get("suggestions", ())
+    suggestions = found.evidence.suggestions
     narrower = _suggested(suggestions, found) if suggestions else _least_known(found)
     blocks: list[Block] = [*_remarks(found), *narrower]
     blocks.append(NotesBlock("Not separable from any one shift", _INSEPARABLE))

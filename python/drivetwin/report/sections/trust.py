@@ -7,7 +7,6 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 
-from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.residuals import residual_tests
 from drivetwin.identify.result import Z95, Estimate, Identification, SignalFit, Verdict
 from drivetwin.parameters import spec_of
@@ -110,8 +109,8 @@ def _answer(found: Identification) -> str:
 
 def residual_score(found: Identification) -> tuple[int, int]:
     """Tests of the likelihood's residuals: how many passed, of how many; (0, 0) without any."""
-    fit = found.evidence.get("likelihood")
-    if not isinstance(fit, LikelihoodFit):
+    fit = found.evidence.likelihood
+    if fit is None:
         return 0, 0
     tests = [test for group in residual_tests(fit).values() for test in group]
     total = sum(1 + len(test.correlation) for test in tests)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""What stands behind an identification, stage by stage.
+
+Names of types only are imported here: the stages themselves know the Identification that holds
+their results.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from drivetwin.held_out import HeldOut
+    from drivetwin.identify.experiment.suggest import Suggestion
+    from drivetwin.identify.integral import IntegralShift
+    from drivetwin.identify.likelihood.fit import LikelihoodFit
+    from drivetwin.identify.literal import PaperShift
+    from drivetwin.identify.several.fit import Several
+    from drivetwin.identify.signals import ShiftSignals
+    from drivetwin.validate import Validation
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """Results of the stages, each with its own units and shapes (SI); empty where none ran.
+
+    What goes by shift is in the order of `Identification.shifts`; of several logs fitted as one,
+    the shifts of the first come first.
+    """
+
+    signals: tuple[ShiftSignals, ...] = ()
+    """What the log showed of each shift; by every method."""
+    paper: tuple[PaperShift, ...] = ()
+    """The paper's stages on each shift: beside the other methods for comparison, where it can be
+    computed and the log has an output torque."""
+    integral: tuple[IntegralShift, ...] = ()
+    """The integral method on each shift, from which the likelihood method starts; empty by the
+    paper's method and without an output torque."""
+    likelihood: LikelihoodFit | None = None
+    """The fit of all shifts together; None by another method, and where it did not converge."""
+    several: Several | None = None
+    """The logs behind a fit of several, from `identify_several`; None of one log."""
+    suggestions: tuple[Suggestion, ...] = ()
+    """Experiments that would tell what is left open, from `examined`; likelihood method only."""
+    validation: tuple[Validation, ...] = ()
+    """Each shift simulated and compared, from `validated`; by every method."""
+    held_out: tuple[HeldOut, ...] = ()
+    """Each shift that was predicted and not fitted, by log and time, from `identify_together`."""
