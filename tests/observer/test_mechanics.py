@@ -10,7 +10,17 @@ import pytest
 
 from drivetwin.driveline import DualClutch, Signal, Trajectory, simulate
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.observer.mechanics import ENGINE, LOAD, OUTPUT, STATES, TWIST, WHEEL, Course, linear
+from drivetwin.observer.mechanics import (
+    ENGINE,
+    LOAD,
+    OUTPUT,
+    STATES,
+    TORQUE_ERROR,
+    TWIST,
+    WHEEL,
+    Course,
+    linear,
+)
 
 GRID = 2e-4
 
@@ -43,7 +53,8 @@ def test_follows_the_core_through_all_phases(drum: float) -> None:
     base = {n: np.where(locked[n], 0.0, carried[n]) for n in carried}
     none = {n: np.zeros(middle.size) for n in base}
     time = run.time[::2]
-    course = Course(time, np.interp(middle, torque.time, torque.values), locked, base, none, 100.0)
+    acting = np.interp(middle, torque.time, torque.values)
+    course = Course(time, acting, acting >= 0.0, locked, base, none, 100.0)
     found = linear(model, course)
     x = np.zeros((time.size, STATES))
     x[:, ENGINE], x[:, OUTPUT] = run.engine_speed[::2], run.output_speed[::2]
@@ -63,12 +74,19 @@ def test_follows_the_core_through_all_phases(drum: float) -> None:
         assert told[~near] == pytest.approx(torques[~near], abs=0.5)
 
 
-def test_overrun_of_the_dissipative_law_divides_by_eta() -> None:
-    model = replace(paper_steps().model, loss_law="dissipative")
+def test_the_dissipative_law_divides_by_eta_where_power_flows_back() -> None:
+    """Whichever sign the engine's own torque has: while it is slowed down it drives."""
+    model = replace(paper_steps().model, loss_law="dissipative", J2e=2.2)
     time = np.array([0.0, 1e-3, 2e-3])
     off = {one.name: np.zeros(2, dtype=bool) for one in model.elements}
     none = {name: np.zeros(2) for name in off}
-    found = linear(model, Course(time, np.array([500.0, -500.0]), off, none, none, 100.0))
-    drive, overrun = found.push[:, ENGINE] / 1e-3
-    assert drive == pytest.approx(500.0 / model.J1)
-    assert overrun == pytest.approx(-500.0 / model.J1)
+    driving = np.array([True, False])
+    found = linear(model, Course(time, np.full(2, -500.0), driving, off, none, none, 100.0))
+    for share, push, transition in zip(
+        (model.eta, 1.0 / model.eta), found.push, found.transition, strict=True
+    ):
+        inertia = share * model.J1 + model.J2e
+        assert push[ENGINE] == pytest.approx(-500.0 * share / inertia * 1e-3)
+        # The error of the engine torque is forgotten at 100/s: its mean over a step is less.
+        mean = (1.0 - np.exp(-0.1)) / 0.1
+        assert transition[ENGINE, TORQUE_ERROR] == pytest.approx(share / inertia * 1e-3 * mean)

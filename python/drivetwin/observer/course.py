@@ -30,6 +30,8 @@ VENT = 0.1
 """Time after it has handed over [s] within which an element of unknown pressure is empty."""
 HAND_OVER = 10.0
 """Drift [1/sqrt(s)] of an unknown torque while the elements hand over: a level in 10 ms."""
+RATE = 0.01
+"""Time on either side of an instant over which the rate of the engine speed is taken [s]."""
 _HANDED_UP = (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_DOWN)
 """Kinds of shift in which the on-coming element carries the torque while both slip."""
 
@@ -103,8 +105,25 @@ def _floored(signal: Sampled) -> Sampled:
     return replace(signal, sigma=max(signal.sigma, FLOOR * float(np.ptp(signal.values))))
 
 
-def course_of(model: DualClutch, seen: Recorded, delay: float) -> Course:
-    """Inputs and locks over the grid; `delay` [s] is the age of the engine torque."""
+def is_driving(model: DualClutch, seen: Recorded, delay: float) -> BoolArray:
+    """Whether power flows from the engine over each step (N-1,): T_g = T_e - J1·ω_e' ≥ 0.
+
+    The sign of T_e does not tell it: with a closed pedal the engine still drives while it is slowed
+    down. `delay` [s] is the age of the engine torque.
+    """
+    middle = 0.5 * (seen.time[1:] + seen.time[:-1])
+    before = np.maximum(middle - RATE, seen.time[0])
+    after = np.minimum(middle + RATE, seen.time[-1])
+    change = seen.speed("engine_speed", after) - seen.speed("engine_speed", before)
+    torque = np.interp(middle + delay, seen.engine_torque.time, seen.engine_torque.values)
+    return np.asarray(torque - model.J1 * change / (after - before) >= 0.0)
+
+
+def course_of(model: DualClutch, seen: Recorded, delay: float, driving: BoolArray) -> Course:
+    """Inputs and locks over the grid; `delay` [s] is the age of the engine torque.
+
+    `driving` (N-1,) is as `is_driving` tells it.
+    """
     time, shift = seen.time, seen.shift
     middle = 0.5 * (time[1:] + time[:-1])
     torque = seen.engine_torque
@@ -125,6 +144,7 @@ def course_of(model: DualClutch, seen: Recorded, delay: float) -> Course:
     return Course(
         time,
         np.interp(middle + delay, torque.time, torque.values),
+        driving,
         locked,
         base,
         drift,

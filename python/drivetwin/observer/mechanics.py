@@ -35,13 +35,15 @@ SPEEDS = 3
 class Course:
     """What is known over the grid `time` (N,), each over the N-1 steps between.
 
-    `engine_torque` [N m] as it acts; by element `locked`, `base` [N m], the torque while it
-    slips, with the sign of the slip and 0 while it is open, and least `drift` [1/sqrt(s)] of the
-    relative error of that; `error_rate` [1/s] at which the engine torque's error is forgotten.
+    `engine_torque` [N m] as it acts; `driving`, whether power flows from the engine, T_g ≥ 0; by
+    element `locked`, `base` [N m], the torque while it slips, with the sign of the slip and 0 while
+    it is open, and least `drift` [1/sqrt(s)] of the relative error of that; `error_rate` [1/s] at
+    which the engine torque's error is forgotten.
     """
 
     time: FloatArray
     engine_torque: FloatArray
+    driving: BoolArray
     locked: Mapping[str, BoolArray]
     base: Mapping[str, FloatArray]
     drift: Mapping[str, FloatArray]
@@ -109,10 +111,10 @@ def _direction(model: DualClutch, one: ShiftElement) -> FloatArray:
 
 
 def _efficiency(model: DualClutch, course: Course) -> FloatArray:
-    """dφ/dT_g (N-1,): η, and 1/η in overrun by the dissipative law."""
+    """dφ/dT_g (N-1,): η, and 1/η by the dissipative law where power flows back."""
     if model.loss_law == "paper":
         return np.full(course.engine_torque.size, model.eta)
-    return np.where(course.engine_torque >= 0.0, model.eta, 1.0 / model.eta)
+    return np.where(course.driving, model.eta, 1.0 / model.eta)
 
 
 def _forces(model: DualClutch, course: Course) -> tuple[FloatArray, FloatArray]:

@@ -17,13 +17,14 @@ import numpy as np
 from drivetwin.driveline import DualClutch
 from drivetwin.logs.roles import PRESSURE
 from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.observer.course import Recorded, course_of, recorded, slip_of
+from drivetwin.observer.course import Recorded, course_of, is_driving, recorded, slip_of
 from drivetwin.observer.mechanics import (
     CARRIED,
     LOAD,
     SPEEDS,
     STATES,
     TORQUE_ERROR,
+    BoolArray,
     Linear,
     answer,
     linear,
@@ -59,17 +60,22 @@ SMALL = 1e-3
 
 @dataclass(frozen=True)
 class _Setting:
-    """A shift with its model parameters, grid and inputs."""
+    """A shift with its model parameters, grid and inputs.
+
+    Which way the power flows is that of the twin's values: a small step along a parameter turns
+    nothing round.
+    """
 
     seen: Recorded
     known: Uncertain
     directions: FloatArray
+    driving: BoolArray
 
     def linear(self, values: FloatArray) -> tuple[DualClutch, Linear]:
         """The linear model at parameters `values` (p,)."""
         model = self.known.model(values)
         delay = self.known.named(values)["te_delay"]
-        return model, linear(model, course_of(model, self.seen, delay))
+        return model, linear(model, course_of(model, self.seen, delay, self.driving))
 
 
 def smooth(twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
@@ -81,7 +87,8 @@ def smooth(twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
     seen = recorded(log, shift, twin.i_in)
     fills = {f"P0.{name}": READ * p.sigma for name, p in seen.pressures.items()}
     known = uncertain(twin, shift, (*STEMS, *fills), fills)
-    setting = _Setting(seen, known, known.directions)
+    driving = is_driving(known.model(known.values), seen, known.named(known.values)["te_delay"])
+    setting = _Setting(seen, known, known.directions, driving)
     model, base = setting.linear(known.values)
     none = np.zeros((base.transition.shape[0], STATES, 0))
     walks = WALKS if setting.seen.pressures else FREE_WALKS
