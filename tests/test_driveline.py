@@ -16,6 +16,7 @@ from drivetwin.driveline import (
     Accuracy,
     DualClutch,
     FrictionTable,
+    LossLaw,
     RoadLoad,
     Signal,
     State,
@@ -46,14 +47,16 @@ def reference_case(name: str) -> tuple[DualClutch, Any, Any, State]:
     return subject.model, case, rows, subject.start
 
 
+@pytest.mark.parametrize("law", ["paper", "dissipative"])
+@pytest.mark.parametrize("engine_torque", [1545.0, -120.0, -900.0])
 @pytest.mark.parametrize("speed", [178.0, -178.0])
-def test_the_steady_torque_lasts(speed: float) -> None:
-    """From its twist both sides accelerate alike: nothing swings."""
-    model = replace(paper_model(), loss_law="dissipative", load=RoadLoad(9000.0, 3000.0))
-    model = replace(model, eta=1.0)  # whichever way the power flows
+def test_the_steady_torque_lasts(law: LossLaw, engine_torque: float, speed: float) -> None:
+    """From its twist both sides accelerate alike: nothing swings, whichever way the power flows."""
+    model = replace(paper_model(), loss_law=law, J2e=2.1, load=RoadLoad(2000.0, 3000.0))
     torque, pressures, _ = held_second_gear()
+    torque = replace(torque, values=np.full(2, engine_torque))
     wheel = speed / model.ratio("B2") / model.i_f
-    carried = model.steady_torque(float(torque.values[0]), model.ratio("B2"), wheel)
+    carried = model.steady_torque(engine_torque, model.ratio("B2"), wheel)
     start = State(speed, speed / model.ratio("B2"), wheel, carried / model.k_o, ("B2",))
     run = simulate(model, torque, pressures, start, np.linspace(0.0, 0.2, 21))
     assert run.shaft_torque == pytest.approx(carried, rel=1e-9)

@@ -127,23 +127,32 @@ class DualClutch:
         held = next(one for one in self.elements if one.name == element)
         return self.i_in * held.i_c * held.i_out
 
-    def sides(self, ratio: float) -> tuple[float, float]:
+    def efficiency(self, *, driving: bool) -> float:
+        """dφ/dT_g: η, and 1/η by the dissipative law where power flows back, not `driving`."""
+        return self.eta if driving or self.loss_law == "paper" else 1.0 / self.eta
+
+    def sides(self, ratio: float, *, driving: bool = True) -> tuple[float, float]:
         """Inertias before and behind the output shaft, at the shaft [kg m^2], in a gear.
 
-        `ratio` is the overall one of the gear. The drums of open elements are left out.
+        `ratio` is the overall one of the gear; `driving` says whether power flows from the engine.
+        The drums of open elements are left out.
         """
-        before = (self.J1 * self.eta + self.J2e) * ratio**2 + self.J_out
-        return before, self.J_v / self.i_f**2
+        engine = self.J1 * self.efficiency(driving=driving) + self.J2e
+        return engine * ratio**2 + self.J_out, self.J_v / self.i_f**2
 
     def steady_torque(self, engine_torque: float, ratio: float, wheel_speed: float) -> float:
         """Torque of the output shaft [N m] at which both of its sides accelerate alike.
 
-        Eqs. 10 and 11 with equal accelerations, in the gear of overall ratio `ratio`, from the
-        engine's torque [N m] and the wheel's speed [rad/s] of either sign.
+        Eqs. 10 and 11 with equal accelerations and φ(T_g) by the loss law, in the gear of overall
+        ratio `ratio`, from the engine's torque [N m] and the wheel's speed [rad/s] of either sign.
         """
         load = self.load.at(wheel_speed) / self.i_f
-        drive = self.eta * engine_torque * ratio
         before, behind = self.sides(ratio)
+        rate = (self.eta * engine_torque * ratio - load) / (before + behind)
+        # T_g = T_e - J1·ω_e': its sign is the same whichever way the power is taken to flow.
+        driving = (engine_torque - self.J1 * ratio * rate) * ratio * wheel_speed >= 0.0
+        before, behind = self.sides(ratio, driving=driving)
+        drive = self.efficiency(driving=driving) * engine_torque * ratio
         return load + behind * (drive - load) / (before + behind)
 
 

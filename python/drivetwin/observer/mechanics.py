@@ -111,10 +111,9 @@ def _direction(model: DualClutch, one: ShiftElement) -> FloatArray:
 
 
 def _efficiency(model: DualClutch, course: Course) -> FloatArray:
-    """dφ/dT_g (N-1,): η, and 1/η by the dissipative law where power flows back."""
-    if model.loss_law == "paper":
-        return np.full(course.engine_torque.size, model.eta)
-    return np.where(course.driving, model.eta, 1.0 / model.eta)
+    """dφ/dT_g (N-1,), by the loss law."""
+    ahead, back = (model.efficiency(driving=driving) for driving in (True, False))
+    return np.where(course.driving, ahead, back)
 
 
 def _forces(model: DualClutch, course: Course) -> tuple[FloatArray, FloatArray]:
