@@ -105,13 +105,13 @@ def _one(
         fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
         shift = recorded(log, shift, fills)
         told = _expected(fit, card, log, shift, number)
-        mine, notes = _with_law(_of_log(found, log, number, told), shift)
+        mine, own = _of_log(found, log, number, told)
+        mine, notes = _with_law(mine, shift)
         twin = Twin.from_identification(mine, card)
         start = None if told is None else (told.time, told.start)
         run = validate(twin, log, shift, start=start)
     except DrivetwinError as fault:
         return HeldOut(log.source, shift, None, notes=(fault.what,))
-    own = {k: v for k, v in mine.estimates.items() if v.method == BEFORE}
     bounds = {} if told is None else _of_signals(told.bounds, run, log, card)
     return HeldOut(log.source, shift, run, own, bounds, (*notes, *run.warnings))
 
@@ -128,16 +128,17 @@ def _expected(
 
 def _of_log(
     found: Identification, log: ShiftLog, number: int, told: Expected | None
-) -> Identification:
+) -> tuple[Identification, dict[str, Estimate]]:
     """The identification with what the log has of its own: from the fit, else as `told`.
 
+    What was told is given again by itself, in the order of the estimates; empty for the fit's.
     Raises IdentificationError for a log that the fit has not seen, by another method.
     """
     several = found.evidence.several
     if number == 0:
-        return found
+        return found, {}
     if several is not None and number <= len(several.logs):
-        return of_one_log(found, several.logs[number - 1])
+        return of_one_log(found, several.logs[number - 1]), {}
     if told is None:
         raise IdentificationError(
             "load and age of the engine torque of a log that was not fitted are told by the "
@@ -147,7 +148,10 @@ def _of_log(
         )
     base = found if several is None else of_one_log(found, several.logs[0])
     load = None if base.load is None else replace(base.load, mean_speed=told.mean_speed)
-    return replace(base, estimates={**base.estimates, **_own(base, told)}, load=load)
+    own = _own(base, told)
+    estimates = {**base.estimates, **own}
+    ordered = {name: one for name, one in estimates.items() if name in own}
+    return replace(base, estimates=estimates, load=load), ordered
 
 
 def _own(base: Identification, told: Expected) -> dict[str, Estimate]:
