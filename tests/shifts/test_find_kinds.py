@@ -65,3 +65,15 @@ def test_the_vibration_dose_needs_a_torque_sensor(
     bare = {role: c for role, c in log.channels.items() if role != "output_torque"}
     (shift,), _ = find_shifts(replace(log, channels=bare), card)
     assert "vibration_dose" not in shift.quality
+
+
+def test_friction_work_is_told_where_the_on_coming_element_carries_the_torque(
+    recording: tuple[ShiftLog, VehicleCard, ShiftKind],
+) -> None:
+    """In a power-on downshift the off-going one slips under it: T_o times the slip is negative."""
+    log, card, kind = recording
+    (shift,), _ = find_shifts(log, card)
+    work = {name: value for name, value in shift.quality.items() if name.startswith("friction_")}
+    told = {"friction_work", "friction_power_max"}
+    assert set(work) == (set() if kind is ShiftKind.POWER_ON_DOWN else told)
+    assert all(value > 1e3 for value in work.values())

@@ -42,6 +42,8 @@ _RING = 0.5
 _BAND = 32.0
 """Cut-off of the low-pass on torque [Hz]: upper end of felt longitudinal vibration."""
 _SPEED_BAND = 25.0
+_AGAINST = 0.05
+"""Share of friction work of the wrong sign up to which the on-coming element alone carries T_o."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,9 @@ def shift_quality(
     9; times the wheel radius: m/s^1.75 of ISO 2631-1, unweighted). J_v is `J_vehicle` [kg m2], or
     the geometric mean of the card's range. `friction_work`, `friction_power_max`: of the on-coming
     element in the inertia phase, T_c = T_o/iout (eq. 16; leaves out the output
-    side's inertia and the drums) times the slip (eq. 15).
+    side's inertia and the drums) times the slip (eq. 15). Friction makes no energy: where more
+    than 5 % of the work comes out negative the off-going element carries T_o, as in a power-on
+    downshift, and there are no such figures.
     """
     start, end = shift.torque_phase[0], shift.lockup_time
     figures = {
@@ -208,6 +212,9 @@ def _friction(
         return {}
     slip = np.interp(time, speeds.time, speeds.input / i_c - i_out * speeds.output)
     power = values / i_out * slip
+    against, along = (float(np.trapezoid(np.maximum(p, 0.0), time)) for p in (-power, power))
+    if against > _AGAINST * (against + along):
+        return {}
     return {
         "friction_work": float(np.trapezoid(power, time)),
         "friction_power_max": float(power.max()),
