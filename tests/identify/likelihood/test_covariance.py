@@ -11,7 +11,7 @@ import pytest
 from drivetwin.driveline import Signal
 from drivetwin.identify.likelihood.covariance import sensor_noise, with_input_noise
 from drivetwin.identify.likelihood.problem import Part
-from drivetwin.identify.likelihood.record import TORQUE
+from drivetwin.identify.likelihood.record import TORQUE, Output
 from drivetwin.identify.likelihood.response import observed, response_of
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import FloatArray
@@ -48,6 +48,66 @@ def test_weighting_equals_the_dense_covariance() -> None:
     expected = np.linalg.solve(dense, columns_in)
     found = whiteness.weighted(columns_in) * record.sigma[:, None]
     assert np.allclose(found, expected * record.sigma[:, None], rtol=1e-3, atol=1e-2)
+
+
+def _sparse(every: int) -> tuple[Part, Point]:
+    """A shift up to lock-up of which outputs and pressures show one sample in so many."""
+    made = bench()
+    posed, start = problem(made)
+    part = posed.until([made.signals.shift.lockup_time - 0.02]).parts[0]
+    record = part.record
+    outputs = tuple(
+        Output(out.name, out.place[::every], out.values[::every], out.sigma)
+        for out in record.outputs
+    )
+    pressures = {
+        name: Signal(p.time[::every], p.values[::every]) for name, p in record.pressures.items()
+    }
+    sigma = {**record.input_sigma, TORQUE: 0.03}
+    sparse = replace(record, outputs=outputs, pressures=pressures, input_sigma=sigma, held_back={})
+    return Part.unweighted(part.structure, sparse).weighted_by(start), start
+
+
+def _filtered(part: Part, point: Point, columns: FloatArray) -> FloatArray:
+    """Products (q, q) of columns (n, q) weighted by a Kalman filter, sample after sample."""
+    path, record = part.weighting.path, part.record
+    assert path is not None
+    response, model = path.response, part.structure.model(point)
+    quiet = np.diag(1.0 / np.diag(path.inverse[0]))
+    spread, state = quiet.copy(), np.zeros((len(quiet), columns.shape[1]))
+    products = np.zeros((columns.shape[1], columns.shape[1]))
+    seen = sorted((k, o) for o, out in enumerate(record.outputs) for k in out.centre)
+    first = np.cumsum([0, *(out.values.size for out in record.outputs)])
+    now = 0
+    for k, o in seen:
+        for step in range(now, k):
+            pushed = sum(
+                power[step] * np.outer(response.drive[name][step], response.drive[name][step])
+                for name, power in path.power.items()
+            )
+            past = response.transition[step]
+            spread, state = past @ spread @ past.T + quiet + pushed, past @ state
+        now = k
+        row, out = observed(model, record.outputs[o].name), record.outputs[o]
+        error = columns[first[o]] - row @ state
+        first[o] += 1
+        variance = float(row @ spread @ row) + out.sigma**2
+        gain = spread @ row / variance
+        state = state + np.outer(gain, error)
+        spread = spread - variance * np.outer(gain, gain)
+        products += np.outer(error, error) / variance
+    return products
+
+
+@pytest.mark.parametrize("every", [10, 20])
+def test_slow_samples_weigh_as_a_kalman_filter_weighs_them(every: int) -> None:
+    part, point = _sparse(every)
+    found = part.linearised(point)
+    assert found is not None
+    slopes = found[1] / np.linalg.norm(found[1], axis=0)
+    expected = np.diag(_filtered(part, point, slopes))
+    weighed = np.einsum("ni,ni->i", slopes, part.weighting.weighted(slopes))
+    assert np.allclose(weighed, expected, rtol=1e-2, atol=0.0)
 
 
 def test_without_input_noise_the_sensors_weigh_alone() -> None:

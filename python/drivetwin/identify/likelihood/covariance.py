@@ -98,7 +98,7 @@ def sensor_noise(record: Record) -> Whiteness:
 def with_input_noise(model: DualClutch, record: Record, response: Response) -> Whiteness:
     """Weighting with the noise of engine torque and pressures in it."""
     power = _power(record, response)
-    inverse = np.asarray(np.linalg.inv(_process(model, record, response, power)), dtype=float)
+    inverse = _inverse(_process(model, record, response, power))
     factor = cholesky_banded(
         _information(inverse, response.transition, model, record),
         overwrite_ab=True,
@@ -138,6 +138,18 @@ def _process(
     for name, drive in response.drive.items():
         noise[1:] += power[name][:, None, None] * drive[:, :, None] * drive[:, None, :]
     return noise
+
+
+def _inverse(noise: FloatArray) -> FloatArray:
+    """Inverses (N, 4, 4) of process noise (N, 4, 4), the first of which is the quiet one.
+
+    Formed in units of that: where states are counted in units of so different size, the digits of
+    the one direction that an input's noise drives are lost beside the quiet ones.
+    """
+    unit = np.sqrt(np.diag(noise[0]))
+    units = np.outer(unit, unit)
+    inverse = np.linalg.inv(noise / units)
+    return np.asarray(0.5 * (inverse + inverse.transpose(0, 2, 1)) / units)
 
 
 def _information(
