@@ -9,13 +9,18 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+from scipy.signal import lfilter
+
 import drivetwin
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import paper, paper_steps
+from drivetwin.identify.likelihood.fit import spread_of
 from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import identify
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification
 
 DURATION = 3.3
@@ -50,3 +55,16 @@ def stepped() -> Identification:
 def by_the_paper() -> Identification:
     """The same by a method without a likelihood."""
     return _identified(paper, Method.PAPER)
+
+
+def slowed(found: Identification) -> Identification:
+    """The same, if its residuals were those of sensors behind a filter of some 20 ms."""
+    fit, _ = likelihood_of(found)
+    rng = np.random.default_rng(2)
+    residuals = tuple(
+        part.record.sigma * lfilter([np.sqrt(0.19)], [1.0, -0.9], rng.normal(size=part.record.size))
+        for part in fit.problem.parts
+    )
+    normal = replace(fit.normal, residuals=residuals)
+    wide = replace(fit, normal=normal, covariance=spread_of(fit.problem, normal, fit.chi2))
+    return replace(found, evidence=replace(found.evidence, likelihood=wide))

@@ -11,7 +11,7 @@ import pytest
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.identify.likelihood.newton import minimise
 from drivetwin.identify.profile import likelihood_of, profile
-from tests.identify.asked import by_the_paper, stepped
+from tests.identify.asked import by_the_paper, slowed, stepped
 
 
 def test_of_a_parameter_that_acts_linearly_is_that_of_the_covariance() -> None:
@@ -21,6 +21,13 @@ def test_of_a_parameter_that_acts_linearly_is_that_of_the_covariance() -> None:
     distance = (one.values - one.estimate) / (half / 1.96)
     assert one.rise == pytest.approx(distance**2, rel=0.15, abs=0.3)
     assert one.rise[np.argmin(np.abs(distance))] == 0.0
+
+
+def test_slow_errors_widen_it_like_the_covariance() -> None:
+    one = profile(slowed(stepped()), "eta")
+    half = 0.5 * (one.linear[1] - one.linear[0])
+    assert half > 1.4 * 1.96 * (stepped().estimates["eta"].std_noise or 0.0)
+    assert one.interval == pytest.approx(one.linear, abs=0.15 * half)
 
 
 def test_is_the_least_cost_with_the_parameter_held() -> None:

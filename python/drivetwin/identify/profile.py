@@ -19,6 +19,7 @@ from drivetwin.errors import IdentificationError, InputError
 from drivetwin.identify.likelihood.derived import parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.newton import minimise
+from drivetwin.identify.likelihood.noise_power import noise_power
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.result import Z95, Identification
@@ -41,7 +42,8 @@ SEARCHES = 8
 
 @dataclass(frozen=True)
 class Profile:
-    """`rise` (n,) of Q, over the noise found in the log, at `values` (n,) of a parameter, SI.
+    """`rise` (n,) of Q, over the noise found in the log, slow errors counted, at `values` (n,) of a
+    parameter, SI.
 
     `interval` is the 95 % interval by the profile, an end infinite where Q does not rise enough;
     `linear` the one by the covariance, from noise alone like the other.
@@ -129,11 +131,17 @@ class _Held:
         row = self.row(self.fit.point)
         return float(np.sqrt(max(float(row @ self.fit.covariance @ row), 0.0)))
 
+    @property
+    def unit(self) -> float:
+        """Rise of Q that counts as one: noise that is louder or slower than the sensors' shows the
+        parameter less."""
+        return noise_power(self.fit, self.row(self.fit.point)[None, :])
+
 
 def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
     """(distance in standard deviations, rise of Q) from the minimum outwards."""
     fit = held.fit
-    lowest, unit = fit.normal.cost, max(fit.chi2, 1.0)
+    lowest, unit = fit.normal.cost, held.unit
     estimate, std, point = held.estimate, held.std, fit.point
     found: list[tuple[float, float]] = []
     distance = 0.0

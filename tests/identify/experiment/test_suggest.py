@@ -11,8 +11,10 @@ import pytest
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.experiment.catalogue import Experiment
 from drivetwin.identify.experiment.suggest import LEAST_KNOWN, examined, suggest
+from drivetwin.identify.likelihood.noise_power import noise_power
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Verdict
-from tests.identify.asked import by_the_paper, stepped, still
+from tests.identify.asked import by_the_paper, slowed, stepped, still
 
 
 def test_throttle_steps_tell_the_age_of_a_torque_that_stood_still() -> None:
@@ -72,3 +74,15 @@ def test_an_identification_takes_up_what_would_tell_it_more() -> None:
     known = {n: e for n, e in still().estimates.items() if e.verdict is Verdict.IDENTIFIED}
     sure = replace(still(), estimates=known)
     assert examined(sure) is sure
+
+
+def test_an_experiment_has_the_slow_errors_of_the_log() -> None:
+    """Else the same shift again would seem to narrow what the sensors' filters have widened."""
+    half, power = [], []
+    for found in (still(), slowed(still())):
+        (told,) = (one for one in suggest(found) if one.parameter == "c_o")
+        half.append(next(p for p in told.prospects if p.experiment is Experiment.AGAIN).half_width)
+        fit, _ = likelihood_of(found)
+        power.append(noise_power(fit, np.eye(len(fit.point.names))[[fit.point.names.index("c_o")]]))
+    assert power[1] > 2.0 * power[0]
+    assert half[1] / half[0] == pytest.approx(np.sqrt(power[1] / power[0]), rel=1e-6)

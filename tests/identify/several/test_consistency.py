@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+from drivetwin.identify.likelihood.noise_power import noise_power
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification
 from drivetwin.identify.several.consistency import (
     Consistency,
     Pull,
     homogeneity,
-    noise_power,
     shared_of,
 )
 from tests.identify.several.made import loaded, together
@@ -66,7 +66,7 @@ def _tested(found: Identification) -> Consistency:
 
 def test_slow_noise_of_a_sensor_counts_before_logs_disagree() -> None:
     fit, _ = likelihood_of(together().found)
-    shared = shared_of(fit)
+    shared = np.eye(len(fit.point.names))[shared_of(fit)]
     assert noise_power(fit, shared) == pytest.approx(max(fit.chi2, 1.0), rel=1e-6)
     rng = np.random.default_rng(1)
     slow = []

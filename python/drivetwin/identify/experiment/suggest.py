@@ -20,6 +20,7 @@ import numpy as np
 from drivetwin.identify.experiment.catalogue import Base, Experiment, Planned, planned
 from drivetwin.identify.likelihood.derived import parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
+from drivetwin.identify.likelihood.noise_power import noise_power
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.method import Method
 from drivetwin.identify.momentum import MomentumSettings
@@ -156,7 +157,8 @@ def _gain(plan: Planned) -> _Gain | None:
 def _covariance(
     fit: LikelihoodFit, names: tuple[str, ...], gain: _Gain | None, repeats: int
 ) -> FloatArray:
-    """Covariance over `names` with an experiment made so many times, each with its own start."""
+    """Covariance over `names` with an experiment made so many times, each with its own start, if
+    noise were what the sensors show."""
     size = len(names)
     information = np.zeros((size, size))
     own = len(fit.point.names)
@@ -166,7 +168,7 @@ def _covariance(
         information[k, k] += MomentumSettings().delay_prior.std ** -2
     if gain is not None:
         information += repeats * _without_start(gain, size)
-    return max(fit.chi2, 1.0) * covariance_of(information)
+    return covariance_of(information)
 
 
 def _without_start(gain: _Gain, size: int) -> FloatArray:
@@ -195,10 +197,11 @@ def _suggestion(
         return Suggestion(one.id, one.verdict, half, (), limit)
     names = _with_age(fit).names
     row = _row(one.id, fit, signals, names)
+    loud = np.sqrt(_noise_power(fit, row))
     prospects = []
     for gain in gains:
         for repeats in REPEATS:
-            std = float(np.sqrt(row @ _covariance(fit, names, gain, repeats) @ row))
+            std = loud * float(np.sqrt(row @ _covariance(fit, names, gain, repeats) @ row))
             verdict = judge(one.id, told[one.id], std, "", systematic).verdict
             prospect = Prospect(
                 gain.experiment, repeats, Z95 * float(np.hypot(std, systematic)), verdict
@@ -208,6 +211,13 @@ def _suggestion(
         prospects.append(prospect)
     order = sorted(prospects, key=_worth)
     return Suggestion(one.id, one.verdict, half, tuple(order))
+
+
+def _noise_power(fit: LikelihoodFit, row: FloatArray) -> float:
+    """That of this log, with its slow errors, along a parameter's derivative (r,): an experiment
+    has the same sensors."""
+    own = row[: len(fit.point.names)]
+    return noise_power(fit, own[None, :]) if own.any() else max(fit.chi2, 1.0)
 
 
 def _worth(prospect: Prospect) -> tuple[bool, float]:

@@ -24,7 +24,8 @@ from scipy.stats import chi2
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.friction import stribeck
 from drivetwin.identify.likelihood.derived import parameters, slopes
-from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of, spread_of
+from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
+from drivetwin.identify.likelihood.noise_power import noise_power
 from drivetwin.identify.likelihood.null_space import reduced
 from drivetwin.identify.likelihood.unknowns import LAW, START, own_of
 from drivetwin.identify.regression import Prior
@@ -103,23 +104,12 @@ def consistency(
     root = _root(covariance[np.ix_(shared, shared)])
     pulls = [_pull(fit, log, shared, root) for log in logs]
     square, freedom = homogeneity(pulls)
-    power = noise_power(fit, shared)
+    power = noise_power(fit, np.eye(len(covariance))[shared])
     square /= power
     rows = _rows(fit, signals, friction)
     told = {name: row[shared] @ root for name, row in rows.items()}
     p = float(chi2.sf(square, freedom)) if freedom else 1.0
     return Consistency(square, freedom, p, _moves(pulls, told, power))
-
-
-def noise_power(fit: LikelihoodFit, shared: Sequence[int]) -> float:
-    """How many times the noise that the sensors show the residuals have, slow errors counted: the
-    mean over the directions of what is `shared` (s,)."""
-    place = np.ix_(shared, shared)
-    covariance = covariance_of(fit.normal.information)[place]
-    spread = spread_of(fit.problem, fit.normal, fit.chi2)[place]
-    scale = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
-    inverse = np.linalg.pinv(covariance / scale, hermitian=True)
-    return float(np.sum(inverse * (spread / scale))) / len(shared)
 
 
 def shared_of(fit: LikelihoodFit) -> list[int]:
