@@ -366,6 +366,48 @@ fn an_element_without_pressure_transmits_nothing_even_at_zero_slip() {
 }
 
 #[test]
+fn what_swings_through_a_lossy_gear_comes_to_rest() {
+    for case in 0..40 {
+        // Spread over their ranges.
+        let part = |place: usize| (0.618_034 * (case * 7 + place + 1) as f64).fract();
+        let between = |place, low: f64, high: f64| low + (high - low) * part(place);
+        let loss = GearLoss {
+            law: LossLaw::Dissipative,
+            eta: between(2, 0.3, 1.0),
+            eta_backward: Some(between(3, 0.3, 1.0)),
+            drag: None,
+            drag_backward: None,
+        };
+        let ratio = between(4, -2.0, 2.0);
+        let network = compile(vec![
+            inertia("a", between(5, 0.1, 3.0)),
+            inertia("c", between(6, 0.1, 3.0)),
+            inertia("f", between(7, 0.1, 3.0)),
+            shaft("c", "a", between(0, 100.0, 1e4), between(1, 4.0, 20.0)),
+            Element::Gear(Gear {
+                name: "g".into(),
+                a: "c".into(),
+                b: "f".into(),
+                ratio,
+                loss: Some(loss),
+            }),
+        ]);
+        let start = start(&[("a", between(8, -50.0, 50.0)), ("f", between(9, -50.0, 50.0))], &[]);
+        for settings in [Settings::default(), Settings::exact()] {
+            let run = simulate_by(
+                (settings, false),
+                &network,
+                &[],
+                &start,
+                &grid(30.0, 3001),
+                &[speed("a")],
+            );
+            assert_eq!(run.status, Status::Completed, "{case} {settings:?}");
+        }
+    }
+}
+
+#[test]
 fn a_start_locks_as_a_clutch_that_is_strong_beyond_measure_does() {
     let outputs = [speed("input"), speed("drum"), speed("output")];
     for (law, from) in [

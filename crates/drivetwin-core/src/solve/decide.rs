@@ -15,6 +15,9 @@ use std::sync::Arc;
 pub(super) const ROUND_OFF: f64 = 1e-10;
 /// Excess over a bound that is round-off, relative to the terms of all torques that are held.
 pub(super) const NOTHING: f64 = 1e-14;
+/// A torque without meaning, N·m: what gears and freewheels hold at rest where all motion has decayed, and what
+/// goes through a gear there, in whichever direction.
+pub(super) const NO_TORQUE: f64 = 1e-7;
 /// Part of their torques that elements must have left up to their bounds where holding is to last.
 const ROOM: f64 = 1e-9;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
@@ -321,7 +324,7 @@ impl<T: Number> Regime<'_, T> {
     ) -> (T::Values, T::Values) {
         match row {
             Row::Friction(j) if self.network.frictions[j].one_way => {
-                (-capacities[j].re(), T::Values::of(f64::INFINITY))
+                (-capacities[j].re() - T::Values::of(NO_TORQUE), T::Values::of(f64::INFINITY))
             }
             Row::Friction(j) => (-capacities[j].re(), capacities[j].re()),
             Row::Gear(g) => {
@@ -342,7 +345,8 @@ impl<T: Number> Regime<'_, T> {
         let line = |(slope, drag): (T, T)| slope.re() * torque + drag.re();
         let [u, v] = bounds.upper.map(line);
         let [l, m] = bounds.lower.map(line);
-        (l.smaller(m), u.larger(v))
+        let more = T::Values::of(NO_TORQUE);
+        (l.smaller(m) - more, u.larger(v) + more)
     }
 
     fn is_reversed(&self, gear: GearState, i: usize, (mode, basis): (&Mode<T>, &[T])) -> bool {
@@ -357,7 +361,7 @@ impl<T: Number> Regime<'_, T> {
         let scale = held.fold(scale, |scale, torque| scale + torque.magnitude());
         let excess = torque * sign - loss.threshold().re();
         excess.decide_with(scale, |excess, scale| {
-            excess.abs() > ROUND_OFF * scale && (excess < 0.0) != backward
+            excess.abs() > ROUND_OFF * scale + NO_TORQUE && (excess < 0.0) != backward
         })
     }
 
@@ -442,7 +446,7 @@ impl<T: Number> Regime<'_, T> {
 
 /// Real part of the scalar product and of the sum of the magnitudes of its terms, which tells
 /// zero from round-off.
-fn sum_and_scale<T: Number>(row: &[T], basis: &[T]) -> (T::Values, T::Values) {
+pub(super) fn sum_and_scale<T: Number>(row: &[T], basis: &[T]) -> (T::Values, T::Values) {
     let none = T::Values::zero_();
     row.iter().zip(basis).fold((none, none), |(sum, scale), (a, b)| {
         let term = a.re() * b.re();

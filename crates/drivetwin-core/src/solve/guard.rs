@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Guards: polynomials that must stay positive while a mode holds, and the earliest that falls.
 
-use super::decide::{NOTHING, ROUND_OFF};
+use super::decide::{NO_TORQUE, NOTHING, ROUND_OFF, sum_and_scale};
 use super::first_fall::first_fall;
 use super::formation::each;
 use super::lanes::{Task, dispatch};
@@ -127,7 +127,7 @@ fn friction_guards<T: Number>(
             let torque = holding_torque(regime, Row::Friction(j));
             let capacity = row.law.at(T::zero_()) * row.peak;
             let mut cap = scaled(&normal, if pressed { capacity } else { T::zero_() });
-            cap[0] += balanced(regime) * NOTHING;
+            cap[0] += balanced(regime) * NOTHING + if row.one_way { NO_TORQUE } else { 0.0 };
             consider(combined(&cap, &torque, 1.0), Cause::Overload(Row::Friction(j), -1.0));
             if !row.one_way {
                 consider(combined(&cap, &torque, -1.0), Cause::Overload(Row::Friction(j), 1.0));
@@ -152,7 +152,7 @@ fn gear_guards<T: Number>(
             let mut power = scaled(&torque, T::of(sign));
             power[0] -= gear.loss.threshold();
             let mut power = if backward { scaled(&power, T::of(-1.0)) } else { power };
-            power[0] += balanced(regime) * ROUND_OFF;
+            power[0] += balanced(regime) * ROUND_OFF + without_direction(regime, i);
             consider(power, Cause::PowerReversal(i));
             if regime.blocked[i] {
                 return;
@@ -169,8 +169,10 @@ fn gear_guards<T: Number>(
                 line[0] += drag;
                 line
             };
-            let upper = larger(bounds.upper.map(line));
-            let lower = scaled(&larger(bounds.lower.map(line).map(negative)), T::of(-1.0));
+            let mut upper = larger(bounds.upper.map(line));
+            let mut lower = scaled(&larger(bounds.lower.map(line).map(negative)), T::of(-1.0));
+            upper[0] += NO_TORQUE;
+            lower[0] -= NO_TORQUE;
             consider(combined(&upper, &loss, -1.0), Cause::Overload(Row::Gear(i), 1.0));
             consider(combined(&loss, &lower, -1.0), Cause::Overload(Row::Gear(i), -1.0));
         }
@@ -195,6 +197,14 @@ fn holding_torque<T: Number>(regime: &Regime<'_, T>, row: Row) -> Series<T> {
 fn balanced<T: Number>(regime: &Regime<'_, T>) -> T {
     let held = regime.mode.stuck.iter().map(|&row| holding_torque(regime, row)[0].re());
     T::lifted(held.fold(T::Values::zero_(), |sum, torque| sum + torque.magnitude()))
+}
+
+/// Torque [N·m] through a rolling gear of which the direction is round-off.
+fn without_direction<T: Number>(regime: &Regime<'_, T>, i: usize) -> T {
+    let mut basis = Vec::new();
+    regime.expansion.basis_at(regime.network, T::zero_(), &mut basis);
+    let row = regime.mode.gear_torque(regime.network).row(i);
+    T::lifted(sum_and_scale(row, &basis).1 * NOTHING + T::Values::of(NO_TORQUE))
 }
 
 /// Slip in its direction. What is released at this instant starts from exact zero, and where static

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! The operators that pass samples in the present regime, and the guards they watch.
 
+use super::decide::NO_TORQUE;
 use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
 use super::regime::{Regime, RowState};
 use crate::network::channel::{self, Channel};
@@ -47,9 +48,6 @@ pub fn can_march<T: Number>(network: &Network<T>) -> bool {
         && network.mechanism.inputs.len() <= MAX_INPUTS
         && network.channels.iter().all(smooth)
 }
-
-/// Normal load [N·m] below which that at the end of a sample may be round-off.
-const LITTLE: f64 = 1e-9;
 
 /// What operators belong to: mode, active channels with their branches, and step length.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -158,7 +156,8 @@ impl<T: Number> Regime<'_, T> {
         for (j, row) in self.network.frictions.iter().enumerate() {
             let side = if self.pressed[j] { 1.0 } else { -1.0 };
             let load = line_of(&row.normal);
-            let nothing = row.normal.nothing() + if self.pressed[j] { LITTLE } else { 0.0 };
+            // Those at the ends of samples are sums.
+            let nothing = row.normal.nothing() + if self.pressed[j] { NO_TORQUE } else { 0.0 };
             let above = Line { offset: load.offset - nothing, ..load };
             operators.loads.push(above.map(|v| v * side));
             match self.rows[j] {
@@ -171,7 +170,8 @@ impl<T: Number> Regime<'_, T> {
                     let position = self.mode.stuck.iter().position(|&s| s == Row::Friction(j));
                     let position = position.expect("a stuck element belongs to the mode");
                     let torque = self.mode.stuck_torque.row(position);
-                    let limit = load.map(|v| v * mu);
+                    let mut limit = load.map(|v| v * mu);
+                    limit.offset += if row.one_way { NO_TORQUE } else { 0.0 };
                     operators.watch_torque(self.network, active, torque, (limit, !row.one_way));
                 }
                 RowState::Slipping { sign } if !active.contains(&j) => {
@@ -196,7 +196,7 @@ impl<T: Number> Regime<'_, T> {
             let side = if backward { -1.0 } else { 1.0 };
             let scaled = |row: &[T], by: f64| row.iter().map(|&c| c * by).collect::<Vec<T>>();
             let power = scaled(self.mode.gear_torque(self.network).row(i), sign * side);
-            let limit = constant(-gear.loss.threshold() * side);
+            let limit = constant(-gear.loss.threshold() * side + NO_TORQUE);
             operators.watch_torque(self.network, active, &power, (limit, false));
             let speed = scaled(&gear.speed, sign);
             operators.watch_speed((self.network, &self.mode), active, &speed, h);
