@@ -24,3 +24,15 @@ def test_a_residual_that_goes_with_an_input_speaks_against_every_value() -> None
     plain = replace(fit.problem, parts=(replace(part, weighting=sensor_noise(part.record)),))
     wrong = replace(fit, problem=plain, normal=replace(fit.normal, residuals=(residual + missing,)))
     assert "the residual of the output torque goes with the engine torque" in against(wrong)
+
+
+def test_the_drift_of_a_sensor_speaks_against_every_value() -> None:
+    """By twice its noise over the log."""
+    fit = fitted()
+    (part,), (residual,) = fit.problem.parts, fit.normal.residuals
+    torque = part.record.outputs[0]
+    drift = np.zeros_like(residual)
+    drift[: torque.values.size] = torque.sigma * np.linspace(-1.0, 1.0, torque.values.size)
+    assert "a sensor drifts" in against(
+        replace(fit, normal=replace(fit.normal, residuals=(residual + drift,)))
+    )

@@ -83,8 +83,8 @@ def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
 def against(fit: LikelihoodFit) -> str:
     """What the residuals say against every value of the fit; empty where nothing.
 
-    Noise, however slow, goes with no input. What does is missing in the model, and moves the
-    parameters by as much as it likes: no interval counts that.
+    Noise goes with no input, unless it is as slow as the log is long. What does is missing in the
+    model, or a drift, and moves the parameters by as much as it likes: no interval counts that.
     """
     found = {
         (test.output, source): abs(size)
@@ -96,7 +96,10 @@ def against(fit: LikelihoodFit) -> str:
     if size <= SIGNIFICANT:
         return ""
     name = output.replace("_", " ")
-    return f"the residual of the {name} goes with the {source}: some effect is not in the model"
+    return (
+        f"the residual of the {name} goes with the {source}: some effect is not in the model, or a "
+        "sensor drifts"
+    )
 
 
 def _test(
