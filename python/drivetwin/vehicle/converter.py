@@ -16,8 +16,9 @@ _PER_1000RPM = 1000.0 * RPM
 
 Curve = Annotated[list[float], Field(min_length=2)]
 
-_MEASURED = 0.02
-"""Power that a measured map may give too much near synchronism, over that taken."""
+_MEASURED, _OF_LARGEST = 0.02, 0.01
+"""Power that a measured map may give too much: over that taken, or over that of the largest torque
+of the pump, which is what errors near synchronism are small against."""
 
 
 class ConverterTable(StrictModel):
@@ -40,9 +41,12 @@ class ConverterTable(StrictModel):
         points = zip(
             self.speed_ratio, self.torque_ratio, self.pump_torque_at_1000rpm_Nm, strict=True
         )
+        largest = max(map(abs, self.pump_torque_at_1000rpm_Nm))
         # Of the pump's power the share 1 - mν is lost; in overrun the pump gives the power.
         creating = [
-            nu for nu, m, torque in points if torque * (1 - m * nu) < -_MEASURED * abs(torque)
+            nu
+            for nu, m, torque in points
+            if torque * (1 - m * nu) < -max(_MEASURED * abs(torque), _OF_LARGEST * largest)
         ]
         if creating:
             at = ", ".join(f"{nu:g}" for nu in creating)
