@@ -145,6 +145,20 @@ def test_an_element_that_slips_in_gear_is_named(gearbox: Gearbox, truck: Powertr
     assert any("C5 slips" in text for text in run(gearbox, weak, plan).warnings)
 
 
+@pytest.mark.parametrize("share", [0.5, 2.0])
+def test_two_vehicles_in_one_drive_are_told(
+    gearbox: Gearbox, truck: Powertrain, share: float
+) -> None:
+    """The road's mass is 23.7 t on wheels of 0.5 m; the card's inertia is what accelerates."""
+    assert truck.mass_inertia == pytest.approx(23747 * 0.5**2)
+    plan = (Leg(0.0, Until(Watched.TIME, 0.5)),)
+    other = replace(truck, mass_inertia=share * truck.mass_inertia)
+    (told,) = run(gearbox, other, plan).warnings
+    assert "6056 kg·m²" in told
+    assert f"{other.mass_inertia:.4g} kg·m²" in told
+    assert run(gearbox, truck, plan).warnings == ()
+
+
 def test_a_leg_that_never_ends_is_an_error(gearbox: Gearbox, truck: Powertrain) -> None:
     plan = (Leg(0.0, Until(Watched.INPUT_SPEED, 300.0)),)
     with pytest.raises(SimulationError, match="input speed does not rise to 300 within"):

@@ -67,7 +67,10 @@ class Control:
 
 @dataclass(frozen=True)
 class Powertrain:
-    """What a drive needs beside the gearbox card; `source` says where the numbers are from."""
+    """What a drive needs beside the gearbox card; `source` says where the numbers are from.
+
+    `mass_inertia` is that of the mass behind the road's resistances, at the wheel: m·r² [kg m^2].
+    """
 
     name: str
     source: str
@@ -75,4 +78,5 @@ class Powertrain:
     converter: Converter
     lock_up: Capacity
     road: RoadLoad
+    mass_inertia: float
     control: Control

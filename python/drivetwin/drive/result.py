@@ -15,6 +15,9 @@ from drivetwin.driveline import EnergyAudit, Event, FloatArray
 from drivetwin.gearbox import Gearbox
 from drivetwin.network import NetworkRun
 
+_OF_MASS = (0.75, 1.5)
+"""Inertia of a vehicle over that of its mass: wheels and axles add to it, few numbers are exact."""
+
 
 @dataclass(frozen=True)
 class Action:
@@ -66,7 +69,8 @@ class DriveRun:
     `engine_torque` is that of the lagging map, `brake_torque` what the service brake can hold;
     `speed_ratio` and `torque_ratio` are the converter's and `turbine_torque` what it gives to the
     gearbox; `slip`, `torque`, `pressure` go by element. `work` is the friction work of each element
-    over the whole drive [J]; `warnings` name elements that slip where they should hold.
+    over the whole drive [J]; `warnings` name elements that slip where they should hold, and tell
+    where gearbox card and powertrain state different vehicles.
     """
 
     time: FloatArray
@@ -131,7 +135,10 @@ def observe(
         work={name: float(np.trapezoid(power[name], time)) for name in elements},
         events=motion.events,
         audit=audit,
-        warnings=_unwanted_slip(elements, actions, motion.events),
+        warnings=(
+            *_two_vehicles(gearbox, powertrain),
+            *_unwanted_slip(elements, actions, motion.events),
+        ),
     )
 
 
@@ -157,6 +164,18 @@ def _maneuver(action: Action, motion: NetworkRun, power: Mapping[str, FloatArray
             )
             for name in action.elements
         ),
+    )
+
+
+def _two_vehicles(gearbox: Gearbox, powertrain: Powertrain) -> tuple[str, ...]:
+    """One sentence where the card's vehicle inertia is not that of the powertrain's mass."""
+    inertia, mass = gearbox.require_drive().vehicle_inertia, powertrain.mass_inertia
+    if _OF_MASS[0] <= inertia / mass <= _OF_MASS[1]:
+        return ()
+    return (
+        f"the gearbox card's vehicle has {inertia:.4g} kg·m² at the wheel, the mass that rolls and "
+        f"climbs {mass:.4g} kg·m²: correct vehicle_inertia_kgm2 on the card, or mass_kg and "
+        "radius_m in [road]",
     )
 
 

@@ -156,5 +156,6 @@ class PowertrainFile(StrictModel):
             converter=self.converter.spec(),
             lock_up=self.lock_up.spec(),
             road=self.road.spec(),
+            mass_inertia=self.road.mass_kg * self.road.radius_m**2,
             control=self.control.spec(),
         )
