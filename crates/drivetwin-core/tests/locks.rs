@@ -6,7 +6,7 @@ mod common;
 use common::{
     clutch, compile, constant, gear, grid, inertia, shaft, simulate, simulate_by, start, torque,
 };
-use drivetwin_core::model::elements::{Clutch, Element, Gear, GearLoss};
+use drivetwin_core::model::elements::{Clutch, Element, Gear, GearLoss, OneWayClutch};
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::simulate::Output;
 use drivetwin_core::solve::{EventKind, Settings, Status};
@@ -363,6 +363,30 @@ fn an_element_without_pressure_transmits_nothing_even_at_zero_slip() {
     let run = simulate(&network, &signals, &rest, &grid(1.0, 11), &[speed("shaft")]);
     assert!((run.columns[0][10] - 1.0).abs() < 1e-12);
     assert!(run.events.is_empty());
+}
+
+#[test]
+fn a_freewheel_that_hardly_lets_go_leaves_its_torque_to_the_clutch_beside_it() {
+    let freewheel = OneWayClutch { name: "F".into(), a: "a".into(), b: "b".into(), clutch: None };
+    let network = compile(vec![
+        inertia("a", 1.75),
+        inertia("b", 0.16),
+        inertia("c", 0.38),
+        Element::Clutch(clutch("C", "a", "b")),
+        Element::OneWayClutch(freewheel),
+        shaft("c", "b", 1340.0, 18.0),
+    ]);
+    // What swings decays below what the freewheel holds by round-off of fast shafts.
+    let start = start(&[("a", 180.0), ("b", 180.0), ("c", 170.0)], &["C"]);
+    let outputs = [Output::Slip("C".into()), friction_torque("F")];
+    for settings in [Settings::default(), Settings::exact()] {
+        let signals = [constant("P C", 500.0, 4.0)];
+        let how = (settings, false);
+        let run = simulate_by(how, &network, &signals, &start, &grid(4.0, 4001), &outputs);
+        assert_eq!(run.status, Status::Completed, "{settings:?}");
+        assert!(run.columns[0].iter().all(|slip| slip.abs() < 1e-9));
+        assert!(run.columns[1].iter().all(|torque| *torque > -1e-6));
+    }
 }
 
 #[test]

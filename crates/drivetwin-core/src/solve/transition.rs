@@ -75,7 +75,7 @@ impl<T: Number> Regime<'_, T> {
     fn is_about_to_vent(&self, j: usize) -> bool {
         let normal = &self.network.frictions[j].normal;
         let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
-        now.decide_with(rate, |now, rate| now <= -rate * 1e-11)
+        self.pressed[j] && now.decide_with(rate, |now, rate| now <= -rate * 1e-11)
     }
 
     /// The first element of which the normal load is gone from an instant on in some runs, as bits, by the values
