@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.driveline import DualClutch, ShiftElement
-from drivetwin.identify.likelihood.response import exponential, observed
+from drivetwin.identify.likelihood.response import direction, exponential, observed
 from drivetwin.observer.observed import FloatArray
 
 BoolArray = NDArray[np.bool_]
@@ -106,8 +106,8 @@ def linear(model: DualClutch, course: Course) -> Linear:
 
 
 def _direction(model: DualClutch, one: ShiftElement) -> FloatArray:
-    """Slip of an element as a row of the three speeds (eq. 15)."""
-    return np.array([1.0 / (model.i_in * one.i_c), -one.i_out, 0.0])
+    """Slip of an element as a row of the three speeds."""
+    return direction(model, one)[:SPEEDS]
 
 
 def _efficiency(model: DualClutch, course: Course) -> FloatArray:

@@ -8,8 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.driveline import Signal
-from tests.identify.likelihood.made import bench, problem
+from benchmarks.estimation.bench import realise
+from drivetwin.driveline import LossLaw, Signal
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenarios import scenario_of
+from tests.identify.likelihood.made import ROUGH, bench, problem
 
 
 @pytest.mark.parametrize("name", ["engine torque", "B3"])
@@ -46,6 +49,39 @@ def test_disturbed_inputs_move_the_run_as_the_response_says(name: str) -> None:
     weight = clear / part.record.sigma
     miss = np.linalg.norm((found - expected) * weight) / np.linalg.norm(found * weight)
     assert miss < 0.03
+
+
+@pytest.mark.parametrize("law", ["paper", "dissipative"])
+@pytest.mark.parametrize("name", [ScenarioName.POWER_OFF_UP, ScenarioName.POWER_OFF_DOWN], ids=str)
+def test_the_engine_torque_acts_by_the_loss_law(name: ScenarioName, law: LossLaw) -> None:
+    """The engine torque moves the run by 1/η where power flows back and the law says so."""
+    scenario = scenario_of(name)
+    scenario = replace(scenario, model=replace(scenario.model, loss_law=law))
+    made = realise(scenario, 0, ROUGH, 0.0)
+    posed, point = problem(made)
+    part, shift = posed.parts[0], made.signals.shift
+    base = part.run(point)
+    assert base is not None
+    old, age = part.record.engine_torque, part.structure.value(point, "te_delay")
+    middle = 0.5 * (base.time[1:] + base.time[:-1])
+    time = np.concatenate([base.time[out.place] for out in part.record.outputs])
+    clear = np.abs(time - shift.lockup_time) > 0.003
+    spans = (
+        (shift.torque_phase[0] - 0.6, 0.4),
+        (shift.inertia_phase[0] + 0.05, 0.2),
+        (shift.lockup_time + 0.1, 0.3),
+    )
+    for start, length in spans:
+        bump = 0.5 * ((old.time > start) & (old.time < start + length))
+        moved = replace(part.record, engine_torque=Signal(old.time, old.values + bump))
+        run = replace(part, record=moved).run(point)
+        assert run is not None
+        change = np.interp(middle + age, old.time, bump)
+        expected = part.answer_to(point, base, {"engine torque": change})
+        found = part.record.stacked(run) - part.record.stacked(base)
+        weight = clear / part.record.sigma
+        miss = np.linalg.norm((found - expected) * weight) / np.linalg.norm(found * weight)
+        assert miss < 0.07
 
 
 @pytest.mark.parametrize("level", [0.97, 0.99, 1.01, 1.03])

@@ -99,10 +99,12 @@ def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
     step = np.diff(time)
     middle = 0.5 * (time[1:] + time[:-1])
     locked = {one.name: _locked(run, one.name, middle) for one in model.elements}
+    driving = _driving(model, run)
     free = np.zeros((step.size, STATES, STATES))
     free += _shaft(model)
     torque = np.zeros((step.size, STATES))
-    torque[:, 0] = model.eta
+    for way, inside in _ways(driving):
+        torque[inside, 0] = model.efficiency(driving=way)
     force = {"engine torque": torque}
     for one in model.elements:
         if one.name not in record.pressures:
@@ -112,16 +114,16 @@ def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
         slip = 0.5 * (run.slip[one.name][1:] + run.slip[one.name][:-1])
         stiffness, gain = _friction(one, slip, pressure)
         sliding = ~locked[one.name]
-        g = _direction(one)
+        g = direction(model, one)
         free -= (stiffness * sliding)[:, None, None] * np.outer(g, g)
         force[one.name] = -(gain * sliding)[:, None] * g
-    inverse = _accelerating(model, locked)
+    inverse = _accelerating(model, locked, driving)
     rate = inverse @ free
     rate[:, 3] = (0.0, 1.0, -model.i_f, 0.0)
     with np.errstate(over="ignore", invalid="ignore"):
         transition, mean = exponential(rate * step[:, None, None])
     effect = mean @ inverse * step[:, None, None]
-    for k, jump in _jumps(model, run):
+    for k, jump in _jumps(model, run, driving):
         transition[k], effect[k] = jump @ transition[k], jump @ effect[k]
     drive = {name: np.einsum("kij,kj->ki", effect, f) for name, f in force.items()}
     return Response(step, transition, drive, effect)
@@ -156,9 +158,9 @@ def exponential(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(result), np.asarray(mean)
 
 
-def _direction(one: ShiftElement) -> FloatArray:
-    """Slip as a row of the state: ω_in/i_c - i_out·ω_out (eq. 15)."""
-    return np.array([1.0 / one.i_c, -one.i_out, 0.0, 0.0])
+def direction(model: DualClutch, one: ShiftElement) -> FloatArray:
+    """Slip of an element as a row (4,) of the state: ω_in/i_c - i_out·ω_out (eq. 15)."""
+    return np.array([1.0 / (model.i_in * one.i_c), -one.i_out, 0.0, 0.0])
 
 
 def _shaft(model: DualClutch) -> FloatArray:
@@ -187,33 +189,62 @@ def _locked(run: Trajectory, name: str, middle: FloatArray) -> BoolArray:
     return result
 
 
-def _accelerating(model: DualClutch, locked: dict[str, BoolArray]) -> FloatArray:
-    """Accelerations per force (n, 4, 4), without those along the slip of locked elements."""
-    mass = np.diag([model.J1 * model.eta + model.J2e, model.J_out, model.J_v, 1.0])
+def _driving(model: DualClutch, run: Trajectory) -> BoolArray:
+    """Whether power flows from the engine over each step (N-1,): the loss law is of two parts.
+
+    φ(T_g) is what the input side and the elements take; its sign is that of T_g.
+    """
+    step = np.diff(run.time)
+    taken = model.J2e * np.diff(run.engine_speed) / step
     for one in model.elements:
-        mass += one.drum_inertia * np.outer(_direction(one), _direction(one))
-    inverse = np.linalg.inv(mass)
+        torque, slip = run.clutch_torque[one.name], run.slip[one.name]
+        carried = 0.5 * (torque[1:] + torque[:-1]) + one.drum_inertia * np.diff(slip) / step
+        taken += direction(model, one)[0] * carried
+    return np.asarray(taken >= 0.0)
+
+
+def _ways(driving: BoolArray) -> tuple[tuple[bool, BoolArray], tuple[bool, BoolArray]]:
+    """Both ways of the power, and where (n,) it flows so."""
+    return (True, driving), (False, ~driving)
+
+
+def _inverse_mass(model: DualClutch, driving: bool) -> FloatArray:
+    """Accelerations per force (4, 4) with no element locked."""
+    engine = model.J1 * model.efficiency(driving=driving) + model.J2e
+    mass = np.diag([engine, model.J_out, model.J_v, 1.0])
+    for one in model.elements:
+        g = direction(model, one)
+        mass += one.drum_inertia * np.outer(g, g)
+    inverse = np.asarray(np.linalg.inv(mass), dtype=np.float64)
     inverse[3] = 0.0
-    count = len(next(iter(locked.values())))
-    result = np.broadcast_to(inverse, (count, STATES, STATES)).copy()
-    for one in model.elements:
-        held = locked[one.name]
-        if held.any():
-            g = _direction(one)
+    return inverse
+
+
+def _accelerating(
+    model: DualClutch, locked: dict[str, BoolArray], driving: BoolArray
+) -> FloatArray:
+    """Accelerations per force (n, 4, 4), without those along the slip of locked elements."""
+    result = np.empty((driving.size, STATES, STATES))
+    for way, inside in _ways(driving):
+        inverse = _inverse_mass(model, way)
+        result[inside] = inverse
+        for one in model.elements:
+            g = direction(model, one)
             along = inverse @ g
-            result[held] -= np.outer(along, along) / (g @ along)
+            result[inside & locked[one.name]] -= np.outer(along, along) / (g @ along)
     return result
 
 
-def _jumps(model: DualClutch, run: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+def _jumps(
+    model: DualClutch, run: Trajectory, driving: BoolArray
+) -> Iterator[tuple[int, FloatArray]]:
     """(step, saltation (4, 4)) of every lock: z moves by the change of acceleration times δt."""
-    inverse = _accelerating(model, {one.name: np.array([False]) for one in model.elements})[0]
     for event in run.events:
         if event.kind != "lock":
             continue
         one = next(e for e in model.elements if e.name == event.element)
-        g = _direction(one)
+        g = direction(model, one)
         k = int(np.searchsorted(run.time, event.time)) - 1
         if 0 <= k < run.time.size - 1:
-            along = inverse @ g
+            along = _inverse_mass(model, bool(driving[k])) @ g
             yield k, np.eye(STATES) - np.outer(along, g) / (g @ along)
