@@ -8,11 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Knowledge
+from benchmarks.estimation.bench import Knowledge, realise
+from drivetwin.dyno.actuators import Program
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood import fit as fitting
-from drivetwin.identify.likelihood.fit import NEAR, Hopeless, fit
-from tests.identify.likelihood.made import bench, fitted, problem, truth_of
+from drivetwin.identify.likelihood.fit import NEAR, Hopeless, fit, nearest
+from tests.identify.likelihood.made import ROUGH, bench, fitted, problem, truth_of
 
 DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 
@@ -50,6 +53,24 @@ def test_a_wrong_start_is_brought_in_by_stages() -> None:
     std = np.sqrt(np.diag(near.covariance))
     shared = [near.point.names.index(name) for name in DRIVELINE]
     assert np.all(np.abs(found.point.values - near.point.values)[shared] < 0.5 * std[shared])
+
+
+def test_a_minimum_is_one_over_unknowns_and_inputs_alike() -> None:
+    """B3 slips at twice the noise of its pressure above P0, B2 waits at its own."""
+    base = SCENARIOS[ScenarioName.POWER_ON_DOWN]()
+    low = base.model.elements[1].P0 + 1.2e4
+    programs = {
+        "B3": Program(((2.15, 1.4e6), (2.20, low), (2.70, low), (2.75, 0.0))),
+        "B2": Program(
+            ((2.30, 0.0), (2.32, 7.6e4), (2.60, 7.6e4), (2.75, 3e5), (2.95, 3.6e5), (3.05, 1.4e6))
+        ),
+    }
+    actuators = {name: replace(base.actuators[name], command=programs[name]) for name in programs}
+    posed, start = problem(realise(replace(base, actuators=actuators, duration=4.6), 1, ROUGH))
+    found = nearest(posed, start)
+    assert found is not None
+    again = posed.weighted_by(found.point).with_expected_inputs(found.point)
+    assert again.cost(found.point) > found.normal.cost - fitting.FALLS
 
 
 def test_a_log_that_the_model_cannot_follow_is_refused() -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,11 @@ PLAUSIBLE = 2.0
 """Q per sample above which a minimum is taken for a wrong one."""
 FAR = 2.0 * PLAUSIBLE
 """Q per sample from which no search with input noise has come down to a plausible one."""
+FALLS = 10.0
+"""Fall of Q at a minimum by the inputs expected there from which another minimum is sought: as a
+rule they change Q by less than 5 either way, and no unknown by half a standard deviation."""
+ROUNDS = 5
+"""Most minima one after the other: the fall halves from each to the next."""
 _FAILED = (
     "the simulation could not be brought onto the measurement",
     "check ratios, clutch gains and P0 on the card against the log, or use the integral method",
@@ -179,23 +184,41 @@ def nearest(problem: Problem, start: Point, most: float = FAR) -> LikelihoodFit 
     """Minimum of Q with input noise; None where Q per sample stays above `most`.
 
     First with the inputs as measured, the weighting following the point; then from there with the
-    inputs expected at that minimum. Formed elsewhere they would explain a wrong model away.
+    inputs expected at the minimum. Formed elsewhere they would explain a wrong model away.
     """
     limit = most * problem.size
     found = minimise(problem, start, lambda _, point: problem.weighted_by(point), limit=limit)
     if found is None or found.normal.cost > limit:
         return None
-    iterations = found.iterations
-    found = minimise(found.problem.with_expected_inputs(found.point), found.point, limit=limit)
-    if found is None or not found.converged:
+    found = _over_inputs(problem, found, limit)
+    if found is None:
         return None
     chi2 = (found.normal.cost - problem.prior.cost(found.point.values)) / problem.size
     if chi2 > PLAUSIBLE:
         return None
     covariance = spread_of(found.problem, found.normal, chi2)
-    iterations += found.iterations
-    point = found.point
-    return LikelihoodFit(found.problem, point, point, covariance, found.normal, chi2, iterations)
+    point, count = found.point, found.iterations
+    return LikelihoodFit(found.problem, point, point, covariance, found.normal, chi2, count)
+
+
+def _over_inputs(problem: Problem, found: Found, limit: float) -> Found | None:
+    """The joint minimum over unknowns and inputs, from the one with the inputs as measured.
+
+    Where an element slips at a pressure that is steady but for its noise, that noise seems to tell
+    μ from P0: the inputs expected at one minimum then lead to another, and so on. None where the
+    first search does not end. `iterations` counts those of all searches.
+    """
+    joint: Found | None = None
+    expected = found.problem.with_expected_inputs(found.point)
+    for _ in range(ROUNDS):
+        following = minimise(expected, found.point, limit=limit)
+        if following is None or not following.converged:
+            break
+        joint = found = replace(following, iterations=found.iterations + following.iterations)
+        expected = problem.weighted_by(found.point).with_expected_inputs(found.point)
+        if found.normal.cost - expected.cost(found.point) < FALLS:
+            break
+    return joint
 
 
 def spread_of(problem: Problem, normal: Normal, chi2: float) -> FloatArray:
