@@ -47,7 +47,7 @@ def test_a_vehicle_that_changed_is_predicted_worse_than_noise() -> None:
 def test_one_with_wrong_friction_is_predicted_worse_than_noise() -> None:
     found, log = together().found, pair()[0]
     friction = {
-        name: replace(curve, stribeck={**curve.stribeck, "mu_c": 1.1 * curve.stribeck["mu_c"]})
+        name: replace(curve, stribeck=replace(curve.stribeck, mu_c=1.1 * curve.stribeck.mu_c))
         for name, curve in found.friction.items()
         if curve.stribeck is not None
     }

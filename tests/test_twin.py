@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.errors import InputError, MissingParameterError, ResultFileError
-from drivetwin.identify.result import OF_RATIO, Estimate, LoadLaw, Verdict
+from drivetwin.identify.result import Estimate, LoadLaw, Verdict
 from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.parameters import OVER_ETA
 from drivetwin.twin import Twin
@@ -62,8 +62,10 @@ def without_scale(twin: Twin, eta: float) -> Twin:
         told["k_o_over_eta"], id="drum.B3_over_eta", value=0.05 / eta
     )
     curve = twin.friction["B3"]
-    law = {k: v if k == "v_s" else v / eta for k, v in (curve.stribeck or {}).items()}
-    curve = replace(curve, stribeck=law, method=curve.method + OF_RATIO)
+    law = curve.stribeck
+    assert law is not None
+    ratio = Stribeck(law.mu_c / eta, law.mu_s / eta, law.v_s, law.mu_v / eta)
+    curve = replace(curve, stribeck=ratio, over_eta=True)
     return replace(twin, parameters=told, friction={"B3": curve})
 
 
@@ -112,7 +114,7 @@ def test_a_twin_is_made_with_the_efficiency_from_design_in_friction_and_load() -
     found, eta, std = identification(), 0.85, 0.02
     design = Estimate("eta", eta, std, Verdict.DESIGN, "card")
     curve = replace(found.friction["B3"], stribeck_covariance=np.diag([1e-6, 1e-6, 0.5, 1e-10]))
-    curve = replace(curve, method=curve.method + OF_RATIO)
+    curve = replace(curve, over_eta=True)
     law = LoadLaw(aero=4.8, std=0.1, mean_speed=14.3, over_eta=True)
     told = replace(found, estimates={**found.estimates, "eta": design}, friction={"B3": curve})
     made = Twin.from_identification(replace(told, load=law), card())
@@ -123,8 +125,9 @@ def test_a_twin_is_made_with_the_efficiency_from_design_in_friction_and_load() -
     half = np.hypot(eta * (curve.mu_hi - curve.mu), 1.96 * std * curve.mu)
     assert one.mu_hi - one.mu == pytest.approx(half, rel=1e-4)
     assert one.mu - one.mu_lo == pytest.approx(half, rel=1e-4)
-    assert one.stribeck == pytest.approx(
-        {key: v if key == "v_s" else eta * v for key, v in STRIBECK.items()}
+    assert one.stribeck is not None
+    assert asdict(one.stribeck) == pytest.approx(
+        {key: v if key == "v_s" else eta * v for key, v in asdict(STRIBECK).items()}
     )
     assert one.stribeck_covariance is not None
     assert one.stribeck_covariance[0, 0] == pytest.approx(eta**2 * 1e-6 + (std * 0.11) ** 2)
@@ -133,7 +136,7 @@ def test_a_twin_is_made_with_the_efficiency_from_design_in_friction_and_load() -
     assert load is not None
     assert (load.aero, load.std) == pytest.approx((eta * 4.8, np.hypot(eta * 0.1, std * 4.8)))
     assert not load.over_eta
-    assert made.dual_clutch(SHIFT).elements[1].friction == Stribeck(**one.stribeck or {})
+    assert made.dual_clutch(SHIFT).elements[1].friction == one.stribeck
 
 
 def test_locked_ratios_are_those_of_the_gears(twin: Twin) -> None:
@@ -146,7 +149,7 @@ def test_locked_ratios_are_those_of_the_gears(twin: Twin) -> None:
 
 def test_element_without_a_curve_runs_on_its_partners_and_says_so(twin: Twin) -> None:
     offgoing, oncoming = twin.dual_clutch(SHIFT).elements
-    assert offgoing.friction == oncoming.friction == Stribeck(**STRIBECK)
+    assert offgoing.friction == oncoming.friction == STRIBECK
     assert "friction of B2 is taken to be that of B3" in twin.assumptions
 
 

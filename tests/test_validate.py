@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivetwin.driveline import Stribeck
 from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, Method, Verdict
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.shift import Shift, ShiftKind
@@ -118,7 +119,7 @@ def twin(truth: dict[str, Any]) -> Twin:
 
 def _curve(clutch: dict[str, float]) -> FrictionCurve:
     flat: FloatArray = np.array([clutch["mu_c"]])
-    law = {key: clutch[key] for key in ("mu_c", "mu_s", "v_s", "mu_v")}
+    law = Stribeck(*(clutch[key] for key in ("mu_c", "mu_s", "v_s", "mu_v")))
     return FrictionCurve(np.zeros(1), flat, flat, flat, flat, flat, law, "given")
 
 

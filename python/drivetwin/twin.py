@@ -326,7 +326,7 @@ class Twin(Shown):
 def friction_law(curve: FrictionCurve) -> Stribeck | FrictionTable:
     """Fitted Stribeck law, or the smoothed curve continued flat to zero slip."""
     if curve.stribeck is not None:
-        return Stribeck(**curve.stribeck)
+        return curve.stribeck
     slip, mu = curve.slip.tolist(), curve.mu.tolist()
     if slip[0] > 0.0:
         slip, mu = [0.0, *slip], [mu[0], *mu]

@@ -206,7 +206,7 @@ def test_without_an_output_torque_ratios_are_told_and_absolute_values_refused() 
         assert absolute is not None
         assert abs(ratio.value - absolute / eta) < 4.0 * ratio.std_noise, name
     assert found.estimates["eta"].verdict is Verdict.NOT_IDENTIFIABLE
-    assert found.friction["B3"].method == "likelihood, μ over η"
+    assert found.friction["B3"].method_text == "likelihood, μ over η"
     _check_efficiency_from_design(found, card)
 
 

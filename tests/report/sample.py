@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.driveline import Event, Signal, Trajectory
+from drivetwin.driveline import Event, Signal, Stribeck, Trajectory
 from drivetwin.identify.result import (
     Estimate,
     FloatArray,
@@ -21,7 +21,7 @@ from drivetwin.validate import SignalTrace, Validation, fit_of, phases_of
 from drivetwin.vehicle.card import ElementSpec, Gear, PriorValue, VehicleCard
 
 TIME = np.arange(0.0, 3.0, 1e-3)
-STRIBECK = {"mu_c": 0.11, "mu_s": 0.135, "v_s": 15.0, "mu_v": 1e-4}
+STRIBECK = Stribeck(mu_c=0.11, mu_s=0.135, v_s=15.0, mu_v=1e-4)
 
 SHIFT = Shift(
     start_gear="2",

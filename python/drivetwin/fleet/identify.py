@@ -177,11 +177,11 @@ def _mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
     if not np.isfinite([low, high]).all():
         verdict = Verdict.WEAK.value
         return Row(
-            RowKind.PARAMETER, name, mu, si_unit=spec.unit, verdict=verdict, method=curve.method,
-            at=slip,
+            RowKind.PARAMETER, name, mu, si_unit=spec.unit, verdict=verdict,
+            method=curve.method_text, at=slip,
         )  # fmt: skip
     std = (high - low) / (2.0 * Z95)
-    one = judge(name, mu, std, curve.method)
+    one = judge(name, mu, std, curve.method_text)
     return replace(_estimate_row(one), at=slip)
 
 
@@ -191,7 +191,7 @@ def _friction_rows(element: str, curve: FrictionCurve) -> Iterator[Row]:
         ends = (float(low), float(high)) if np.isfinite([low, high]).all() else (None, None)
         yield Row(
             RowKind.FRICTION, element, float(mu), ci95_lo=ends[0], ci95_hi=ends[1],
-            si_unit="1", method=curve.method, at=float(slip),
+            si_unit="1", method=curve.method_text, at=float(slip),
         )  # fmt: skip
 
 

@@ -284,13 +284,13 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
     mu, slopes = stribeck(fit.theta, grid)
     std = np.sqrt(np.einsum("pn,pq,qn->n", slopes, fit.covariance[:4, :4], slopes))
     v_s = float(np.exp(fit.theta[LOG_V]))
-    law = {
-        "mu_c": float(fit.theta[MU_C]),
-        "mu_s": float(fit.theta[MU_C] + fit.theta[MU_DROP]),
-        "v_s": v_s,
-        "mu_v": float(fit.theta[MU_V]),
-    }
-    least = min(float(mu.min()), law["mu_c"], law["mu_s"])
+    law = Stribeck(
+        mu_c=float(fit.theta[MU_C]),
+        mu_s=float(fit.theta[MU_C] + fit.theta[MU_DROP]),
+        v_s=v_s,
+        mu_v=float(fit.theta[MU_V]),
+    )
+    least = min(float(mu.min()), law.mu_c, law.mu_s)
     if least <= 0.0:
         raise IdentificationError(
             f"the friction of {equations.element.name} comes out as μ = {least:.3g}",
@@ -357,7 +357,7 @@ def paper_friction(signals: ShiftSignals, driveline: Driveline, points: int = 40
     return PaperFriction(element.name, curve, time[picked])
 
 
-def fit_law(slip: FloatArray, mu: FloatArray) -> dict[str, float]:
+def fit_law(slip: FloatArray, mu: FloatArray) -> Stribeck:
     """Stribeck law by least squares on μ-slip points (n,): linear in three, v_s on a grid.
 
     v_s is not taken below the least slip seen, where nothing would show the law's rise.
@@ -371,4 +371,4 @@ def fit_law(slip: FloatArray, mu: FloatArray) -> dict[str, float]:
             best = (error, found, float(v_s))
     assert best is not None
     mu_c, drop, mu_v = (float(v) for v in best[1])
-    return {"mu_c": mu_c, "mu_s": mu_c + drop, "v_s": best[2], "mu_v": mu_v}
+    return Stribeck(mu_c, mu_c + drop, best[2], mu_v)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.driveline import RoadLoad
+from drivetwin.driveline import RoadLoad, Stribeck
 from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.method import Method as Method
 from drivetwin.parameters import spec_of
@@ -20,7 +20,7 @@ from drivetwin.shown import Shown
 FloatArray = NDArray[np.float64]
 
 OF_RATIO = ", μ over η"
-"""What follows the method of a curve where no output torque gives μ its scale."""
+"""What follows the method in words of a curve that is μ/η."""
 
 Z95 = 1.959963984540054
 """Half width of a 95 % interval in standard deviations, of a normal distribution."""
@@ -85,7 +85,8 @@ class FrictionCurve:
     """μ over |slip| of one element, over the slip range seen; arrays (n,), slip in rad/s.
 
     `mu_lo`, `mu_hi` bound the 95 % band (total). `points_slip`, `points_mu` are the raw points
-    behind it. `stribeck` holds mu_c, mu_s, v_s [rad/s], mu_v [s/rad] of the fitted law, or is None.
+    behind it. `stribeck` is the fitted law, or None; `stribeck_covariance` (4, 4) is over its
+    fields, from noise. `over_eta` marks a curve that is μ/η: no output torque gave μ its scale.
     """
 
     slip: FloatArray
@@ -94,14 +95,15 @@ class FrictionCurve:
     mu_hi: FloatArray
     points_slip: FloatArray
     points_mu: FloatArray
-    stribeck: dict[str, float] | None
+    stribeck: Stribeck | None
     method: str
     stribeck_covariance: FloatArray | None = None
+    over_eta: bool = False
 
     @property
-    def over_eta(self) -> bool:
-        """Whether the curve is μ/η: no output torque gave μ its scale."""
-        return self.method.endswith(OF_RATIO)
+    def method_text(self) -> str:
+        """The method as files and the report name it: with what the curve is over."""
+        return self.method + OF_RATIO if self.over_eta else self.method
 
     @property
     def symbol(self) -> str:
@@ -116,7 +118,7 @@ class FrictionCurve:
         scale = np.array([eta, eta, 1.0, eta])
         covariance = self.stribeck_covariance
         if law is not None and covariance is not None:
-            by_eta = np.array([law["mu_c"], law["mu_s"], 0.0, law["mu_v"]])
+            by_eta = np.array([law.mu_c, law.mu_s, 0.0, law.mu_v])
             covariance = np.outer(scale, scale) * covariance + std**2 * np.outer(by_eta, by_eta)
         return replace(
             self,
@@ -124,9 +126,9 @@ class FrictionCurve:
             mu_lo=mu - below,
             mu_hi=mu + above,
             points_mu=eta * self.points_mu,
-            stribeck=law and {key: v if key == "v_s" else eta * v for key, v in law.items()},
-            method=self.method.removesuffix(OF_RATIO),
+            stribeck=law and Stribeck(eta * law.mu_c, eta * law.mu_s, law.v_s, eta * law.mu_v),
             stribeck_covariance=covariance,
+            over_eta=False,
         )
 
 

@@ -10,7 +10,9 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
 
+from drivetwin.driveline import Stribeck
 from drivetwin.identify.result import (
+    OF_RATIO,
     Estimate,
     FloatArray,
     FrictionCurve,
@@ -91,9 +93,9 @@ class FrictionRecord(Record):
             mu=curve.mu.tolist(),
             mu_lo=curve.mu_lo.tolist(),
             mu_hi=curve.mu_hi.tolist(),
-            stribeck=None if curve.stribeck is None else StribeckRecord(**curve.stribeck),
+            stribeck=None if curve.stribeck is None else StribeckRecord(**vars(curve.stribeck)),
             stribeck_covariance=_rows(curve.stribeck_covariance),
-            method=curve.method,
+            method=curve.method_text,
         )
 
     def curve(self) -> FrictionCurve:
@@ -105,11 +107,12 @@ class FrictionRecord(Record):
             mu_hi=_array(self.mu_hi),
             points_slip=np.empty(0),
             points_mu=np.empty(0),
-            stribeck=None if self.stribeck is None else self.stribeck.model_dump(),
-            method=self.method,
+            stribeck=None if self.stribeck is None else Stribeck(**self.stribeck.model_dump()),
+            method=self.method.removesuffix(OF_RATIO),
             stribeck_covariance=None
             if self.stribeck_covariance is None
             else np.asarray(self.stribeck_covariance),
+            over_eta=self.method.endswith(OF_RATIO),
         )
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from drivetwin.converter import Converter
-from drivetwin.driveline import Stribeck
 from drivetwin.export.parameters.content import Curve, Scalar
 from drivetwin.export.parameters.of_twin import converter_curves, parameters_of
 from drivetwin.identify.result import Estimate, Verdict
@@ -72,7 +71,7 @@ def test_the_curve_gives_the_law_of_the_simulation() -> None:
     assert curve.axis.unit == "rad/s"
     assert curve.axis.points[0] == 0.0
     slip = np.linspace(0.0, 95.0, 2000)
-    law = Stribeck(**STRIBECK).at(slip)
+    law = STRIBECK.at(slip)
     assert np.interp(slip, curve.axis.points, curve.values) == pytest.approx(law, rel=1e-3)
 
 

@@ -14,7 +14,7 @@ from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
 from drivetwin.export.parameters.of_twin import parameters_of
 from drivetwin.export.parameters.to_twin import updated
-from drivetwin.identify.result import OF_RATIO, Estimate, LoadLaw, Verdict
+from drivetwin.identify.result import Estimate, LoadLaw, Verdict
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT
 
@@ -85,7 +85,7 @@ def test_an_edited_curve_becomes_the_law() -> None:
 def test_friction_over_eta_is_written_and_changed_as_such() -> None:
     given = twin()
     curve = given.friction["B3"]
-    given = replace(given, friction={"B3": replace(curve, method=curve.method + OF_RATIO)})
+    given = replace(given, friction={"B3": replace(curve, over_eta=True)})
     content = parameters_of(given)
     numbers = {one.name: one for one in content.scalars}
     mu_c, (curve_then,) = numbers["mu_c.B3"], content.curves

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,14 @@ def test_falling_shape_falls_and_sensors_widen_its_band() -> None:
     )
     assert np.diff(narrow.mu).max() <= 1e-9
     assert np.mean(wide.mu_hi - wide.mu_lo) > 1.5 * np.mean(narrow.mu_hi - narrow.mu_lo)
+
+
+def test_without_a_torque_scale_a_shape_is_over_eta_as_its_law_was() -> None:
+    found = stepped()
+    ratio = replace(found, friction={"B3": replace(found.friction["B3"], over_eta=True)})
+    curve = shaped_friction(ratio, Shape.FREE, {}).curves["B3"]
+    assert curve.over_eta
+    assert curve.method_text == "likelihood, free shape, μ over η"
 
 
 def test_other_methods_are_refused() -> None:

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.identify.result import OF_RATIO
 from drivetwin.report.figures.comparison import friction_overlay
 from drivetwin.report.figures.friction import friction_figure
 from tests.report.sample import friction
@@ -35,7 +34,7 @@ def test_curve_without_interval_or_law_is_still_drawn() -> None:
 
 def test_a_curve_over_eta_says_so_on_its_axis() -> None:
     told = friction()
-    ratio = replace(told, method=told.method + OF_RATIO)
+    ratio = replace(told, over_eta=True)
     titles = [friction_figure("B3", one).layout.yaxis.title.text for one in (told, ratio)]
     assert titles == ["friction coefficient μ [–]", "friction coefficient μ/η [–]"]
     overlay = friction_overlay("B3", {"a": told, "b": ratio}, ["a", "b"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin.identify.result import OF_RATIO
 from drivetwin.report.sections.blocks import FigureBlock
 from drivetwin.report.sections.story import friction_section
 from tests.report.sample import identification
@@ -14,7 +13,7 @@ from tests.report.sample import identification
 def test_friction_without_an_output_torque_is_told_as_what_it_is() -> None:
     found = identification()
     curve = found.friction["B3"]
-    ratio = replace(found, friction={"B3": replace(curve, method=curve.method + OF_RATIO)})
+    ratio = replace(found, friction={"B3": replace(curve, over_eta=True)})
     with_torque, without = friction_section(found), friction_section(ratio)
     assert "follows from the output torque" in with_torque.intro
     assert "no output torque" in without.intro

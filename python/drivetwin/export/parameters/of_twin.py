@@ -127,7 +127,8 @@ def _design(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
 
 def _laws(twin: Twin) -> Iterator[Scalar]:
     for name, curve in twin.friction.items():
-        for field, value in (curve.stribeck or {}).items():
+        law = {} if curve.stribeck is None else vars(curve.stribeck)
+        for field, value in law.items():
             unit, text = LAW_FIELDS[field]
             over = ", over η" if curve.over_eta and field != "v_s" else ""
             yield Scalar(f"{field}.{name}", value, unit, text + over)
@@ -141,7 +142,7 @@ def _friction(twin: Twin) -> Iterator[Curve]:
             f"mu.{name}",
             Axis("slip", tuple(points.tolist()), "rad/s"),
             tuple(law.at(points).tolist()),
-            text=one_line(f"friction coefficient of {name} over slip, {curve.method}"),
+            text=one_line(f"friction coefficient of {name} over slip, {curve.method_text}"),
         )
 
 

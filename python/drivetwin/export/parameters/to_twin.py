@@ -13,7 +13,7 @@ from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, parameters_of
 from drivetwin.export.parameters.spelling import dotted_name, flat_name
 from drivetwin.export.parameters.units import is_same_unit
-from drivetwin.identify.result import OF_RATIO, Estimate, FrictionCurve, Verdict
+from drivetwin.identify.result import Estimate, FrictionCurve, Verdict
 from drivetwin.parameters import spec_of
 from drivetwin.twin import SIMULATED
 
@@ -153,8 +153,10 @@ def _with(twin: Twin, name: str, value: float) -> Twin:
 
 def _with_law(twin: Twin, element: str, field: str, value: float) -> Twin:
     curve = twin.friction[element]
-    law = {**(curve.stribeck or {}), field: value}
-    changed = replace(curve, stribeck=law, method=_method(curve), stribeck_covariance=None)
+    assert curve.stribeck is not None  # Else the twin would not know the name.
+    changes: dict[str, Any] = {field: value}
+    law = replace(curve.stribeck, **changes)
+    changed = replace(curve, stribeck=law, method=METHOD, stribeck_covariance=None)
     return replace(twin, friction={**twin.friction, element: changed})
 
 
@@ -168,11 +170,6 @@ def _with_curve(twin: Twin, name: str, given: Curve, changed: dict[str, Scalar |
         )
     slip, mu = np.array(given.axis.points), np.array(given.values)
     nothing = np.zeros(0)
-    method = _method(twin.friction[element])
-    curve = FrictionCurve(slip, mu, mu, mu, nothing, nothing, None, method)
+    over_eta = twin.friction[element].over_eta
+    curve = FrictionCurve(slip, mu, mu, mu, nothing, nothing, None, METHOD, over_eta=over_eta)
     return replace(twin, friction={**twin.friction, element: curve})
-
-
-def _method(curve: FrictionCurve) -> str:
-    """Method of a changed curve: what was μ/η is changed as μ/η."""
-    return METHOD + OF_RATIO if curve.over_eta else METHOD

@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.driveline import Stribeck
 from drivetwin.identify.friction import stribeck
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.unknowns import LAW
-from drivetwin.identify.result import OF_RATIO, Z95, FrictionCurve
+from drivetwin.identify.result import Z95, FrictionCurve
 from drivetwin.identify.signals import FloatArray
 
 METHOD = "likelihood"
@@ -49,9 +50,10 @@ def curves_of(
             mu=mu,
             mu_lo=mu - half,
             mu_hi=mu + half,
-            stribeck={"mu_c": mu_c, "mu_s": mu_c + drop, "v_s": v_s, "mu_v": mu_v},
-            method=METHOD if part.scale_known else METHOD + OF_RATIO,
+            stribeck=Stribeck(mu_c, mu_c + drop, v_s, mu_v),
+            method=METHOD,
             stribeck_covariance=to_law @ fit.covariance[square] @ to_law.T,
+            over_eta=not part.scale_known,
         )
     return found
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.driveline import Stribeck
 from drivetwin.identify.result import FrictionCurve
 from drivetwin.report.decimate import MAX_POINTS
 from drivetwin.report.style import COMPARED, FITTED, MEASURED, axis, layout
@@ -41,7 +40,7 @@ def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
     if curve.stribeck is not None:
         figure.add_scatter(
             x=curve.slip,
-            y=Stribeck(**curve.stribeck).at(curve.slip),
+            y=curve.stribeck.at(curve.slip),
             mode="lines",
             name="Stribeck law",
             line={"color": COMPARED, "width": 1.6, "dash": "dash"},

@@ -109,7 +109,7 @@ def friction_section(found: Identification) -> Section:
     """μ over slip of every element that slipped under load."""
     blocks: list[Block] = []
     for element, curve in found.friction.items():
-        caption = f"Friction of {element}, method: {curve.method}. "
+        caption = f"Friction of {element}, method: {curve.method_text}. "
         blocks.append(FigureBlock(friction_figure(element, curve), caption + _law_text(curve)))
     over_eta = any(curve.over_eta for curve in found.friction.values())
     return Section(
@@ -127,8 +127,8 @@ def _law_text(curve: FrictionCurve) -> str:
         return "No Stribeck law fits within the range seen; the smoothed curve is used."
     return (
         f"Stribeck law {curve.symbol} = μ_c + (μ_s − μ_c)·exp(−|s|/v_s) + μ_v·|s| with "
-        f"μ_c = {significant(law['mu_c'])}, μ_s = {significant(law['mu_s'])}, "
-        f"v_s = {significant(law['v_s'], 3)} rad/s, μ_v = {significant(law['mu_v'], 3)} s/rad."
+        f"μ_c = {significant(law.mu_c)}, μ_s = {significant(law.mu_s)}, "
+        f"v_s = {significant(law.v_s, 3)} rad/s, μ_v = {significant(law.mu_v, 3)} s/rad."
     )
 
 
