@@ -336,7 +336,9 @@ def sensitivities(
     Names are fields of the model (`eta`, `J1`, `k_o`, `load.constant`), of a shift element
     (`B3.P0`, `B3.mu_c`, `B3.mu.4` for a point of a table), of the start (`start.twist`), and delays
     of inputs without jumps (`delay.engine torque`, `delay.B3`). Event times are differentiated
-    implicitly; where an event grazes no derivative exists.
+    implicitly; where an event grazes no derivative exists. A start that agrees with its locks is
+    differentiated through `dissipative` gears as if power flowed forward in the impulse that keeps
+    it so; the other way it would be another number.
     Raises InputError for an unknown name, the delay of an input that jumps, or an inconsistent
     description.
     """
