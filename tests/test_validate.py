@@ -181,6 +181,10 @@ def test_the_log_behind_a_twin_leaves_no_range_of_it(
     assert with_fit(identification(), [one]).warnings == identification().warnings
     failed = replace(one, trajectory=replace(one.trajectory, status="events too dense"))
     assert "ended early" in with_fit(identification(), [failed]).warnings[-1]
+    speed = one.traces["input_speed"]
+    astray = {**one.traces, "input_speed": replace(speed, simulated=2.0 * speed.simulated)}
+    told = with_fit(identification(), [replace(one, traces=astray)]).warnings
+    assert "range of speed" in told[-1]
 
 
 def test_start_state_keeps_the_gear_and_the_measured_twist(

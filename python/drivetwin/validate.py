@@ -146,11 +146,12 @@ def compared(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) -> 
 def with_fit(found: Identification, validations: Sequence[Validation]) -> Identification:
     """Identification with the fits of its validations entered: pooled over the shifts.
 
-    Of their warnings only a run that ended early counts: the ranges are those of these logs.
+    Of their warnings count runs that ended early and those that left the speeds of their own log:
+    all other ranges are those of these logs.
     """
     if not validations:
         return found
-    warnings = tuple(text for one in validations for text in _ended(one.trajectory))
+    warnings = tuple(text for one in validations for text in _strayed(one))
     return replace(
         found,
         fit=_pooled_fit(validations),
@@ -304,6 +305,16 @@ def _ended(run: Trajectory) -> list[str]:
     if run.status == "completed":
         return []
     return [f"simulation of the validation ended early: {run.status}"]
+
+
+def _strayed(one: Validation) -> list[str]:
+    """Words for a run of the log behind a twin that goes where that log does not."""
+    texts, speed = _ended(one.trajectory), one.traces.get("input_speed")
+    if speed is None:
+        return texts
+    measured = speed.measured[np.isfinite(speed.measured)]
+    limits = (float(measured.min()), float(measured.max()))
+    return texts + _outside("speed", [speed.simulated], limits)
 
 
 def _slip_under_load(run: Trajectory) -> list[FloatArray]:
