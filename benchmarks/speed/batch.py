@@ -19,6 +19,7 @@ from benchmarks.speed.growth import Curve
 from benchmarks.speed.statement import BAR, Inputs, Problem, start
 from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
 from drivetwin.driveline import (
+    ENGINE_TORQUE,
     Accuracy,
     FloatArray,
     ShiftElement,
@@ -26,7 +27,6 @@ from drivetwin.driveline import (
     Trajectory,
     simulate,
 )
-from drivetwin.export.modelica.dual_clutch import ENGINE_TORQUE
 
 RUNS = 1000
 _SPREAD = 0.05

@@ -12,8 +12,8 @@ from benchmarks.speed.core import Example, Scenario
 from benchmarks.speed.measure import Entry, Group, Judge, Quality
 from benchmarks.speed.shift import OUTPUTS, PROGRAM
 from benchmarks.speed.statement import STEP, Solution
-from drivetwin.driveline import Accuracy, FloatArray, Signal
-from drivetwin.export.modelica.dual_clutch import ENGINE_TORQUE, network_of, network_start
+from drivetwin.driveline import ENGINE_TORQUE, Accuracy, FloatArray, Signal
+from drivetwin.export.modelica.dual_clutch import network_of, network_start
 from drivetwin.gearbox import load_gearbox
 from drivetwin.gearbox import reduce as reduce_shift
 from drivetwin.gearbox.compare import SHAFT, WHEEL, dual_clutch_form, whole_gearbox

@@ -9,6 +9,7 @@ from benchmarks.speed.core import Example, Scenario
 from benchmarks.speed.measure import Entry, Group, Judge, Quality, timed
 from benchmarks.speed.statement import Inputs, Problem, Solution, start
 from drivetwin.driveline import (
+    ENGINE_TORQUE,
     DualClutch,
     RoadLoad,
     Sensitivities,
@@ -20,7 +21,7 @@ from drivetwin.driveline import (
     sensitivities,
     simulate,
 )
-from drivetwin.export.modelica.dual_clutch import ENGINE_TORQUE, SHAFT, network_of, network_start
+from drivetwin.export.modelica.dual_clutch import SHAFT, network_of, network_start
 from drivetwin.network import Output
 
 PROGRAM = "drivetwin"

@@ -310,10 +310,9 @@ def _ended(run: Trajectory) -> list[str]:
 def _strayed(one: Validation) -> list[str]:
     """Words for a run of the log behind a twin that goes where that log does not."""
     texts, speed = _ended(one.trajectory), one.traces.get("input_speed")
-    if speed is None:
+    if speed is None or not np.isfinite(speed.measured).any():
         return texts
-    measured = speed.measured[np.isfinite(speed.measured)]
-    limits = (float(measured.min()), float(measured.max()))
+    limits = (float(np.nanmin(speed.measured)), float(np.nanmax(speed.measured)))
     return texts + _outside("speed", [speed.simulated], limits)
 
 

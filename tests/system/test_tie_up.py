@@ -11,9 +11,9 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-from drivetwin.driveline import Accuracy, FloatArray, Signal
+from drivetwin.driveline import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.gearbox import Gearbox, builtin_gearboxes, load_gearbox, reduce
-from drivetwin.gearbox.compare import ENGINE_TORQUE, WholeGearbox, whole_gearbox
+from drivetwin.gearbox.compare import WholeGearbox, whole_gearbox
 from drivetwin.gearbox.maneuver import plan
 from drivetwin.gearbox.network import network_elements
 from drivetwin.network import NetworkRun, Output, Start, simulate

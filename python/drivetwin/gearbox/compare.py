@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.driveline import DualClutch, FloatArray, RoadLoad, Signal, State
+from drivetwin.driveline import ENGINE_TORQUE, DualClutch, FloatArray, RoadLoad, Signal, State
 from drivetwin.driveline import simulate as simulate_dual_clutch
 from drivetwin.errors import SimulationError
 from drivetwin.gearbox.drive import Drive
@@ -20,7 +20,6 @@ from drivetwin.network import Start
 from drivetwin.network import simulate as simulate_network
 
 AXLE, WHEEL, SHAFT = "axle beyond the shaft", "wheel of the vehicle", "shaft to the axle"
-ENGINE_TORQUE = "engine torque"
 _COMPLETED = "completed"
 
 

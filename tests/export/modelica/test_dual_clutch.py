@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.driveline import (
+    ENGINE_TORQUE,
     DualClutch,
     FrictionTable,
     LossLaw,
@@ -21,7 +22,7 @@ from drivetwin.driveline import (
 )
 from drivetwin.errors import InputError
 from drivetwin.export.fmu.experiment import Experiment
-from drivetwin.export.modelica.dual_clutch import ENGINE_TORQUE, modelica_text, write_modelica
+from drivetwin.export.modelica.dual_clutch import modelica_text, write_modelica
 from drivetwin.export.subject import Subject
 from tests.export.modelica.compiled import run
 from tests.export.parameters.sample import twin

@@ -105,7 +105,7 @@ impl<T: Number> Normal<T> {
         }
     }
 
-    /// What is left of the load by round-off where the pressure is the fill pressure; above zero.
+    /// What is left of the load [N·m] by round-off where the pressure is the fill pressure; above zero.
     pub fn nothing(&self) -> T {
         let size = match self {
             Self::Pressure { gain, p0, .. } => (*gain * *p0).re().magnitude(),

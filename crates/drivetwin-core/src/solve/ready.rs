@@ -156,7 +156,7 @@ impl<T: Number> Regime<'_, T> {
         for (j, row) in self.network.frictions.iter().enumerate() {
             let side = if self.pressed[j] { 1.0 } else { -1.0 };
             let load = line_of(&row.normal);
-            // Those at the ends of samples are sums.
+            // At the end of a sample the load is a sum, with round-off of its own.
             let nothing = row.normal.nothing() + if self.pressed[j] { NO_TORQUE } else { 0.0 };
             let above = Line { offset: load.offset - nothing, ..load };
             operators.loads.push(above.map(|v| v * side));

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin.driveline import DualClutch, ShiftElement, Signal, State
+from drivetwin.driveline import ENGINE_TORQUE, DualClutch, ShiftElement, Signal, State
 from drivetwin.export.modelica.model import Run, package_text
 from drivetwin.export.subject import Subject
 from drivetwin.network import Element, Start
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from drivetwin.export.fmu.experiment import Experiment
 
 ENGINE, OUTPUT, WHEEL, SHAFT = "engine", "output", "wheel", "output shaft"
-ENGINE_TORQUE = "engine torque"
 _INPUT, _AXLE = "input gear", "axle"
 
 

@@ -23,7 +23,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_array
 
 from drivetwin.driveline import DualClutch
-from drivetwin.identify.likelihood.record import Record
+from drivetwin.identify.likelihood.record import TORQUE, Record
 from drivetwin.identify.likelihood.response import STATES, Response, observed
 from drivetwin.identify.signals import FloatArray
 
@@ -113,7 +113,7 @@ def _power(record: Record, response: Response) -> dict[str, FloatArray]:
     """Variance (N-1,) of an input's noise as constant over each step, by name."""
     found = {}
     for name in response.drive:
-        signal = record.engine_torque if name == "engine torque" else record.pressures[name]
+        signal = record.engine_torque if name == TORQUE else record.pressures[name]
         between = float(np.median(np.diff(signal.time)))
         found[name] = record.input_sigma[name] ** 2 * between / response.step
     return found

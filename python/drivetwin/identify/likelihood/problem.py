@@ -23,7 +23,7 @@ import numpy as np
 from drivetwin.driveline import Sensitivities, Signal, Trajectory, sensitivities, simulate
 from drivetwin.errors import InputError
 from drivetwin.identify.likelihood.covariance import Whiteness, sensor_noise, with_input_noise
-from drivetwin.identify.likelihood.record import Record
+from drivetwin.identify.likelihood.record import TORQUE, Record
 from drivetwin.identify.likelihood.response import Response, observed, response_of
 from drivetwin.identify.likelihood.unknowns import TE_OFFSET, Point, Structure
 from drivetwin.identify.likelihood.work import EXPANSION, RUN, WEIGHTING, spend
@@ -103,7 +103,7 @@ class Part:
         slopes = columns @ matrix
         response = self.response(point, found.run)
         for name, disturbance in self._torque_changes(point).items():
-            answer = self.seen(point, response.to({"engine torque": disturbance}))
+            answer = self.seen(point, response.to({TORQUE: disturbance}))
             slopes[:, point.names.index(name)] = answer
         if not np.all(np.isfinite(slopes)):
             return None

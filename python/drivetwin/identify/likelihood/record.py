@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.driveline import Signal, Trajectory
+from drivetwin.driveline import ENGINE_TORQUE, Signal, Trajectory
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.smooth import (
     bend_of,
@@ -21,7 +21,7 @@ from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
 
 IndexArray = NDArray[np.intp]
 
-TORQUE = "engine torque"
+TORQUE = ENGINE_TORQUE
 """Name of the engine torque among the inputs; the others are pressures by element."""
 OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
 """Compared signals, in the order in which residuals are stacked."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from drivetwin.driveline import Signal
 from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.record import TORQUE
 from drivetwin.identify.likelihood.slow import BLOCK, block_means, white_of
 from drivetwin.identify.signals import FloatArray
 
@@ -71,7 +72,7 @@ def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
     """Tests of every output by label of the shift."""
     found = {}
     for part, outputs in zip(fit.problem.parts, white_residuals(fit).values(), strict=True):
-        inputs = {"engine torque": part.record.engine_torque} | {
+        inputs = {TORQUE: part.record.engine_torque} | {
             f"pressure of {name}": signal for name, signal in part.record.pressures.items()
         }
         found[part.structure.label] = tuple(

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
 from drivetwin.driveline import DualClutch, ShiftElement, Trajectory
-from drivetwin.identify.likelihood.record import Record
+from drivetwin.identify.likelihood.record import TORQUE, Record
 from drivetwin.identify.signals import FloatArray
 
 BoolArray = NDArray[np.bool_]
@@ -105,7 +105,7 @@ def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
     torque = np.zeros((step.size, STATES))
     for way, inside in _ways(driving):
         torque[inside, 0] = model.efficiency(driving=way)
-    force = {"engine torque": torque}
+    force = {TORQUE: torque}
     for one in model.elements:
         if one.name not in record.pressures:
             continue

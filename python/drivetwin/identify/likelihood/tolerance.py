@@ -13,6 +13,7 @@ import numpy as np
 
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.likelihood.record import TORQUE
 from drivetwin.identify.signals import FloatArray
 from drivetwin.vehicle.spec import SensorTolerance
 
@@ -49,8 +50,8 @@ def _error(part: Part, fit: LikelihoodFit, role: str, kind: str) -> FloatArray |
             for out in part.record.outputs
         ]
         return np.concatenate(chosen)
-    inputs = {"engine torque": part.record.engine_torque} | dict(part.record.pressures)
-    name = "engine torque" if role == "engine_torque" else role.removeprefix("pressure.")
+    inputs = {TORQUE: part.record.engine_torque} | dict(part.record.pressures)
+    name = TORQUE if role == "engine_torque" else role.removeprefix("pressure.")
     run = part.run(fit.point)
     if name not in inputs or run is None:
         return None
