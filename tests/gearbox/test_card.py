@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.errors import CardError, InputError, ReductionError
-from drivetwin.gearbox import Gearbox, builtin_gearboxes, gearbox_schema, load_gearbox
+from drivetwin.gearbox import Gearbox, builtin_gearboxes, load_gearbox
 
 SMALL = """
 name = "small"
@@ -139,7 +139,3 @@ def test_what_a_card_leaves_out_is_asked_for_when_needed(tmp_path: Path) -> None
         box.capacity("B")
     with pytest.raises(InputError, match="no gear '3'"):
         box.gear("3")
-
-
-def test_the_schema_is_published_for_editors() -> None:
-    assert {"sets", "pairs", "elements", "gears"} <= set(gearbox_schema()["properties"])

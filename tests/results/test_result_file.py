@@ -15,7 +15,6 @@ from drivetwin.identify.result import SignalFit, Verdict
 from drivetwin.results.result_file import (
     ResultFile,
     load_result,
-    result_json_schema,
     save_result,
 )
 from tests.report.sample import identification
@@ -106,9 +105,3 @@ def test_damaged_or_newer_files_are_refused(tmp_path: Path, content: str, says: 
     path.write_text(content, encoding="utf-8")
     with pytest.raises(ResultFileError, match=says):
         load_result(path)
-
-
-def test_schema_is_published_under_the_names_of_the_file() -> None:
-    schema = result_json_schema()
-    assert "schema" in schema["properties"]
-    assert "from" in schema["$defs"]["ShiftRecord"]["properties"]

@@ -41,7 +41,7 @@ PYTHON_LAYERS = (
             "_native",
         }
     ),
-    frozenset({"logs", "vehicle", "held", "gearbox"}),
+    frozenset({"logs", "vehicle", "gearbox"}),
     frozenset({"shifts", "dyno", "drive"}),
     frozenset({"identify"}),
     frozenset(
@@ -58,7 +58,7 @@ PYTHON_LAYERS = (
     ),
     frozenset({"observer"}),
     frozenset({"report", "export"}),
-    frozenset({"fleet", "app"}),
+    frozenset({"fleet", "app", "schemas"}),
     frozenset({"cli", "__main__"}),
 )
 """From the bottom up: a module may import from its own layer and those below."""

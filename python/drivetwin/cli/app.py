@@ -23,6 +23,7 @@ from drivetwin.cli.observe import observe
 from drivetwin.cli.output import show_error
 from drivetwin.cli.reduce import reduce
 from drivetwin.cli.report import report
+from drivetwin.cli.schema import schema
 from drivetwin.cli.shifts import shifts
 from drivetwin.cli.simulate import simulate
 from drivetwin.cli.synth import synth
@@ -49,6 +50,7 @@ for command in (
     gearbox,
     reduce,
     drive,
+    schema,
 ):
     app.command()(command)
 app.command(name="app")(workbench)

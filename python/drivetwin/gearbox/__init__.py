@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.gearbox.card import builtin_gearboxes, gearbox_schema, load_gearbox
+from drivetwin.gearbox.card import builtin_gearboxes, load_gearbox
 from drivetwin.gearbox.compare import Comparison, compare
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.estimate import estimate
@@ -24,7 +24,6 @@ __all__ = [
     "compare",
     "estimate",
     "gear_statics",
-    "gearbox_schema",
     "load_gearbox",
     "network_elements",
     "ratio_remarks",

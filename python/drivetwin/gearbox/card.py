@@ -38,11 +38,6 @@ def load_gearbox(card: Path | str) -> Gearbox:
     return gearbox_of(document)
 
 
-def gearbox_schema() -> dict[str, Any]:
-    """Return the JSON Schema of the gearbox card, for editors."""
-    return GearboxFile.model_json_schema()
-
-
 def _find(card: Path | str) -> Path:
     builtin = _CARDS / f"{card}.toml"
     if str(card) in builtin_gearboxes():

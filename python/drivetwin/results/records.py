@@ -147,7 +147,7 @@ class ParameterRecord(Record):
         return self
 
     @classmethod
-    def of(cls, estimate: Estimate) -> ParameterRecord:
+    def of(cls, estimate: Estimate) -> Self:
         """Record of an estimate."""
         return cls(
             value=estimate.value,

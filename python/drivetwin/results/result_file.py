@@ -149,11 +149,6 @@ def plain(value: Any) -> Any:
     return finite_or_none(value) if isinstance(value, float) else str(value)
 
 
-def result_json_schema() -> dict[str, Any]:
-    """JSON Schema of `result.json`."""
-    return ResultFile.model_json_schema(by_alias=True)
-
-
 def save_result(path: Path | str, identification: Identification) -> None:
     """Write `result.json`; the file appears whole or not at all."""
     write_text(path, ResultFile.of(identification).to_json())

@@ -10,7 +10,7 @@ import numpy as np
 from drivetwin.identify.result import FloatArray, FrictionCurve, Identification, LoadLaw
 from drivetwin.identify.uncertainty import KNOWN, designed
 from drivetwin.logs.mapping import ChannelSpec
-from drivetwin.results.records import FrictionRecord, LoadRecord, ParameterRecord
+from drivetwin.results.records import FrictionRecord, LoadRecord
 from drivetwin.results.result_file import plain
 from drivetwin.results.twin_file import (
     TWIN_SCHEMA,
@@ -21,6 +21,7 @@ from drivetwin.results.twin_file import (
     GearRecord,
     TransmissionRecord,
     TwinFile,
+    TwinParameterRecord,
 )
 from drivetwin.results.version import program_version
 from drivetwin.twin import Twin, TwinElement, TwinGear
@@ -133,7 +134,7 @@ def file_of(twin: Twin) -> TwinFile:
             channels={role: ChannelRecord(**vars(one)) for role, one in twin.channels.items()},
             converter=ConverterRecord.of(twin.converter),
         ),
-        parameters={name: ParameterRecord.of(one) for name, one in twin.parameters.items()},
+        parameters={name: TwinParameterRecord.of(one) for name, one in twin.parameters.items()},
         friction={name: FrictionRecord.of(curve) for name, curve in twin.friction.items()},
         load=LoadRecord.of(twin.load_law),
         covariance=None

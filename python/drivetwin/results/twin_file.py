@@ -18,6 +18,7 @@ from drivetwin.results.records import (
     FrictionRecord,
     Interval,
     LoadRecord,
+    OptionalFloat,
     ParameterRecord,
     Record,
     SchemaName,
@@ -98,6 +99,12 @@ class TransmissionRecord(Record):
     converter: ConverterRecord | None = None
 
 
+class TwinParameterRecord(ParameterRecord):
+    """A parameter in TOML, which knows no null: without `value` where the log could not tell it."""
+
+    value: OptionalFloat = None
+
+
 class CovarianceRecord(Record):
     """Covariance of the parameters `ids` (total), row by row, in products of their SI units."""
 
@@ -121,7 +128,7 @@ class TwinFile(Record):
     method: Method
     loss_law: Literal["paper", "dissipative"]
     transmission: TransmissionRecord
-    parameters: dict[str, ParameterRecord]
+    parameters: dict[str, TwinParameterRecord]
     friction: dict[str, FrictionRecord]
     load: LoadRecord | None = None
     covariance: CovarianceRecord | None = None
@@ -129,11 +136,6 @@ class TwinFile(Record):
     inputs: dict[str, str]
     settings: dict[str, Any]
     assumptions: list[str]
-
-
-def twin_json_schema() -> dict[str, Any]:
-    """JSON Schema of `twin.toml`."""
-    return TwinFile.model_json_schema(by_alias=True)
 
 
 def write_twin_file(path: Path | str, content: TwinFile) -> None:
@@ -151,17 +153,7 @@ def read_twin_file(path: Path | str) -> TwinFile:
 
     Raises ResultFileError where the file is missing, damaged or of a newer schema.
     """
-    return read_record(path, _parsed, TWIN_SCHEMA, TwinFile)
-
-
-def _parsed(text: str) -> dict[str, Any]:
-    """The document with the null values that TOML does not know."""
-    tree = tomllib.loads(text)
-    parameters = tree.get("parameters")
-    for parameter in parameters.values() if isinstance(parameters, dict) else ():
-        if isinstance(parameter, dict):
-            parameter.setdefault("value", None)
-    return tree
+    return read_record(path, tomllib.loads, TWIN_SCHEMA, TwinFile)
 
 
 def _without_null(value: Any) -> Any:

@@ -10,7 +10,7 @@ from drivetwin.errors import CardError
 from drivetwin.logs.roles import PRESSURE
 from drivetwin.tomlfile import raise_faults, read_toml
 from drivetwin.vehicle.check import card_faults
-from drivetwin.vehicle.schema import CardFile, SensorsTable, card_schema
+from drivetwin.vehicle.schema import CardFile, SensorsTable
 from drivetwin.vehicle.spec import (
     ElementSpec,
     Gear,
@@ -27,7 +27,6 @@ __all__ = [
     "SensorTolerance",
     "VehicleCard",
     "brake_ratios",
-    "card_schema",
     "load_card",
 ]
 

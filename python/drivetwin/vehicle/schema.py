@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
@@ -177,8 +177,3 @@ class CardFile(StrictModel):
     converter: ConverterTable | None = None
     sensors: SensorsTable = SensorsTable()
     channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
-
-
-def card_schema() -> dict[str, Any]:
-    """Return the JSON Schema of the vehicle card, for editors."""
-    return CardFile.model_json_schema()

@@ -43,7 +43,9 @@ class _CurveRecord(StrictModel):
     text: str = ""
 
 
-class _File(StrictModel):
+class ParameterFile(StrictModel):
+    """A file of parameters as JSON."""
+
     schema_name: str = Field(alias="schema", pattern=f"^{SCHEMA}$")
     name: str
     scalars: list[_ScalarRecord]
@@ -67,7 +69,7 @@ def json_text(parameters: ParameterSet) -> str:
 def parse_json(text: str, source: str) -> ParameterSet:
     """Read the file. Raises FileFormatError where it is damaged or of another schema."""
     try:
-        content = _File.model_validate_json(text)
+        content = ParameterFile.model_validate_json(text)
     except ValidationError as fault:
         raise FileFormatError(
             f"no parameters in the schema {SCHEMA}: {fault}",

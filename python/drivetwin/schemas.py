@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""JSON Schemas of the files that drivetwin reads and writes, for editors and other programs."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+class FileKind(StrEnum):
+    """A file of tables whose keys are checked."""
+
+    VEHICLE_CARD = "vehicle-card"
+    GEARBOX_CARD = "gearbox-card"
+    POWERTRAIN = "powertrain"
+    CHANNEL_MAPPING = "channel-mapping"
+    FLEET_RULES = "fleet-rules"
+    RESULT = "result"
+    TWIN = "twin"
+    PARAMETERS = "parameters"
+
+
+_MODELS = {
+    FileKind.VEHICLE_CARD: ("vehicle.schema", "CardFile"),
+    FileKind.GEARBOX_CARD: ("gearbox.schema", "GearboxFile"),
+    FileKind.POWERTRAIN: ("drive.schema", "PowertrainFile"),
+    FileKind.CHANNEL_MAPPING: ("logs.profile", "MappingFile"),
+    FileKind.FLEET_RULES: ("fleet.rules", "RulesFile"),
+    FileKind.RESULT: ("results.result_file", "ResultFile"),
+    FileKind.TWIN: ("results.twin_file", "TwinFile"),
+    FileKind.PARAMETERS: ("export.parameters.json_file", "ParameterFile"),
+}
+"""Module below the package, and the model there, by which the program itself checks the file; each
+is imported when it is asked for."""
+
+
+def json_schema(kind: FileKind | str) -> dict[str, Any]:
+    """Return the JSON Schema (2020-12) of a file, e.g. of `vehicle-card`.
+
+    It says which keys there are, their types and the limits of single values. What depends on
+    several keys is checked by the reader alone. Raises ValueError for a kind that does not exist.
+    """
+    kind = FileKind(kind)
+    module, name = _MODELS[kind]
+    model: type[BaseModel] = getattr(import_module(f"drivetwin.{module}"), name)
+    return {"$schema": _DIALECT, **model.model_json_schema(), "title": f"drivetwin {kind}"}
