@@ -38,7 +38,7 @@ class Keep(StrEnum):
     LAST = "last"  # every output at the end
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scenario:
     """Inputs and start of a run; `pressures` [Pa, gauge] by element name."""
 
@@ -47,7 +47,7 @@ class Scenario:
     start: State
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Batch:
     """Result of a batch, runs in the order given.
 
@@ -62,7 +62,7 @@ class Batch:
     failed: Mapping[int, str]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BatchSensitivities:
     """A batch with exact derivatives by `parameters` (p,), through all events.
 
@@ -171,7 +171,7 @@ _Start = tuple[float, float, float, float, list[str]]
 _Plain = tuple[list[tuple[str, FloatArray, FloatArray, float]], _Start]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Asked:
     """What the core is asked for, as it takes it; `shape` is that of the values kept."""
 

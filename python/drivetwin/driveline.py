@@ -172,7 +172,7 @@ class State:
     locked: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Signal:
     """An input, linear between its samples; `time` (n,) [s], `values` (n,) SI.
 
@@ -256,7 +256,7 @@ class EnergyAudit:
     error: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """Result of one run. Arrays (n,) on `time`; `clutch_torque` and `slip` by element name.
 
@@ -277,7 +277,7 @@ class Trajectory:
     audit: EnergyAudit | None = field(default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sensitivities:
     """A run with its derivatives.
 

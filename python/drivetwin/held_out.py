@@ -40,7 +40,7 @@ class Outcome(StrEnum):
     NOT_PREDICTED = "not predicted"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HeldOut:
     """One shift that was predicted.
 

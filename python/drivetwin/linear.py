@@ -53,7 +53,7 @@ class Oscillation:
     damping: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearSystem:
     """x' = A x + B u, y = C x + D u about an operating point; SI; names as the rows stand."""
 

@@ -51,7 +51,7 @@ class Start:
     locked: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NetworkRun:
     """Result: `columns[kind, name]` (n,) on `time`; NaN after a failure, see `status`."""
 

@@ -22,7 +22,7 @@ from drivetwin.validate import validated, with_fit
 from drivetwin.vehicle.spec import VehicleCard
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Source:
     """A log with its usable shifts; `held` are the numbers, from 1, of those to be predicted."""
 
@@ -53,7 +53,7 @@ class Source:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Together:
     """What came of it: the identification, the logs fitted, and a twin of each by its source."""
 

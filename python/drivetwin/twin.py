@@ -72,7 +72,7 @@ class TwinElement:
         return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Twin(Shown):
     """What is known of one driveline after an identification; immutable, SI.
 

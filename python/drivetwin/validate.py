@@ -30,7 +30,7 @@ _CARRIES = 0.02
 """Share of a run's largest clutch torque from which an element's slip asks for its friction."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SignalTrace:
     """One compared signal on its own measured time base; arrays (n,), SI."""
 
@@ -41,7 +41,7 @@ class SignalTrace:
     """Mean of the measurement over the whole log, the reference of fit %."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Validation(Shown):
     """One shift simulated from its measured inputs.
 

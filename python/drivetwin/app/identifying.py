@@ -24,7 +24,7 @@ _WEIGHTS = {Method.PAPER: 1.0, Method.INTEGRAL: 30.0, Method.LIKELIHOOD: 70.0}
 """How long the methods take, relative to each other."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Task:
     """What to identify from; `card` is as the locks have it, `shifts` as moved by hand."""
 
@@ -34,7 +34,7 @@ class Task:
     methods: Sequence[Method]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Outcome:
     """What one method found, with its twin; `found` holds the validation.
 

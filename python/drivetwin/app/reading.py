@@ -31,7 +31,7 @@ LONGEST = 60.0
 """Time [s] after which reading is given up."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Opened:
     """What a log holds and how it is read.
 

@@ -34,7 +34,7 @@ MOST_UPLOADS = 8
 """Uploads kept for one session; the oldest goes that is not open."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Live:
     """What the sliders move: the run as identified, the present run and the figure of both."""
 
@@ -43,7 +43,7 @@ class Live:
     figure: go.Figure
 
 
-@dataclass
+@dataclass(eq=False)
 class Session:
     """The mutable shell around an immutable `Work`; every change goes through its lock."""
 
@@ -237,7 +237,7 @@ class Session:
         return opened
 
 
-@dataclass
+@dataclass(eq=False)
 class Sessions:
     """All sessions of a server by an unguessable key."""
 

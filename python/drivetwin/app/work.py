@@ -29,7 +29,7 @@ class Source:
     uploaded: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Work:
     """The state of a session.
 

@@ -95,7 +95,7 @@ class Asked:
     departures: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Answer:
     """One answer as a file and as a table; `twin` is written beside where it has one."""
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Outcome:
     """What one log gave: the log and card themselves, the identification, its twin."""
 

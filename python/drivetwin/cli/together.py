@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from drivetwin.together import Together
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Joined:
     """What came of the logs: those that were fitted or predicted, and what was identified."""
 

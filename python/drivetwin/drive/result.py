@@ -62,7 +62,7 @@ class Maneuver:
     work: tuple[ElementWork, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DriveRun:
     """A drive; arrays (n,) on `time` [s], SI.
 

@@ -19,7 +19,7 @@ from drivetwin.logs.shiftlog import Channel
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DynoRun:
     """What one run recorded (`channels`, each on its own time base) and what was true.
 

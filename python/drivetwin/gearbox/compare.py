@@ -23,7 +23,7 @@ AXLE, WHEEL, SHAFT = "axle beyond the shaft", "wheel of the vehicle", "shaft to 
 _COMPLETED = "completed"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """The whole gearbox and its dual-clutch form over `time` (n,) [s]."""
 
@@ -70,7 +70,7 @@ def _start(reduction: Reduction, maneuver: Maneuver, coupling: float) -> tuple[f
     return output, output / drive.i_f, twist
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WholeGearbox:
     """The reference shift with all members: elements, inputs by name, start."""
 

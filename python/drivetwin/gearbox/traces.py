@@ -22,7 +22,7 @@ class CouplingError:
     output_speed: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Traces:
     """Shaft torque [N m], speeds of input and output [rad/s] of one model; arrays (n,)."""
 

@@ -30,7 +30,7 @@ FEWEST = 10
 """Fits from which a standard deviation is told."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bootstrap:
     """Refitted parameters: `values` (n, q) by `ids` (q,), SI; `failed` fits are left out.
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from drivetwin.validate import Validation
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Evidence:
     """Results of the stages, each with its own units and shapes (SI); empty where none ran.
 

@@ -42,7 +42,7 @@ class FrictionSettings:
     """Pressure [Pa] above P0 from which an element counts as filled."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FrictionFit:
     """Stribeck law and P0 of one element; `fit.theta` is (mu_c, mu_s - mu_c, mu_v, ln v_s, P0, …).
 
@@ -313,7 +313,7 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PaperFriction:
     """The paper's μ-slip points, from extremes of T_o in the inertia phase, and their curve."""
 

@@ -27,7 +27,7 @@ NUISANCES = ("te_rounding", "drum")
 """Stems of what acts on the parameters, is the same in all shifts of a log and is not reported."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class IntegralShift:
     """All stages for one shift; a stage the data could not carry is None, and `refusals` says why.
 

@@ -21,7 +21,7 @@ EXCITATION = 0.03
 """Least relative variation of the engine torque in gear for eq. 10 to tell η from J′."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PaperShift:
     """The stages of the paper on one shift; `values` by parameter id, `doubts` by parameter id.
 

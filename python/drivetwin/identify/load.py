@@ -77,7 +77,7 @@ SETTLING = 0.5
 """Time after lock-up [s] in which the output speed cannot stand in for the wheel speed."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LoadFit:
     """Regression of eq. 11: θ = (T_v/i_f, J3) in `fit`.
 

@@ -18,7 +18,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.identify.signals import FloatArray, Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Windows:
     """Kernel windows: `start` (m,) [s] and `width` (m,) [s]."""
 

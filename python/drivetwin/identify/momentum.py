@@ -59,7 +59,7 @@ class MomentumSettings:
         return self.margin + 3.0 * shift.sigma.get(boundary, 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stretch:
     """A stretch of the log where one momentum equation holds.
 
@@ -86,7 +86,7 @@ DELAY_Q_MIN = 30.0
 """Least rise of Q over the scanned ages for the minimum to mean anything."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DelayScan:
     """Q of the regression over the assumed age of the engine torque: `delay` [s], `q`, (n,).
 
@@ -102,7 +102,7 @@ class DelayScan:
         return std < DELAY_STD_MAX and float(np.ptp(self.q)) > DELAY_Q_MIN
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MomentumFit:
     """Result of the joint regression. `names` are the parameters of `fit.theta`, in order,
     `priors` what was known of them beforehand, by name.

@@ -40,7 +40,7 @@ SEARCHES = 8
 """Most steps at one value."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Profile:
     """`rise` (n,) of Q, over the noise found in the log, slow errors counted, at `values` (n,) of a
     parameter, SI.
@@ -102,7 +102,7 @@ def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftS
     return fit, found.evidence.signals
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Held:
     """A fit with one parameter to be held, by its place among the reported ones and its name."""
 

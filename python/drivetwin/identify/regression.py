@@ -31,7 +31,7 @@ NUGGET = 1e-9
 """Added to S relative to its diagonal: strongly overlapping windows are nearly dependent."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Term:
     """One channel's part of the equations, at one θ.
 
@@ -46,7 +46,7 @@ class Term:
     slopes: Mapping[int, tuple[FloatArray, Quadrature]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Prior:
     """Normal prior on θ: `mean` (p,) and `precision` (p, p), zero rows where nothing is known."""
 
@@ -78,7 +78,7 @@ class Prior:
         return float((theta - self.mean) @ self.pull(theta))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Estimate `theta` (p,), `covariance` (p, p) from noise and priors, and its residuals.
 
@@ -100,7 +100,7 @@ class Fit:
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=float)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BandedCholesky:
     """S = L·Lᵀ for a covariance that couples only windows near each other in the list.
 
@@ -143,7 +143,7 @@ def _unweighable() -> IdentificationError:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Point:
     residual: FloatArray
     q: float

@@ -80,7 +80,7 @@ class Estimate:
         return self._interval(self.std_total)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FrictionCurve:
     """μ over |slip| of one element, over the slip range seen; arrays (n,), slip in rad/s.
 
@@ -167,7 +167,7 @@ class SignalFit:
     fit_percent: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Identification(Shown):
     """Everything one `identify` run found. Immutable; the twin, report and exports read it.
 

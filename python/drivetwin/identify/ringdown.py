@@ -29,7 +29,7 @@ BAND = (2.0, 60.0)
 """Frequencies [Hz] in which a driveline's first torsional mode is looked for."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RingDown:
     """Decay rate σ [1/s] and damped frequency ω_d [rad/s], `covariance` (2, 2) of the two.
 
@@ -69,7 +69,7 @@ class RingDown:
         return float(np.sqrt(slope @ self.covariance @ slope))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drive:
     """Engine torque [N m] as it acts on the oscillator, and its static gain on T_o."""
 

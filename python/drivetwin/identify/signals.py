@@ -20,7 +20,7 @@ NO_DRUM = PriorValue(0.0)
 """Inertia of the drum of an element that has none."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sampled:
     """One signal: `time` (n,) s increasing, `values` (n,) SI, `sigma` white noise of a sample."""
 
@@ -107,7 +107,7 @@ class Driveline:
         return tuple(c for c in self.couplings.values() if c.drum.value > 0 or c.drum.std > 0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ShiftSignals:
     """The measured signals of a log, engine side referred to ω_e, and the shift they show.
 

@@ -37,7 +37,7 @@ class Weighting:
     outside: float = 0.01
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GridFit:
     """A grid search by weighted least squares.
 

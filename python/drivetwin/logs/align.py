@@ -55,7 +55,7 @@ class Delay:
     span: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Least-squares solution (p,) and its covariance (p, p)."""
 

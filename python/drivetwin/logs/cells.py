@@ -24,7 +24,7 @@ _GROUPED = re.compile(r"[+-]?\d{1,3}([ .,'’\u00a0\u202f]\d{3})+([.,]\d*)?", re
 _NOT_A_NUMBER = frozenset(("nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Numbers:
     """A column as numbers: `values` (n,) where `present` (n,); NaN where the file says so.
 

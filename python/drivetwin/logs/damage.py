@@ -97,7 +97,7 @@ _CLIPPED_RUNS = 3
 """A limit is reached in so many runs of so many equal samples."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Damage:
     """Samples (n,) that are no measurement, and the words for them."""
 

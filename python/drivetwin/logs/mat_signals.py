@@ -27,7 +27,7 @@ _DEPTH = 12
 """Structs nested deeper than this are no log."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Signals:
     """What was found: channels, and by name what holds no signal and why."""
 

@@ -42,7 +42,7 @@ class Column:
         return f"{self.name} ({self.group})" if self.group else self.name
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RawChannel:
     """One column as recorded: `time` (n,) [s], `values` (n,) in `unit`; None: file names no unit.
 
@@ -143,7 +143,7 @@ class Joined:
         raise IndexError(index)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RawLog:
     """All columns of one file in memory. `unreadable` tells by name why one holds no numbers."""
 

@@ -66,7 +66,7 @@ _SI = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Channel:
     """One measured signal.
 
@@ -112,7 +112,7 @@ class Channel:
         return () if self.quantity is Quantity.STATE else pauses(self.time)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ShiftLog(Shown):
     """All mapped channels of one recording, by role.
 

@@ -94,7 +94,7 @@ _MUST_VARY = frozenset(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Checked:
     """A channel that passed, and what was left out of it."""
 

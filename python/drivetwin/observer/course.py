@@ -36,7 +36,7 @@ _HANDED_UP = (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_DOWN)
 """Kinds of shift in which the on-coming element carries the torque while both slip."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recorded:
     """What an observer sees of one shift: fresh samples, SI; `pressures` only where there are any.
 

@@ -31,7 +31,7 @@ ENGINE, OUTPUT, WHEEL, TWIST, TORQUE_ERROR, CARRIED, LOAD = 0, 1, 2, 3, 4, 5, 7
 SPEEDS = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Course:
     """What is known over the grid `time` (N,), each over the N-1 steps between.
 
@@ -50,7 +50,7 @@ class Course:
     error_rate: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Linear:
     """Discrete model: x_{k+1} = F_k·x_k + b_k with F (N-1, 8, 8), b (N-1, 8).
 

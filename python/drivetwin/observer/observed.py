@@ -16,7 +16,7 @@ from drivetwin.shifts.shift import Shift
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Band:
     """A torque [N m] and one standard deviation of its error, both (n,)."""
 
@@ -38,7 +38,7 @@ class Band:
         return float(np.mean((truth >= self.lower) & (truth <= self.upper)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Observation:
     """The torques of one shift on `time` (n,) [s].
 

@@ -58,7 +58,7 @@ SMALL = 1e-3
 """Part of a standard deviation over which parameters are differenced."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Setting:
     """A shift with its model parameters, grid and inputs.
 

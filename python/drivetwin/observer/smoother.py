@@ -19,7 +19,7 @@ Measurement = tuple[FloatArray, float, float]
 """Row (n,) of the state, the value read and its variance."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Process:
     """x_{k+1} = F_k·x_k + b_k + noise of covariance diag(q_k); F (N-1, n, n), b and q (N-1, n).
 
@@ -45,7 +45,7 @@ class Process:
         return F @ x + self.push[k - 1], P
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Filtered:
     """State (N, n) and covariance (N, n, n) given the past; -2·log-likelihood of the log."""
 

@@ -17,7 +17,7 @@ LEVEL = 0.05
 """Relative standard deviation of the friction of an element whose own curve is not known."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Uncertain:
     """Parameters of a shift's model by id with `values` (p,) and `covariance` (p, p), total.
 

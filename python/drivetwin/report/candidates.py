@@ -17,7 +17,7 @@ DIFFER = 2.58
 """Difference in its standard deviations from which two values differ: 1 % by chance."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
     """One identification under the `name` that tables and figures give it.
 
@@ -62,7 +62,7 @@ class Candidate:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trial:
     """One shift of a log, simulated by each candidate that can; `refused` says why others cannot.
 

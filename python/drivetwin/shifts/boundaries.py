@@ -103,7 +103,7 @@ def _boundary(found: Crossing | None) -> Boundary | None:
     return None if found is None else Boundary(found.time, found.sigma)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Slip:
     """Synchronisation error (n,) on `time` [s], and how far it is from that of the gear held.
 

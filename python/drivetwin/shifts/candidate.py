@@ -32,7 +32,7 @@ class CandidateRefusedError(Exception):
     """A candidate turned out to be no usable shift; the text is the reason."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Search:
     """What every step of the search needs."""
 

@@ -20,7 +20,7 @@ _LEAST = 8
 """Fewest samples that any statement on a ratio is made from."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GearboxSpeeds:
     """Input and output speed of the gearbox [rad/s], (n,) on `time` [s]; no NaN.
 

@@ -46,7 +46,7 @@ _AGAINST = 0.05
 """Share of friction work of the wrong sign up to which the on-coming element alone carries T_o."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Torque:
     """Output torque over the shift and its response, low-passed, on a uniform grid."""
 

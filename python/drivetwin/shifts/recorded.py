@@ -45,7 +45,7 @@ def parts_between(span: Span, gaps: tuple[Span, ...]) -> tuple[Span, ...]:
     return tuple(parts)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Gap:
     """A gap [s] of one channel, and the `reach` of what it leaves unknown."""
 

@@ -35,7 +35,7 @@ class OnsetSource(StrEnum):
     UNKNOWN = "no channel"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Smoothed:
     """A channel averaged over about SMOOTH; `noise` is what is left in `values` of its noise."""
 

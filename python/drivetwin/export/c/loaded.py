@@ -36,7 +36,7 @@ COLUMNS = (
 """What a run returns, in order."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CRun:
     """Columns (n,) by name on the time grid, SI; NaN from the failure on where one ended it."""
 

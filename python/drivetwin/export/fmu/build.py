@@ -45,7 +45,7 @@ _FOLDERS = {
 _NOT_IN_FMU = ("Makefile", "dt_observer.c", "dt_observer.h", "dt_run.c")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BuildOptions:
     """How an FMU is built; `platforms` empty: the one this program runs on, by its own compiler."""
 

@@ -36,7 +36,7 @@ _LABELS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Experiment:
     """A measured shift on the FMU's communication points.
 

@@ -28,7 +28,7 @@ _INTERVAL = 1e-3
 _TOLERANCE = 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run:
     """Inputs by name and a start, from `time[0]` to `time[1]` [s]."""
 

@@ -26,7 +26,7 @@ _DIVISORS = ("k_o", "i_in", "i_f", "i_c", "i_out")
 _KINDS = {Scalar: "number", Curve: "curve"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Update:
     """The twin with the values of a file.
 

@@ -66,7 +66,7 @@ def untold(store: Store, found: Sequence[JointEstimate], wanted: Sequence[str] =
     return [name for name in dict.fromkeys(wanted or names) if name not in told]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Data:
     """The logs of a parameter with all fields known: `readings` (n, fields), `unit` (n,) in
     `names`; `notes` what could not be used.
@@ -115,7 +115,7 @@ def estimate(seen: Observed, known: Mapping[str, LogFacts]) -> JointEstimate | N
     return _conclude(seen, known, _Settled(data, steps, group, since, found, sound))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Settled:
     """What the conclusions are drawn from: groups are units, or what became of them after a step
     at the reading `since`; `sound` (n,) tells the logs that took part.

@@ -27,7 +27,7 @@ _SMALLEST, _LARGEST = 1e-3, 1e3
 """Bounds of σ over the scatter of the observations; at the smaller one it counts as zero."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Observations:
     """What is known: `y` (n,) with its stated standard deviations `std` (n,), the unit of each
     (n,) as a number from 0, fixed effects `x` (n, p) and random ones `z` (n, q).
@@ -45,7 +45,7 @@ class Observations:
         return int(self.unit.max()) + 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MixedFit:
     """The fit: `beta` (p,) with `covariance` (p, p) and 95 % half widths `half` (p,).
 
@@ -66,7 +66,7 @@ class MixedFit:
     excess: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Weighted:
     """Sums over the logs with weights 1/d, which depend on w alone: Σ ln d, of x and y together,
     and by unit of z·zᵀ and of z·(x, y)ᵀ.
@@ -78,7 +78,7 @@ class _Weighted:
     cross: FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Solved:
     """β and what the likelihood is made of, for given variances."""
 

@@ -28,7 +28,7 @@ class LogFacts:
     settings: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Observed:
     """One parameter of the vehicles that one rule reads: `value` (n,) and `std` (n,) by log.
 

@@ -67,7 +67,7 @@ class Outlier:
     reason: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Points:
     """The logs behind an estimate, for figures: readings of the first field (NaN without one),
     values and standard deviations (n,), units (n,).
@@ -79,7 +79,7 @@ class Points:
     unit: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JointEstimate:
     """One parameter over the units that one rule reads.
 

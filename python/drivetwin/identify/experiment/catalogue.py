@@ -43,7 +43,7 @@ class Experiment(StrEnum):
     STILL_PEDAL = "the shift with the engine torque held still after lock-up"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Base:
     """The shift that an experiment starts from: its part of the fit at the minimum, its lock-up."""
 
@@ -62,7 +62,7 @@ class Base:
         return float(np.max(np.abs(self.record.steady_torque.values)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Planned:
     """An experiment as a part of a fit, with a start of its own at `point`."""
 

@@ -112,7 +112,7 @@ def _relative_width(one: Estimate) -> float:
 _OPEN = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Gain:
     """Information (r, r) that an experiment adds, over `names` (r,)."""
 

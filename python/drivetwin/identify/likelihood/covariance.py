@@ -32,7 +32,7 @@ QUIET = 1e-4
 the random walk over a log stays below what the sensors show of the state."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NoisePath:
     """How input noise reaches the outputs.
 
@@ -47,7 +47,7 @@ class NoisePath:
     factor: FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Whiteness:
     """Weighting of residuals (n,) by the inverse of their covariance.
 

@@ -54,7 +54,7 @@ class Hopeless(IdentificationError):
     """No start leads anywhere near the measurement, whatever its signals are taken for."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LikelihoodFit:
     """The minimum of Q at `point`, and what is told of the unknowns: `mean`, `covariance` (p, p).
 

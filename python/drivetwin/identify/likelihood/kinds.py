@@ -187,7 +187,7 @@ def _shown(problem: Problem) -> frozenset[str]:
     return frozenset(out.name for part in problem.parts for out in part.record.outputs)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Choices:
     """Every way to take the signals, the one at hand first: `flips` (q, m) of `SIGNALS` are 1 where
     one is of the other kind than now, `left` (q,) is Q with the price of kinds, less a constant,

@@ -57,7 +57,7 @@ ROUGH = 1e-3
 Refresh = Callable[[Problem, Point], Problem]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Found:
     """Where a search ended: the point, Q and its expansion there, and whether it is a minimum."""
 
@@ -160,7 +160,7 @@ def _along_kink(
         sides.append(_Side.seen(behind, normal, trial.values - point.values))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Side:
     """One of the smooth pieces that meet at a kink, continued to the point of the search: its
     gradient (p,) there, and by how much it lies `below` Q."""

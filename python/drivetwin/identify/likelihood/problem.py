@@ -36,7 +36,7 @@ ROUND_OFF = 1e-6
 """What a sum of squares may be negative by, relative to the squares in it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Part:
     """One shift: its structure, what was recorded, and the weighting of its residuals.
 
@@ -197,7 +197,7 @@ class Part:
         return Signal(signal.time, values, -delay)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Normal:
     """Q and its Gauss-Newton expansion at one point: gradient (p,), information (p, p).
 
@@ -213,7 +213,7 @@ class Normal:
     regressors: tuple[FloatArray, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """All parts with the prior and bounds of their unknowns; `lower`, `upper` (p,)."""
 

@@ -36,7 +36,7 @@ FLOOR = 2e-5
 largest value: what an ideal sensor is given. With none at all the weighting loses its digits."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Output:
     """A compared signal: `values` (n,) stamped at the points `place` (n,) of the record's grid.
 
@@ -96,7 +96,7 @@ class Output:
         return np.asarray((total[self.place] - before) / window)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Record:
     """One shift's span of a log.
 

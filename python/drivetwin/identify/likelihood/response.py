@@ -31,7 +31,7 @@ BoolArray = NDArray[np.bool_]
 STATES = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Response:
     """Discrete linear response on a time grid of N points.
 

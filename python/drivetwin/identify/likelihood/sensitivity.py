@@ -26,7 +26,7 @@ FRICTION = "mu."
 """Start of the id of μ of an element, at `slips` of the sensitivity."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sensitivity:
     """Change of each result by each sensor error, SI.
 

@@ -33,7 +33,7 @@ START = ("speed", "wheel_speed", "twist")
 """Unknowns of the start of each shift's run: ω_out and ω_w [rad/s], shaft twist [rad]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Point:
     """One set of values of all unknowns by name; immutable."""
 

@@ -85,7 +85,7 @@ class Consistency:
         return f"the logs do not agree on what they share ({figures}){tail}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pull:
     """One log in the coordinates of the joint covariance: information (s, s) and pull (s,)."""
 

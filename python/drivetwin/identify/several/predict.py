@@ -140,7 +140,7 @@ def _unseen(fit: LikelihoodFit, problem: Problem, point: Point) -> list[int]:
     return [k for k, name in enumerate(point.names) if name in mine]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Before:
     """What the gear held before the shifts tells: `point`, covariance `own` (u, u) of what is
     unseen, and its answer `along` (u, k) to a change of what is known."""

@@ -40,7 +40,7 @@ LEVEL = (0.12, 0.2)
 """Wide prior of μ at every knot."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ShapedFriction:
     """Curves of friction by element with 95 % bands, sensors included.
 

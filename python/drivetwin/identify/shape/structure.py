@@ -11,7 +11,7 @@ from drivetwin.identify.likelihood.unknowns import Point, Structure
 from drivetwin.identify.signals import Coupling, FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """Knots (K,) of |slip| [rad/s], the first 0, between which μ is linear."""
 
@@ -22,7 +22,7 @@ class Table:
         return tuple(f"{element}.mu.{k}" for k in range(self.knots.size))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shaped(Structure):
     """A structure whose `tables` take the place of laws, by element."""
 

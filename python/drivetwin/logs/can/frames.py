@@ -16,7 +16,7 @@ PAYLOAD, LONGEST = 8, 64
 """Most data bytes of a classical frame, and of one of CAN FD."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frames:
     """Data frames in file order.
 

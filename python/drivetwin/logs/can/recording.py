@@ -23,7 +23,7 @@ from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.validate import MIN_SAMPLES
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Track:
     """All payloads (n, bytes) of one message from one `sender`, at `time` (n,) [s].
 

@@ -15,7 +15,7 @@ _BYTE = 8
 _FIRST_SPECIAL, _ERROR = 0xFB, 0xFE
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CodeCheck:
     """Which codes are values (n,), and how many are not, by their meaning."""
 

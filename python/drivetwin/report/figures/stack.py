@@ -30,7 +30,7 @@ _LEAST_SPAN = 0.04
 _ZOOMS = {"torque": "torque phase", "inertia": "inertia phase", "after": "lock-up"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curve:
     """One trace: `time` (n,) s, `values` (n,) SI."""
 
@@ -46,7 +46,7 @@ class Curve:
     """Named in the legend."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Panel:
     """One row: what its y axis shows, in which unit, and its curves. `weight` is its height."""
 

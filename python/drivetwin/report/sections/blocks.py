@@ -40,7 +40,7 @@ class Cell:
     """Page that the text leads to."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FigureBlock:
     """A figure with its caption.
 
@@ -96,7 +96,7 @@ class TilesBlock:
 Block = FigureBlock | TableBlock | NotesBlock | TilesBlock
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Section:
     """A titled part of the report; `anchor` is its address in the page."""
 
