@@ -25,10 +25,11 @@ RPM = 2.0 * math.pi / 60.0
         ("ft·lb", 1.3558179483314004),
         ("lbf-ft", 1.3558179483314004),
         *((text, 1.3558179483314004) for text in ("ft-lbs", "ft lbs", "ft·lbf", "lbf.ft")),
+        *((text, 0.0254 * 4.4482216152605) for text in ("in-lb", "in.lbf", "lb-in", "lbf·in")),
     ],
 )
 def test_torque_spellings(spelling: str, factor: float) -> None:
-    assert channel_unit(spelling, Quantity.TORQUE, HERE).factor == factor
+    assert channel_unit(spelling, Quantity.TORQUE, HERE).factor == pytest.approx(factor, rel=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -117,7 +118,8 @@ def test_a_state_needs_no_unit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("spelling", "factor"), [("s", 1.0), ("[s]", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("min", 60.0)]
+    ("spelling", "factor"),
+    [("s", 1.0), ("[s]", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("min", 60.0), ("d", 86400.0)],
 )
 def test_time_units(spelling: str, factor: float) -> None:
     assert time_factor(spelling, HERE) == factor

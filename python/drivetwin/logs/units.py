@@ -26,6 +26,8 @@ _DEG = math.pi / 180.0
 _PSI = 6894.757293168361
 _FT_LB = 1.3558179483314004
 _KGF = 9.80665
+_INCH = 0.0254
+_LBF = 0.45359237 * _KGF
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ _SPELLINGS: dict[Quantity, dict[float, str]] = {
         10.0: "daNm daN·m daN.m daN*m",
         _FT_LB: "ft·lb ft.lb ft*lb ft-lb ftlb lb·ft lb.ft lb*ft lb-ft lbft lbf·ft lbf*ft lbf-ft "
         "ft·lbs ft.lbs ft*lbs ft-lbs ftlbs lbs·ft lbs-ft ft·lbf ft.lbf ft*lbf ft-lbf ftlbf lbf.ft",
+        _INCH * _LBF: "in·lb in.lb in*lb in-lb inlb lb·in lb.in lb*in lb-in lbin in·lbs in.lbs "
+        "in*lbs in-lbs inlbs in·lbf in.lbf in*lbf in-lbf inlbf lbf·in lbf.in lbf*in lbf-in lbfin",
         _KGF: "kgf·m kgf.m kgf*m kgfm kp·m kpm",
     },
     Quantity.SPEED: {
@@ -104,7 +108,11 @@ _TIME = {
     "ps": 1e-12,
     "min": 60.0,
     "h": 3600.0,
+    "d": 86400.0,
+    "day": 86400.0,
+    "days": 86400.0,
 }
+"""Seconds of each unit of time; days are what Excel and MATLAB count dates in."""
 
 
 def _normal(spelling: str) -> str:
@@ -148,8 +156,8 @@ def lookup(spelling: str) -> Unit | None:
 
 def is_unit(spelling: str) -> bool:
     """Tell whether a text is a spelling of any unit, time and refused ones included."""
-    folded = _normal(spelling).casefold()
-    return lookup(spelling) is not None or folded in _REASONS_FOLDED or folded in _TIME
+    refused = _normal(spelling).casefold() in _REASONS_FOLDED
+    return lookup(spelling) is not None or refused or is_time_unit(spelling)
 
 
 def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit:
@@ -181,6 +189,11 @@ def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit
             where,
         )  # fmt: skip
     return unit
+
+
+def is_time_unit(spelling: str) -> bool:
+    """Tell whether a text is a spelling of a unit of time."""
+    return _normal(spelling).casefold() in _TIME
 
 
 def time_factor(spelling: str | None, where: Where) -> float:
