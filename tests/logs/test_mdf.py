@@ -108,6 +108,63 @@ def test_the_unit_of_time_can_be_asserted(tmp_path: Path) -> None:
     assert read_raw(path, options).channels[0].time == pytest.approx(FAST)
 
 
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_stamps_with_a_unit_of_their_own_are_read_in_it(tmp_path: Path, version: str) -> None:
+    with asammdf.MDF(version=version) as mdf:
+        mdf.append([signal("x", np.arange(0.0, 2000.0, 10.0), SLOW[:1].repeat(200))], acq_name="g")
+        stamps = mdf.groups[0].channels[0]
+        if version == "3.30":
+            stamps.conversion.unit = "ms"
+        else:
+            stamps.unit = "ms"
+        path = Path(mdf.save(tmp_path / f"log{version}.mdf", overwrite=True))
+    raw = read_raw(path)
+    assert raw.channels[0].time == pytest.approx(np.arange(200) * 0.01, rel=1e-14)
+    assert [text.partition(" read ")[2] for text in raw.warnings] == ["in 'ms', as its unit says"]
+    asserted = read_raw(path, ReadOptions(TimeColumn(unit="s")))
+    assert asserted.channels[0].time[-1] == 1990.0
+    assert asserted.warnings == ()
+
+
+def over_angle(path: Path, with_time: bool) -> Path:
+    """A group over crank angle, in which time may stand too, and one over time."""
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append(
+            [signal("p", FAST, FAST, "bar"), signal("angle", FAST, 720.0 * FAST, "deg")],
+            acq_name="crank",
+        )
+        mdf.append([signal("n", SLOW, SLOW, "rpm")], acq_name="slow")
+        time, _, angle = mdf.groups[0].channels
+        if with_time:
+            angle.channel_type, angle.sync_type = 2, 2
+        else:
+            time.sync_type = 2
+        return Path(mdf.save(path, overwrite=True))
+
+
+def test_a_group_over_crank_angle_has_no_time(tmp_path: Path) -> None:
+    raw = read_raw(over_angle(tmp_path / "log.mf4", with_time=False))
+    assert [one.name for one in raw.channels] == ["n"]
+    assert raw.warnings == ("groups without a time channel left out: crank",)
+
+
+def test_of_time_and_crank_angle_time_counts(tmp_path: Path) -> None:
+    raw = read_raw(over_angle(tmp_path / "log.mf4", with_time=True))
+    assert [one.name for one in raw.channels] == ["p", "angle", "n"]
+    assert np.array_equal(raw.channels[0].time, FAST)
+    assert raw.warnings == ()
+
+
+def test_of_two_groups_the_one_with_records_has_the_role(tmp_path: Path) -> None:
+    none = np.array([])
+    groups = [
+        ("never", [signal("EngTrq", none, none)]),
+        ("10ms", [signal("EngTrq", SLOW, SLOW)]),
+    ]
+    log = read_log(save(tmp_path / "log.mf4", groups, "4.10"), None, needed=())
+    assert np.array_equal(log["engine_torque"].time, SLOW)
+
+
 def test_without_the_library_the_install_command_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -233,6 +290,16 @@ def test_a_channel_that_is_invalid_throughout_is_refused(tmp_path: Path) -> None
     )
     raw = read_raw(save(tmp_path / "log.mf4", [("g", [made])], "4.10"))
     assert raw.unreadable == {"n (g)": "the recorder marks all 2000 samples invalid"}
+
+
+def test_a_channel_without_any_valid_sample_is_refused(tmp_path: Path) -> None:
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([signal("x", FAST, FAST), signal("y", FAST, FAST)], acq_name="g")
+        mdf.groups[0].channels[1].flags |= 1
+        path = Path(mdf.save(tmp_path / "log.mf4", overwrite=True))
+    raw = read_raw(path)
+    assert [one.name for one in raw.channels] == ["y"]
+    assert raw.unreadable == {"x (g)": "the recorder marks all 2000 samples invalid"}
 
 
 def test_a_damaged_comment_of_the_file_leaves_nothing_behind(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from drivetwin.logs.mdf_blocks import check_blocks
 from drivetwin.logs.origin import origin_of, origin_told, since
 from drivetwin.logs.raw import Column, Joined, RawChannel, ReadOptions, Recording, Window
 from drivetwin.logs.shiftlog import FloatArray
-from drivetwin.logs.units import time_factor
+from drivetwin.logs.units import is_time_unit, time_factor
 
 _KIND = "an MDF file"
 _FRAGMENT = 1 << 23
@@ -41,6 +41,15 @@ _MOST_INFLATION = 1100
 
 _LISTED = 8
 """So many texts of a table are told."""
+
+_MASTERS = (2, 3)
+"""Types of a channel of MDF 4 over which its group is recorded: stored, or counted."""
+
+_TIME, _NO_TIME = 1, (2, 3, 4)
+"""What such a channel holds: time; angle, distance or index."""
+
+_ALL_INVALID = 1
+"""Flag of a channel of MDF 4 none of whose samples is valid."""
 
 
 @dataclass(frozen=True)
@@ -105,32 +114,58 @@ class MdfRecording:
         self._mdf = mdf
         self._path = path
         self._stamps: tuple[int, FloatArray] | None = None
-        unit = options.time.unit
-        self._factor = 1.0 if unit is None else time_factor(unit, Where(file=str(path)))
+        self._asserted = options.time.unit
+        self._factors: dict[int, float] = {}
         self.warnings: tuple[str, ...] = ()
         names = _group_names(mdf.groups)
         places: list[_Place] = []
         columns: list[Column] = []
         timeless: list[str] = []
         for number, group in enumerate(mdf.groups):
-            if number not in mdf.masters_db:
+            if not self._has_time(number, group, names[number]):
                 timeless.append(names[number])
                 continue
             self._check_size(group, names[number])
             if holds_frames(group):
                 continue
+            empty = int(group.channel_group.cycles_nr) == 0
             for index, channel in enumerate(group.channels):
                 if index == mdf.masters_db[number]:
                     continue
-                unit_text = mdf.get_channel_unit(group=number, index=index)
+                unit = self._unit(number, index)
                 places.append(_Place(number, index))
-                columns.append(Column(channel.name, unit_text.strip() or None, names[number]))
+                columns.append(Column(channel.name, unit, names[number], empty=empty))
         self._places = tuple(places)
         self.columns: Sequence[Column] = tuple(columns)
         self.origin = self._found_origin()
         if timeless:
-            self.warnings = (f"groups without a time channel left out: {', '.join(timeless)}",)
+            left = f"groups without a time channel left out: {', '.join(timeless)}"
+            self.warnings = (left, *self.warnings)
         self.warnings = (*self.warnings, *origin_told(self.origin))
+
+    def _has_time(self, number: int, group: Any, name: str) -> bool:
+        """Whether a group is recorded over time; its stamps and their unit are known then.
+
+        By the standard they are seconds; a unit that says otherwise is believed, and told.
+        """
+        master = _time_channel(group, self._mdf.masters_db.get(number))
+        if master is None:
+            return False
+        self._mdf.masters_db[number] = master
+        stated, factor = self._unit(number, master), 1.0
+        if self._asserted is not None:
+            factor = time_factor(self._asserted, Where(file=str(self._path)))
+        elif stated is not None and is_time_unit(stated):
+            factor = time_factor(stated, Where(file=str(self._path)))
+            if factor != 1.0:
+                note = f"time of group {name!r} read in {stated!r}, as its unit says"
+                self.warnings = (*self.warnings, note)
+        self._factors[number] = factor
+        return True
+
+    def _unit(self, group: int, index: int) -> str | None:
+        text: str = self._mdf.get_channel_unit(group=group, index=index)
+        return text.strip() or None
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one channel, in a window only the records inside; see `Recording`."""
@@ -174,16 +209,16 @@ class MdfRecording:
 
     def _starts(self) -> Iterator[float]:
         """First stamp [s] of each group with records; one that is damaged is told when read."""
-        for number in self._mdf.masters_db:
+        for number, factor in self._factors.items():
             with contextlib.suppress(Exception):
                 first = self._mdf.get_master(number, record_offset=0, record_count=1)
-                yield from np.asarray(first, dtype=np.float64) * self._factor
+                yield from np.asarray(first, dtype=np.float64) * factor
 
     def _time(self, group: int) -> FloatArray:
         """Stamps [s] of a group; those of the last one stay in memory for its other channels."""
         if self._stamps is None or self._stamps[0] != group:
             master = np.asarray(self._mdf.get_master(group), dtype=np.float64)
-            self._stamps = (group, since(master * self._factor, self.origin))
+            self._stamps = (group, since(master * self._factors[group], self.origin))
         return self._stamps[1]
 
     def _samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:
@@ -200,15 +235,18 @@ class MdfRecording:
             "samples_only": True,
             "ignore_invalidation_bits": True,  # marked samples are left out here, and counted
         }
+        channel = self._mdf.groups[place.group].channels[place.index]
         note = ""
         samples, marks = self._mdf.get(raw=False, **wanted)
         if samples.dtype.kind in "SUO":
-            conversion = self._mdf.groups[place.group].channels[place.index].conversion
+            conversion = channel.conversion
             if _holds_numbers(conversion):
                 samples = np.full(samples.shape, np.nan)
             else:
                 samples, marks = self._mdf.get(raw=True, **wanted)
                 note = _codes(conversion)
+        if getattr(channel, "flags", 0) & _ALL_INVALID:
+            marks = np.ones(len(samples), dtype=np.bool_)
         return samples, None if marks is None else np.asarray(marks, dtype=np.bool_), note
 
     def _check_size(self, group: Any, name: str) -> None:
@@ -223,6 +261,22 @@ class MdfRecording:
                 "the file is cut or damaged: record or export the log again",
                 Where(file=str(self._path)),
             )
+
+
+def _time_channel(group: Any, found: int | None) -> int | None:
+    """The channel that holds the time of a group; None where it is recorded over something else.
+
+    Of several over which it is recorded, as time and crank angle, asammdf has `found` the last.
+    """
+    if found is None:
+        return None
+    times = (
+        index
+        for index, channel in enumerate(group.channels)
+        if channel.channel_type in _MASTERS and getattr(channel, "sync_type", None) == _TIME
+    )
+    over_time = getattr(group.channels[found], "sync_type", _TIME) not in _NO_TIME
+    return found if over_time else next(times, None)
 
 
 def _group_names(groups: Sequence[Any]) -> list[str]:
