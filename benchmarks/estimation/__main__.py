@@ -20,9 +20,9 @@ from benchmarks.estimation.report import (
 from benchmarks.estimation.starts import count_outcomes
 from benchmarks.estimation.study import run_study
 from benchmarks.estimation.unseen import identify_unseen
+from drivetwin.atomic import write_text
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
-from drivetwin.results.atomic import write_text
 
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
 COUNT, TRIES, FAULTY, VEHICLES = 200, 200, 20, 100

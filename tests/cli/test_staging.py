@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.atomic import keeping
 from drivetwin.cli.staging import staged
 from drivetwin.errors import FileFormatError, InputError, Where
-from drivetwin.results.atomic import keeping
 
 
 def test_files_appear_together_in_a_new_folder(tmp_path: Path) -> None:

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from drivetwin.errors import FileFormatError, TimeError, UnitError
+from drivetwin.atomic import keeping
+from drivetwin.errors import FileFormatError, InputError, TimeError, UnitError
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.logs.shiftlog import Channel, Quantity
@@ -57,6 +59,32 @@ def test_a_shift_log_is_the_same_in_every_format(tmp_path: Path, suffix: str) ->
         assert again[role].values == pytest.approx(channel.values, rel=1e-14)
         assert again[role].held == channel.held
     assert again.warnings == first.warnings
+
+
+@pytest.mark.parametrize("suffix", [*SUFFIXES, ".MF4", ".MAT"])
+def test_a_log_appears_whole_or_not_at_all(
+    tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / f"log{suffix}"
+    write_log(path, channels())
+    assert list(tmp_path.iterdir()) == [path]
+    whole = path.read_bytes()
+    monkeypatch.setattr("os.fsync", _full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        write_log(str(path), channels()[:1])
+    assert list(tmp_path.iterdir()) == [path]
+    assert path.read_bytes() == whole
+
+
+def _full_disk(_: int) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_log_does_not_take_the_place_of_one_to_be_kept(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    write_log(path, channels())
+    with keeping([path]), pytest.raises(InputError, match="would be written over"):
+        write_log(path, channels())
 
 
 def test_a_channel_in_a_unit_that_is_unknown_is_not_written_in_another() -> None:

@@ -28,6 +28,7 @@ PYTHON_LAYERS = (
     frozenset(
         {
             "errors",
+            "atomic",
             "progress",
             "shown",
             "parameters",

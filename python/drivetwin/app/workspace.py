@@ -17,12 +17,12 @@ from drivetwin.app.locks import Lock, LockKind
 from drivetwin.app.phases import Boundary
 from drivetwin.app.uploads import LIMITS
 from drivetwin.app.work import Source, Work
+from drivetwin.atomic import write_bytes, write_text
 from drivetwin.errors import RefusedError, Where
 from drivetwin.identify.method import Method
 from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.logs.profile import ChannelTable
 from drivetwin.logs.roles import quantity_of
-from drivetwin.results.atomic import write_bytes, write_text
 from drivetwin.results.twin_build import file_of, twin_from_file
 from drivetwin.results.twin_file import TwinFile
 from drivetwin.results.version import program_version

@@ -65,9 +65,9 @@ def gearbox(
 
 
 def _write_modelica(box: Gearbox, path: Path) -> None:
+    from drivetwin.atomic import write_text
     from drivetwin.export.modelica.model import package_text
     from drivetwin.gearbox import network_elements
-    from drivetwin.results.atomic import write_text
 
     ends = (box.input, box.output)
     write_text(path, package_text(box.name, network_elements(box), note=box.name, ends=ends))

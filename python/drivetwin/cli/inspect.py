@@ -46,10 +46,10 @@ def inspect(
 
     And what `shifts` and `identify` would warn of in it, or refuse it for.
     """
+    from drivetwin.atomic import write_text
     from drivetwin.logs.mapping import Mapped
     from drivetwin.logs.profile import mapping_text, read_mapping
     from drivetwin.logs.survey import survey
-    from drivetwin.results.atomic import write_text
     from drivetwin.vehicle.card import load_card
 
     card = None if vehicle is None else load_card(vehicle)

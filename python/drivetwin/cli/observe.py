@@ -51,10 +51,10 @@ def observe(
 
     For logs without torque sensors. An output torque in the log is not used.
     """
+    from drivetwin.atomic import write_text
     from drivetwin.logs.read import read_log
     from drivetwin.observer.observe import observed
     from drivetwin.report.observer import render_observations
-    from drivetwin.results.atomic import write_text
     from drivetwin.shifts.usable import usable_shifts
     from drivetwin.twin import Twin
     from drivetwin.vehicle.card import load_card

@@ -54,9 +54,9 @@ def simulate(
     Measured engine torque and pressures drive the model; the log may be another than the twin's.
     Ratios and shift elements are the twin's own, so no vehicle card is needed.
     """
+    from drivetwin.atomic import write_text
     from drivetwin.cli.tables import fit_table
     from drivetwin.logs.read import read_log
-    from drivetwin.results.atomic import write_text
     from drivetwin.shifts.usable import usable_shifts
     from drivetwin.stepped import Stepping, stepped_again
     from drivetwin.twin import Twin

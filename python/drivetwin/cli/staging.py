@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from drivetwin.atomic import check_kept
 from drivetwin.errors import DrivetwinError, InputError
-from drivetwin.results.atomic import check_kept
 
 
 def refuse_alike(files: Sequence[Path], remedy: str) -> None:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from drivetwin.atomic import write_bytes, write_text
 from drivetwin.identify.result import Identification
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.html import render_report, save_library
-from drivetwin.results.atomic import write_bytes, write_text
 
 LIBRARY = "plotly.js"
 

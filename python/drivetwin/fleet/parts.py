@@ -16,10 +16,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from drivetwin.atomic import write_bytes
 from drivetwin.errors import StoreError, Where
 from drivetwin.fleet.rows import Row, RowKind, schema, table
 from drivetwin.fleet.task import GO_ON, Outcome
-from drivetwin.results.atomic import write_bytes
 
 INBOX, ROWS = "inbox", "rows"
 """Folders of a store: parts of single logs, and the large parts that take their place."""

@@ -112,7 +112,7 @@ def save_answer(answer: Answer, path: Path) -> None:
     """Write an answer as CSV, or as Parquet where the name ends so."""
     from io import BytesIO, StringIO
 
-    from drivetwin.results.atomic import write_bytes, write_text
+    from drivetwin.atomic import write_bytes, write_text
 
     if path.suffix.casefold() == ".parquet":
         import pyarrow as pa

@@ -11,9 +11,11 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
+from drivetwin.atomic import replacing
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.extras import require
 from drivetwin.logs.raw import RawChannel
@@ -34,13 +36,14 @@ def as_recorded(channel: Channel) -> RawChannel:
     return RawChannel(name, unit or None, channel.time, values)
 
 
-def write_log(path: Path, channels: Sequence[RawChannel]) -> None:
+def write_log(path: Path | str, channels: Sequence[RawChannel]) -> None:
     """Write channels in the format of the suffix: .csv, .mf4, .mat or .parquet.
 
-    An existing file is replaced. Raises FileFormatError for another suffix or for names that repeat
-    or cannot stand in the format, TimeError where time does not increase, MissingExtraError without
-    the library of the format.
+    The file appears whole or not at all, in place of an existing one. Raises FileFormatError for
+    another suffix or for names that repeat or cannot stand in the format, TimeError where time does
+    not increase, MissingExtraError without the library of the format.
     """
+    path = Path(path)
     writer = _WRITERS.get(path.suffix.casefold())
     where = Where(file=str(path))
     if writer is None:
@@ -51,7 +54,8 @@ def write_log(path: Path, channels: Sequence[RawChannel]) -> None:
         raise FileFormatError("names repeat, or one is 'time'", "rename the channels", where)
     for channel in channels:
         check_order(channel.time, Where(file=str(path), channel=channel.name))
-    writer(path, channels)
+    with replacing(path) as file:
+        writer(file, path, channels)
 
 
 def _table(channels: Sequence[RawChannel]) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
@@ -67,7 +71,7 @@ def _table(channels: Sequence[RawChannel]) -> tuple[FloatArray, list[FloatArray]
     return time, columns, masks
 
 
-def _write_csv(path: Path, channels: Sequence[RawChannel]) -> None:
+def _write_csv(file: BinaryIO, _: Path, channels: Sequence[RawChannel]) -> None:
     time, columns, masks = _table(channels)
     texts = [[repr(stamp) for stamp in time.tolist()]]
     for column, mask in zip(columns, masks, strict=True):
@@ -76,7 +80,7 @@ def _write_csv(path: Path, channels: Sequence[RawChannel]) -> None:
     names = [_TIME, *(channel.name for channel in channels)]
     units = ["s", *(channel.unit or "" for channel in channels)]
     rows = [_quoted(names), _quoted(units), *(",".join(row) for row in zip(*texts, strict=True))]
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    file.write(("\n".join(rows) + "\n").encode("utf-8"))
 
 
 def _cell(value: float) -> str:
@@ -89,7 +93,7 @@ def _quoted(cells: Sequence[str]) -> str:
     )
 
 
-def _write_parquet(path: Path, channels: Sequence[RawChannel]) -> None:
+def _write_parquet(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> None:
     require("pyarrow", "io", "a Parquet file", path)
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -103,10 +107,10 @@ def _write_parquet(path: Path, channels: Sequence[RawChannel]) -> None:
         arrays.append(pa.array(column, mask=mask == 0.0))
     units = {channel.name: channel.unit for channel in channels if channel.unit}
     schema = pa.schema(fields, metadata={"units": json.dumps(units)})
-    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), path)
+    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), file)
 
 
-def _write_mat(path: Path, channels: Sequence[RawChannel]) -> None:
+def _write_mat(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> None:
     from scipy.io import savemat
 
     content: dict[str, object] = {}
@@ -119,10 +123,10 @@ def _write_mat(path: Path, channels: Sequence[RawChannel]) -> None:
         content[f"{channel.name}_t"] = channel.time
         if channel.unit:
             content[f"{channel.name}_unit"] = channel.unit
-    savemat(path, content, long_field_names=True, do_compression=True)
+    savemat(file, content, long_field_names=True, do_compression=True)
 
 
-def _write_mf4(path: Path, channels: Sequence[RawChannel]) -> None:
+def _write_mf4(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> None:
     asammdf = require("asammdf", "mdf", "an MDF file", path)
     groups: dict[bytes, list[RawChannel]] = {}
     for channel in channels:
@@ -139,12 +143,13 @@ def _write_mf4(path: Path, channels: Sequence[RawChannel]) -> None:
                 for channel in group
             ]
             mdf.append(signals, acq_name=f"raster {number}", common_timebase=True)
-        mdf.save(path, overwrite=True, compression=1)
+        mdf.save(file, compression=1)
 
 
-_WRITERS: dict[str, Callable[[Path, Sequence[RawChannel]], None]] = {
+_WRITERS: dict[str, Callable[[BinaryIO, Path, Sequence[RawChannel]], None]] = {
     ".csv": _write_csv,
     ".mf4": _write_mf4,
     ".mat": _write_mat,
     ".parquet": _write_parquet,
 }
+"""Each writes into an open file; the path is named where that fails."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from drivetwin.atomic import write_text
 from drivetwin.errors import DrivetwinError
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.progress import tell
@@ -17,7 +18,6 @@ from drivetwin.report.sections.comparison import (
     origin_section,
     trial_sections,
 )
-from drivetwin.results.atomic import write_text
 from drivetwin.results.version import program_version
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin import Twin

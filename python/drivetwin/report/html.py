@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from drivetwin.atomic import write_text
 from drivetwin.identify.result import Identification
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.progress import part, tell
@@ -23,7 +24,6 @@ from drivetwin.report.sections.limits import limits_section
 from drivetwin.report.sections.provenance import provenance_section
 from drivetwin.report.sections.story import friction_section, shift_section, validation_section
 from drivetwin.report.sections.trust import trust_section
-from drivetwin.results.atomic import write_text
 
 _BELOW_BUTTONS = 30
 """Room above the panels [px] where the page has the zoom buttons outside the figure."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from drivetwin.atomic import write_text
 from drivetwin.identify.result import Identification
 from drivetwin.identify.several.fit import Several, of_one_log
 from drivetwin.logs.shiftlog import ShiftLog
@@ -18,7 +19,6 @@ from drivetwin.report.sections.provenance import provenance_section
 from drivetwin.report.sections.story import friction_section, shift_section, validation_section
 from drivetwin.report.sections.together import held_out_section, of_log, several_section
 from drivetwin.report.sections.trust import trust_section
-from drivetwin.results.atomic import write_text
 
 
 def save_together(path: Path | str, found: Identification, logs: Sequence[ShiftLog]) -> None:

@@ -11,8 +11,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, FiniteFloat
 
+from drivetwin.atomic import write_text
 from drivetwin.identify.result import Identification, Method
-from drivetwin.results.atomic import write_text
 from drivetwin.results.reading import read_record
 from drivetwin.results.records import (
     FitRecord,

@@ -10,9 +10,9 @@ from typing import Any, Literal, Self
 import tomlkit
 from pydantic import Field, FiniteFloat, model_validator
 
+from drivetwin.atomic import write_text
 from drivetwin.converter import Converter
 from drivetwin.identify.result import Method
-from drivetwin.results.atomic import write_text
 from drivetwin.results.reading import read_record
 from drivetwin.results.records import (
     FrictionRecord,

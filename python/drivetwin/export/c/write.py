@@ -6,10 +6,10 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
+from drivetwin.atomic import write_bytes
 from drivetwin.export.checks import check_exportable
 from drivetwin.export.entries import Entry, entries_of, locked_index, start_entries
 from drivetwin.export.subject import Subject
-from drivetwin.results.atomic import write_bytes
 
 _LOSS_LAWS = {"paper": "DT_PAPER", "dissipative": "DT_DISSIPATIVE"}
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
+from drivetwin.atomic import write_bytes
 from drivetwin.errors import InputError
 from drivetwin.export.c.write import model_sources, twin_source
 from drivetwin.export.compiler import compile_library, native_platform
@@ -26,7 +27,6 @@ from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.xml_text import document
 from drivetwin.export.platforms import Platform
 from drivetwin.export.subject import Subject
-from drivetwin.results.atomic import write_bytes
 from drivetwin.stepping import DEFAULT_STEP
 
 _FOLDERS = {

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from drivetwin.atomic import write_text
 from drivetwin.errors import FileFormatError, InputError, Where
 from drivetwin.export.parameters.cdfx import cdfx_text, legal_for_cdfx, parse_cdfx
 from drivetwin.export.parameters.content import ParameterSet
@@ -16,7 +17,6 @@ from drivetwin.export.parameters.dcm import dcm_text, legal_for_dcm, parse_dcm
 from drivetwin.export.parameters.json_file import json_text, legal_for_json, parse_json
 from drivetwin.export.parameters.matlab import legal_for_m, m_text, parse_m
 from drivetwin.export.parameters.ssv import legal_for_ssv, parse_ssv, ssv_text
-from drivetwin.results.atomic import write_text
 
 
 class ParameterFormat(StrEnum):

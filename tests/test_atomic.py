@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.atomic import keeping, write_text
 from drivetwin.errors import InputError
-from drivetwin.results.atomic import keeping, write_text
 
 
 def test_replaces_the_old_file_and_leaves_nothing_beside(tmp_path: Path) -> None:

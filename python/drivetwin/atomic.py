@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
+from typing import BinaryIO
 
 from drivetwin.errors import InputError, Where
 
@@ -48,29 +49,33 @@ def _identity(path: Path) -> _Identity | None:
     return None
 
 
-def write_text(path: Path | str, text: str) -> None:
-    """Write `text` (UTF-8) beside `path` and rename it into place.
+@contextmanager
+def replacing(path: Path | str) -> Iterator[BinaryIO]:
+    """Open a file beside `path` to write into; it is renamed into place when the block succeeds.
 
-    A run that is stopped leaves the old file, never half of the new one. Raises OSError, and
-    InputError where `path` is to be kept.
-    """
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: Path | str, data: bytes) -> None:
-    """Write `data` as `write_text` does; several machines may write the same file.
-
-    Raises InputError where `path` is to be kept.
+    A block that fails or is stopped leaves the old file, never half of the new one; several
+    machines may write the same file. Raises OSError, and InputError where `path` is to be kept.
     """
     path = Path(path)
     check_kept(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f"{path.name}.{platform.node()}.{os.getpid()}.partial")
     try:
-        with beside.open("wb") as file:
-            file.write(data)
+        with beside.open("w+b") as file:
+            yield file
             file.flush()
             os.fsync(file.fileno())
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def write_text(path: Path | str, text: str) -> None:
+    """Write `text` (UTF-8) in place of `path`, whole or not at all; raises as `replacing` does."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path | str, data: bytes) -> None:
+    """Write `data` in place of `path`, whole or not at all; raises as `replacing` does."""
+    with replacing(path) as file:
+        file.write(data)
