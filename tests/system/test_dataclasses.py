@@ -17,13 +17,15 @@ from drivetwin.driveline import Signal
 
 def own_dataclasses() -> dict[type, dict[str, Any]]:
     """Every dataclass of the package, with the names that its module knows."""
-    found = {}
+    found: dict[type, dict[str, Any]] = {}
     for one in pkgutil.walk_packages(drivetwin.__path__, "drivetwin."):
-        if not one.name.endswith("__main__"):
-            names = vars(import_module(one.name))
-            own = [each for each in names.values() if getattr(each, "__module__", "") == one.name]
-            found |= {each: names for each in own if isinstance(each, type)}
-    return {each: names for each, names in found.items() if dataclasses.is_dataclass(each)}
+        if one.name.endswith("__main__"):
+            continue
+        names = vars(import_module(one.name))
+        for each in names.values():
+            if isinstance(each, type) and dataclasses.is_dataclass(each):
+                found |= {each: names} if each.__module__ == one.name else {}
+    return found
 
 
 def named(hint: object) -> Iterator[type]:

@@ -123,7 +123,8 @@ def _write_mat(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> No
         content[f"{channel.name}_t"] = channel.time
         if channel.unit:
             content[f"{channel.name}_unit"] = channel.unit
-    savemat(file, content, long_field_names=True, do_compression=True)
+    # An open file is taken; the type stubs of SciPy do not say so.
+    savemat(file, content, long_field_names=True, do_compression=True)  # type: ignore[arg-type]
 
 
 def _write_mf4(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> None:
