@@ -64,6 +64,10 @@ wheel: $(venv)/.dev ## the abi3 wheel, into dist/
 test-wheel: wheel ## run the demo from the wheel where there is no Rust
 	tools/try_wheel.sh $(bin)/python dist/drivetwin-*.whl
 
+.PHONY: notices
+notices: $(venv)/.dev ## write the licences of the linked crates, after a change of Cargo.lock
+	$(bin)/python -m tools.notices
+
 .PHONY: reference
 reference: $(venv)/.native ## solve the reference problems anew with SciPy
 	$(bin)/python -m reference

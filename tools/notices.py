@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Write the licences of the crates that are linked into the native module.
+
+`python -m tools.notices` writes THIRD-PARTY-NOTICES.txt, which every wheel carries beside LICENSE;
+call it after a change of Cargo.lock. It needs cargo and the sources of the crates.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+NOTICES = ROOT / "THIRD-PARTY-NOTICES.txt"
+MODULE = "drivetwin-py"
+
+_HEAD = """\
+The native module of drivetwin contains the Rust crates below and the Rust standard library
+(MIT OR Apache-2.0, The Rust Project Contributors). Where a crate leaves the choice, its MIT licence
+is taken. Written by `python -m tools.notices`.
+"""
+_RULE = "-" * 79
+_NAMES = ("LICENSE", "LICENCE", "COPYING", "NOTICE")
+_WITHOUT_TEXT = "Licensed under {licence} by {authors}; the crate ships no text of its own."
+
+
+@dataclass(frozen=True)
+class Crate:
+    """A linked crate: name, version, and the texts that its licence wants to be passed on."""
+
+    name: str
+    version: str
+    texts: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.version}"
+
+
+def linked() -> tuple[Crate, ...]:
+    """The crates that a build for any platform links, by name.
+
+    Raises subprocess.CalledProcessError where cargo cannot resolve them.
+    """
+    command = ["cargo", "metadata", "--locked", "--format-version", "1"]
+    metadata = json.loads(
+        subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout
+    )
+    packages = {package["id"]: package for package in metadata["packages"]}
+    nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
+    found: set[str] = set()
+    waiting = [id for id, package in packages.items() if package["name"] == MODULE]
+    while waiting:
+        id = waiting.pop()
+        if id in found or _runs_in_the_compiler(packages[id]):
+            continue
+        found.add(id)
+        waiting += [each["pkg"] for each in nodes[id]["deps"] if _is_linked(each)]
+    foreign = (packages[id] for id in found if packages[id]["source"] is not None)
+    return tuple(sorted(map(_crate, foreign), key=str))
+
+
+def _runs_in_the_compiler(package: dict[str, Any]) -> bool:
+    return any("proc-macro" in target["kind"] for target in package["targets"])
+
+
+def _is_linked(dependency: dict[str, Any]) -> bool:
+    """Whether it is more than a dependency of build script or tests."""
+    return any(kind["kind"] is None for kind in dependency["dep_kinds"])
+
+
+def _crate(package: dict[str, Any]) -> Crate:
+    texts = tuple(_texts(Path(package["manifest_path"]).parent))
+    if not texts:
+        by = ", ".join(package["authors"]) or package["repository"]
+        texts = (_WITHOUT_TEXT.format(licence=package["license"], authors=by),)
+    return Crate(package["name"], package["version"], texts)
+
+
+def _texts(folder: Path) -> Iterator[str]:
+    """The MIT licence of a crate, or all that it has, and those of the C sources it brings."""
+    own = sorted(path for path in folder.iterdir() if path.name.upper().startswith(_NAMES))
+    mit = [path for path in own if "MIT" in path.name.upper()]
+    for path in (*(mit or own), *sorted(folder.glob("c_src/**/LICENSE"))):
+        lines = path.read_text(encoding="utf-8").strip().splitlines()
+        yield "\n".join(line.rstrip() for line in lines)
+
+
+def notices(crates: tuple[Crate, ...]) -> str:
+    """The notices as text: each licence once, below the crates that it belongs to."""
+    owners: dict[tuple[str, ...], list[str]] = {}
+    for crate in crates:
+        owners.setdefault(tuple(dict.fromkeys(crate.texts)), []).append(str(crate))
+    parts = [_HEAD]
+    for texts, names in owners.items():
+        parts.append("\n\n".join([_RULE, "\n".join(names), *texts]) + "\n")
+    return "\n".join(parts)
+
+
+def main() -> int:
+    """Write the file."""
+    NOTICES.write_text(notices(linked()), encoding="utf-8", newline="\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
