@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import time as clock
 
 import numpy as np
@@ -280,4 +281,94 @@ def test_one_comma_that_groups_no_thousands_tells_for_its_column(proof: str) -> 
 @pytest.mark.parametrize("day", ["11/22/2026", "31.02.2026", "Monday"])
 def test_a_date_that_cannot_be_read_is_told_and_not_the_clock(day: str) -> None:
     with pytest.raises(TimeError, match=f"line 2: '{day}' is no date that can be read"):
-        read(f"Date,Time,n_in [rpm]\n{day},12:00:00,1200\n{day},12:00:01,1201\n")
+        read(f"Date,Time,n_in [rpm]\n{day},23:59:59,1200\n11/23/2026,00:00:00,1201\n")
+
+
+PAIRS = """t1;EngTrq;t2;nAb;PrsBrk2
+s;Nm;ms;1/min;bar
+0,00;1000;5;700,5;1,5
+0,01;1001;25;701;
+0,02;;;;
+0,03;1003;;;
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PAIRS,
+        PAIRS.replace("t1", "time").replace("t2", "time"),
+        re.sub("(?m)^(.*?;.*?);", r"\1;;", PAIRS),
+        PAIRS.replace("0,02;;;;", "0,02;;NaN;NaN;NaN"),
+    ],
+)
+def test_each_of_several_time_columns_is_that_of_the_columns_behind(text: str) -> None:
+    log = read(text)
+    found = {one.name: (one.time.tolist(), one.values.tolist()) for one in log.channels}
+    assert found == {
+        "EngTrq": ([0.0, 0.01, 0.03], [1000.0, 1001.0, 1003.0]),
+        "nAb": ([0.005, 0.025], [700.5, 701.0]),
+        "PrsBrk2": ([0.005], [1.5]),
+    }
+    (warning,) = log.warnings
+    assert "each for the columns that follow it" in warning
+
+
+def test_several_time_columns_keep_one_origin() -> None:
+    log = read("t1 [ms],x [Nm],t2 [ms],y [Nm]\n1717151696123,1,1717151696120,2\n")
+    assert [one.time.tolist() for one in log.channels] == [[0.003], [0.0]]
+
+
+def test_a_value_beside_no_stamp_of_its_own_is_refused() -> None:
+    with pytest.raises(TimeError, match=r"channel 'y': line 3 has no time stamp"):
+        read("t1 [s],x [Nm],t2 [s],y [Nm]\n0,1,0,2\n1,2,,3\n")
+
+
+@pytest.mark.parametrize(
+    "names",
+    ["time,timestamp,x,y", "time,x,timestamp,y", "time,x,y,time", "x,time,y,time"],
+)
+def test_time_columns_that_are_none_of_pairs_are_not_chosen_between(names: str) -> None:
+    with pytest.raises(MappingError, match="several time columns"):
+        read(f"{names}\ns,s,s,s\n0,1,2,3\n1,2,3,4\n")
+
+
+def test_a_temperature_is_no_time() -> None:
+    log = read("time,EngTrq,T1,T2\ns,Nm,degC,°C\n0.0,5,20,21\n0.1,6,20,21\n")
+    assert [one.name for one in log.channels] == ["EngTrq", "T1", "T2"]
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Run 5;;\nDriver;N.N.;\n",
+        "Time;12:30;\nDate;03.05.2024;\n",
+        "sep=;\nRun;5;\n",
+        ";CAN1;XCP\n",
+        "a;b;c\nd;e;f\n",
+    ],
+)
+def test_rows_as_wide_as_the_table_may_stand_above_the_names(head: str) -> None:
+    log = read(head + "time;EngTrq;nAb\ns;Nm;1/min\n0,0;1000;700,5\n0,1;1001;701\n")
+    assert {one.name: one.unit for one in log.channels} == {"EngTrq": "Nm", "nAb": "1/min"}
+    assert log.channels[0].time.tolist() == [0.0, 0.1]
+    assert "above the names left out" in log.warnings[0]
+
+
+@pytest.mark.parametrize("stamp", ["", "nan"])
+def test_a_first_row_without_time_is_no_row_of_units(stamp: str) -> None:
+    text = f"time [s],x [Nm],g\n{stamp},1000,1\n0.1,1001,1\n"
+    if stamp:
+        assert read(text).channels[0].values.tolist() == [1000.0, 1001.0]
+    else:
+        with pytest.raises(TimeError, match="line 2 has no time stamp"):
+            read(text)
+    assert read("time,g\ns,1\n0.0,0\n").channels[0].unit == "1"
+
+
+@pytest.mark.parametrize("word", ["-nan", "-nan(ind)", "-1.#IND", "1.#QNAN0", "Infinity", "#NV"])
+@pytest.mark.parametrize("other", ["", "5"])
+def test_what_programs_write_for_no_number_is_none(word: str, other: str) -> None:
+    column = values(read(f"time [s],x [Nm]\n0,{word}\n1,{other}\n2,6\n"), "x")
+    assert not np.isfinite(column[0])
+    assert column[1:] == ([5.0, 6.0] if other else [6.0])

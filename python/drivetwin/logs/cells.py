@@ -21,7 +21,12 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 _GROUPED = re.compile(r"[+-]?\d{1,3}([ .,'’\u00a0\u202f]\d{3})+([.,]\d*)?", re.ASCII)
 """A number with signs between its thousands, in the manner of any country."""
 
-_NOT_A_NUMBER = frozenset(("nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"))
+_NOT_A_NUMBER = re.compile(
+    r"[+-]?(nan|nan\((ind|snan)\)|inf|infinity|1\.#(ind|qnan|snan|inf)0*)|#?n/a|na|null|none|"
+    r"#nv|#n/v|#num!|#div/0!|#zahl!|#value!|#wert!",
+    re.IGNORECASE,
+)
+"""Words for no number: of C libraries, of databases, of Excel in English and German."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +106,7 @@ def _one_by_one(cells: Sequence[str], plain: Sequence[str], line_numbers: Sequen
             present[row] = False
         elif _NUMBER.fullmatch(text):
             values[row] = float(text)
-        elif text.casefold() not in _NOT_A_NUMBER and fault is None:
+        elif fault is None and not _NOT_A_NUMBER.fullmatch(text):
             cell = cells[row].strip()
             fault = f"line {line_numbers[row]}: {cell[:40]!r} is no number"
             if _GROUPED.fullmatch(cell):

@@ -4,7 +4,8 @@
 Delimiter `,` `;` `|`, tab or blanks; decimal point or comma; units in a row under the names or in
 the names as `EngTrq [Nm]`; comment lines (# % //), the last of which may hold the names; lines of
 another form above the names; byte order mark; quoted fields; time as a number or as a clock, with
-the date beside it. An empty cell is no sample of its column, so each keeps its own time base.
+the date beside it, in one column or, as numbers, in one before each signal or group of signals. An
+empty cell is no sample of its column, so each keeps its own time base.
 """
 
 from __future__ import annotations
@@ -14,13 +15,17 @@ import contextlib
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin.errors import FileFormatError, TimeError, Where
 from drivetwin.logs.cells import Numbers, decimal_sign, is_number, to_numbers
 from drivetwin.logs.clock import clock_seconds, is_clock
-from drivetwin.logs.names import name_and_unit, time_index
+from drivetwin.logs.names import is_time_name, name_and_unit, time_index, time_indices
 from drivetwin.logs.origin import origin_of, origin_told, since
 from drivetwin.logs.raw import RawChannel, RawLog, TimeColumn
 from drivetwin.logs.shiftlog import FloatArray
@@ -54,14 +59,27 @@ class _Table:
 
 
 @dataclass(frozen=True)
+class _Stamps:
+    """Time [s] (n,) of the rows that one time column has a stamp for: where `known` (n,)."""
+
+    seconds: FloatArray
+    known: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
 class _Header:
-    """Names and units of the columns and the index of the time column."""
+    """Names and units of the columns, and of each the index of its time column."""
 
     names: Sequence[str]
     units: Sequence[str | None]
-    time: int
+    times: Sequence[int]
     height: int
     """How many rows it takes: names, perhaps units, comments, types."""
+
+    @property
+    def clocks(self) -> list[int]:
+        """The time columns; each is its own."""
+        return list(dict.fromkeys(self.times))
 
 
 def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
@@ -70,7 +88,7 @@ def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
     Raises FileFormatError (empty, binary, no header, ragged rows), MissingChannelError (no time
     column), MappingError (several), UnitError and TimeError (time without unit or stamps).
     """
-    table = _table(_decode(data, file), file)
+    table = _table(_decode(data, file), time, file)
     header = _header(table, time, file)
     body = table.rows[header.height :]
     if not body:
@@ -79,23 +97,30 @@ def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
     decimal = decimal_sign(body, file)
     cells = list(zip(*body, strict=True))
     columns = [to_numbers(column, lines, decimal) for column in cells]
-    where = Where(file=file, channel=header.names[header.time])
     days = next((i for i, name in enumerate(header.names) if name.casefold() in _DATE_NAMES), None)
-    warnings = table.warnings
-    if is_clock(cells[header.time][0]):
+    first, *others = header.clocks
+    where = Where(file=file, channel=header.names[first])
+    told: tuple[str, ...] = ()
+    if others:
+        stamps, told = _several_stamps(header, columns, lines, time, file)
+    elif is_clock(cells[first][0]):
         dates = None if days is None else cells[days]
-        seconds = _clock(cells[header.time], dates, lines, where)
+        seconds = _clock(cells[first], dates, lines, where)
+        stamps = {first: _Stamps(seconds, np.ones(len(body), np.bool_))}
     else:
-        unit = time.unit if time.unit is not None else header.units[header.time]
-        stamps = _stamps(columns[header.time], lines, where) * time_factor(unit, where)
-        origin = origin_of(stamps[:1])
-        seconds, warnings = since(stamps, origin), (*warnings, *origin_told(origin))
-    channels, unreadable = _channels(header, columns, seconds, without={header.time, days})
-    return RawLog(tuple(channels), unreadable, warnings, file)
+        counted = _stamps(columns[first], lines, where) * _factor(header, first, time, where)
+        origin = origin_of(counted[:1])
+        told = origin_told(origin)
+        stamps = {first: _Stamps(since(counted, origin), columns[first].present)}
+    channels, unreadable = _channels(header, columns, stamps, without={*stamps, days})
+    return RawLog(tuple(channels), unreadable, (*table.warnings, *told), file)
 
 
 def _channels(
-    header: _Header, columns: Sequence[Numbers], seconds: FloatArray, without: set[int | None]
+    header: _Header,
+    columns: Sequence[Numbers],
+    stamps: Mapping[int, _Stamps],
+    without: set[int | None],
 ) -> tuple[list[RawChannel], dict[str, str]]:
     channels: list[RawChannel] = []
     unreadable: dict[str, str] = {}
@@ -104,13 +129,14 @@ def _channels(
     ):
         if index in without or (not name and not column.present.any()):
             continue
+        time = stamps[header.times[index]]
+        present = column.present & time.known
         if column.fault is not None:
             unreadable[name] = column.fault
-        elif column.present.all():
-            channels.append(RawChannel(name, unit, seconds, column.values))
+        elif present.all():
+            channels.append(RawChannel(name, unit, time.seconds, column.values))
         else:
-            present = column.present
-            channels.append(RawChannel(name, unit, seconds[present], column.values[present]))
+            channels.append(RawChannel(name, unit, time.seconds[present], column.values[present]))
     return channels, unreadable
 
 
@@ -130,12 +156,12 @@ def _decode(data: bytes, file: str) -> str:
         return data.decode("cp1252", errors="replace")
 
 
-def _table(text: str, file: str) -> _Table:
+def _table(text: str, time: TimeColumn, file: str) -> _Table:
     """Split into rows; comment and blank lines are left out."""
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    delimiter = None
-    if stated := re.fullmatch(r"sep=(.)", lines[0].strip()):
-        delimiter = stated[1]
+    separators: Sequence[str] = _SEPARATORS
+    if stated := re.fullmatch(r'"?sep=(.)"?\s*', lines[0]):
+        separators = (stated[1],)
         lines[0] = ""
     kept = [
         (number, line)
@@ -144,10 +170,8 @@ def _table(text: str, file: str) -> _Table:
     ]
     if not kept:
         raise FileFormatError("the file holds only comments", _EXPORT, Where(file=file))
-    above: list[tuple[int, str]] = []
-    if delimiter is None:
-        delimiter, start = _delimiter([line for _, line in kept], file)
-        above, kept = kept[:start], kept[start:]
+    delimiter, start = _delimiter([line for _, line in kept], separators, time, file)
+    above, kept = kept[:start], kept[start:]
     kept = _names_in_comments(lines[: kept[0][0] - 1], delimiter, kept[0][1]) + kept
     numbers = [number for number, _ in kept]
     rows = []
@@ -197,26 +221,54 @@ def _fields(line: str, delimiter: str) -> list[str]:
     return next(reader)
 
 
-def _delimiter(lines: Sequence[str], file: str) -> tuple[str, int]:
+def _delimiter(
+    lines: Sequence[str], separators: Sequence[str], time: TimeColumn, file: str
+) -> tuple[str, int]:
     """The sign that splits most lines into equally many fields, and the line of the names.
 
     Lines of another form may stand above the names, rows of numbers may not.
     """
     lines = lines[:_LOOKED_AT]
-    for sign in _SEPARATORS:
+    for sign in separators:
         rows = [_split(line, sign) for line in lines]
-        usual = max(Counter(map(len, rows)).items(), key=lambda item: (item[1], item[0]))[0]
-        last = all(not row[-1].strip() for row in rows if len(row) == usual)
-        start = next((i for i, row in enumerate(rows) if _may_be_names(row, usual, last)), None)
         data = [_is_data(line, sign) for line in lines]
-        if start is not None and not any(data[:start]) and (sign != _BLANKS or any(data)):
+        start = _names_line(rows, data, time)
+        if start is not None and (sign != _BLANKS or any(data)):
             return sign, start
+    if len(separators) == 1:
+        return separators[0], 0
     raise FileFormatError(
         f"no columns found: no tab, semicolon, comma, bar or blank splits {lines[0][:60]!r} and "
         "the lines below alike",
         _EXPORT,
         Where(file=file),
     )
+
+
+def _names_line(
+    rows: Sequence[Sequence[str]], data: Sequence[bool], time: TimeColumn
+) -> int | None:
+    """The row of the names above the `data`: the fullest with a name for time, else the first.
+
+    Rows above it may be as wide where a program fills all up with separators.
+    """
+    usual = max(Counter(map(len, rows)).items(), key=lambda item: (item[1], item[0]))[0]
+    last = all(not row[-1].strip() for row in rows if len(row) == usual)
+    above = rows[: max(1, data.index(True) if True in data else len(data))]
+    may = [index for index, row in enumerate(above) if _may_be_names(row, usual, last)]
+    timed = [index for index in may if _names_time(rows[index], time)]
+    return max(timed, key=lambda index: _filled(rows[index]), default=next(iter(may), None))
+
+
+def _names_time(row: Sequence[str], time: TimeColumn) -> bool:
+    """Whether a row has a name for time."""
+    names = (name_and_unit(cell.strip())[0] for cell in row)
+    return any(is_time_name(name) if time.source is None else name == time.source for name in names)
+
+
+def _filled(row: Sequence[str]) -> int:
+    """Fields up to the last that is not blank."""
+    return max((index for index, cell in enumerate(row, start=1) if cell.strip()), default=0)
 
 
 def _split(line: str, delimiter: str) -> list[str]:
@@ -275,18 +327,43 @@ def _header(table: _Table, time: TimeColumn, file: str) -> _Header:
     split = [name_and_unit(cell) for cell in cells]
     names = [name for name, _ in split]
     units = [unit for _, unit in split]
-    index = time_index(names, time, file)
-    below: list[list[str]] = []
-    for row in table.rows[1:_MOST_ROWS]:
-        # A unit may be the number 1; what stands below it is a row of numbers if any cell is one.
-        looked_at = row if below else [row[index]]
-        if any(is_number(cell) or is_number(cell, ",") or is_clock(cell) for cell in looked_at):
-            break
-        below.append([cell.strip() for cell in row])
+    below = _rows_below(table, time_indices(names, units, time))
     stated = max(below, key=lambda row: sum(map(is_unit, row)), default=[])
     if any(map(is_unit, stated)) or (stated and not any(units)):
         units = [_unit(beside, under) for beside, under in zip(units, stated, strict=True)]
-    return _Header(names, units, index, height=1 + len(below))
+    return _Header(names, units, _time_columns(names, units, time, file), height=1 + len(below))
+
+
+def _rows_below(table: _Table, times: Sequence[int]) -> list[list[str]]:
+    """Rows of units, comments or types between the names and the first row of numbers.
+
+    Of units only the first may hold numbers: that of a fraction, `1`, but not for time.
+    """
+    below: list[list[str]] = []
+    for row in table.rows[1:_MOST_ROWS]:
+        looked_at = (
+            row if below else [*(row[i] for i in times), *(c for c in row if not is_unit(c))]
+        )
+        if any(is_number(cell) or is_number(cell, ",") or is_clock(cell) for cell in looked_at):
+            break
+        below.append([cell.strip() for cell in row])
+    return below
+
+
+def _time_columns(
+    names: Sequence[str], units: Sequence[str | None], time: TimeColumn, file: str
+) -> list[int]:
+    """The index of the time column of each column: the one, or of several the one before it.
+
+    Several count where each stands before columns of its own and is named as the others but for
+    digits, as `t1, EngTrq, t2, SpdIn`.
+    """
+    found = time_indices(names, units, time)
+    stems = {re.sub(r"[^a-z]", "", names[index].casefold()) for index in found}
+    before_others = all(after - one > 1 for one, after in pairwise([*found, len(names)]))
+    if len(found) > 1 and found[0] == 0 and len(stems) == 1 and before_others:
+        return [max(one for one in found if one <= index) for index in range(len(names))]
+    return [time_index(names, units, time, file)] * len(names)
 
 
 def _unit(beside: str | None, under: str) -> str | None:
@@ -315,10 +392,52 @@ def _clock(
 
 
 def _stamps(column: Numbers, lines: Sequence[int], where: Where) -> FloatArray:
+    if not _readable(column, where).present.all():
+        raise _no_stamp(lines[int(column.present.argmin())], where)
+    return column.values
+
+
+def _readable(column: Numbers, where: Where) -> Numbers:
+    """A time column; raises TimeError where it holds something else than numbers."""
     if column.fault is not None:
         remedy = "export time as seconds since the start of the recording"
         raise TimeError(f"no time stamp: {column.fault}", remedy, where)
-    if not column.present.all():
-        line = lines[int(column.present.argmin())]
-        raise TimeError(f"line {line} has no time stamp", "remove the line", where)
-    return column.values
+    return column
+
+
+def _no_stamp(line: int, where: Where) -> TimeError:
+    return TimeError(f"line {line} has no time stamp", "remove the line", where)
+
+
+def _several_stamps(
+    header: _Header,
+    columns: Sequence[Numbers],
+    lines: Sequence[int],
+    time: TimeColumn,
+    file: str,
+) -> tuple[dict[int, _Stamps], tuple[str, ...]]:
+    """Stamps of each of several time columns, from one origin, and what is told of them.
+
+    A shorter one ends in blanks or NaN; no value may stand beside these.
+    """
+    counted: dict[int, FloatArray] = {}
+    for clock in header.clocks:
+        where = Where(file=file, channel=header.names[clock])
+        column = _readable(columns[clock], where)
+        counted[clock] = column.values * _factor(header, clock, time, where)
+    known = {clock: np.isfinite(stamps) for clock, stamps in counted.items()}
+    origin = origin_of(float(one) for clock in counted for one in counted[clock][known[clock]][:1])
+    for index, column in enumerate(columns):
+        bare = ~known[header.times[index]] & np.isfinite(column.values)
+        if bare.any():
+            raise _no_stamp(
+                lines[int(bare.argmax())], Where(file=file, channel=header.names[index])
+            )
+    named = ", ".join(header.names[clock] for clock in header.clocks)
+    note = f"several time columns, each for the columns that follow it: {named}"
+    stamps = {clock: _Stamps(since(counted[clock], origin), known[clock]) for clock in counted}
+    return stamps, (note, *origin_told(origin))
+
+
+def _factor(header: _Header, clock: int, time: TimeColumn, where: Where) -> float:
+    return time_factor(time.unit if time.unit is not None else header.units[clock], where)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.logs.raw import TimeColumn
-from drivetwin.logs.units import is_unit
+from drivetwin.logs.units import is_time_unit, is_unit, lookup
 from drivetwin.tomlfile import did_you_mean
 
 _TIME_NAMES = frozenset(
@@ -35,15 +35,28 @@ def is_time_name(name: str) -> bool:
     return re.sub(r"[^a-z]", "", name.casefold()) in _TIME_NAMES
 
 
-def time_index(names: Sequence[str], time: TimeColumn, file: str) -> int:
-    """Return the index of the time column: as stated, else the one with a name for time.
+def time_indices(names: Sequence[str], units: Sequence[str | None], time: TimeColumn) -> list[int]:
+    """Return the indices of all time columns: as stated, else those with a name for time.
+
+    A column of another unit, such as a temperature `T1`, is none.
+    """
+    if time.source is not None:
+        return [index for index, name in enumerate(names) if name == time.source]
+    return [
+        index
+        for index, (name, unit) in enumerate(zip(names, units, strict=True))
+        if is_time_name(name) and (unit is None or is_time_unit(unit) or lookup(unit) is None)
+    ]
+
+
+def time_index(
+    names: Sequence[str], units: Sequence[str | None], time: TimeColumn, file: str
+) -> int:
+    """Return the index of the one time column, see `time_indices`.
 
     Raises MappingError where there are several, MissingChannelError where there is none.
     """
-    if time.source is not None:
-        found = [index for index, name in enumerate(names) if name == time.source]
-    else:
-        found = [index for index, name in enumerate(names) if is_time_name(name)]
+    found = time_indices(names, units, time)
     if len(found) == 1:
         return found[0]
     where = Where(file=file)

@@ -76,7 +76,8 @@ class ParquetRecording:
         named = options.time.source is not None or any(map(is_time_name, names))
         if not named and len(temporal) == 1:
             return temporal[0]
-        return time_index(names, options.time, str(self._path))
+        units = [column.unit for column in columns]
+        return time_index(names, units, options.time, str(self._path))
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one column; rows without a value are no samples. See `Recording`."""
