@@ -112,7 +112,7 @@ def test_the_unit_of_time_can_be_asserted(tmp_path: Path) -> None:
 def test_stamps_with_a_unit_of_their_own_are_read_in_it(tmp_path: Path, version: str) -> None:
     with asammdf.MDF(version=version) as mdf:
         mdf.append([signal("x", np.arange(0.0, 2000.0, 10.0), SLOW[:1].repeat(200))], acq_name="g")
-        stamps = mdf.groups[0].channels[0]
+        stamps: Any = mdf.groups[0].channels[0]
         if version == "3.30":
             stamps.conversion.unit = "ms"
         else:
@@ -134,7 +134,8 @@ def over_angle(path: Path, with_time: bool) -> Path:
             acq_name="crank",
         )
         mdf.append([signal("n", SLOW, SLOW, "rpm")], acq_name="slow")
-        time, _, angle = mdf.groups[0].channels
+        channels: Sequence[Any] = mdf.groups[0].channels
+        time, _, angle = channels
         if with_time:
             angle.channel_type, angle.sync_type = 2, 2
         else:
@@ -295,7 +296,8 @@ def test_a_channel_that_is_invalid_throughout_is_refused(tmp_path: Path) -> None
 def test_a_channel_without_any_valid_sample_is_refused(tmp_path: Path) -> None:
     with asammdf.MDF(version="4.10") as mdf:
         mdf.append([signal("x", FAST, FAST), signal("y", FAST, FAST)], acq_name="g")
-        mdf.groups[0].channels[1].flags |= 1
+        marked: Any = mdf.groups[0].channels[1]
+        marked.flags |= 1
         path = Path(mdf.save(tmp_path / "log.mf4", overwrite=True))
     raw = read_raw(path)
     assert [one.name for one in raw.channels] == ["y"]
