@@ -12,6 +12,7 @@ from drivetwin.driveline import DualClutch, Signal, State, Trajectory, simulate
 from drivetwin.errors import MissingParameterError
 from drivetwin.identify.result import FloatArray, Identification, SignalFit
 from drivetwin.logs.held import fresh_samples
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.progress import tell
 from drivetwin.shifts.converter import behind_converter
@@ -205,7 +206,7 @@ def phases_of(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[floa
 
 def _window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
     """Span of the shift's four phases that all channels cover, from a calm moment on."""
-    roles = ["engine_torque", f"pressure.{shift.offgoing}", f"pressure.{shift.oncoming}"]
+    roles = ["engine_torque", *map(pressure_role, (shift.offgoing, shift.oncoming))]
     channels = [log[role] for role in (*roles, *(name for name in SIGNALS if name in log))]
     start = max(shift.before[0], *(channel.time[0] for channel in channels))
     end = min(shift.after[1], *(channel.time[-1] for channel in channels))

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 from drivetwin.errors import MappingError, UnitError, Where
 from drivetwin.logs.mapping import ChannelSpec, spec_of
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.raw import Column as LogColumn
-from drivetwin.logs.roles import PRESSURE, ROLES, quantity_of
+from drivetwin.logs.roles import ROLES, quantity_of
 from drivetwin.logs.shiftlog import Quantity
 from drivetwin.logs.survey import Column, Survey
 from drivetwin.logs.units import channel_unit, first_spellings
@@ -37,7 +38,7 @@ class Entry:
 
 def roles_of(card: VehicleCard) -> tuple[str, ...]:
     """All roles that a column may have, the pressures of the card's elements last."""
-    return (*ROLES, *(PRESSURE + element for element in card.elements))
+    return (*ROLES, *(pressure_role(element) for element in card.elements))
 
 
 def unit_names() -> list[str]:

@@ -17,6 +17,7 @@ from drivetwin.dyno.actuators import Actuator, Program, Vibration
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import HeldGear, Scenario, TorqueReduction
 from drivetwin.dyno.sensors import Sensor
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import Quantity
 
 _DEAD_TIME = 0.012
@@ -97,7 +98,7 @@ def log_sensors(
     return (
         torque,
         *(
-            Sensor(f"pressure.{name}", pressure, column, "bar", 1000.0, pressure_noise, 10.0)
+            Sensor(pressure_role(name), pressure, column, "bar", 1000.0, pressure_noise, 10.0)
             for name, column in pressure_columns.items()
         ),
         Sensor("output_torque", Quantity.TORQUE, "TrqOut", "Nm", 1000.0, output_noise, 0.01),

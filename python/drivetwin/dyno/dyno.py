@@ -14,6 +14,7 @@ from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.dyno.truth import Truth, truth_of
 from drivetwin.errors import InputError, SimulationError, Where
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import Channel
 
 FloatArray = NDArray[np.float64]
@@ -93,7 +94,7 @@ def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[st
         total = np.sum([each.values for each in pressures.values()], axis=0)
         both = Signal(grid, np.asarray(total, dtype=np.float64))
         pressures = dict.fromkeys(pressures, both)
-    inputs = {f"pressure.{name}": pressure for name, pressure in pressures.items()}
+    inputs = {pressure_role(name): pressure for name, pressure in pressures.items()}
     return trajectory, {"engine_torque": torque, **inputs, **speeds}
 
 

@@ -11,8 +11,8 @@ import tomlkit
 
 from drivetwin.dyno.dyno import DynoRun
 from drivetwin.dyno.scenario import Scenario
+from drivetwin.logs.pressure import pressed_element
 from drivetwin.logs.raw import RawChannel
-from drivetwin.logs.roles import PRESSURE
 from drivetwin.logs.shiftlog import Channel, FloatArray
 from drivetwin.logs.units import BAR
 from drivetwin.logs.write import as_recorded
@@ -83,7 +83,7 @@ def card_text(scenario: Scenario) -> str:
         table = ConverterTable.of(scenario.converter.converter)
         card.add("converter", tomlkit.item(table.model_dump()))
     if scenario.one_clutch:
-        (column,) = (s.column for s in scenario.sensors if s.role.startswith(PRESSURE))
+        (column,) = (s.column for s in scenario.sensors if pressed_element(s.role) is not None)
         roles = {gear.element: {"source": column} for gear in scenario.gears}
         card.add("channels", tomlkit.item({"pressure": roles}))
     return tomlkit.dumps(card)

@@ -10,6 +10,7 @@ import numpy as np
 from drivetwin.identify.noise import resolution, white_noise
 from drivetwin.identify.signals import Coupling, Driveline, Sampled, ShiftSignals
 from drivetwin.logs.held import fresh_samples
+from drivetwin.logs.pressure import pressed_element
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.shift import Shift
@@ -93,8 +94,8 @@ def disturbed(signals: ShiftSignals, role: str, gain: float, offset: float) -> S
     def changed(s: Sampled) -> Sampled:
         return replace(s, values=s.values * (1.0 + gain) + offset)
 
-    if role.startswith("pressure."):
-        name = role.removeprefix("pressure.")
+    name = pressed_element(role)
+    if name is not None:
         if name not in signals.pressures:
             return signals
         pressures = {**signals.pressures, name: changed(signals.pressures[name])}

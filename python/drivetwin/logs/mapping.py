@@ -8,8 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from drivetwin.errors import MappingError, MissingChannelError, Where
+from drivetwin.logs.pressure import pressed_element, pressure_role
 from drivetwin.logs.raw import Column, ReadOptions
-from drivetwin.logs.roles import MEASURED, PRESSURE, ROLES, STAND_INS
+from drivetwin.logs.roles import MEASURED, ROLES, STAND_INS
 from drivetwin.tomlfile import did_you_mean
 
 
@@ -112,7 +113,7 @@ def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, l
         for role, pattern in _NAMES.items()
     }
     for element, kind in elements.items():
-        found[PRESSURE + element] = _pressure_candidates(columns, element, kind)
+        found[pressure_role(element)] = _pressure_candidates(columns, element, kind)
     return {
         role: _foremost(_with_numbers(candidates))
         for role, candidates in found.items()
@@ -190,13 +191,13 @@ def resolve(
             warnings += _others(candidates[0], columns)
             continue
         what = f"{role!r} may be any of the columns {', '.join(map(str, candidates))}"
-        if role in needed or role in MEASURED or role.startswith(PRESSURE):
+        if role in needed or role in MEASURED or pressed_element(role) is not None:
             raise MappingError(what, _choice(role, candidates), Where(file=file))
         warnings.append(f"{what}; none is used, name one in a channel mapping")
     _refuse_shared(channels, stated, file)
     _refuse_absent(needed, channels, columns, file)
-    order = [*ROLES, *(PRESSURE + element for element in elements)]
-    without = [element for element in elements if PRESSURE + element not in channels]
+    order = [*ROLES, *(pressure_role(element) for element in elements)]
+    without = [element for element in elements if pressure_role(element) not in channels]
     if without:
         warnings.append(f"no pressure of {', '.join(without)}: nothing that needs it can be told")
     return Mapped(
@@ -258,8 +259,8 @@ def _refuse_unknown_elements(
     stated: Mapping[str, ChannelSpec], elements: Mapping[str, str], file: str
 ) -> None:
     for role in stated:
-        element = role.removeprefix(PRESSURE)
-        if role.startswith(PRESSURE) and element not in elements:
+        element = pressed_element(role)
+        if element is not None and element not in elements:
             raise MappingError(
                 f"the mapping has a pressure of {element!r}, which is no element of the vehicle "
                 f"card{did_you_mean(element, elements)}",

@@ -12,8 +12,9 @@ from pydantic import Field
 
 from drivetwin.errors import MappingError
 from drivetwin.logs.mapping import ChannelSpec, Mapped
+from drivetwin.logs.pressure import pressed_element, pressure_role
 from drivetwin.logs.raw import BusOptions, ReadOptions, TimeColumn
-from drivetwin.logs.roles import PRESSURE, ROLES, quantity_of
+from drivetwin.logs.roles import ROLES, quantity_of
 from drivetwin.logs.units import first_spellings
 from drivetwin.tomlfile import StrictModel, raise_faults, read_toml, schema_faults
 
@@ -42,7 +43,7 @@ class ByRole(StrictModel, Generic[Entry]):
             if entry is not None:
                 yield role, entry
         for element, entry in self.pressure.items():
-            yield PRESSURE + element, entry
+            yield pressure_role(element), entry
 
 
 class ChannelTable(StrictModel):
@@ -129,12 +130,13 @@ def mapping_text(
     pressures = tomlkit.table(is_super_table=True)
     for role, spec in channels.items():
         table = _table(spec, role if role in unitless else None)
-        if role.startswith(PRESSURE):
-            pressures.add(role.removeprefix(PRESSURE), table)
-        else:
+        element = pressed_element(role)
+        if element is None:
             tables.add(role, table)
+        else:
+            pressures.add(element, table)
     if pressures:
-        tables.add(PRESSURE.rstrip("."), pressures)
+        tables.add("pressure", pressures)
     document.add("channels", tables)
     return tomlkit.dumps(document)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from drivetwin.logs.pressure import pressed_element
 from drivetwin.logs.shiftlog import Quantity
 
 ROLES: dict[str, Quantity] = {
@@ -17,10 +18,7 @@ ROLES: dict[str, Quantity] = {
     "shift_in_process": Quantity.STATE,
     "lockup_engaged": Quantity.STATE,
 }
-"""Roles that exist once; beside them stands one `pressure.<element>` for each shift element."""
-
-PRESSURE = "pressure."
-"""Prefix of the roles of clutch and brake pressures."""
+"""Roles that exist once; beside them stands one pressure for each shift element."""
 
 NEEDED = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
 """Roles without which a log cannot be identified in absolute terms (pressures come on top)."""
@@ -40,4 +38,4 @@ MEASURED = frozenset(role for role in ROLES if ROLES[role] in (Quantity.TORQUE, 
 
 def quantity_of(role: str) -> Quantity:
     """Return the quantity of a role; raises KeyError for a role that does not exist."""
-    return Quantity.PRESSURE if role.startswith(PRESSURE) else ROLES[role]
+    return ROLES[role] if pressed_element(role) is None else Quantity.PRESSURE

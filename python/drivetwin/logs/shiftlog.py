@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from drivetwin.driveline import LATEST
 from drivetwin.errors import MissingChannelError, TimeError, Where
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.shown import Shown
 
 FloatArray = NDArray[np.float64]
@@ -157,4 +158,4 @@ class ShiftLog(Shown):
 
     def pressure(self, element: str) -> Channel:
         """Pressure of a clutch or brake by its name on the card."""
-        return self[f"pressure.{element}"]
+        return self[pressure_role(element)]

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin.logs.mapping import ChannelSpec, Mapped, guess, spec_of
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.raw import Column as LogColumn
 from drivetwin.logs.raw import ReadOptions
-from drivetwin.logs.roles import NEEDED, PRESSURE, quantity_of
+from drivetwin.logs.roles import NEEDED, quantity_of
 from drivetwin.logs.shiftlog import Quantity
 from drivetwin.logs.summary import ColumnSummary, summarise
 from drivetwin.vehicle.spec import VehicleCard
@@ -120,7 +121,7 @@ def _notes(candidates: Mapping[str, Sequence[LogColumn]], card: VehicleCard | No
         for role, found in candidates.items()
         if len(found) > 1
     ]
-    wanted = [*NEEDED, *(PRESSURE + element for element in (card.elements if card else ()))]
+    wanted = [*NEEDED, *(pressure_role(element) for element in (card.elements if card else ()))]
     missing = [role for role in wanted if not candidates.get(role)]
     if missing:
         notes.append(f"no column for {', '.join(missing)}: name it in a channel mapping")

@@ -12,6 +12,7 @@ from drivetwin.errors import InputError, Where
 from drivetwin.identify.inputs import pressures_of, sampled
 from drivetwin.identify.likelihood.smooth import local_mean
 from drivetwin.identify.signals import Sampled
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.mechanics import BoolArray, Course
 from drivetwin.observer.observed import FloatArray
@@ -73,7 +74,7 @@ def recorded(log: ShiftLog, shift: Shift, i_in: float) -> Recorded:
         speeds["wheel_speed"] = sampled(log["wheel_speed"])
     speeds = {name: _floored(signal) for name, signal in speeds.items()}
     torque = sampled(log["engine_torque"])
-    there = all(f"pressure.{name}" in log for name in (shift.offgoing, shift.oncoming))
+    there = all(pressure_role(name) in log for name in (shift.offgoing, shift.oncoming))
     pressures = pressures_of(log, shift) if there else {}
     used = (torque, *speeds.values(), *pressures.values())
     start = max(shift.before[0], shift.before[1] - LONGEST, *(s.time[0] for s in used))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.driveline import DualClutch
-from drivetwin.logs.roles import PRESSURE
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.course import Recorded, course_of, is_driving, recorded, slip_of
 from drivetwin.observer.mechanics import (
@@ -114,7 +114,7 @@ def _notes(seen: Recorded, log: ShiftLog) -> tuple[str, ...]:
     texts = []
     if not seen.pressures:
         elements = seen.shift.offgoing, seen.shift.oncoming
-        missing = " and ".join(name for name in elements if PRESSURE + name not in log)
+        missing = " and ".join(name for name in elements if pressure_role(name) not in log)
         texts.append(f"no pressure of {missing}: clutch torques follow from the speeds alone")
     if "wheel_speed" not in seen.speeds:
         texts.append("no wheel speed: what lies behind the shaft follows from the model")

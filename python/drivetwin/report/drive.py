@@ -8,6 +8,7 @@ from io import StringIO
 import numpy as np
 
 from drivetwin.drive.result import DriveRun
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.report.figures.drive import (
     energy_figure,
     maneuver_panels,
@@ -79,7 +80,7 @@ def traces_text(run: DriveRun) -> str:
         ("shaft_torque", "N*m"): run.shaft_torque,
         ("speed_ratio", "1"): run.speed_ratio,
         ("torque_ratio", "1"): run.torque_ratio,
-        **{(f"pressure.{name}", "Pa"): values for name, values in run.pressure.items()},
+        **{(pressure_role(name), "Pa"): values for name, values in run.pressure.items()},
         **{(f"slip.{name}", "rad/s"): values for name, values in run.slip.items()},
         **{(f"torque.{name}", "N*m"): values for name, values in run.torque.items()},
     }

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from drivetwin.logs.roles import PRESSURE, quantity_of
+from drivetwin.logs.pressure import pressed_element
+from drivetwin.logs.roles import quantity_of
 from drivetwin.parameters import OVER_ETA, spec_of
 
 
@@ -31,7 +32,8 @@ _SYMBOLS = {
 
 def channel_symbol(role: str) -> str:
     """Role of a channel as a symbol, e.g. `T_o` or `P B2`; the role itself where it has none."""
-    return _SYMBOLS.get(role, role.replace(PRESSURE, "P "))
+    element = pressed_element(role)
+    return _SYMBOLS.get(role, role) if element is None else f"P {element}"
 
 
 def channel_unit(role: str) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import Channel, ShiftLog, open_ends
 from drivetwin.logs.units import BAR
 from drivetwin.shifts.boundaries import Boundary, break_away, lock_up
@@ -168,7 +169,7 @@ def _torque_start(
         reason = f"one clutch is {offgoing} and {oncoming} in turn: the torque phase is empty"
         return begin, (reason,)
     earliest = max(earliest, begin.time - search.settings.max_torque_phase)
-    if f"pressure.{oncoming}" in search.log:
+    if pressure_role(oncoming) in search.log:
         return _pressure_start(search, (offgoing, oncoming), earliest, phase)
     if "output_torque" in search.log and kind is ShiftKind.POWER_ON_UP:
         torque = smoothed(search.log["output_torque"], (earliest, begin.time))

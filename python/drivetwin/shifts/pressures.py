@@ -12,13 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.shift import Shift
 
 
 def one_clutch(log: ShiftLog, offgoing: str, oncoming: str) -> bool:
     """Whether both elements have their pressure from one column."""
-    roles = (f"pressure.{offgoing}", f"pressure.{oncoming}")
+    roles = (pressure_role(offgoing), pressure_role(oncoming))
     if any(role not in log for role in roles):
         return False
     first, second = (log[role] for role in roles)
@@ -40,7 +41,9 @@ def shift_pressures(log: ShiftLog, shift: Shift) -> dict[str, Channel]:
     return {
         shift.offgoing: replace(channel, values=np.where(before, channel.values, 0.0)),
         shift.oncoming: replace(
-            channel, role=f"pressure.{shift.oncoming}", values=np.where(before, 0.0, channel.values)
+            channel,
+            role=pressure_role(shift.oncoming),
+            values=np.where(before, 0.0, channel.values),
         ),
     }
 

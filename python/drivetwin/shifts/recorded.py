@@ -17,7 +17,7 @@ import numpy as np
 
 from drivetwin.errors import DamagedChannelError, Where
 from drivetwin.logs.held import fresh_samples
-from drivetwin.logs.roles import PRESSURE
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import Channel, ShiftLog, open_ends
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
@@ -97,7 +97,7 @@ def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[
         gaps = (*torque.gaps, *open_ends(torque.time, whole))
         found += [_Gap(torque, gap, (gap[0] - OLDEST, gap[1] + YOUNGEST)) for gap in gaps]
     for name, fill in fills.items():
-        if PRESSURE + name in log:
+        if pressure_role(name) in log:
             pressure = log.pressure(name)
             inner = [gap for gap in pressure.gaps if _decides(pressure, gap, shift, fill)]
             gaps = (*inner, *open_ends(pressure.time, whole))

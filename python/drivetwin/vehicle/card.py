@@ -7,7 +7,7 @@ import hashlib
 from pathlib import Path
 
 from drivetwin.errors import CardError
-from drivetwin.logs.roles import PRESSURE
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.tomlfile import raise_faults, read_toml
 from drivetwin.vehicle.check import card_faults
 from drivetwin.vehicle.schema import CardFile, SensorsTable
@@ -67,5 +67,5 @@ def load_card(path: Path | str) -> VehicleCard:
 
 def _tolerances(sensors: SensorsTable) -> dict[str, SensorTolerance]:
     stated = {role: table for role, table in sensors if role != "pressure" and table is not None}
-    stated |= {PRESSURE + element: table for element, table in sensors.pressure.items()}
+    stated |= {pressure_role(element): table for element, table in sensors.pressure.items()}
     return {role: table.tolerance() for role, table in stated.items()}

@@ -18,6 +18,7 @@ from drivetwin.identify.likelihood.tolerance import sensor_shifts
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.result import FrictionCurve
 from drivetwin.identify.signals import FloatArray, ShiftSignals
+from drivetwin.logs.pressure import pressure_role
 from drivetwin.vehicle.spec import SensorTolerance
 
 SIZE = 0.01
@@ -92,7 +93,7 @@ def _largest_readings(fit: LikelihoodFit) -> dict[str, float]:
     for part in fit.problem.parts:
         record = part.record
         readings = {"engine_torque": record.engine_torque.values}
-        readings |= {f"pressure.{name}": one.values for name, one in record.pressures.items()}
+        readings |= {pressure_role(name): one.values for name, one in record.pressures.items()}
         for out in record.outputs:
             readings["input_speed" if out.name == "engine_speed" else out.name] = out.values
         for role, values in readings.items():

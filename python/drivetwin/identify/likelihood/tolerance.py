@@ -15,6 +15,7 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import TORQUE
 from drivetwin.identify.signals import FloatArray
+from drivetwin.logs.pressure import pressed_element
 from drivetwin.vehicle.spec import SensorTolerance
 
 
@@ -51,11 +52,11 @@ def _error(part: Part, fit: LikelihoodFit, role: str, kind: str) -> FloatArray |
         ]
         return np.concatenate(chosen)
     inputs = {TORQUE: part.record.engine_torque} | dict(part.record.pressures)
-    name = TORQUE if role == "engine_torque" else role.removeprefix("pressure.")
+    source = TORQUE if role == "engine_torque" else pressed_element(role)
     run = part.run(fit.point)
-    if name not in inputs or run is None:
+    if source is None or source not in inputs or run is None:
         return None
     middle = 0.5 * (run.time[1:] + run.time[:-1])
-    values = np.interp(middle, inputs[name].time, inputs[name].values)
+    values = np.interp(middle, inputs[source].time, inputs[source].values)
     disturbance = values if kind == "gain" else np.ones_like(values)
-    return -part.answer_to(fit.point, run, {name: disturbance})
+    return -part.answer_to(fit.point, run, {source: disturbance})
