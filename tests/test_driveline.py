@@ -170,6 +170,7 @@ def test_a_fixed_order_is_less_exact() -> None:
     ("given", "message"),
     [
         *(({"order": order}, "an integer from 1 to 14") for order in (-1, 0, 15, 2.0)),
+        ({"order": 6}, "a finite max_step"),
         *(
             ({"tolerance": tolerance}, "a finite positive number")
             for tolerance in (0.0, -1e-9, float("nan"), float("inf"))

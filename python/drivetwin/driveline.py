@@ -198,8 +198,8 @@ class Accuracy:
     does an energy audit. `tolerance` is the truncation error allowed per step relative to the
     states (1e-10 at least unless `exact`, for networks that operators pass), finite and positive;
     `max_step` [s] the longest step, positive, inf for no limit; `order` a fixed order from 1 to 14
-    in place of one that follows the tolerance (it implies `exact`). Raises InputError for other
-    numbers.
+    in place of one that follows the tolerance (it implies `exact`): nothing but a finite `max_step`
+    then keeps the error small. Raises InputError for other numbers.
     """
 
     exact: bool = False
@@ -217,6 +217,9 @@ class Accuracy:
         ):
             fault = f"order is {self.order!r}"
             remedy = f"give an integer from {ORDERS[0]} to {ORDERS[-1]}, or None"
+        elif self.order is not None and math.isinf(self.max_step):
+            fault = f"order is {self.order} and max_step inf: nothing limits the error of a step"
+            remedy = "give a finite max_step [s] with it"
         else:
             return
         raise InputError(f"accuracy: {fault}", remedy)
