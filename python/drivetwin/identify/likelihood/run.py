@@ -21,6 +21,9 @@ from drivetwin.vehicle.spec import VehicleCard
 DISAGREE = 5.0
 """Difference of the two methods in its standard deviations from which a warning is due."""
 
+OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
+"""What the linear method reads off a load that it takes as constant."""
+
 
 def likelihood_alone(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
@@ -55,11 +58,16 @@ def likelihood(
 
 
 def _disagreements(told: Conclusions, linear: Conclusions) -> list[str]:
-    """Parameters on which the two methods differ by more than their noise explains."""
+    """Parameters on which the two methods differ by more than their noise explains.
+
+    Where the load grows with speed, which is told, the linear method must differ on what it reads
+    off a constant one.
+    """
+    explained = OF_A_CONSTANT_LOAD if told.load is not None else frozenset()
     texts = []
     for name, estimate in told.estimates.items():
         other = linear.estimates.get(name)
-        if other is None or other.value is None or estimate.value is None:
+        if other is None or other.value is None or estimate.value is None or name in explained:
             continue
         spread = float(np.hypot(estimate.std_noise or 0.0, other.std_noise or 0.0))
         if spread > 0.0 and abs(estimate.value - other.value) > DISAGREE * spread:
