@@ -68,6 +68,10 @@ test-wheel: wheel ## run the demo from the wheel where there is no Rust
 notices: $(venv)/.dev ## write the licences of the linked crates, after a change of Cargo.lock
 	$(bin)/python -m tools.notices
 
+.PHONY: api
+api: $(venv)/.native ## write the page of the Python names, docs/reference/python.md
+	$(bin)/python -m tools.api
+
 .PHONY: reference
 reference: $(venv)/.native ## solve the reference problems anew with SciPy
 	$(bin)/python -m reference
