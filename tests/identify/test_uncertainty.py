@@ -40,6 +40,17 @@ def test_systematic_part_counts_in_the_verdict() -> None:
     assert judge("eta", 0.85, 0.001, "integral", 0.3).verdict is Verdict.WEAK
 
 
+@pytest.mark.parametrize(
+    ("noise", "systematic", "sensors"), [(0.05, 0.3, True), (0.3, 0.05, False), (0.3, None, False)]
+)
+def test_no_experiment_is_advised_where_the_sensors_decide(
+    noise: float, systematic: float | None, sensors: bool
+) -> None:
+    reason = judge("eta", 0.85, noise, "integral", systematic).reason
+    assert ("step the pedal" not in reason) == sensors
+    assert ("calibrate" in reason) == sensors
+
+
 def test_a_delay_of_zero_is_sound() -> None:
     assert judge("te_delay", 0.0, 0.0005, "integral").verdict is Verdict.IDENTIFIED
     assert judge("te_delay", 0.0, 0.05, "integral").verdict is Verdict.NOT_IDENTIFIABLE

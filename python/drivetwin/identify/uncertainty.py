@@ -19,6 +19,11 @@ DELAY_IDENTIFIED = 0.005
 """Half width of the 95 % interval of a delay [s] below which it counts as identified."""
 PRIOR_SHARE = 0.8
 """A posterior standard deviation above this share of the prior's says the prior decided."""
+SENSORS = 0.8
+"""Share of the total standard deviation from which the sensors' tolerances decide an interval."""
+CALIBRATE = (
+    "the sensors' tolerances decide its interval: calibrate them, then state less on the card"
+)
 KNOWN = "known from design, as the card says"
 ADDS_LITTLE = "design value of the card, to which the log adds little"
 
@@ -44,6 +49,19 @@ def experiment_for(parameter_id: str) -> str:
     return _EXPERIMENT[spec_of(parameter_id).stem]
 
 
+def sensors_decide(std_noise: float, std_systematic: float | None) -> bool:
+    """Whether an interval comes from the sensors' tolerances, so that no experiment narrows it."""
+    systematic = std_systematic or 0.0
+    return systematic > SENSORS * float(np.hypot(std_noise, systematic))
+
+
+def advice_for(parameter_id: str, std_noise: float, std_systematic: float | None) -> str:
+    """What would narrow the interval of a parameter: an experiment, or better sensors."""
+    if sensors_decide(std_noise, std_systematic):
+        return CALIBRATE
+    return experiment_for(parameter_id)
+
+
 def judge(
     parameter_id: str,
     value: float,
@@ -65,6 +83,7 @@ def judge(
     else:
         width, limit, end = half / max(abs(value), 1e-300), spec.weak_above, 1.0
     inside = spec.lower <= value <= spec.upper
+    advice = advice_for(parameter_id, std_noise, std_systematic)
     if not np.isfinite(width) or width > end or not inside:
         shown = f"the 95 % interval {value:.4g} ± {half:.2g} {spec.unit} says nothing"
         return Estimate(
@@ -73,10 +92,10 @@ def judge(
             None,
             Verdict.NOT_IDENTIFIABLE,
             method,
-            reason=f"{shown}; {experiment_for(parameter_id)}",
+            reason=f"{shown}; {advice}",
         )
     if width > limit:
-        reason = f"the 95 % interval is ± {half:.2g} {spec.unit}; {experiment_for(parameter_id)}"
+        reason = f"the 95 % interval is ± {half:.2g} {spec.unit}; {advice}"
         verdict = Verdict.WEAK
     else:
         reason, verdict = "", Verdict.IDENTIFIED
@@ -107,7 +126,7 @@ def judge_with_design(
         return one
     half = Z95 * float(np.hypot(std, std_systematic or 0.0))
     wide = f"the 95 % interval is ± {half:.2g} {spec.unit}, with the card's design value in it"
-    text = "; ".join(part for part in (note, wide, experiment_for(name)) if part)
+    text = "; ".join(part for part in (note, wide, advice_for(name, std, std_systematic)) if part)
     return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, text)
 
 

@@ -35,6 +35,12 @@ def test_the_least_known_come_first_with_an_experiment() -> None:
     assert rows[0][2].text == "1 %"
 
 
+def test_what_the_sensors_decide_is_not_said_to_be_narrowed_by_an_experiment() -> None:
+    advice = {row[0].text: row[3].text for row in tables()[1].rows}
+    assert "calibrate" in advice["J′ (3)"]
+    assert "J_out" in advice["Jo′"]
+
+
 def test_sensors_without_a_tolerance_have_no_share() -> None:
     found = identification()
     bare = {name: replace(one, std_systematic=None) for name, one in found.estimates.items()}

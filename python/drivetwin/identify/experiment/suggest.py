@@ -27,7 +27,7 @@ from drivetwin.identify.momentum import MomentumSettings
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Z95, Estimate, Identification, Verdict
 from drivetwin.identify.signals import FloatArray, ShiftSignals
-from drivetwin.identify.uncertainty import DELAY_IDENTIFIED, judge
+from drivetwin.identify.uncertainty import CALIBRATE, DELAY_IDENTIFIED, judge, sensors_decide
 from drivetwin.progress import part, tell
 
 AGE = "te_delay"
@@ -36,8 +36,6 @@ REPEATS = (1, 2, 4)
 LEAST_KNOWN = 3
 """How many identified parameters are told how to narrow."""
 NO_SCALE = "an output-shaft torque sensor alone gives torques their scale"
-SENSORS = 0.8
-"""Share of the total standard deviation from which the sensors' tolerances decide it."""
 
 
 @dataclass(frozen=True)
@@ -192,9 +190,8 @@ def _suggestion(
     if one.id not in told:
         return Suggestion(one.id, one.verdict, half, (), NO_SCALE)
     systematic = one.std_systematic or 0.0
-    if one.std_total is not None and systematic > SENSORS * one.std_total:
-        limit = "the sensors' tolerances decide its interval: calibrate them, or state less"
-        return Suggestion(one.id, one.verdict, half, (), limit)
+    if one.std_noise is not None and sensors_decide(one.std_noise, systematic):
+        return Suggestion(one.id, one.verdict, half, (), CALIBRATE)
     names = _with_age(fit).names
     row = _row(one.id, fit, signals, names)
     loud = np.sqrt(_noise_power(fit, row))

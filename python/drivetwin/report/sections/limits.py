@@ -8,7 +8,7 @@ from math import isfinite
 
 from drivetwin.identify.experiment.suggest import Suggestion
 from drivetwin.identify.result import Estimate, Identification, Verdict
-from drivetwin.identify.uncertainty import experiment_for
+from drivetwin.identify.uncertainty import advice_for
 from drivetwin.report.figures.parameters import correlation_figure, half_width_percent
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.blocks import (
@@ -132,7 +132,7 @@ def _least_known(found: Identification) -> Iterator[TableBlock]:
                 Cell(parameter_label(name)),
                 Cell(f"± {significant(width, 2)} %", number=True),
                 Cell(_sensor_share(found.estimates[name]), number=True),
-                Cell(experiment_for(name)),
+                Cell(_advice(found.estimates[name])),
             )
             for width, name in ranked
         ]
@@ -140,14 +140,18 @@ def _least_known(found: Identification) -> Iterator[TableBlock]:
             Cell("parameter"),
             Cell("interval", number=True, note="95 %, of the value"),
             Cell("from sensors", number=True, note="share of the variance"),
-            Cell("experiment that would narrow it"),
+            Cell("what would narrow it"),
         )
         yield TableBlock(
-            "The least well known, and what to record. Where tolerances of the sensors make the "
-            "interval, no experiment helps: calibrate the sensor.",
+            "The least well known. Where tolerances of the sensors make the interval, no "
+            "experiment narrows it.",
             head,
             rows,
         )
+
+
+def _advice(one: Estimate) -> str:
+    return advice_for(one.id, one.std_noise or 0.0, one.std_systematic)
 
 
 def _sensor_share(one: Estimate) -> str:
