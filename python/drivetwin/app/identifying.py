@@ -48,7 +48,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why one method found nothing."""
+    """Why one method found nothing, and what to do."""
 
     method: Method
     text: str
@@ -67,7 +67,7 @@ def identify_all(emit: Emit, task: Task) -> None:
             try:
                 emit(_outcome(task, shifts, method))
             except IdentificationError as error:
-                emit(Refusal(method, error.what))
+                emit(Refusal(method, f"{error.what} -> {error.remedy}"))
         start = end
 
 

@@ -205,7 +205,7 @@ def _without_torque(
         raise IdentificationError(
             "the log has no output torque: inertias, load, shaft and friction share one unknown "
             f"scale without it, which the {method} method cannot leave open",
-            "map an output-shaft torque sensor as `output_torque`, or use --method likelihood",
+            "map an output-shaft torque sensor as `output_torque`, or use the likelihood method",
             Where(file=log.source),
         )
     found, best = likelihood_alone(signals, drivelines, card)
