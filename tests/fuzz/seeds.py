@@ -7,6 +7,7 @@ import struct
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -48,16 +49,20 @@ def _mdf3(folder: Path) -> bytes:
         return Path(mdf.save(folder / "seed.mdf", overwrite=True)).read_bytes()
 
 
-def _mat5_plain(folder: Path) -> bytes:
-    """MATLAB 5 without compression, as older programs write it."""
-    from scipy.io import savemat
+def _mat_plain(version: Literal["4", "5"]) -> Callable[[Path], bytes]:
+    """MATLAB 4, and 5 without compression, as older programs write them."""
 
-    path = folder / "seed5.mat"
-    table: dict[str, object] = {}
-    for one in channels():
-        table |= {one.name: one.values, f"{one.name}_t": one.time, f"{one.name}_unit": one.unit}
-    savemat(path, table)
-    return path.read_bytes()
+    def make(folder: Path) -> bytes:
+        from scipy.io import savemat
+
+        path = folder / f"seed{version}.mat"
+        table: dict[str, object] = {}
+        for one in channels():
+            table |= {one.name: one.values, f"{one.name}_t": one.time, f"{one.name}_unit": one.unit}
+        savemat(path, table, format=version)
+        return path.read_bytes()
+
+    return make
 
 
 def _mat73(folder: Path) -> bytes:
@@ -157,7 +162,8 @@ SEEDS: dict[str, Callable[[Path], bytes]] = {
     "mdf3": _mdf3,
     "mf4-bus": _mf4_bus,
     "mat": _written(".mat"),
-    "mat5": _mat5_plain,
+    "mat4": _mat_plain("4"),
+    "mat5": _mat_plain("5"),
     "mat73": _mat73,
     "parquet": _written(".parquet"),
     "candump": lambda _: candump(spaced=True),

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""MATLAB v5 to v7.3: the ways a workspace holds signals, their times and units."""
+"""MATLAB v4 to v7.3: the ways a workspace holds signals, their times and units."""
 
 from __future__ import annotations
 
+import struct
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.io import savemat
 
 from drivetwin.errors import FileFormatError, MissingChannelError, MissingExtraError, UnitError
@@ -112,6 +114,32 @@ def test_complex_numbers_are_told(tmp_path: Path) -> None:
     assert [one.name for one in raw.channels] == ["x"]
     assert raw.unreadable.keys() == {"n", "s"}
     assert set(raw.unreadable.values()) == {"complex numbers: export their real part"}
+
+
+def version4(order: Literal["<", ">"], name: str, values: NDArray[Any], kind: int) -> bytes:
+    """A variable as the manual of MATLAB 4 says; `kind` holds the tens and units of its type."""
+    mark = kind + (1000 if order == ">" else 0)
+    head = struct.pack(f"{order}5i", mark, values.shape[0], values.shape[1], 0, len(name) + 1)
+    data = values.astype(values.dtype.newbyteorder(order)).tobytes(order="F")
+    return head + name.encode() + b"\0" + data
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_version_4(tmp_path: Path, order: Literal["<", ">"]) -> None:
+    time = np.arange(50.0)[:, None]
+    unit = np.frombuffer(b"rpm", np.uint8).astype(np.float64)[None, :]
+    path = tmp_path / "log"
+    path.write_bytes(
+        version4(order, "t", time, 0)
+        + version4(order, "n_in", (time * 1.1).astype(np.float32), 10)
+        + version4(order, "n_in_unit", unit, 1)
+        + version4(order, "gear", (3 - time.T).astype(np.int16), 30)
+    )
+    found = by_name(read_raw(path))
+    assert np.array_equal(found["n_in"].time, time[:, 0])
+    assert np.array_equal(found["n_in"].values, (time[:, 0] * 1.1).astype(np.float32))
+    assert (found["n_in"].unit, found["gear"].unit) == ("rpm", None)
+    assert np.array_equal(found["gear"].values, 3 - time[:, 0])
 
 
 def test_version_7_3(tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Damaged MATLAB 5 files are refused before SciPy reads them; sound ones of all classes pass."""
+"""Damaged MATLAB files are refused before SciPy reads them; sound ones of all classes pass."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scipy.io import savemat
 from scipy.sparse import csc_array
 
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.mat_blocks import check_blocks
+from drivetwin.logs.mat_blocks import check_blocks, is_version4
 
 CONTENT = {
     "x": np.arange(40.0),
@@ -82,3 +82,30 @@ def test_cut_files_are_refused(tmp_path: Path, compressed: bool) -> None:
     for size in range(137, 136 + first, 7):
         with pytest.raises(FileFormatError):
             check(tmp_path, whole[:size])
+
+
+def written4(folder: Path) -> bytes:
+    path = folder / "whole4.mat"
+    savemat(path, {"x": np.arange(40.0), "text": "rpm", "z": CONTENT["z"]}, format="4")
+    return path.read_bytes()
+
+
+def test_version_4_is_told_by_its_first_variable(tmp_path: Path) -> None:
+    whole = written4(tmp_path)
+    check(tmp_path, whole)
+    assert is_version4(whole)
+    for head in (b"", bytes(200), b"time,x\n0.0,1\n" * 9, written(compressed=False), whole[:21]):
+        assert not is_version4(head)
+
+
+def test_cut_and_damaged_files_of_version_4_are_refused(tmp_path: Path) -> None:
+    whole = written4(tmp_path)
+    first = 20 + 2 + 40 * 8
+    for size in (first - 1, first + 7, len(whole) - 1):
+        with pytest.raises(FileFormatError, match=r"is cut|no sound head"):
+            check(tmp_path, whole[:size])
+    for place in (0, 1, 12, 16):  # type, rest of the type, complex, length of the name
+        damaged = bytearray(whole)
+        damaged[first + place] = 77
+        with pytest.raises(FileFormatError, match="variable 2"):
+            check(tmp_path, bytes(damaged))

@@ -11,6 +11,7 @@ from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.can.open import is_bus_text, open_blf, open_bus_text
 from drivetwin.logs.csv import read_csv
 from drivetwin.logs.mat import open_mat
+from drivetwin.logs.mat_blocks import is_version4
 from drivetwin.logs.mdf import open_mdf
 from drivetwin.logs.parquet import open_parquet
 from drivetwin.logs.raw import ReadOptions, Recording
@@ -72,6 +73,8 @@ def _opener(head: bytes, path: Path) -> Opener:
                 "of a bus as ASC, BLF or candump",
                 Where(file=str(path)),
             )
+    if is_version4(head):
+        return open_mat
     return open_bus_text if is_bus_text(head) else _open_csv
 
 

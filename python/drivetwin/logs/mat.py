@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reader of MATLAB files: v5 to v7 by SciPy, v7.3 (HDF5) by pymatreader.
+"""Reader of MATLAB files: v4 to v7 by SciPy, v7.3 (HDF5) by pymatreader.
 
 A channel is `x` with its time `x_t`, a vector beside one time vector, or a struct of time and data.
 """
@@ -30,7 +30,7 @@ _PLAIN = (
 
 @contextmanager
 def open_mat(path: Path, options: ReadOptions) -> Iterator[Recording]:
-    """Read a MATLAB file of version 5 to 7.3.
+    """Read a MATLAB file of version 4 to 7.3.
 
     Time is in s, unless the file (`<name>_t_unit`, `time_unit`) or the mapping says otherwise.
     Raises MissingExtraError (v7.3 without pymatreader), FileFormatError for a damaged file or one

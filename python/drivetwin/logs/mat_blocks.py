@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Integrity of a MATLAB 5 file, before SciPy reads it: its reader trusts damaged bytes.
+"""Integrity of a MATLAB 4 or 5 file, before SciPy reads it: its reader trusts damaged bytes.
 
-The file is a header of 128 bytes and elements of a tag (type, length) and data. Compressed elements
-carry a checksum, which SciPy does not look at; others consist of parts with tags of their own. An
-unknown type in either can end the process.
+A file of version 5 is a header of 128 bytes and elements of a tag (type, length) and data.
+Compressed elements carry a checksum, which SciPy does not look at; others consist of parts with
+tags of their own. An unknown type in either can end the process. A file of version 4 is variables
+only: five numbers (type, rows, columns, whether complex, length of the name), name and data.
 """
 
 from __future__ import annotations
@@ -28,14 +29,23 @@ _DEEPEST = 50
 """Deepest nesting of structs and cells that is followed."""
 _CHUNK = 1 << 20
 
+_HEAD4 = 20
+_BYTES4 = (8, 4, 4, 2, 2, 1)
+"""Bytes of a number by its kind in version 4: double, single, four kinds of integers."""
+_LONGEST4 = 256
+"""Letters that the name of a variable of version 4 has at most, with the zero at its end."""
+
 
 def check_blocks(path: Path) -> None:
     """Raise FileFormatError where an element is cut, of no known type, or fails its checksum."""
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(_HEADER)
+        if is_version4(head):
+            _check4(file, size, path)
+            return
         if len(head) < _HEADER or head[126:128] not in (b"IM", b"MI"):
-            return  # version 4 has neither header nor elements
+            return  # SciPy says what it is
         order = "<" if head[126:128] == b"IM" else ">"
         for number, (kind, length) in enumerate(_elements(file, order), start=1):
             start = file.tell()
@@ -48,6 +58,39 @@ def check_blocks(path: Path) -> None:
             if kind == _MATRIX and not _ordered(file, start + length, order):
                 raise _damaged(f"variable {number} has parts of no known type or length", path)
             file.seek(start + length)
+
+
+def is_version4(head: bytes) -> bool:
+    """Tell whether a file that starts with `head` is one of version 4, which has no mark."""
+    variable = _variable4(head[:_HEAD4])
+    return variable is not None and head[_HEAD4:][: variable[0]].find(b"\0") == variable[0] - 1
+
+
+def _variable4(head: bytes) -> tuple[int, int] | None:
+    """Bytes of name and data of a variable of version 4; None where its head is none."""
+    if len(head) < _HEAD4:
+        return None
+    order = "<" if head[1:4] == bytes(3) else ">"  # the type is a small number
+    kind, rows, columns, imaginary, name = struct.unpack(f"{order}5i", head)
+    thousands, number, form = kind // 1000, kind // 10 % 10, kind % 10
+    if thousands != (order == ">") or kind // 100 % 10 or number >= len(_BYTES4) or form > 2:
+        return None
+    if min(rows, columns) < 0 or imaginary not in (0, 1) or not 1 < name <= _LONGEST4:
+        return None
+    return name, rows * columns * _BYTES4[number] * (1 + imaginary)
+
+
+def _check4(file: BinaryIO, size: int, path: Path) -> None:
+    place, number = 0, 0
+    while place < size:
+        file.seek(place)
+        number += 1
+        variable = _variable4(file.read(_HEAD4))
+        if variable is None:
+            raise _damaged(f"variable {number} has no sound head", path)
+        place += _HEAD4 + sum(variable)
+    if place > size:
+        raise _damaged(f"variable {number} is cut at the end of the file", path)
 
 
 def _elements(file: BinaryIO, order: str) -> Iterator[tuple[int, int]]:
