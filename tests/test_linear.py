@@ -20,7 +20,8 @@ from drivetwin.driveline import (
     simulate,
 )
 from drivetwin.errors import InputError
-from drivetwin.linear import Element, Slip, linearise
+from drivetwin.linear import Slip, linearise
+from drivetwin.network import Element
 
 FRICTION = Stribeck(mu_c=0.12, mu_s=0.145, v_s=6.0, mu_v=1e-4)
 B2 = ShiftElement("B2", 1.4, 1.6, 2.9e-2, 8e4, FRICTION)

@@ -19,8 +19,8 @@ from drivetwin import _native
 from drivetwin.border import as_json
 from drivetwin.driveline import DualClutch, FloatArray
 from drivetwin.errors import InputError
+from drivetwin.network import Element
 
-Element = Mapping[str, object]
 Output = tuple[str, str]
 """A quantity and the name of its node or element, such as ("shaft_torque", "output shaft")."""
 

@@ -32,6 +32,11 @@ Output = tuple[OutputKind, str]
 """What to record and of which node or element."""
 
 
+def element(kind: str, name: str, **fields: object) -> Element:
+    """Return an element of this type and name with the fields of its kind."""
+    return {"type": kind, "name": name, **fields}
+
+
 @dataclass(frozen=True)
 class Sine:
     """An input `offset + amplitude·sin(2π·frequency·t + phase)`; frequency in Hz, phase in rad."""

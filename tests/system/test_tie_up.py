@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from drivetwin.gearbox import Gearbox, builtin_gearboxes, load_gearbox, reduce
 from drivetwin.gearbox.compare import WholeGearbox, whole_gearbox
 from drivetwin.gearbox.maneuver import plan
 from drivetwin.gearbox.network import network_elements
-from drivetwin.network import NetworkRun, Output, Start, simulate
+from drivetwin.network import Element, NetworkRun, Output, Start, simulate
 
 BOXES = [name for name in builtin_gearboxes() if not load_gearbox(name).dogs]
 SECOND = np.array([0.0, 1.0])
@@ -28,7 +27,7 @@ RIGID_PLASTIC = {
 }
 
 
-def elements_of(box: Gearbox) -> list[dict[str, Any]]:
+def elements_of(box: Gearbox) -> list[Element]:
     """The gearbox with capacities equal to its pressures, and a torque on either shaft."""
     plain = [
         {**each, **RIGID_PLASTIC} if each["type"] == "clutch" else each

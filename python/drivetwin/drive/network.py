@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
 
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.errors import InputError
 from drivetwin.gearbox import Drive, Gearbox, gear_statics, network_elements
 from drivetwin.gearbox.spec import ElementKind
-from drivetwin.network import Element, Output, Start
+from drivetwin.network import Element, Output, Start, element
 
 CRANK, AXLE, WHEEL = "crankshaft", "axle beyond the shaft", "wheel of the vehicle"
 SHAFT, ROAD = "shaft to the axle", "rolling resistance"
@@ -50,16 +49,16 @@ def _engine(powertrain: Powertrain, drive: Drive) -> list[Element]:
     engine = powertrain.engine
     table = {"throttle": [0.0, 1.0], "speed": engine.speed, "torque": [engine.closed, engine.full]}
     return [
-        _element("inertia", "engine", node=CRANK, inertia=drive.engine_inertia),
-        _element("engine_map", "map", node=CRANK, throttle=PEDAL, lag=engine.lag, map=table),
+        element("inertia", "engine", node=CRANK, inertia=drive.engine_inertia),
+        element("engine_map", "map", node=CRANK, throttle=PEDAL, lag=engine.lag, map=table),
     ]
 
 
 def _converter(powertrain: Powertrain, turbine: str) -> list[Element]:
     table, clutch = asdict(powertrain.converter), powertrain.lock_up
     return [
-        _element("torque_converter", "converter", pump=CRANK, turbine=turbine, map=table),
-        _element(
+        element("torque_converter", "converter", pump=CRANK, turbine=turbine, map=table),
+        element(
             "clutch",
             LOCK_UP,
             a=CRANK,
@@ -79,11 +78,11 @@ def _vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[Element]
     # A disc brake by its torque: unit gain and friction make the input a capacity in N m.
     unit = {"slip": [0.0], "mu": [1.0]}
     return [
-        _element("spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o),
-        _element("gear", "final drive", a=AXLE, b=WHEEL, ratio=drive.i_f),
-        _element("inertia", "vehicle", node=WHEEL, inertia=drive.vehicle_inertia),
-        _element("road_load", ROAD, node=WHEEL, **road),
-        _element(
+        element("spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o),
+        element("gear", "final drive", a=AXLE, b=WHEEL, ratio=drive.i_f),
+        element("inertia", "vehicle", node=WHEEL, inertia=drive.vehicle_inertia),
+        element("road_load", ROAD, node=WHEEL, **road),
+        element(
             "clutch",
             BRAKE,
             a=WHEEL,
@@ -96,10 +95,6 @@ def _vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[Element]
             drum_inertia=0.0,
         ),
     ]
-
-
-def _element(kind: str, name: str, **fields: Any) -> Element:
-    return {"type": kind, "name": name, **fields}
 
 
 def standstill(gearbox: Gearbox, gear: str, idle: float) -> Start:

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
 from drivetwin.converter import Converter
 from drivetwin.driveline import DualClutch, FloatArray, ShiftElement, Signal, State, Trajectory
-from drivetwin.network import Element, Output, Start, simulate
+from drivetwin.network import Element, Output, Start, element, simulate
 
 _CRANK, _TURBINE, _INPUT, _OUTPUT = "crankshaft", "turbine", "input", "output"
 _AXLE, _WHEEL, _SHAFT = "axle", "wheel", "output shaft"
@@ -83,20 +82,20 @@ class OpenConverter:
         """The dual clutch in general elements, the converter before it."""
         loss = {"law": model.loss_law, "eta": model.eta}
         return [
-            _element("torque", _TORQUE, node=_CRANK, input=_TORQUE),
-            _element("inertia", "engine", node=_CRANK, inertia=self.engine_inertia),
-            _element(
+            element("torque", _TORQUE, node=_CRANK, input=_TORQUE),
+            element("inertia", "engine", node=_CRANK, inertia=self.engine_inertia),
+            element(
                 "torque_converter",
                 "converter",
                 pump=_CRANK,
                 turbine=_TURBINE,
                 map=asdict(self.converter),
             ),
-            _element("inertia", "J1", node=_TURBINE, inertia=model.J1),
-            _element("gear", "input gear", a=_TURBINE, b=_INPUT, ratio=model.i_in, loss=loss),
+            element("inertia", "J1", node=_TURBINE, inertia=model.J1),
+            element("gear", "input gear", a=_TURBINE, b=_INPUT, ratio=model.i_in, loss=loss),
             *(part for each in model.elements for part in _clutch(each)),
-            _element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
-            _element(
+            element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
+            element(
                 "spring_damper",
                 _SHAFT,
                 a=_OUTPUT,
@@ -104,14 +103,10 @@ class OpenConverter:
                 stiffness=model.k_o,
                 damping=model.c_o,
             ),
-            _element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
-            _element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
-            _element("road_load", "load", node=_WHEEL, **asdict(model.load)),
+            element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
+            element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
+            element("road_load", "load", node=_WHEEL, **asdict(model.load)),
         ]
-
-
-def _element(kind: str, name: str, **fields: Any) -> Element:
-    return {"type": kind, "name": name, **fields}
 
 
 def _sides(name: str) -> tuple[str, str]:
@@ -123,9 +118,9 @@ def _clutch(one: ShiftElement) -> list[Element]:
     """A shift element between its two ratios (eq. 15)."""
     driving, driven = _sides(one.name)
     return [
-        _element("gear", f"{one.name} i_c", a=_INPUT, b=driving, ratio=one.i_c),
-        _element("gear", f"{one.name} i_out", a=driven, b=_OUTPUT, ratio=one.i_out),
-        _element(
+        element("gear", f"{one.name} i_c", a=_INPUT, b=driving, ratio=one.i_c),
+        element("gear", f"{one.name} i_out", a=driven, b=_OUTPUT, ratio=one.i_out),
+        element(
             "clutch",
             one.name,
             a=driving,

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from drivetwin.gearbox import Gearbox, gear_statics, network_elements, reduce
 from drivetwin.gearbox.dual import shift_element
 from drivetwin.gearbox.reduction import ElementRatios
 from drivetwin.gearbox.spec import GROUND
-from drivetwin.network import Element, Output, Start, simulate
+from drivetwin.network import Element, Output, Start, element, simulate
 
 _ENGINE, _AXLE, _WHEEL, _SHAFT = "engine", "axle", "wheel", "output shaft"
 _TORQUE = "engine torque"
@@ -90,9 +89,6 @@ class Plant:
     def _elements(self, model: DualClutch) -> list[Element]:
         loss = {"law": model.loss_law, "eta": model.eta}
         box, shaft = self.gearbox, {"stiffness": model.k_o, "damping": model.c_o}
-
-        def element(kind: str, name: str, **fields: Any) -> Element:
-            return {"type": kind, "name": name, **fields}
 
         return [
             element("torque", "engine torque", node=_ENGINE, input=_TORQUE),

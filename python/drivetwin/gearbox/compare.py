@@ -13,10 +13,10 @@ from drivetwin.errors import SimulationError
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.gears import gear_statics
 from drivetwin.gearbox.maneuver import Maneuver, plan, signals, time_grid
-from drivetwin.gearbox.network import Element, network_elements
+from drivetwin.gearbox.network import network_elements
 from drivetwin.gearbox.reduction import Reduction
 from drivetwin.gearbox.traces import CouplingError, Traces
-from drivetwin.network import Start
+from drivetwin.network import Element, Start, element
 from drivetwin.network import simulate as simulate_network
 
 AXLE, WHEEL, SHAFT = "axle beyond the shaft", "wheel of the vehicle", "shaft to the axle"
@@ -122,10 +122,6 @@ def _surroundings(reduction: Reduction, maneuver: Maneuver) -> list[Element]:
     """Engine, shaft, final drive, vehicle and load around the gearbox."""
     drive, engine, output = maneuver.drive, reduction.gearbox.input, reduction.gearbox.output
     load = maneuver.load * drive.i_f
-
-    def element(kind: str, name: str, **fields: str | float) -> Element:
-        return {"type": kind, "name": name, **fields}
-
     return [
         element("inertia", "inertia of the engine", node=engine, inertia=drive.engine_inertia),
         element("torque", "torque of the engine", node=engine, input=ENGINE_TORQUE),

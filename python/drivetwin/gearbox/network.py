@@ -6,14 +6,12 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterator
 from dataclasses import asdict
-from typing import Any
 
 from drivetwin.driveline import FrictionTable
 from drivetwin.gearbox.spec import Capacity, ElementKind, Gearbox, ShiftMember
+from drivetwin.network import Element
 
 _NO_CAPACITY = Capacity(gain=0.0, P0=0.0, peak=1.0, friction=FrictionTable((0.0,), (0.0,)))
-
-Element = dict[str, Any]
 
 
 def network_elements(

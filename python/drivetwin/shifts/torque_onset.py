@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +24,6 @@ _AROUND = 0.15
 """Span [s] before that place in which the fall may have begun."""
 _SHAFT = 0.015
 """A shaft of 10 Hz passes a fall on by so much later [s]."""
-
-
-class OnsetSource(StrEnum):
-    """What told the start of the torque phase."""
-
-    PRESSURE = "on-coming pressure above P0"
-    OUTPUT_TORQUE = "fall of the output torque"
-    UNKNOWN = "no channel"
 
 
 @dataclass(frozen=True, eq=False)
