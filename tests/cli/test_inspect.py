@@ -10,7 +10,9 @@ from typing import Any
 import pytest
 
 from drivetwin.cli import main
+from drivetwin.logs.csv import read_csv
 from drivetwin.logs.profile import read_mapping
+from drivetwin.logs.raw import RawLog, TimeColumn
 from tests.cli.conftest import Files
 
 
@@ -29,6 +31,20 @@ def test_columns_rates_and_roles(bench_files: Files, capsys: pytest.CaptureFixtu
     assert columns["PrsBrk3"]["unit"] == "bar"
     assert columns["SpdIn"]["rate"] == pytest.approx(1000.0)
     assert found["notes"] == []
+
+
+def test_a_file_is_parsed_once(
+    bench_files: Files, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parsed: list[str] = []
+
+    def counted(data: bytes, file: str, time: TimeColumn) -> RawLog:
+        parsed.append(file)
+        return read_csv(data, file, time)
+
+    monkeypatch.setattr("drivetwin.logs.formats.read_csv", counted)
+    _inspect(capsys, str(bench_files.log), "--vehicle", str(bench_files.card))
+    assert parsed == [str(bench_files.log)]
 
 
 def test_a_log_without_units_names_or_all_samples_is_described_not_refused(

@@ -16,6 +16,7 @@ from drivetwin.app.expansion import refuse_expansion
 from drivetwin.app.jobs import Emit
 from drivetwin.errors import DrivetwinError, InputError
 from drivetwin.gearbox import load_gearbox
+from drivetwin.logs.formats import open_recording
 from drivetwin.logs.mapping import ChannelSpec, Mapped
 from drivetwin.logs.profile import mapping_text, read_mapping
 from drivetwin.logs.raw import ReadOptions
@@ -73,7 +74,8 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
         card = replace(load_card(request.card), source=request.card_label)
         stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
         stated = replace(stated, channels={**stated.channels, **request.channels})
-        looked = survey(request.log, card, stated)
+        with open_recording(request.log, stated.options) as recording:
+            looked = survey(recording, str(request.log), card, stated)
     try:
         with _labelled(labels):
             mapping = _written(scratch, stated.channels, stated.options)

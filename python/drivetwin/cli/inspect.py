@@ -24,6 +24,8 @@ from drivetwin.errors import DrivetwinError
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from drivetwin.logs.mapping import Mapped
+    from drivetwin.logs.raw import Recording
     from drivetwin.vehicle.card import VehicleCard
 
 
@@ -47,6 +49,7 @@ def inspect(
     And what `shifts` and `identify` would warn of in it, or refuse it for.
     """
     from drivetwin.atomic import write_text
+    from drivetwin.logs.formats import open_recording
     from drivetwin.logs.mapping import Mapped
     from drivetwin.logs.profile import mapping_text, read_mapping
     from drivetwin.logs.survey import survey
@@ -54,9 +57,9 @@ def inspect(
 
     card = None if vehicle is None else load_card(vehicle)
     stated = Mapped({}) if channels is None else read_mapping(channels)
-    with step(f"reading {log.name}"):
-        found = survey(log, card, stated)
-        warnings, refusal = _as_read(log, card, channels)
+    with step(f"reading {log.name}"), open_recording(log, stated.options) as recording:
+        found = survey(recording, str(log), card, stated)
+        warnings, refusal = _as_read(recording, log, card, stated)
     if write_mapping is not None:
         write_text(write_mapping, mapping_text(found.mapping, found.options, found.unitless))
     if as_json:
@@ -78,13 +81,13 @@ def inspect(
 
 
 def _as_read(
-    log: Path, card: VehicleCard | None, channels: Path | None
+    recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped
 ) -> tuple[tuple[str, ...], DrivetwinError | None]:
     """What reading a log for use warns of, whatever roles it lacks; or why it is refused."""
-    from drivetwin.logs.read import read_log
+    from drivetwin.logs.read import read_recording
 
     try:
-        return read_log(log, card, channels, needed=()).warnings, None
+        return read_recording(recording, log, card, stated, needed=()).warnings, None
     except DrivetwinError as fault:
         return (), fault
 

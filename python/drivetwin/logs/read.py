@@ -60,27 +60,43 @@ def read_log(
     """
     path = Path(path)
     stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})
+    with open_recording(path, stated.options) as recording:
+        log = read_recording(recording, path, card, stated, needed, window)
+    mappings = {} if mapping is None else {Path(mapping).name: _digest(Path(mapping))}
+    return replace(log, mappings=mappings)
+
+
+def read_recording(
+    recording: Recording,
+    path: Path,
+    card: VehicleCard | None,
+    stated: Mapped,
+    needed: Iterable[str] = FOR_SHIFTS,
+    window: Window | None = None,
+) -> ShiftLog:
+    """Return the log of an open `recording` of the file `path` with the mapping `stated`.
+
+    See `read_log`; the log names no mapping file.
+    """
     elements = {} if card is None else card.elements
     kinds = {name: element.kind for name, element in elements.items()}
     channels: dict[str, Channel] = {}
-    with open_recording(path, stated.options) as recording:
-        specs = {**({} if card is None else card.channels), **stated.channels}
-        mapped = resolve(recording.columns, specs, kinds, needed, str(path))
-        _refuse_unitless(recording, mapped.channels, specs, str(path))
-        warnings = [*recording.warnings, *mapped.warnings]
-        for count, (role, spec) in enumerate(mapped.channels.items()):
-            tell(count / len(mapped.channels))
-            try:
-                checked = _checked(
-                    role, spec, recording.load(_picked(recording, spec), window), str(path)
-                )
-            except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
-                if role in specs or quantity_of(role) not in AUXILIARY:
-                    raise
-                warnings.append(f"channel {spec.source!r}: {fault.what}; left out")
-                continue
-            channels[role] = checked.channel
-            warnings += checked.warnings
+    specs = {**({} if card is None else card.channels), **stated.channels}
+    mapped = resolve(recording.columns, specs, kinds, needed, str(path))
+    _refuse_unitless(recording, mapped.channels, specs, str(path))
+    warnings = [*recording.warnings, *mapped.warnings]
+    for count, (role, spec) in enumerate(mapped.channels.items()):
+        tell(count / len(mapped.channels))
+        try:
+            raw = recording.load(_picked(recording, spec), window)
+            checked = _checked(role, spec, raw, str(path))
+        except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
+            if role in specs or quantity_of(role) not in AUXILIARY:
+                raise
+            warnings.append(f"channel {spec.source!r}: {fault.what}; left out")
+            continue
+        channels[role] = checked.channel
+        warnings += checked.warnings
     check_common_span(channels, str(path))
     if card is not None:
         check_gearing(channels, card, str(path))
@@ -90,8 +106,7 @@ def read_log(
         warnings += [*torque_balance(channels, card), *final_drive_held(channels, card)]
         warnings += clock_warnings(channels, card)
     warnings += torque_warnings(channels)
-    mappings = {} if mapping is None else {Path(mapping).name: _digest(Path(mapping))}
-    return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)), mappings)
+    return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
 
 
 def _refuse_unitless(

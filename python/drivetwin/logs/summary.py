@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from drivetwin.errors import DamagedChannelError
-from drivetwin.logs.formats import open_recording
 from drivetwin.logs.held import find_raster
-from drivetwin.logs.raw import Column, RawChannel, ReadOptions, Window
+from drivetwin.logs.raw import Column, RawChannel, Recording, Window
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 
 
@@ -40,16 +38,15 @@ class Summary:
     warnings: tuple[str, ...]
 
 
-def summarise(path: Path, options: ReadOptions | None = None) -> Summary:
-    """Look at every column of a file; raises the errors of its reader."""
+def summarise(recording: Recording) -> Summary:
+    """Look at every column of an open file; raises the errors of its reader."""
     found: list[ColumnSummary] = []
-    with open_recording(path, options) as recording:
-        for index, column in enumerate(recording.columns):
-            try:
-                found.append(_summary(column, recording.load(index)))
-            except DamagedChannelError as fault:
-                found.append(ColumnSummary(column, fault=fault.what))
-        return Summary(tuple(found), recording.warnings)
+    for index, column in enumerate(recording.columns):
+        try:
+            found.append(_summary(column, recording.load(index)))
+        except DamagedChannelError as fault:
+            found.append(ColumnSummary(column, fault=fault.what))
+    return Summary(tuple(found), recording.warnings)
 
 
 def _summary(column: Column, channel: RawChannel) -> ColumnSummary:

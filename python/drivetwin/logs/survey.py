@@ -5,13 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from drivetwin.logs.mapping import ChannelSpec, Mapped, guess, spec_of
 from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.raw import Column as LogColumn
-from drivetwin.logs.raw import ReadOptions
+from drivetwin.logs.raw import ReadOptions, Recording
 from drivetwin.logs.roles import NEEDED, quantity_of
 from drivetwin.logs.shiftlog import Quantity
 from drivetwin.logs.summary import ColumnSummary, summarise
@@ -71,13 +70,13 @@ class Survey:
         }
 
 
-def survey(log: Path, card: VehicleCard | None, stated: Mapped) -> Survey:
-    """Look at a log; the card names the pressures, what is `stated` overrides guesses.
+def survey(recording: Recording, source: str, card: VehicleCard | None, stated: Mapped) -> Survey:
+    """Look at an open log; the card names the pressures, what is `stated` overrides guesses.
 
     Raises the typed errors of the readers, but none for channels that are missing or ambiguous:
     these become notes.
     """
-    summary = summarise(log, stated.options)
+    summary = summarise(recording)
     columns = [one.column for one in summary.columns]
     specs = {**({} if card is None else card.channels), **stated.channels}
     kinds = {} if card is None else {name: spec.kind for name, spec in card.elements.items()}
@@ -93,7 +92,7 @@ def survey(log: Path, card: VehicleCard | None, stated: Mapped) -> Survey:
     }
     faults = [f"{one.column}: {one.fault}" for one in summary.columns if one.fault]
     return Survey(
-        source=str(log),
+        source=source,
         columns=tuple(_column(one, candidates) for one in summary.columns if not one.fault),
         mapping=mapping,
         options=stated.options,
