@@ -17,19 +17,26 @@ pub struct Coordinates<T> {
     pub speeds: Matrix<T>,
 }
 
+impl<T: Number> Coordinates<T> {
+    /// Coordinates under `C ω = 0`; of the nodes the first in `order` are made dependent. `None` where rows of C
+    /// depend on each other.
+    pub fn under(mut c: Matrix<T>, order: &[usize]) -> Option<Self> {
+        let dependent = eliminate(&mut c, order);
+        let independent: Vec<usize> = (0..c.cols).filter(|i| !dependent.contains(i)).collect();
+        let speeds = over_independent(&c, &independent, &dependent);
+        (dependent.len() == c.rows).then_some(Self { independent, dependent, speeds })
+    }
+}
+
 /// Choose coordinates for `C ω = 0`; faults name the elements.
 pub fn coordinates<T: Number>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileError> {
-    let mut c = constraint_matrix(m, |_| None);
-    let dependent = eliminate(&mut c, &massless_first(m));
-    if dependent.len() < c.rows {
-        return Err(CompileError::DependentConstraints { elements: dependent_elements(m) });
-    }
-    let independent: Vec<usize> = (0..m.nodes.len()).filter(|i| !dependent.contains(i)).collect();
-    if independent.is_empty() {
+    let found = Coordinates::under(constraint_matrix(m, |_| None), &massless_first(m));
+    let dependent = || CompileError::DependentConstraints { elements: dependent_elements(m) };
+    let found = found.ok_or_else(dependent)?;
+    if found.independent.is_empty() {
         return Err(CompileError::Immobile);
     }
-    let speeds = over_independent(&c, &independent, &dependent);
-    Ok(Coordinates { independent, dependent, speeds })
+    Ok(found)
 }
 
 /// The map from node torques to generalised forces, `Kᵀ f`, like N, but built from the force rows: the

@@ -4,7 +4,8 @@
 
 use super::compile::Network;
 use super::constraints::{constraint_matrix, force_map};
-use super::linalg::{Matrix, SparseRows, independent_rows, is_nothing, is_zero, least_norm, solve};
+use super::hold::{Held, Hold};
+use super::linalg::{Matrix, SparseRows, is_nothing, is_zero, solve};
 use super::radius::radius;
 use crate::model::mechanism::{self, Loss, LossLaw};
 use crate::number::{Number, Values};
@@ -92,8 +93,12 @@ pub struct Mode<T> {
 /// What all modes with the same states of the lossy gears share.
 #[derive(Clone, Debug)]
 pub struct Motion<T> {
-    /// Accelerations of the independent speeds per node torque, speeds × nodes.
-    mobility: Matrix<T>,
+    /// Generalised forces per node torque, speeds × nodes.
+    force_map: Matrix<T>,
+    /// Generalised forces per acceleration of the independent speeds, speeds × speeds.
+    mass: Matrix<T>,
+    /// Generalised forces of all that does not hold a speed, speeds × basis.
+    forces: Matrix<T>,
     /// Accelerations with nothing at rest, speeds × basis.
     free: Matrix<T>,
 }
@@ -167,22 +172,19 @@ impl<T: Number> Network<T> {
     pub fn mode(&self, key: ModeKey, capacity: &[T]) -> Option<Mode<T>> {
         let motion = self.motion_of(key)?;
         let stuck = key.rows();
-        let mut derivative = self.with_other_states(&motion.free);
-        let (stuck_torque, redundant) = if stuck.is_empty() && self.prescribed.is_empty() {
-            (Matrix::zeros(0, self.basis()), false)
-        } else {
-            let (speeds, nodes) = self.held_speeds(&stuck);
-            let response = motion.mobility.times_columns(&nodes);
-            let mut needed = speeds.times(&motion.free);
-            for i in 0..self.prescribed.len() {
-                needed[(stuck.len() + i, self.first_rate() + i)] -= 1.0;
-            }
-            let weights = || self.weights(&stuck, capacity);
-            let (torque, redundant) =
-                holding_torque(speeds.times(&response), needed, weights, stuck.len());
-            derivative.subtract(&response.times(&torque));
-            (torque, redundant)
-        };
+        let (acceleration, stuck_torque, redundant) =
+            if stuck.is_empty() && self.prescribed.is_empty() {
+                (motion.free.clone(), Matrix::zeros(0, self.basis()), false)
+            } else {
+                let (speeds, nodes) = self.held_speeds(&stuck);
+                let hold = self.hold(&motion, (speeds, &nodes), stuck.len());
+                let rates = self.rates(stuck.len());
+                let weights = || self.weights(&stuck, capacity);
+                let Held { acceleration, torque, redundant } =
+                    hold.solve((&motion.forces, rates.as_ref()), weights)?;
+                (acceleration, torque, redundant)
+            };
+        let derivative = self.with_other_states(&acceleration);
         Some(Mode {
             key,
             rates: SparseRows::of(&derivative),
@@ -192,6 +194,29 @@ impl<T: Number> Network<T> {
             stuck_torque,
             stuck,
             redundant,
+        })
+    }
+
+    /// The rows and nodes of [`Network::held_speeds`] in a motion, so many of them at rest.
+    fn hold<'m>(
+        &self,
+        motion: &'m Motion<T>,
+        (rows, nodes): (Matrix<T>, &[mechanism::Row<T>]),
+        resting: usize,
+    ) -> Hold<'m, T> {
+        let acting = (!self.losses.is_empty()).then(|| motion.force_map.times_columns(nodes));
+        Hold { inertia: &motion.mass, acting, rows, resting }
+    }
+
+    /// Accelerations of held speeds over the basis, where some behind those at rest are prescribed.
+    fn rates(&self, resting: usize) -> Option<Matrix<T>> {
+        let count = self.prescribed.len();
+        (count > 0).then(|| {
+            let mut rates = Matrix::zeros(resting + count, self.basis());
+            for i in 0..count {
+                rates[(resting + i, self.first_rate() + i)] = T::of(1.0);
+            }
+            rates
         })
     }
 
@@ -208,9 +233,9 @@ impl<T: Number> Network<T> {
     pub(super) fn motion(&self, key: ModeKey) -> Option<Motion<T>> {
         let kt = force_map(self.force_rows(key), &self.coordinates)?.transposed();
         let mass = kt.times(&self.inertia).times(&self.coordinates.speeds);
-        let mobility = solve(mass, kt).ok()?;
-        let free = mobility.times(&self.with_drag(key));
-        Some(Motion { mobility, free })
+        let forces = kt.times(&self.with_drag(key));
+        let free = solve(mass.clone(), forces.clone()).ok()?;
+        Some(Motion { force_map: kt, mass, forces, free })
     }
 
     /// The constraints as their forces act on the nodes: the driven side of a rolling gear gets what its
@@ -293,7 +318,7 @@ impl<T: Number> Network<T> {
         multipliers.select_rows(&lossy)
     }
 
-    /// What impulses that take `excess` (rows and prescribed speeds × 1, rad/s) off the speeds of rows take off
+    /// What impulses that take `excess` (rows and prescribed speeds × 1, rad/s) off the speeds of rows add to
     /// the independent speeds, speeds × 1, and what of them enters each lossy gear, losses × 1. They act
     /// through the gears as torques do: `KᵀIN Δv = -Kᵀ g λ`. `None` as of [`Network::mode`].
     pub fn impulse(
@@ -304,11 +329,11 @@ impl<T: Number> Network<T> {
     ) -> Option<(Matrix<T>, Matrix<T>)> {
         let motion = self.motion_of(key)?;
         let (speeds, nodes) = self.held_speeds(rows);
-        let response = motion.mobility.times_columns(&nodes);
-        let impulses = held_by(&speeds.times(&response), excess, rows.len());
-        let change = response.times(&impulses);
-        let mut residual = self.inertia.times(&self.coordinates.speeds).times(&change);
-        subtract_held(&mut residual, &nodes, &impulses);
+        let hold = self.hold(&motion, (speeds, &nodes), rows.len());
+        let change = hold.stop(excess)?;
+        let mut residual = Matrix::zeros(self.inertia.rows, 1);
+        residual.subtract(&self.inertia.times(&self.coordinates.speeds).times(&change));
+        subtract_held(&mut residual, &nodes, &hold.impulses(&change));
         Some((change, self.entering(key, &residual)))
     }
 
@@ -368,40 +393,6 @@ fn subtract_held<T: Number>(
             node_torques.subtract_from_row(node, (torques.row(i), direction));
         }
     }
-}
-
-/// Least-norm solution of `W x = b` for what holds speeds; those prescribed, from row `stuck` on, win where the
-/// rows contradict each other.
-pub fn held_by<T: Number>(w: &Matrix<T>, b: &Matrix<T>, stuck: usize) -> Matrix<T> {
-    let order: Vec<usize> = (stuck..w.rows).chain(0..stuck).collect();
-    least_norm(&w.select_rows(&order), &b.select_rows(&order))
-}
-
-/// Solve `W τ = b` for the torques that hold the speeds. For redundant locks the torques are those of
-/// least `Σ (τ_j / weight_j)²`.
-fn holding_torque<T: Number>(
-    w: Matrix<T>,
-    b: Matrix<T>,
-    weights: impl FnOnce() -> Vec<T>,
-    stuck: usize,
-) -> (Matrix<T>, bool) {
-    if independent_rows(&w).len() == w.rows
-        && let Ok(torque) = solve(w.clone(), b.clone())
-    {
-        return (torque, false);
-    }
-    let weights = weights();
-    let mut scaled = w;
-    for r in 0..scaled.rows {
-        for c in 0..scaled.cols {
-            scaled[(r, c)] *= weights[c];
-        }
-    }
-    let mut torque = held_by(&scaled, &b, stuck);
-    for i in 0..torque.rows {
-        torque.row_mut(i).iter_mut().for_each(|t| *t *= weights[i]);
-    }
-    (torque, true)
 }
 
 /// Numbers of the bits that are set.

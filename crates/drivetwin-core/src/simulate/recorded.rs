@@ -49,6 +49,11 @@ impl<T: Real> Recorded<T> {
         let count = samples.1.count();
         let first = block.count == 0;
         block.count = count;
+        if first && !T::DERIVATIVES && samples.1.are_all() {
+            let terms = samples.0.take(count).map(|sample| sample.borrow().re() * factor.re());
+            values.extend(terms);
+            return;
+        }
         values.resize(values.len() + if first { count } else { 0 }, 0.0);
         let at = values.len() - count;
         if first {

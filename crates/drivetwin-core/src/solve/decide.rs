@@ -65,6 +65,9 @@ impl<T: Number> Regime<'_, T> {
                     || self.rank(&candidates) == candidates.len()
                     || !self.decide_exhaustively(&candidates, Some(moving))
                 {
+                    let found = (trial, mode, basis);
+                    let (trial, mode) =
+                        self.hold_what_stays(found, &candidates, overloaded.is_some());
                     self.adopt(trial, &candidates, mode);
                 }
                 return Ok(());
@@ -122,6 +125,41 @@ impl<T: Number> Regime<'_, T> {
             }
         }
         false
+    }
+
+    /// Let friction elements rest that move off without acceleration, where that is right too: at exactly its
+    /// capacity an element holds. After an overload something else must move off in their place.
+    fn hold_what_stays(
+        &mut self,
+        (mut trial, mut mode, basis): (Assignment, Arc<Mode<T>>, Vec<T>),
+        candidates: &[Row],
+        overloaded: bool,
+    ) -> (Assignment, Arc<Mode<T>>) {
+        let before = self.assignment();
+        for &row in candidates {
+            if matches!(row, Row::Gear(_)) || trial.direction(row).is_none() {
+                continue;
+            }
+            let moves_as_before = |held: &Assignment| {
+                let same = |row: &Row| held.direction(*row) == before.direction(*row);
+                overloaded && candidates.iter().all(same)
+            };
+            let mut held = trial.clone();
+            held.rest(row);
+            if moves_as_before(&held) {
+                continue;
+            }
+            self.tell_slipping_from_held(&mut held, candidates);
+            if moves_as_before(&held) || !self.stays(row, (&mode, &basis)) {
+                continue;
+            }
+            let Ok(mode_held) = self.mode(self.key_of(&held)) else { continue };
+            let basis_held = self.basis_now(&held, candidates);
+            if self.fault(&held, candidates, (&mode_held, &basis_held)).is_none() {
+                (trial, mode) = (held, mode_held);
+            }
+        }
+        (trial, mode)
     }
 
     /// Whether what moves off would also do so against static friction.
@@ -278,6 +316,12 @@ impl<T: Number> Regime<'_, T> {
             })
         };
         candidates.iter().copied().find(returns)
+    }
+
+    /// Whether a row has no acceleration but round-off.
+    fn stays(&self, row: Row, (mode, basis): (&Mode<T>, &[T])) -> bool {
+        let (a, scale) = self.acceleration(row, mode, basis);
+        a.decide_with(scale, |a, scale| a.abs() <= ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION)
     }
 
     /// The row at rest that exceeds its bounds most, relative to their size.

@@ -6,8 +6,8 @@ use super::guard::Cause;
 use super::regime::{Event, EventKind, Regime, RowState, self_locking, sign_of};
 use super::status::Status;
 use crate::network::channel::form;
-use crate::network::linalg::{Matrix, solve};
-use crate::network::{GearState, ModeKey, Row, held_by};
+use crate::network::linalg::Matrix;
+use crate::network::{GearState, Hold, ModeKey, Row};
 use crate::number::{Number, Values};
 
 /// Speed of what is to rest that is no more than round-off of a start, relative to the fastest.
@@ -181,7 +181,7 @@ impl<T: Number> Regime<'_, T> {
             }
             if self.gears == before {
                 for i in 0..network.speeds() {
-                    self.x[i] -= change[(i, 0)];
+                    self.x[i] += change[(i, 0)];
                 }
                 break;
             }
@@ -225,10 +225,10 @@ impl<T: Number> Regime<'_, T> {
             g.row_mut(i).copy_from_slice(speed);
         }
         let excess = self.excess(&rows);
-        let response = solve(network.mass.clone(), g.transposed()).expect("the mass is regular");
-        let change = response.times(&held_by(&g.times(&response), &excess, rows.len()));
+        let hold = Hold { inertia: &network.mass, acting: None, rows: g, resting: rows.len() };
+        let change = hold.stop(&excess).expect("the mass is regular");
         for i in 0..network.speeds() {
-            self.x[i] -= change[(i, 0)];
+            self.x[i] += change[(i, 0)];
         }
     }
 

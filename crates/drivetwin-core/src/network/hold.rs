@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+//! What holds speeds (THEORY section 1): torques of friction elements at rest, of gears held by their loss and
+//! of prescribed speeds, with the accelerations under them.
+
+use super::constraints::{Coordinates, force_map};
+use super::linalg::{Matrix, independent_rows, least_norm, solve};
+use crate::number::Number;
+use std::borrow::Cow;
+
+/// Motion under held speeds: `A a + B τ = f`, `G a = g`, without `g` zero.
+///
+/// Rows are dealt with as constraints are: some speeds follow from the others, and the torques from the balance
+/// of these. The shorter way, τ from `G A⁻¹ B`, loses all digits where a member has next to no mass.
+pub struct Hold<'a, T> {
+    /// A: generalised force per acceleration, speeds × speeds.
+    pub inertia: &'a Matrix<T>,
+    /// B: generalised force that each torque takes away, speeds × rows; none where that is `Gᵀ`.
+    pub acting: Option<Matrix<T>>,
+    /// G: what is held, over the speeds, rows × speeds; those prescribed come last.
+    pub rows: Matrix<T>,
+    /// How many of the rows are at rest rather than prescribed.
+    pub resting: usize,
+}
+
+/// Accelerations, speeds × columns, and torques, rows × columns, for each column of f and g.
+pub struct Held<T> {
+    pub acceleration: Matrix<T>,
+    pub torque: Matrix<T>,
+    /// Whether more is held than there are speeds.
+    pub redundant: bool,
+}
+
+impl<T: Number> Hold<'_, T> {
+    /// Where rows contradict each other those prescribed win. Torques of redundant rows are those of least
+    /// `Σ (τ_j / weight_j)²`. `None` if the efficiencies leave the accelerations undetermined.
+    pub fn solve(
+        &self,
+        (f, g): (&Matrix<T>, Option<&Matrix<T>>),
+        weights: impl FnOnce() -> Vec<T>,
+    ) -> Option<Held<T>> {
+        let kept = self.independent();
+        let (left, acceleration) = self.motion(&kept, (f, g))?;
+        let mut balance = f.clone();
+        balance.subtract(&self.inertia.times(&acceleration));
+        let redundant = kept.len() < self.rows.rows;
+        let torque = if redundant {
+            self.shared(&balance, &weights())
+        } else {
+            let acting = self.acting().select_columns(&kept).select_rows(&left.dependent);
+            let found = solve(acting, balance.select_rows(&left.dependent)).ok()?;
+            let place = |row| kept.iter().position(|&k| k == row);
+            found.select_rows(&(0..kept.len()).filter_map(place).collect::<Vec<_>>())
+        };
+        Some(Held { acceleration, torque, redundant })
+    }
+
+    /// Change of the speeds by impulses that take `excess` (rows × 1, rad/s) off what is held. `None` as above.
+    pub fn stop(&self, excess: &Matrix<T>) -> Option<Matrix<T>> {
+        let mut taken = Matrix::zeros(excess.rows, 1);
+        taken.subtract(excess);
+        let nothing = Matrix::zeros(self.inertia.rows, 1);
+        self.motion(&self.independent(), (&nothing, Some(&taken))).map(|(_, change)| change)
+    }
+
+    /// Impulses of the rows that change the speeds so.
+    pub fn impulses(&self, change: &Matrix<T>) -> Matrix<T> {
+        let mut balance = Matrix::zeros(change.rows, 1);
+        balance.subtract(&self.inertia.times(change));
+        self.shared(&balance, &vec![T::of(1.0); self.rows.rows])
+    }
+
+    /// Rows that are independent of each other, prescribed ones first.
+    fn independent(&self) -> Vec<usize> {
+        let order: Vec<usize> = (self.resting..self.rows.rows).chain(0..self.resting).collect();
+        let found = independent_rows(&self.rows.select_rows(&order));
+        found.into_iter().map(|i| order[i]).collect()
+    }
+
+    /// What the rows `kept` leave to move, and the accelerations.
+    fn motion(
+        &self,
+        kept: &[usize],
+        (f, g): (&Matrix<T>, Option<&Matrix<T>>),
+    ) -> Option<(Coordinates<T>, Matrix<T>)> {
+        let all: Vec<usize> = (0..self.inertia.rows).collect();
+        let rows = self.rows.select_rows(kept);
+        let left = Coordinates::under(rows.clone(), &all)?;
+        let forces = match &self.acting {
+            Some(acting) => force_map(acting.select_columns(kept).transposed(), &left)?,
+            None => left.speeds.clone(),
+        };
+        let forces = forces.transposed();
+        let mass = forces.times(self.inertia).times(&left.speeds);
+        let Some(g) = g else {
+            let free = solve(mass, forces.times(f)).ok()?;
+            let acceleration = left.speeds.times(&free);
+            return Some((left, acceleration));
+        };
+        let given = solve(rows.select_columns(&left.dependent), g.select_rows(kept)).ok()?;
+        let mut driving = f.clone();
+        driving.subtract(&self.inertia.select_columns(&left.dependent).times(&given));
+        let mut acceleration = left.speeds.times(&solve(mass, forces.times(&driving)).ok()?);
+        for (i, &speed) in left.dependent.iter().enumerate() {
+            acceleration.subtract_from_row(speed, (given.row(i), T::of(-1.0)));
+        }
+        Some((left, acceleration))
+    }
+
+    fn acting(&self) -> Cow<'_, Matrix<T>> {
+        let acting = self.acting.as_ref().map(Cow::Borrowed);
+        acting.unwrap_or_else(|| Cow::Owned(self.rows.transposed()))
+    }
+
+    /// Torques of all rows that exert `balance` together.
+    fn shared(&self, balance: &Matrix<T>, weights: &[T]) -> Matrix<T> {
+        let mut scaled = self.acting().into_owned();
+        for r in 0..scaled.rows {
+            scaled.row_mut(r).iter_mut().zip(weights).for_each(|(b, &weight)| *b *= weight);
+        }
+        let mut torque = least_norm(&scaled, balance);
+        for (i, &weight) in weights.iter().enumerate() {
+            torque.row_mut(i).iter_mut().for_each(|t| *t *= weight);
+        }
+        torque
+    }
+}
