@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load
 from drivetwin.cli.output import JsonFlag, note, print_json, show, step
@@ -14,7 +15,11 @@ if TYPE_CHECKING:
 
     from drivetwin.identify.held_gear import HeldGear
     from drivetwin.identify.resonance import Resonance
+    from drivetwin.logs.shiftlog import ShiftLog
+    from drivetwin.shifts.converter import LockUp
+    from drivetwin.shifts.find import FoundShifts
     from drivetwin.shifts.shift import Shift
+    from drivetwin.vehicle.card import VehicleCard
 
 
 def shifts(
@@ -25,10 +30,7 @@ def shifts(
     For a log without output torque also the driveline's resonance after each shift and the total
     inertia over η in each gear held, where the log carries them.
     """
-    from drivetwin.cli.tables import quality_tables, shift_table
-    from drivetwin.identify.held_gear import held_gears
-    from drivetwin.identify.resonance import after_shift
-    from drivetwin.results.result_file import RejectedRecord, ShiftRecord
+    from drivetwin.cli.tables import shift_table
     from drivetwin.shifts.converter import lock_ups
     from drivetwin.shifts.find import find_shifts, held_spans
 
@@ -36,40 +38,65 @@ def shifts(
         recording, card = load(log, vehicle, channels)
         found = find_shifts(recording, card)
     closings = lock_ups(recording, card)
-    gears: tuple[HeldGear, ...] = ()
-    swings: list[Resonance | str] = []
-    if "output_torque" not in recording:
-        with step("looking at the gears held"):
-            gears = held_gears(recording, card, found.shifts)
-            swings = [after_shift(recording, shift) for shift in found.shifts]
+    with step("looking at the gears held"):
+        seen = _from_speeds(recording, card, found.shifts)
     if as_json:
-        print_json(
-            {
-                "shifts": [ShiftRecord.of(one).model_dump(by_alias=True) for one in found.shifts],
-                "rejected": [RejectedRecord.of(one).model_dump() for one in found.rejected],
-                "lock_ups": [asdict(one) for one in closings],
-                "resonances": [_swing(*pair) for pair in zip(found.shifts, swings, strict=False)],
-                "held_gears": [asdict(one) for one in gears],
-                "warnings": recording.warnings,
-            }
-        )
+        print_json(_document(found, closings, seen) | {"warnings": recording.warnings})
         return
     if found.shifts:
         show(shift_table(found.shifts, log.name))
     else:
         held = ", ".join(dict.fromkeys(gear for gear, _ in held_spans(recording, card)))
         note(f"no gear shift; gear held: {held or 'none'}")
+    _tell(found, closings, seen)
+    for warning in recording.warnings:
+        note(f"warning: {warning}")
+
+
+class _Seen(NamedTuple):
+    """What the speeds tell of a log without output torque; nothing of another log."""
+
+    gears: tuple[HeldGear, ...] = ()
+    swings: tuple[tuple[Shift, Resonance | str], ...] = ()
+
+
+def _from_speeds(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> _Seen:
+    from drivetwin.identify.held_gear import held_gears
+    from drivetwin.identify.resonance import after_shift
+
+    if "output_torque" in log:
+        return _Seen()
+    gears = held_gears(log, card, shifts)
+    return _Seen(gears, tuple((shift, after_shift(log, shift)) for shift in shifts))
+
+
+def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> dict[str, Any]:
+    from drivetwin.results.result_file import RejectedRecord, ShiftRecord
+
+    return {
+        "shifts": [ShiftRecord.of(one).model_dump(by_alias=True) for one in found.shifts],
+        "rejected": [RejectedRecord.of(one).model_dump() for one in found.rejected],
+        "lock_ups": [asdict(one) for one in closings],
+        "resonances": [_swing(*pair) for pair in seen.swings],
+        "held_gears": [asdict(one) for one in seen.gears],
+    }
+
+
+def _tell(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> None:
+    """All that is to be said behind the table of the shifts, in words and further tables."""
+    from drivetwin.cli.tables import quality_tables
+
     for table in quality_tables(found.shifts):
         show(table)
     for closing in closings:
         text = f"; {closing.warning}" if closing.warning else ""
         note(f"converter lock-up at {_spread(closing.time, closing.sigma)} s (95 %){text}")
-    if gears:
-        show(_gear_table(gears))
-    for gear in gears:
+    if seen.gears:
+        show(_gear_table(seen.gears))
+    for gear in seen.gears:
         if gear.reason:
             note(f"gear {gear.gear}: {gear.reason}")
-    for shift, swing in zip(found.shifts, swings, strict=False):
+    for shift, swing in seen.swings:
         note(f"{_name(shift)}: {_said(swing)}")
     for shift in found.shifts:
         for warning in shift.warnings:
@@ -77,8 +104,6 @@ def shifts(
     for candidate in found.rejected:
         start, end = candidate.time
         note(f"rejected, {start:.3f} s to {end:.3f} s: {candidate.reason}")
-    for warning in recording.warnings:
-        note(f"warning: {warning}")
 
 
 def _name(shift: Shift) -> str:
