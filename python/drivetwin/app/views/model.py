@@ -34,7 +34,7 @@ from drivetwin.errors import MissingParameterError
 from drivetwin.identify.method import Method
 from drivetwin.identify.result import Z95
 from drivetwin.parameters import spec_of
-from drivetwin.report.labels import parameter_label
+from drivetwin.report.labels import parameter_label, shift_labels
 from drivetwin.report.sections.trust import TONES
 from drivetwin.report.units import display_of, with_uncertainty
 from drivetwin.validate import Validation
@@ -218,7 +218,7 @@ def _same(one: Lock, other: Lock) -> bool:
 
 def _choices(work: Work) -> Component:
     methods = {method.value: method.value for method in work.results}
-    shifts = {str(k): f"{one.start_gear}→{one.end_gear}" for k, one in enumerate(work.shifts)}
+    shifts = {str(k): name for k, name in enumerate(shift_labels(work.shifts))}
     shown = work.require_outcome().method.value
     return row(
         choice("model-method", "Result", methods, shown),

@@ -34,7 +34,8 @@ from drivetwin.app.views.parts import (
     told,
 )
 from drivetwin.app.work import Work
-from drivetwin.report.sections.story import PHASE_KEY
+from drivetwin.report.labels import shift_labels
+from drivetwin.report.sections.story import phase_key
 from drivetwin.report.units import display_of, significant
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift
@@ -137,7 +138,7 @@ def _register_fields(app: Dash, sessions: Sessions) -> None:
 
 def _content(work: Work) -> list[Component]:
     shift = work.require_shift()
-    names = {str(k): f"{one.start_gear}→{one.end_gear}" for k, one in enumerate(work.shifts)}
+    names = {str(k): name for k, name in enumerate(shift_labels(work.shifts))}
     fields = [
         field(
             {"boundary": one.value},
@@ -160,7 +161,7 @@ def _content(work: Work) -> list[Component]:
             phase_figure(work.require_log(), shift),
             edits={"shapePosition": True},
         ),
-        hint(PHASE_KEY),
+        hint(phase_key(shift.kind)),
         notes("About this shift", shift.warnings),
         _quality(shift),
     ]

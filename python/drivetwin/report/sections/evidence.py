@@ -15,6 +15,7 @@ from drivetwin.report.figures.load import load_figure
 from drivetwin.report.figures.momentum import momentum_figure
 from drivetwin.report.figures.ringdown import ringdown_figure
 from drivetwin.report.figures.wlse import WlseLabels, wlse_figure
+from drivetwin.report.labels import shift_labels
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -105,7 +106,7 @@ def evidence_sections(found: Identification) -> list[Section]:
 
 def _stages(found: Identification, stages: Sequence[_Kind], method: str) -> list[_Stages[_Kind]]:
     """Evidence of one method, each with the shift it is of where there are several."""
-    names = [f"Shift {one.start_gear}→{one.end_gear}, {method}" for one in found.shifts]
+    names = [f"Shift {name}, {method}" for name in shift_labels(found.shifts)]
     if len(stages) < 2 or len(stages) != len(names):
         names = [method[0].upper() + method[1:]] * len(stages)
     return [_Stages(name, one) for name, one in zip(names, stages, strict=True)]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.residuals import (
@@ -20,7 +21,7 @@ from drivetwin.identify.signals import ShiftSignals
 from drivetwin.report.figures.residuals import residual_figure, residual_panels
 from drivetwin.report.figures.sensitivity import sensitivity_figure
 from drivetwin.report.figures.shift_phases import shift_spans
-from drivetwin.report.labels import channel_label
+from drivetwin.report.labels import channel_label, shift_labels
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -42,7 +43,7 @@ def likelihood_sections(found: Identification) -> list[Section]:
 
 
 def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
-    labels = [_label(s) for s in found.evidence.signals]
+    labels = _labels(found.evidence.signals)
     tests = residual_tests(fit).values()
     blocks: list[Block] = [_test_table(list(zip(labels, tests, strict=True)))]
     for label, shift, residuals in zip(
@@ -69,10 +70,13 @@ def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
     )
 
 
-def _label(signals: ShiftSignals) -> str:
-    """The shift, and its log where there are several."""
-    shift = f"{signals.shift.start_gear}→{signals.shift.end_gear}"
-    return f"{shift} of log {signals.log}" if signals.log else shift
+def _labels(signals: Sequence[ShiftSignals]) -> list[str]:
+    """The shifts, and their logs where there are several."""
+    labels = []
+    for log, group in groupby(signals, key=lambda one: one.log):
+        names = shift_labels([one.shift for one in group])
+        labels += [f"{name} of log {log}" if log else name for name in names]
+    return labels
 
 
 def _test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> TableBlock:

@@ -9,6 +9,7 @@ from drivetwin.report.figures.friction import friction_figure
 from drivetwin.report.figures.recording import log_figure, log_panels
 from drivetwin.report.figures.shift_phases import shift_panels, shift_phases
 from drivetwin.report.figures.validation import validation_figure, validation_panels
+from drivetwin.report.labels import shift_labels
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -21,14 +22,15 @@ from drivetwin.report.sections.blocks import (
     link_of,
 )
 from drivetwin.report.units import significant
-from drivetwin.shifts.shift import Shift
+from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.validate import Validation
 
-PHASE_KEY = (
-    "1 gear held before the shift · 2 torque phase: the on-coming element takes over torque, the "
-    "output torque dips · 3 inertia phase: the input speed falls to the new gear · 4 new gear "
-    "locked, lock-up oscillation."
-)
+_TORQUE_PHASE = {
+    ShiftKind.POWER_ON_UP: "the on-coming element takes over torque, the output torque dips",
+    ShiftKind.POWER_OFF_DOWN: "the on-coming element takes over torque",
+    ShiftKind.POWER_OFF_UP: "empty where the on-coming element takes hold only later",
+    ShiftKind.POWER_ON_DOWN: "empty where the on-coming element takes hold only later",
+}
 
 OF_TORQUE = (
     "The clutch torque follows from the output torque (eq. 16, with the output side's inertia), "
@@ -42,23 +44,33 @@ OF_SPEEDS = (
 )
 
 
+def phase_key(kind: ShiftKind) -> str:
+    """What the numbers of the four phases stand for in a shift of this kind."""
+    up = kind in (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_UP)
+    return (
+        f"1 gear held before the shift · 2 torque phase: {_TORQUE_PHASE[kind]} · 3 inertia phase: "
+        f"the input speed {'falls' if up else 'rises'} to that of the new gear · 4 new gear "
+        "locked, lock-up oscillation."
+    )
+
+
 def shift_section(found: Identification, log: ShiftLog) -> Section:
     """Measured signals with the detected phases, one figure per shift."""
     blocks: list[Block] = []
     if len(found.shifts) > 1:
         text = "The whole log; each button shows one shift of those that were used."
         blocks.append(FigureBlock(log_figure(log, found.shifts), text, log_panels(log)))
-    for shift in found.shifts:
-        title = f"Shift {shift.start_gear}→{shift.end_gear}, {shift.kind.value}. "
+    for name, shift in zip(shift_labels(found.shifts), found.shifts, strict=True):
+        title = f"Shift {name}, {shift.kind.value}. "
         blocks.append(
             FigureBlock(
                 shift_phases(log, shift),
-                title + PHASE_KEY,
+                title + phase_key(shift.kind),
                 shift_panels(log, shift),
                 link_of(shift),
             )
         )
-        blocks.append(_phase_table(shift))
+        blocks.append(_phase_table(name, shift))
         if shift.warnings:
             blocks.append(NotesBlock("About this shift", shift.warnings, Tone.DOUBTFUL))
     if found.rejected:
@@ -72,7 +84,7 @@ def shift_section(found: Identification, log: ShiftLog) -> Section:
     )
 
 
-def _phase_table(shift: Shift) -> TableBlock:
+def _phase_table(name: str, shift: Shift) -> TableBlock:
     spans = (
         ("1 gear held", shift.before, None),
         ("2 torque phase", shift.torque_phase, "torque_start"),
@@ -100,9 +112,7 @@ def _phase_table(shift: Shift) -> TableBlock:
         Cell("lasts", number=True),
     )
     elements = f"{shift.offgoing} off-going, {shift.oncoming} on-coming."
-    return TableBlock(
-        f"Phases of shift {shift.start_gear}→{shift.end_gear}: {elements}", head, rows
-    )
+    return TableBlock(f"Phases of shift {name}: {elements}", head, rows)
 
 
 def friction_section(found: Identification) -> Section:
@@ -114,7 +124,7 @@ def friction_section(found: Identification) -> Section:
     over_eta = any(curve.over_eta for curve in found.friction.values())
     return Section(
         "friction",
-        "Friction of the on-coming element",
+        "Friction over slip",
         f"{OF_SPEEDS if over_eta else OF_TORQUE} Only the product of μ and N·D·A·r can be told "
         "from a log: an error of the geometry scales the whole curve. Points that scatter at one "
         "slip are of the torque phase, where the element carries little.",
@@ -135,16 +145,16 @@ def _law_text(curve: FrictionCurve) -> str:
 def validation_section(validations: tuple[Validation, ...]) -> Section:
     """Simulation over measurement (Fig. 11)."""
     blocks: list[Block] = []
-    for one in validations:
-        shift = one.shift
+    names = shift_labels([one.shift for one in validations])
+    for name, one in zip(names, validations, strict=True):
         text = (
-            f"Shift {shift.start_gear}→{shift.end_gear}: the measured engine torque and pressures "
+            f"Shift {name}: the measured engine torque and pressures "
             "drive the identified model; nothing else is fed in after the start. Below each output "
-            "stands what is left, measured minus simulated. While the on-coming element slips, the "
+            "stands what is left, measured minus simulated. While an element slips, the "
             "noise of its pressure sensor passes into the simulated torque and output speed."
         )
         blocks.append(
-            FigureBlock(validation_figure(one), text, validation_panels(one), link_of(shift))
+            FigureBlock(validation_figure(one), text, validation_panels(one), link_of(one.shift))
         )
         blocks.append(_event_table(one))
     return Section(
