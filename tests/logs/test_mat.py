@@ -97,6 +97,21 @@ def test_the_time_vector_can_be_named(tmp_path: Path) -> None:
     assert [one.name for one in raw.channels] == ["x"]
 
 
+def test_the_time_that_is_stated_goes_before_one_by_name(tmp_path: Path) -> None:
+    content = {"t": T, "Gbx": T + 1, "Gbx_T": np.cos(T), "n": T[::2], "n_t": T[::2]}
+    found = by_name(read(tmp_path, content, ReadOptions(TimeColumn("t"))))
+    assert np.array_equal(found["Gbx"].time, T)
+    assert np.array_equal(found["n"].time, T[::2])
+
+
+def test_a_temperature_is_no_time(tmp_path: Path) -> None:
+    content = {"t": T, "Gbx": T + 1, "Gbx_T": np.cos(T), "Gbx_T_unit": "degC", "T1": T * 3}
+    found = by_name(read(tmp_path, {**content, "T1_unit": "°C"}))
+    assert set(found) == {"Gbx", "Gbx_T", "T1"}
+    assert all(np.array_equal(one.time, T) for one in found.values())
+    assert found["Gbx_T"].unit == "degC"
+
+
 def test_two_time_vectors_that_fit_are_not_chosen_between(tmp_path: Path) -> None:
     raw = read(tmp_path, {"t": T, "time": T + 5, "x": T, "y": T, "y_t": T})
     assert raw.unreadable["x"] == "several time vectors fit: t, time"

@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from drivetwin.errors import Where
-from drivetwin.logs.names import is_time_name
+from drivetwin.logs.names import is_time_name, may_be_time
 from drivetwin.logs.raw import RawChannel, TimeColumn
 from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.units import time_factor
@@ -57,8 +57,9 @@ class _Search:
             self.found.unreadable[prefix] = "structs are nested too deep"
             return
         vectors = {name: v for name, value in tree.items() if (v := _vector(value)) is not None}
-        times = self._times(vectors)
-        used = {name for name in vectors if self._is_time(name, vectors)}
+        clocks = {name for name in vectors if may_be_time(_unit(name, tree))}
+        times = self._times(vectors, clocks)
+        used = {name for name in vectors if self._is_time(name, vectors, clocks)}
         for name, values in vectors.items():
             if name in used:
                 continue
@@ -117,7 +118,7 @@ class _Search:
         """A vector without a time of its own: the one common time vector of its length."""
         stated = self._stated.source
         names = [stated] if stated is not None and stated in vectors else [
-            name for name in vectors if is_time_name(name)
+            name for name in vectors if is_time_name(name) and may_be_time(_unit(name, tree))
         ]  # fmt: skip
         fitting = [name for name in names if vectors[name].size == values.size]
         if len(fitting) == 1:
@@ -131,21 +132,25 @@ class _Search:
                 f"no time vector of its {values.size} samples: neither {path}_t nor a common one"
             )
 
-    def _times(self, vectors: Mapping[str, FloatArray]) -> dict[str, str]:
-        """The time vector of each name that has one of its own."""
+    def _times(self, vectors: Mapping[str, FloatArray], clocks: Set[str]) -> dict[str, str]:
+        """The time vector of each name that has one of its own among `clocks`.
+
+        What is stated for the whole file goes before it, where it fits.
+        """
+        stated = vectors.get(self._stated.source or "")
         return {
             name: name + suffix
-            for name in vectors
+            for name, values in vectors.items()
             for suffix in _TIME_SUFFIXES
-            if name + suffix in vectors
+            if name + suffix in clocks and (stated is None or stated.size != values.size)
         }
 
-    def _is_time(self, name: str, vectors: Mapping[str, FloatArray]) -> bool:
+    def _is_time(self, name: str, vectors: Mapping[str, FloatArray], clocks: Set[str]) -> bool:
         owner = any(
             name.endswith(suffix) and name.removesuffix(suffix) in vectors
             for suffix in _TIME_SUFFIXES
         )
-        return owner or is_time_name(name) or name == self._stated.source
+        return name == self._stated.source or (name in clocks and (owner or is_time_name(name)))
 
     def _seconds(self, name: str, tree: Mapping[str, Any]) -> float:
         """Factor to seconds of a time vector; MATLAB's own unit is the second."""

@@ -35,6 +35,11 @@ def is_time_name(name: str) -> bool:
     return re.sub(r"[^a-z]", "", name.casefold()) in _TIME_NAMES
 
 
+def may_be_time(unit: str | None) -> bool:
+    """Tell whether a column of this unit may hold time: none is stated, or none of another kind."""
+    return unit is None or is_time_unit(unit) or lookup(unit) is None
+
+
 def time_indices(names: Sequence[str], units: Sequence[str | None], time: TimeColumn) -> list[int]:
     """Return the indices of all time columns: as stated, else those with a name for time.
 
@@ -45,7 +50,7 @@ def time_indices(names: Sequence[str], units: Sequence[str | None], time: TimeCo
     return [
         index
         for index, (name, unit) in enumerate(zip(names, units, strict=True))
-        if is_time_name(name) and (unit is None or is_time_unit(unit) or lookup(unit) is None)
+        if is_time_name(name) and may_be_time(unit)
     ]
 
 
