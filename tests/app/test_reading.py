@@ -41,14 +41,20 @@ def test_a_wrong_mapping_is_a_fault_with_the_columns_at_hand(place: Path, tmp_pa
 def test_a_corrected_unit_is_what_the_log_is_read_in(place: Path, tmp_path: Path) -> None:
     plain, opened = (
         _open(place, tmp_path, channels=channels)
-        for channels in ({}, {"output_torque": ChannelSpec(_column(place), unit="kNm")})
+        for channels in ({}, {"output_torque": ChannelSpec(_column(place), unit="lbf*ft")})
     )
     assert plain.log is not None
-    if opened.log is None:
-        assert "torque" in opened.fault
-    else:
-        ratio = opened.log["output_torque"].values / plain.log["output_torque"].values
-        assert ratio == pytest.approx(1e3)
+    assert opened.log is not None
+    ratio = opened.log["output_torque"].values / plain.log["output_torque"].values
+    assert ratio == pytest.approx(0.3048 * 0.45359237 * 9.80665)
+
+
+def test_a_corrected_unit_that_cannot_be_is_a_fault(place: Path, tmp_path: Path) -> None:
+    opened = _open(
+        place, tmp_path, channels={"output_torque": ChannelSpec(_column(place), unit="kNm")}
+    )
+    assert opened.log is None
+    assert "largest torque" in opened.fault
 
 
 def _column(place: Path) -> str:
