@@ -314,7 +314,15 @@ def _strayed(one: Validation) -> list[str]:
     if speed is None or not np.isfinite(speed.measured).any():
         return texts
     limits = (float(np.nanmin(speed.measured)), float(np.nanmax(speed.measured)))
-    return texts + _outside("speed", [speed.simulated], limits)
+    if (reached := _beyond([speed.simulated], limits)) is None:
+        return texts
+    shift = one.shift
+    return [
+        *texts,
+        f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s: the simulated "
+        f"input speed goes from {reached[0]:.4g} to {reached[1]:.4g} rad/s, the measured one from "
+        f"{limits[0]:.4g} to {limits[1]:.4g}",
+    ]
 
 
 def _slip_under_load(run: Trajectory) -> list[FloatArray]:
@@ -329,15 +337,22 @@ _RANGES = {"slip": "rad/s", "pressure": "Pa", "torque": "N·m", "speed": "rad/s"
 
 
 def _outside(name: str, arrays: list[FloatArray], limits: tuple[float, float]) -> list[str]:
+    if (reached := _beyond(arrays, limits)) is None:
+        return []
+    return [
+        f"the simulation leaves the twin's range of {name}: {reached[0]:.4g} to {reached[1]:.4g}, "
+        f"identified for {limits[0]:.4g} to {limits[1]:.4g} {_RANGES[name]}"
+    ]
+
+
+def _beyond(arrays: list[FloatArray], limits: tuple[float, float]) -> tuple[float, float] | None:
+    """Least and greatest value; None where no value lies clearly beyond the limits."""
     values = np.concatenate(arrays)
     values = values[np.isfinite(values)]
     if values.size == 0:
-        return []
+        return None
     low, high = float(values.min()), float(values.max())
     margin = 0.02 * (limits[1] - limits[0])
     if low >= limits[0] - margin and high <= limits[1] + margin:
-        return []
-    return [
-        f"the simulation leaves the twin's range of {name}: {low:.4g} to {high:.4g}, "
-        f"identified for {limits[0]:.4g} to {limits[1]:.4g} {_RANGES[name]}"
-    ]
+        return None
+    return low, high
