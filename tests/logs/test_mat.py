@@ -118,6 +118,18 @@ def test_two_time_vectors_that_fit_are_not_chosen_between(tmp_path: Path) -> Non
     assert [one.name for one in raw.channels] == ["y"]
 
 
+def test_columns_of_a_matrix_over_the_time_are_signals(tmp_path: Path) -> None:
+    values = np.column_stack((np.cos(T), T * 2.0, T * 3.0))
+    bus = {"time": T, "signals": {"values": values[:, :2], "label": "bus", "dimensions": 2.0}}
+    raw = read(tmp_path, {"tout": T[:, None], "yout": values, "log": bus, "map": np.eye(T.size)})
+    found = by_name(raw)
+    assert list(found) == ["yout(1)", "yout(2)", "yout(3)", "bus(1)", "bus(2)"]
+    assert all(np.array_equal(one.time, T) for one in found.values())
+    assert np.array_equal(found["yout(3)"].values, values[:, 2])
+    assert np.array_equal(found["bus(1)"].values, values[:, 0])
+    assert "a matrix 200×200" in raw.unreadable["map"]
+
+
 def test_a_matrix_is_told(tmp_path: Path) -> None:
     raw = read(tmp_path, {"t": T, "x": T, "both": np.column_stack((T, T))})
     assert "a matrix 200×2" in raw.unreadable["both"]

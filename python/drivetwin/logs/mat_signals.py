@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -77,7 +77,7 @@ class _Search:
             elif not used and (pair := _time_and_values(value)) is not None:
                 self._add(prefix + name, _unit(name, tree), pair, self._seconds(name, {}))
             elif name not in vectors:
-                self._told(prefix + name, value)
+                self._matrix(prefix + name, value, vectors, tree)
 
     def _items(self, items: list[Any], path: str, depth: int) -> None:
         for place, item in enumerate(items):
@@ -103,10 +103,14 @@ class _Search:
                 unit = _field_unit(part) or unit
                 values = next((part[key] for key in _DATA_FIELDS if key in part), None)
             vector = _vector(values)
-            if vector is None:
-                self._told(name, values)
-            else:
+            if vector is not None:
                 self._add(name, unit, (time, vector), factor)
+                continue
+            columns = _columns(values, [time])
+            for number, column in enumerate(columns, start=1):
+                self._add(f"{name}({number})", unit, (time, column), factor)
+            if not columns:
+                self._told(name, values)
 
     def _common(
         self,
@@ -116,10 +120,7 @@ class _Search:
         tree: Mapping[str, Any],
     ) -> None:
         """A vector without a time of its own: the one common time vector of its length."""
-        stated = self._stated.source
-        names = [stated] if stated is not None and stated in vectors else [
-            name for name in vectors if is_time_name(name) and may_be_time(_unit(name, tree))
-        ]  # fmt: skip
+        names = self._common_times(vectors, tree)
         fitting = [name for name in names if vectors[name].size == values.size]
         if len(fitting) == 1:
             own = path.rsplit(".", 1)[-1]
@@ -131,6 +132,30 @@ class _Search:
             self.found.unreadable[path] = (
                 f"no time vector of its {values.size} samples: neither {path}_t nor a common one"
             )
+
+    def _matrix(
+        self,
+        path: str,
+        value: Any,
+        vectors: Mapping[str, FloatArray],
+        tree: Mapping[str, Any],
+    ) -> None:
+        """Columns over a common time vector, else no signal."""
+        times = [vectors[name] for name in self._common_times(vectors, tree)]
+        columns = _columns(value, times)
+        for number, column in enumerate(columns, start=1):
+            self._common(f"{path}({number})", column, vectors, tree)
+        if not columns:
+            self._told(path, value)
+
+    def _common_times(
+        self, vectors: Mapping[str, FloatArray], tree: Mapping[str, Any]
+    ) -> list[str]:
+        """The time vectors for all that have none of their own: as stated, else by name."""
+        stated = self._stated.source
+        if stated is not None and stated in vectors:
+            return [stated]
+        return [one for one in vectors if is_time_name(one) and may_be_time(_unit(one, tree))]
 
     def _times(self, vectors: Mapping[str, FloatArray], clocks: Set[str]) -> dict[str, str]:
         """The time vector of each name that has one of its own among `clocks`.
@@ -183,6 +208,20 @@ def _vector(value: Any) -> FloatArray | None:
         return None
     squeezed = value.squeeze()
     return squeezed.astype(np.float64) if squeezed.ndim == 1 and squeezed.size > 1 else None
+
+
+def _columns(value: Any, times: Sequence[FloatArray]) -> list[FloatArray]:
+    """The columns of a matrix with a row for each sample of one of `times`, as Simulink writes.
+
+    None where rows and columns cannot be told apart, and where the first column only grows: it may
+    be a time of its own.
+    """
+    sizes = [time.size for time in times]
+    matrix = isinstance(value, np.ndarray) and value.dtype.kind in "iufb" and value.ndim == 2
+    if not matrix or value.shape[0] not in sizes or value.shape[1] in sizes:
+        return []
+    columns = list(value.astype(np.float64).T)
+    return columns if np.any(np.diff(columns[0]) <= 0.0) else []
 
 
 def _time_and_values(value: Any) -> tuple[FloatArray, FloatArray] | None:
