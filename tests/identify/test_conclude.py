@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.identify.conclude import MISFIT, Conclusions, conclude, low_gear_notes
+from drivetwin.identify.conclude import MISFIT, Conclusions, conclude, labels_of, low_gear_notes
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Verdict
 from drivetwin.vehicle.spec import PriorValue
@@ -23,6 +23,15 @@ def test_a_gear_with_still_torque_is_named() -> None:
 def test_another_shift_from_that_gear_with_steps_tells_it() -> None:
     both = (*still().evidence.signals, *stepped().evidence.signals)
     assert low_gear_notes(both) == {}
+
+
+def test_the_same_shift_twice_is_told_apart_by_its_lock_up() -> None:
+    (first,) = stepped().evidence.signals
+    later = replace(first, shift=replace(first.shift, lockup_time=12.5))
+    assert labels_of([first]) == ["shift 2-3"]
+    assert labels_of([first, later])[1] == "shift 2-3 at 12.50 s"
+    apart = [replace(first, log=1), replace(later, log=2)]
+    assert labels_of(apart) == ["log 1, shift 2-3", "log 2, shift 2-3"]
 
 
 def _with_J_out(value: float, known: PriorValue | None) -> Conclusions:

@@ -129,6 +129,17 @@ def _impossible(name: str, value: float, prior: PriorValue | None) -> Estimate |
     return designed(name, prior.value, prior.std, f"design value of the card: {text}")
 
 
+def labels_of(signals: Sequence[ShiftSignals]) -> list[str]:
+    """What the shifts are called: by gears, and by lock-up where a log has the same shift twice."""
+    gears = [(s.log, s.shift.start_gear, s.shift.end_gear) for s in signals]
+    labels = []
+    for s, same in zip(signals, gears, strict=True):
+        label = f"shift {s.shift.start_gear}-{s.shift.end_gear}"
+        label += f" at {s.shift.lockup_time:.2f} s" if gears.count(same) > 1 else ""
+        labels.append(f"log {s.log}, {label}" if s.log else label)
+    return labels
+
+
 def low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
     """By parameter id what a still engine torque in the lower gear costs it.
 
@@ -199,12 +210,12 @@ def _misfits(
 ) -> dict[str, str]:
     """By parameter of `ids` the regression behind it in which the model does not hold."""
     found: dict[str, str] = {}
-    for shift, s in zip(shifts, signals, strict=True):
+    for shift, label in zip(shifts, labels_of(signals), strict=True):
         for name, chi2 in _residual_powers(shift).items():
             if chi2 > MISFIT:
                 text = (
-                    f"the {name} of shift {s.shift.start_gear}-{s.shift.end_gear} leaves "
-                    f"{chi2:.0f} times the noise power: some effect is not in the model"
+                    f"the {name} of {label} leaves {chi2:.0f} times the noise power: some effect "
+                    "is not in the model"
                 )
                 concerned = [i for i in ids if i in shift.ids and spec_of(i).stem in RESTS_ON[name]]
                 found |= dict.fromkeys(concerned, text)
@@ -231,8 +242,7 @@ def _warnings(
     shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: dict[str, str]
 ) -> tuple[str, ...]:
     texts = list(dict.fromkeys(notes.values()))
-    for shift, s in zip(shifts, signals, strict=True):
-        label = f"shift {s.shift.start_gear}-{s.shift.end_gear}"
+    for shift, s, label in zip(shifts, signals, labels_of(signals), strict=True):
         texts += list(s.shift.warnings)
         texts += [
             f"{label}: the {name} leaves {chi2:.1f} times the noise power; intervals are widened"
