@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.app.jobs import call
-from drivetwin.app.reading import LONGEST, Opened, Request, open_gearbox, open_log
+from drivetwin.app.reading import LONGEST, Opened, Request, open_gearbox, open_log, time_for
 from drivetwin.errors import InputError
 from drivetwin.logs.mapping import ChannelSpec
 from tests.app.bad_files import hdf5_bomb, mat_bomb
@@ -94,3 +94,11 @@ def test_faults_of_an_upload_call_it_by_its_label(place: Path, tmp_path: Path) -
             call(open_log, request, tmp_path / "mapping.toml", limit=LONGEST)
         assert label in str(caught.value)
         assert "a1b2c3" not in str(caught.value)
+
+
+def test_a_long_log_gets_more_time_within_bounds(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    for size, limit in ((1000, LONGEST + 0.002), (160_000_000, LONGEST + 320.0), (10**9, 600.0)):
+        with log.open("wb") as file:
+            file.truncate(size)
+        assert time_for(log) == pytest.approx(limit)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.app import reading
 from drivetwin.app.folder import Folder
 from drivetwin.app.locks import Lock, LockKind
 from drivetwin.app.mapping import Entry, rows_of
@@ -55,6 +56,14 @@ def test_cancelling_leaves_nothing_running(session: Session) -> None:
     assert session.job is None
     assert session.poll() is False
     assert session.work.method is None
+
+
+def test_a_log_is_given_up_after_the_time_for_its_size(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "PER_BYTE", -1.0)
+    with pytest.raises(InputError, match="was stopped"):
+        _open(session)
 
 
 def test_a_correction_reads_the_log_again(session: Session) -> None:

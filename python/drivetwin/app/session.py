@@ -232,7 +232,7 @@ class Session:
         )
         scratch = self.scratch / "mapping.toml"
         opened: reading.Opened = jobs.call(
-            reading.open_log, request, scratch, limit=reading.LONGEST
+            reading.open_log, request, scratch, limit=reading.time_for(request.log)
         )
         return opened
 
