@@ -31,3 +31,16 @@ def test_both_where_the_off_going_one_slips_under_pressure(stepped: Run) -> None
     slow = _held(signals, 2.0 * SLIDES)
     assert carriers(slow, driveline) == ("B3", "B2")
     assert all_carriers([signals, slow], [driveline, driveline]) == ("B3", "B2")
+
+
+def test_noise_about_the_fill_pressure_does_not_make_an_element_slip_under_load(
+    stepped: Run,
+) -> None:
+    """Single samples, some in a thousand, rise far enough over the whole of it."""
+    signals, driveline = stepped.signals(), stepped.truth.driveline()
+    off, sigma = signals.pressures["B2"], 7e3
+    noise = sigma * np.random.default_rng(0).standard_normal(off.time.size)
+    near = driveline.offgoing.P0.value + 2.0 * sigma + noise
+    values = np.where(off.time < signals.shift.inertia_phase[0] + 3.0 * SLIDES, near, 0.0)
+    pressures = {**signals.pressures, "B2": Sampled(off.time, values, sigma)}
+    assert carriers(replace(signals, pressures=pressures), driveline) == ("B3",)

@@ -11,10 +11,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from drivetwin.identify.likelihood.smooth import local_mean
 from drivetwin.identify.signals import Driveline, ShiftSignals
 
 SLIDES = 0.15
-"""Time [s] for which an off-going element must stay filled in the inertia phase."""
+"""Time [s] for which an off-going element must be filled in the inertia phase."""
+ABOVE = 3.0
+"""Pressure above P0, in its noise, from which an element is filled: nearer to it, noise seems to
+tell μ from P0."""
 
 
 def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
@@ -22,10 +26,11 @@ def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
     coming, leaving = driveline.oncoming, driveline.offgoing
     pressure = signals.pressures[leaving.name]
     start, end = signals.shift.inertia_phase
+    steady = local_mean(pressure)  # noise alone lifts single samples far above P0
     inside = (pressure.time > start) & (pressure.time < end)
-    limit = leaving.P0.value + 2.0 * leaving.P0.std + 3.0 * pressure.sigma
-    filled = pressure.time[inside & (pressure.values > limit)]
-    slides = filled.size > 0 and float(np.ptp(filled)) > SLIDES
+    limit = leaving.P0.value + 2.0 * leaving.P0.std + ABOVE * pressure.sigma
+    filled = np.count_nonzero(inside & (steady > limit))
+    slides = filled * float(np.median(np.diff(pressure.time))) > SLIDES
     return (coming.name, leaving.name) if slides else (coming.name,)
 
 
