@@ -16,7 +16,9 @@ from drivetwin.driveline import FrictionTable, ShiftElement
 from drivetwin.dyno.actuators import Actuator, Program
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification
+from drivetwin.identify.shape import departures as module
 from drivetwin.identify.shape.departures import Departure, Kind, departures
 from drivetwin.identify.signals import Sampled
 from tests.identify.asked import DURATION, RATE, stepped
@@ -61,6 +63,26 @@ def test_sees_none_where_there_is_none() -> None:
     for one in departures(stepped()):
         assert one.text != "seen", one
         assert abs(one.value) < 3.0 * one.std
+
+
+def test_slow_errors_of_a_sensor_make_a_departure_less_sure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Noise of the output torque that stays for 50 samples; nothing found is put back."""
+    monkeypatch.setattr(module, "_put_back", lambda *_: None)
+    found = stepped()
+    fit, _ = likelihood_of(found)
+    (residual,), (part,) = fit.normal.residuals, fit.problem.parts
+    count = part.record.outputs[0].values.size
+    held = np.repeat(np.random.default_rng(1).standard_normal(count // 50 + 1), 50)[:count]
+    slow = residual.copy()
+    slow[:count] += part.record.sigma[:count] * held
+    wrong = replace(fit, normal=replace(fit.normal, residuals=(slow,)))
+    evidence = replace(found.evidence, likelihood=wrong)
+    sure, unsure = departures(found), departures(replace(found, evidence=evidence))
+    for before, after in zip(sure, unsure, strict=True):
+        assert after.std >= 0.99 * before.std
+    assert max(a.std / b.std for a, b in zip(unsure, sure, strict=True)) > 1.2
 
 
 def test_a_steady_temperature_tells_nothing_and_a_moving_one_is_looked_at() -> None:

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.identify.conclude import Conclusions, low_gear_notes
+from drivetwin.identify.conclude import Conclusions, labels_of, low_gear_notes
 from drivetwin.identify.design import contradictions, design_of, held_against
 from drivetwin.identify.likelihood.curves import METHOD, curves_of
 from drivetwin.identify.likelihood.derived import absolute_ids, of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.late import lateness_in_words
+from drivetwin.identify.likelihood.left_out import left_out
 from drivetwin.identify.likelihood.limits import at_limits
 from drivetwin.identify.likelihood.null_space import null_directions
 from drivetwin.identify.likelihood.other_law import other_law_in_words
@@ -84,12 +84,17 @@ def conclude(
         if estimates[name].verdict is not Verdict.DESIGN
     }
     estimates |= {name: doubted(estimates[name], text) for name, text in limits.items()}
+    curves = curves_of(fit, linear, systematic)
+    effects = tuple(left_out(fit))
+    for effect in effects:
+        estimates = effect.held_against(estimates, tuple(values), matrix)
+        curves = {name: effect.widened(fit, name, curve) for name, curve in curves.items()}
     if why := against(fit):
         estimates = {name: doubted(one, why) for name, one in estimates.items()}
     estimates |= _of_what_is_fixed(fit, signals, drivelines, estimates)
     return Conclusions(
         estimates,
-        curves_of(fit, linear, systematic),
+        curves,
         tuple(values),
         correlation(covariance),
         (
@@ -97,6 +102,7 @@ def conclude(
             *(one.text for one in contradicted),
             *(f"{name}: {text}" for name, text in limits.items()),
             *_warnings(fit, signals),
+            *(one.text for one in effects),
             *other_law_in_words(fit, values, matrix, np.sqrt(np.diag(covariance))),
         ),
         _load_law(fit, systematic),
@@ -187,9 +193,8 @@ def _systematic(matrix: FloatArray, systematic: FloatArray) -> list[float]:
 
 def _warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
     texts = []
-    for s, tests in zip(signals, residual_tests(fit).values(), strict=True):
-        label = f"shift {s.shift.start_gear}-{s.shift.end_gear}"
-        label = f"log {s.log}, {label}" if s.log else label
+    labels = labels_of(signals)
+    for s, label, tests in zip(signals, labels, residual_tests(fit).values(), strict=True):
         texts += list(s.shift.warnings)
         texts += [f"{label}: {text}" for test in tests for text in test.warnings]
-    return (*texts, *lateness_in_words(fit), *null_directions(fit))
+    return (*texts, *null_directions(fit))

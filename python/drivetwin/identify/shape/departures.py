@@ -22,9 +22,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from drivetwin.driveline import ShiftElement, Trajectory
-from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
-from drivetwin.identify.likelihood.newton import minimise
+from drivetwin.identify.likelihood.contact import Contact, contact_of
+from drivetwin.identify.likelihood.fit import LikelihoodFit, spread_of
+from drivetwin.identify.likelihood.newton import minimise, step_of
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.score import score_of
 from drivetwin.identify.profile import likelihood_of
@@ -99,7 +99,7 @@ def departures(found: Identification, temperature: Sampled | None = None) -> tup
         if again is None:
             break
         step = _step(again, largest, temperature, total)
-    std = np.sqrt(max(fit.chi2, 1.0) * np.diag(step.covariance))
+    std = np.sqrt(np.diag(step.covariance))
     return tuple(
         Departure(e.kind, e.element, float(value), float(error), e.plausible)
         for e, value, error in zip(step.effects, total, std, strict=True)
@@ -127,10 +127,10 @@ def _step(
     columns = [_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
     precision = np.array([e.plausible for e in effects]) ** -2.0
     score = score_of(fit.problem, fit.normal, columns)
-    schur = score.own - score.cross.T @ covariance_of(fit.normal.information) @ score.cross
-    covariance = covariance_of(schur + np.diag(precision))
-    pull = score.pull if known is None else score.pull - precision * known
-    return _Step(effects, columns, covariance @ pull, covariance)
+    normal = score.beside(fit.normal, precision, 0.0 if known is None else known)
+    mine = slice(fit.point.values.size, None)
+    covariance = spread_of(fit.problem, normal, fit.chi2)[mine, mine]
+    return _Step(effects, columns, step_of(normal.information, normal.gradient)[mine], covariance)
 
 
 def _put_back(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodFit | None:
@@ -151,53 +151,28 @@ def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) ->
     names = dict.fromkeys(e.name for part in fit.problem.parts for e in part.structure.elements)
     for name in names:
         seen = [
-            _Seen.of(part, run, fit, name)
+            contact_of(part, fit.point, run, name)
             for part, run in zip(fit.problem.parts, runs, strict=True)
             if run is not None
         ]
         slip = tuple(one.slip for one in seen)
         reach = max(float(np.max(np.abs(s))) for s in slip)
         yield _Effect(Kind.DRAG, name, slip, DRAG_SHARE * largest / reach)
-        yield _level(Kind.PRESSURE, name, seen, [one.pressure for one in seen])
+        yield _level(Kind.PRESSURE, name, seen, [one.above for one in seen])
         if temperature is not None:
             yield _level(Kind.TEMPERATURE, name, seen, [temperature.at(one.middle) for one in seen])
 
 
-@dataclass(frozen=True)
-class _Seen:
-    """One element in one part, over the steps (N-1,): slip, contact torque, pressure."""
-
-    middle: FloatArray
-    slip: FloatArray
-    contact: FloatArray
-    pressure: FloatArray
-
-    @classmethod
-    def of(cls, part: Part, run: Trajectory, fit: LikelihoodFit, name: str) -> _Seen:
-        """What the run shows of the element; contact counts while it slips."""
-        middle = 0.5 * (run.time[1:] + run.time[:-1])
-        model = part.structure.model(fit.point)
-        one = next((e for e in model.elements if e.name == name), None)
-        if one is None:
-            nothing = np.zeros(middle.size)
-            return cls(middle, nothing, nothing, nothing)
-        slip = 0.5 * (run.slip[name][1:] + run.slip[name][:-1])
-        signal = part.record.pressures[name]
-        above = np.maximum(np.interp(middle, signal.time, signal.values) - one.P0, 0.0)
-        contact = np.sign(slip) * one.friction.at(slip) * one.gain * above
-        slipping = np.minimum(np.abs(run.slip[name][1:]), np.abs(run.slip[name][:-1])) > 1e-6
-        return cls(middle, slip, np.where(slipping, contact, 0.0), above)
-
-
-def _level(kind: Kind, name: str, seen: list[_Seen], quantity: list[FloatArray]) -> _Effect:
+def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray]) -> _Effect:
     """μ that goes with a quantity, about its mean while the element slips."""
-    weights = np.concatenate([np.abs(one.contact) for one in seen])
+    contact = [one.friction * one.per_mu for one in seen]
+    weights = np.abs(np.concatenate(contact))
     values = np.concatenate(quantity)
     slipping = weights > 0.0
     if not slipping.any() or np.ptp(values[slipping]) == 0.0:
         return _Effect(kind, name, (), 0.0)
     mean = float(np.average(values, weights=weights))
-    torques = tuple(one.contact * (part - mean) for one, part in zip(seen, quantity, strict=True))
+    torques = tuple(one * (part - mean) for one, part in zip(contact, quantity, strict=True))
     return _Effect(kind, name, torques, LEVEL_SHARE / float(np.ptp(values[slipping])))
 
 
@@ -205,17 +180,9 @@ def _columns(part: Part, fit: LikelihoodFit, effects: list[_Effect], place: int)
     """Change (n, q) of the outputs of one part by a unit of each effect."""
     run = part.run(fit.point)
     assert run is not None
-    model = part.structure.model(fit.point)
     columns = []
     for effect in effects:
-        one = next((e for e in model.elements if e.name == effect.element), None)
-        force = np.zeros((run.time.size - 1, 4))
-        if one is not None:
-            force -= effect.torques[place][:, None] * _direction(one)
+        contact = contact_of(part, fit.point, run, effect.element)
+        force = contact.forces(effect.torques[place])
         columns.append(part.answer_to_force(fit.point, run, force))
     return np.column_stack(columns)
-
-
-def _direction(one: ShiftElement) -> FloatArray:
-    """Slip of an element as a row of the state (eq. 15)."""
-    return np.array([1.0 / one.i_c, -one.i_out, 0.0, 0.0])

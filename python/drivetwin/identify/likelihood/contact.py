@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT
+"""What presses and slips in one element of a simulated shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.driveline import Trajectory
+from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.likelihood.response import direction
+from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.signals import FloatArray
+
+SLIPPING = 1e-6
+"""Slip [rad/s] above which a simulated element is not locked."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One element in one part, over the steps (N-1,) of a run with their `middle` [s].
+
+    `slip` [rad/s], pressure `above` P0 [Pa], `friction` of its law, and the torque `per_mu` [N m]
+    that friction of 1 makes, with the sign of slip, 0 where the element is locked. `row` (4,) is
+    its slip as a row of the state. Of an element that the part does not have all are 0.
+    """
+
+    middle: FloatArray
+    slip: FloatArray
+    above: FloatArray
+    friction: FloatArray
+    per_mu: FloatArray
+    row: FloatArray
+
+    def forces(self, torques: FloatArray) -> FloatArray:
+        """Forces (N-1, 4) on the speeds by torques (N-1,) that act against slip."""
+        return -torques[:, None] * self.row
+
+
+def contact_of(part: Part, point: Point, run: Trajectory, name: str) -> Contact:
+    """What `run`, that of the part at `point`, shows of element `name`."""
+    middle = 0.5 * (run.time[1:] + run.time[:-1])
+    model = part.structure.model(point)
+    one = next((e for e in model.elements if e.name == name), None)
+    if one is None or name not in part.record.pressures:
+        nothing = np.zeros(middle.size)
+        return Contact(middle, nothing, nothing, nothing, nothing, np.zeros(4))
+    slips = run.slip[name]
+    slip = 0.5 * (slips[1:] + slips[:-1])
+    signal = part.record.pressures[name]
+    above = np.maximum(np.interp(middle, signal.time, signal.values) - one.P0, 0.0)
+    slipping = np.minimum(np.abs(slips[1:]), np.abs(slips[:-1])) > SLIPPING
+    per_mu = np.where(slipping, np.sign(slip) * one.gain * above, 0.0)
+    return Contact(middle, slip, above, one.friction.at(slip), per_mu, direction(model, one))

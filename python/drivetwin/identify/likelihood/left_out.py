@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: MIT
+"""Effects that the fit leaves out, each by the columns of what it does to the outputs.
+
+A torque sensor's filter delays it by some milliseconds, a pressure sensor may be as late, and
+friction need not follow a Stribeck law. All of them move parameters by several standard deviations
+and hardly show in Q. What each would be if it were free, and where the unknowns would follow, is
+one step of Gauss and Newton from the minimum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from drivetwin.driveline import Trajectory
+from drivetwin.identify.conclude import with_systematic_band
+from drivetwin.identify.friction import stribeck
+from drivetwin.identify.likelihood.contact import contact_of
+from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of, spread_of
+from drivetwin.identify.likelihood.newton import step_of
+from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.likelihood.score import score_of
+from drivetwin.identify.likelihood.smooth import local_mean
+from drivetwin.identify.likelihood.unknowns import LAW
+from drivetwin.identify.result import Z95, Estimate, FrictionCurve
+from drivetwin.identify.signals import FloatArray, Sampled
+from drivetwin.identify.uncertainty import doubted
+
+TORQUE = "output_torque"
+SIGNIFICANT = 5.0
+"""Size of an effect in its standard deviations from which it is told; of several columns together
+what is as rare."""
+LATEST = 0.05
+"""Plausible delay of a sensor [s]."""
+WAVES = 6
+"""Shapes of friction over slip: so many halves of a cosine over the root of slip."""
+PLAUSIBLE_MU = 0.02
+"""Plausible size of each of them."""
+GRID = 200
+"""Slips at which shapes are held against what a Stribeck law can do."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What q columns would be if they were free: `amounts` (q,) with their `covariance` (q, q).
+
+    `moves` (p,) is where the unknowns of the fit would follow, `fall` how much Q would fall.
+    """
+
+    amounts: FloatArray
+    covariance: FloatArray
+    moves: FloatArray
+    fall: float
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviation (q,) of the amounts."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def significant(self) -> bool:
+        """Whether noise and slow errors of the sensors hardly make as much."""
+        size = float(self.amounts @ np.linalg.pinv(self.covariance, hermitian=True) @ self.amounts)
+        return size > chi2.isf(2.0 * norm.sf(SIGNIFICANT), self.amounts.size)
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Friction over slip that no Stribeck law near `law` (4,) has: cosines over the root of slip up
+    to `largest` [rad/s], less what such a law can do of each."""
+
+    law: FloatArray
+    largest: float
+
+    def at(self, slip: FloatArray) -> FloatArray:
+        """Each shape (n, WAVES) over |slip| (n,)."""
+        grid = self.largest * np.linspace(0.0, 1.0, GRID) ** 2
+        by_law = np.linalg.lstsq(stribeck(self.law, grid)[1].T, self._waves(grid), rcond=None)[0]
+        return np.asarray(self._waves(slip) - stribeck(self.law, slip)[1].T @ by_law)
+
+    def _waves(self, slip: FloatArray) -> FloatArray:
+        place = np.sqrt(np.clip(slip / self.largest, 0.0, 1.0))
+        return np.cos(np.pi * np.outer(place, np.arange(1, WAVES + 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """An effect that the log shows and the fit leaves out.
+
+    `text` says what it is, `corrected` what the fit would have to be given. `moves` (p,) is where
+    the unknowns would follow, and `beside` what μ of one element gains beside that of its law.
+    """
+
+    text: str
+    corrected: str
+    moves: FloatArray
+    element: str = ""
+    beside: Callable[[FloatArray], FloatArray] = np.zeros_like
+
+    def held_against(
+        self, estimates: Mapping[str, Estimate], ids: tuple[str, ...], slopes: FloatArray
+    ) -> dict[str, Estimate]:
+        """The estimates, none of them identified that would leave its interval with the effect.
+
+        `slopes` (q, p) are the derivatives of the parameters `ids` by the unknowns.
+        """
+        told = dict(estimates)
+        for name, move in zip(ids, slopes @ self.moves, strict=True):
+            one = told[name]
+            if one.value is None or one.std_total is None or abs(move) <= Z95 * one.std_total:
+                continue
+            why = f"with {self.corrected} the log gives {one.value + move:.5g} {one.unit}"
+            told[name] = doubted(one, why.removesuffix(" 1"))
+        return told
+
+    def widened(self, fit: LikelihoodFit, name: str, curve: FrictionCurve) -> FrictionCurve:
+        """The curve of an element, its band widened by how far μ would move with the effect."""
+        index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
+        change = self.moves[index] @ stribeck(fit.point.values[index], curve.slip)[1]
+        if name == self.element:
+            change = change + self.beside(curve.slip)
+        return with_systematic_band(curve, np.abs(change))
+
+
+def left_out(fit: LikelihoodFit) -> Iterator[LeftOut]:
+    """All that the log shows of effects the fit leaves out: an output torque or a pressure that is
+    late, friction of another shape than Stribeck's."""
+    yield from _torque_told(late_torque(fit))
+    ending = f".{LAW[-1]}"
+    for name in (n.removesuffix(ending) for n in fit.point.names if n.endswith(ending)):
+        yield from _pressure_told(late_pressure(fit, name), name)
+        shapes = _shapes(fit, name)
+        yield from _shape_told(other_shape(fit, name, shapes), name, shapes)
+
+
+def late_torque(fit: LikelihoodFit) -> Step:
+    """How late the output torque is against the speeds [s]: none in a log without one."""
+
+    def columns(part: Part, run: Trajectory) -> FloatArray:
+        rate = np.gradient(run.shaft_torque, run.time)
+        shown = [
+            -out.seen(run.time, rate) if out.name == TORQUE else np.zeros(out.values.size)
+            for out in part.record.outputs
+        ]
+        return np.concatenate(shown)[:, None]
+
+    return _step(fit, columns, LATEST)
+
+
+def late_pressure(fit: LikelihoodFit, name: str) -> Step:
+    """How late the measured pressure of an element is against the torque that it makes [s]."""
+
+    def columns(part: Part, run: Trajectory) -> FloatArray:
+        response, record = part.response(fit.point, run), part.record
+        if name not in response.drive:
+            return np.zeros((record.size, 1))
+        seen = record.pressures[name]
+        steady = local_mean(Sampled(seen.time, seen.values, record.input_sigma[name]))
+        rate = np.diff(np.interp(run.time, seen.time, steady)) / np.diff(run.time)
+        return part.seen(fit.point, response.to({name: rate}))[:, None]
+
+    return _step(fit, columns, LATEST)
+
+
+def other_shape(fit: LikelihoodFit, name: str, shapes: Shapes) -> Step:
+    """How much of each of `shapes` the friction of an element has beside its Stribeck law."""
+
+    def columns(part: Part, run: Trajectory) -> FloatArray:
+        response = part.response(fit.point, run)
+        contact = contact_of(part, fit.point, run, name)
+        torques = shapes.at(np.abs(contact.slip)) * contact.per_mu[:, None]
+        answers = [response.forced(contact.forces(one)) for one in torques.T]
+        return np.column_stack([part.seen(fit.point, one) for one in answers])
+
+    return _step(fit, columns, PLAUSIBLE_MU)
+
+
+def _shapes(fit: LikelihoodFit, name: str) -> Shapes:
+    """Shapes beside the law of an element, over the slips at which it carries torque."""
+    largest = 0.0
+    for part in fit.problem.parts:
+        contact = contact_of(part, fit.point, _run(fit, part), name)
+        carrying = np.abs(contact.slip[contact.per_mu != 0.0])
+        largest = max(largest, float(np.max(carrying, initial=0.0)))
+    law = np.array([fit.point[f"{name}.{key}"] for key in LAW])
+    return Shapes(law, max(largest, 1.0))
+
+
+def _run(fit: LikelihoodFit, part: Part) -> Trajectory:
+    run = part.run(fit.point)
+    assert run is not None, "a fit can be simulated"
+    return run
+
+
+def _step(
+    fit: LikelihoodFit, columns: Callable[[Part, Trajectory], FloatArray], plausible: float
+) -> Step:
+    """The step in all unknowns and the amounts of `columns`, about zero by what is `plausible`.
+
+    Columns of an unstable run, which has no finite response, tell nothing.
+    """
+    every = [columns(part, _run(fit, part)) for part in fit.problem.parts]
+    every = [one if np.all(np.isfinite(one)) else np.zeros_like(one) for one in every]
+    score = score_of(fit.problem, fit.normal, every)
+    normal = score.beside(fit.normal, np.full(score.pull.size, plausible**-2.0))
+    step = step_of(normal.information, normal.gradient)
+    effects = slice(fit.point.values.size, None)
+    amounts, moves = step[effects], step[: effects.start]
+    fall = float(score.pull @ amounts)
+    noise = max(fit.chi2, 1.0) * covariance_of(normal.information)
+    alone = Step(amounts, noise[effects, effects], moves, fall)
+    if not alone.significant:
+        return alone
+    spread = spread_of(fit.problem, normal, fit.chi2)
+    return Step(amounts, spread[effects, effects], moves, fall)
+
+
+def _delay(found: Step) -> str:
+    """A delay with its interval, and to which side."""
+    side = "late" if found.amounts[0] > 0.0 else "early"
+    half = Z95 * found.std[0]
+    return f"{1e3 * abs(found.amounts[0]):.1f} ± {1e3 * half:.1f} ms {side}"
+
+
+def _shift(found: Step, channel: str) -> str:
+    """The line of the mapping that takes a delay away."""
+    line = f"channels.{channel}.time_shift_s = {-found.amounts[0]:.4f}"
+    return f"set {line} in the channel mapping and compare"
+
+
+def _torque_told(found: Step) -> Iterator[LeftOut]:
+    if not found.significant:
+        return
+    text = (
+        f"the output torque is {_delay(found)} against the speeds, if the model of the shaft "
+        f"holds: c_o, ζ and the age of the engine torque hang on it; {_shift(found, TORQUE)}"
+    )
+    yield LeftOut(text, "the output torque in time", found.moves)
+
+
+def _pressure_told(found: Step, name: str) -> Iterator[LeftOut]:
+    if not found.significant:
+        return
+    text = (
+        f"the pressure of {name} is {_delay(found)} against the torque that it makes, if its "
+        f"friction follows a Stribeck law (Q falls by {found.fall:.0f}): μ and P0 hang on it; "
+        f"{_shift(found, f'pressure.{name}')}"
+    )
+    yield LeftOut(text, f"the pressure of {name} in time", found.moves)
+
+
+def _shape_told(found: Step, name: str, shapes: Shapes) -> Iterator[LeftOut]:
+    if not found.significant:
+        return
+    grid = shapes.largest * np.linspace(0.0, 1.0, GRID)
+    departs = float(np.max(np.abs(shapes.at(grid) @ found.amounts)))
+    text = (
+        f"the friction of {name} departs from a Stribeck law over slip by up to {departs:.2g}, if "
+        f"its pressure is in time and μ goes with nothing else (Q falls by {found.fall:.0f}): μ "
+        "and P0 hang on it; compare with friction of free shape (examine --friction free), and "
+        "check the sensor of that pressure"
+    )
+    yield LeftOut(
+        text,
+        f"friction of {name} of free shape",
+        found.moves,
+        name,
+        lambda slip: np.asarray(shapes.at(slip) @ found.amounts),
+    )
