@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.covariance import sensor_noise
-from drivetwin.identify.likelihood.residuals import against
-from tests.identify.likelihood.made import fitted
+from drivetwin.identify.likelihood.residuals import against, unweighted
+from drivetwin.identify.result import Verdict
+from tests.identify.likelihood.made import bench, fitted
 
 
 def test_a_residual_that_goes_with_an_input_speaks_against_every_value() -> None:
@@ -36,3 +38,15 @@ def test_the_drift_of_a_sensor_speaks_against_every_value() -> None:
     assert "a sensor drifts" in against(
         replace(fit, normal=replace(fit.normal, residuals=(residual + drift,)))
     )
+
+
+def test_a_fit_that_leaves_out_the_noise_of_its_inputs_says_so() -> None:
+    fit, made = fitted(), bench()
+    assert unweighted(fit, ["shift 2-3"]) == ""
+    (part,) = fit.problem.parts
+    bare = replace(fit.problem, parts=(replace(part, weighting=sensor_noise(part.record)),))
+    told = conclude(replace(fit, problem=bare), [made.signals], [made.driveline], {}, {})
+    (text,) = [one for one in told.warnings if "noise of engine torque and pressures" in one]
+    assert text.startswith("shift 2-3: ")
+    assert all(one.verdict is not Verdict.IDENTIFIED for one in told.estimates.values())
+    assert text in told.estimates["k_o"].reason

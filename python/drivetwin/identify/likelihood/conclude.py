@@ -18,7 +18,7 @@ from drivetwin.identify.likelihood.limits import at_limits
 from drivetwin.identify.likelihood.null_space import null_directions
 from drivetwin.identify.likelihood.other_law import other_law_in_words
 from drivetwin.identify.likelihood.priors import over_eta
-from drivetwin.identify.likelihood.residuals import against, residual_tests
+from drivetwin.identify.likelihood.residuals import against, residual_tests, unweighted
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
 from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw, Verdict
@@ -89,8 +89,9 @@ def conclude(
     for effect in effects:
         estimates = effect.held_against(estimates, tuple(values), matrix)
         curves = {name: effect.widened(fit, name, curve) for name, curve in curves.items()}
-    if why := against(fit):
-        estimates = {name: doubted(one, why) for name, one in estimates.items()}
+    for why in (against(fit), unweighted(fit, labels_of(signals))):
+        if why:
+            estimates = {name: doubted(one, why) for name, one in estimates.items()}
     estimates |= _of_what_is_fixed(fit, signals, drivelines, estimates)
     return Conclusions(
         estimates,
@@ -197,4 +198,6 @@ def _warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str,
     for s, label, tests in zip(signals, labels, residual_tests(fit).values(), strict=True):
         texts += list(s.shift.warnings)
         texts += [f"{label}: {text}" for test in tests for text in test.warnings]
+    if why := unweighted(fit, labels):
+        texts.append(why)
     return (*texts, *null_directions(fit))

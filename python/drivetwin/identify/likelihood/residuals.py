@@ -8,6 +8,7 @@ its power in means over m samples.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,6 +101,25 @@ def against(fit: LikelihoodFit) -> str:
     return (
         f"the residual of the {name} goes with the {source}: some effect is not in the model, or a "
         "sensor drifts"
+    )
+
+
+def unweighted(fit: LikelihoodFit, labels: Sequence[str]) -> str:
+    """What is said against every value where a part's weighting leaves out the noise of the inputs;
+    empty where none does. `labels` are those of the shifts.
+
+    It has no weighting with that noise where a run has no finite response to it.
+    """
+    left = [
+        label
+        for part, label in zip(fit.problem.parts, labels, strict=True)
+        if part.weighting.path is None
+    ]
+    if not left:
+        return ""
+    return (
+        f"{', '.join(left)}: the noise of engine torque and pressures is not counted, for the "
+        "simulation has no finite response to it: intervals are too narrow"
     )
 
 
