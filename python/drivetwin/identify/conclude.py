@@ -40,7 +40,7 @@ RESTS_ON = {
 """Stems of the parameters that rest on each regression."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Conclusions:
     """What the pipeline puts into the Identification."""
 

@@ -58,7 +58,7 @@ class _Table:
     warnings: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Stamps:
     """Time [s] (n,) of the rows that one time column has a stamp for: where `known` (n,)."""
 

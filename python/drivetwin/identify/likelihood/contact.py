@@ -17,7 +17,7 @@ SLIPPING = 1e-6
 """Slip [rad/s] above which a simulated element is not locked."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contact:
     """One element in one part, over the steps (N-1,) of a run with their `middle` [s].
 

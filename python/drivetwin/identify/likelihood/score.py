@@ -12,7 +12,7 @@ from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.signals import FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Score:
     """Sums over all parts for q columns Z of the outputs, with J and r those of the fit.
 

@@ -74,7 +74,7 @@ class Departure:
         return "none seen"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Effect:
     """A departure's torque over the steps (N-1,) by part, per unit."""
 
@@ -106,7 +106,7 @@ def departures(found: Identification, temperature: Sampled | None = None) -> tup
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Step:
     """What one step finds: `values` (q,) of the effects, and `columns` (n, q) of each part."""
 
