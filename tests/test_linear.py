@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from drivetwin.driveline import (
     Signal,
     State,
     Stribeck,
+    in_series,
     simulate,
 )
 from drivetwin.errors import InputError
@@ -96,6 +98,33 @@ def test_the_eigenfrequency_agrees_with_the_ring_down_in_time() -> None:
     crossings = at + swing[at] / (swing[at] - swing[at + 1])
     half = np.diff(crossings[:16]).mean() * 1e-3
     assert 0.5 / half == pytest.approx(mode.frequency, rel=1e-4)
+
+
+@pytest.mark.parametrize("stiffness", [100.0, 300.0, 400.0, 1e4, 1.8e5])
+@pytest.mark.parametrize("inertias", [(1.0, 1.0), (2.0, 2.0), (14.0, 2.0), (3.0, 5.0)])
+def test_critical_damping_is_no_oscillation(
+    stiffness: float, inertias: tuple[float, float]
+) -> None:
+    """Two inertias on a shaft, and the same a little less damped: ζ = 1 - 1e-6."""
+    elements: list[Element] = [
+        {"type": "inertia", "name": node, "node": node, "inertia": inertia}
+        for node, inertia in zip("ab", inertias, strict=True)
+    ]
+    critical = 2.0 * math.sqrt(stiffness * in_series(*inertias))
+    swings = []
+    for damping in (critical, critical * (1.0 - 1e-6)):
+        shaft: Element = {
+            "type": "spring_damper",
+            "name": "shaft",
+            "a": "a",
+            "b": "b",
+            "stiffness": stiffness,
+            "damping": damping,
+        }
+        swings.append(linearise([*elements, shaft], []).oscillations())
+    assert swings[0] == ()
+    (mode,) = swings[1]
+    assert mode.damping == pytest.approx(1.0 - 1e-6, abs=1e-9)
 
 
 def test_the_frequency_response_is_what_a_sine_settles_to() -> None:

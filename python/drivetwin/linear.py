@@ -34,6 +34,7 @@ _HELD = {"prescribed_speed": "input", "engine_map": "throttle"}
 class Slip:
     """Operating point of a slipping element: slip [rad/s], signed, and gauge pressure [Pa].
 
+    At zero slip the element is taken to move forward.
     Raises InputError where one of them is not finite.
     """
 
@@ -71,9 +72,11 @@ class LinearSystem:
         return np.asarray(values[np.argsort(np.abs(values), kind="stable")])
 
     def oscillations(self) -> tuple[Oscillation, ...]:
-        """Modes that swing, by frequency."""
+        """Modes that swing, by frequency; what is critically damped to 1e-12 does not."""
         values = self.eigenvalues()
-        pairs = values[values.imag > 1e-9 * np.abs(values).max(initial=1.0)]
+        sizes = np.abs(values)
+        # Round-off parts the two equal eigenvalues of critical damping by its square root.
+        pairs = values[values.imag > np.maximum(1e-6 * sizes, 1e-9 * sizes.max(initial=1.0))]
         found = [
             Oscillation(float(v.imag / (2 * np.pi)), float(-v.real / np.abs(v))) for v in pairs
         ]
