@@ -6,7 +6,7 @@ from __future__ import annotations
 import gc
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingExtraError
 from drivetwin.logs.formats import open_recording
-from drivetwin.logs.raw import Column, RawChannel, ReadOptions, TimeColumn
+from drivetwin.logs.raw import Column, RawChannel, RawLog, ReadOptions, TimeColumn
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.vehicle.card import load_card
@@ -291,6 +291,40 @@ def test_a_channel_that_is_invalid_throughout_is_refused(tmp_path: Path) -> None
     )
     raw = read_raw(save(tmp_path / "log.mf4", [("g", [made])], "4.10"))
     assert raw.unreadable == {"n (g)": "the recorder marks all 2000 samples invalid"}
+
+
+def by_formula(path: Path, formula: str) -> RawLog:
+    made = asammdf.Signal(
+        samples=np.arange(60000, 60050, dtype=np.uint16), timestamps=SLOW[:50], name="x",
+        unit="Nm", conversion={"formula": formula},
+    )  # fmt: skip
+    return read_raw(save(path / "log.mf4", [("g", [made])], "4.10"))
+
+
+@pytest.mark.parametrize(
+    ("formula", "value"),
+    [
+        ("X / 7 + 0.5", lambda x: x / 7 + 0.5),
+        ("0.01*X1*X1", lambda x: 0.01 * x * x),
+        ("X*X", lambda x: x * x),
+        ("sqrt(X)", np.sqrt),
+        ("5", lambda x: 0.0 * x + 5.0),
+    ],
+)
+def test_formulas_are_evaluated_in_real_numbers(
+    tmp_path: Path, formula: str, value: Callable[[FloatArray], FloatArray]
+) -> None:
+    found = by_formula(tmp_path, formula).channels[0].values
+    assert found == pytest.approx(value(np.arange(60000.0, 60050.0)), rel=1e-15)
+
+
+@pytest.mark.parametrize("formula", ["pow(X, 2)", "IF(X > 2, 1, 0)", "X^2", "X2 + 1", "X +"])
+def test_raw_values_are_none_where_a_formula_cannot_be_evaluated(
+    tmp_path: Path, formula: str
+) -> None:
+    raw = by_formula(tmp_path, formula)
+    assert raw.channels == ()
+    assert raw.unreadable == {"x (g)": f"its formula {formula!r} is none that can be evaluated"}
 
 
 def test_a_channel_without_any_valid_sample_is_refused(tmp_path: Path) -> None:

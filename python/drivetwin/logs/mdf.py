@@ -236,18 +236,38 @@ class MdfRecording:
             "ignore_invalidation_bits": True,  # marked samples are left out here, and counted
         }
         channel = self._mdf.groups[place.group].channels[place.index]
+        formula = getattr(channel.conversion, "formula", "")
         note = ""
-        samples, marks = self._mdf.get(raw=False, **wanted)
-        if samples.dtype.kind in "SUO":
-            conversion = channel.conversion
-            if _holds_numbers(conversion):
+        samples, marks = self._mdf.get(raw=bool(formula), **wanted)
+        if formula:
+            samples = self._evaluated(formula, samples, channel.name)
+        elif samples.dtype.kind in "SUO":
+            if _holds_numbers(channel.conversion):
                 samples = np.full(samples.shape, np.nan)
             else:
                 samples, marks = self._mdf.get(raw=True, **wanted)
-                note = _codes(conversion)
+                note = _codes(channel.conversion)
         if getattr(channel, "flags", 0) & _ALL_INVALID:
             marks = np.ones(len(samples), dtype=np.bool_)
         return samples, None if marks is None else np.asarray(marks, dtype=np.bool_), note
+
+    def _evaluated(self, formula: str, raw: Any, name: str) -> Any:
+        """The physical values (n,) of a formula over the raw ones `X`, also named `X1`.
+
+        asammdf takes raw values for physical ones where it cannot evaluate a formula, and computes
+        with integers where they are, which overflow.
+        """
+        numexpr = require("numexpr", "mdf", _KIND, self._path)
+        try:
+            numbers = np.asarray(raw, dtype=np.float64)
+            names = {"X": numbers, "X1": numbers, "INF": np.inf, "NaN": np.nan}
+            return np.broadcast_to(numexpr.evaluate(formula, names, {}), numbers.shape)
+        except Exception:
+            raise DamagedChannelError(
+                f"its formula {formula!r} is none that can be evaluated",
+                "export the log with physical values, or map another channel",
+                Where(file=str(self._path), channel=name),
+            ) from None
 
     def _check_size(self, group: Any, name: str) -> None:
         """Refuse a group that claims more records than the file can hold, before it is loaded."""
