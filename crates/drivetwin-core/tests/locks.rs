@@ -8,7 +8,6 @@ use common::{
 };
 use drivetwin_core::model::elements::{Clutch, Element, Gear, GearLoss, OneWayClutch};
 use drivetwin_core::model::mechanism::LossLaw;
-use drivetwin_core::model::{FrictionLaw, Stribeck};
 use drivetwin_core::simulate::Output;
 use drivetwin_core::solve::{EventKind, Settings, Status};
 
@@ -275,90 +274,6 @@ fn what_is_let_go_beside_redundant_locks_has_overcome_its_static_capacity() {
     assert_eq!(let_go.iter().map(|&(element, _)| element).collect::<Vec<_>>(), [1, 2]);
     assert!(let_go.iter().all(|(_, time)| (time - 9.0 / 9.9).abs() < 1e-9), "{let_go:?}");
     assert!((run.columns[0][100] - run.columns[1][100]).abs() < 1e-9);
-}
-
-#[test]
-fn a_member_heavier_than_the_others_beyond_measure_is_held_like_them() {
-    for inertia_of_c in [1.0, 1e6, 1e12, 1e18] {
-        let network = compile(vec![
-            inertia("a", 1.0),
-            inertia("b", 1.0),
-            inertia("c", inertia_of_c),
-            torque("a", "T"),
-            Element::Clutch(clutch("brake", "c", "ground")),
-            Element::Clutch(clutch("one", "b", "c")),
-            Element::Clutch(clutch("other", "c", "a")),
-        ]);
-        let pressures = ["P brake", "P one", "P other"].map(|name| constant(name, 9.0, 1.0));
-        let [brake, one, other] = pressures;
-        let signals = [constant("T", 5.0, 1.0), brake, one, other];
-        let outputs = ["brake", "one", "other"].map(friction_torque);
-        let rest = start(&[("a", 0.0), ("b", 0.0), ("c", 0.0)], &[]);
-        let run = simulate(&network, &signals, &rest, &grid(1.0, 11), &outputs);
-        assert_eq!(run.status, Status::Completed);
-        assert!(run.events.is_empty(), "{:?}", run.events);
-        let held = run.columns.iter().map(|column| column[5].abs());
-        for (held, expected) in held.zip([5.0, 0.0, 5.0]) {
-            assert!((held - expected).abs() < 1e-9, "{held} at {inertia_of_c} kg m²");
-        }
-    }
-}
-
-#[test]
-fn two_clutches_transmit_over_a_member_without_mass_between_them() {
-    for (drive, capacity, accelerations) in
-        [(5.0, 10.0, [2.5, 2.5]), (5.0, 1e4, [2.5, 2.5]), (30.0, 10.0, [20.0, 10.0])]
-    {
-        for drum in [None, Some(1e-15), Some(1e-10), Some(1e-6)] {
-            let mut elements = vec![
-                inertia("a", 1.0),
-                inertia("c", 1.0),
-                torque("a", "T"),
-                Element::Clutch(clutch("first", "a", "drum")),
-                Element::Clutch(clutch("second", "drum", "c")),
-            ];
-            elements.extend(drum.map(|drum| inertia("drum", drum)));
-            let [first, second] = ["P first", "P second"].map(|name| constant(name, capacity, 1.0));
-            let signals = [constant("T", drive, 1.0), first, second];
-            let outputs =
-                [speed("a"), speed("c"), friction_torque("first"), friction_torque("second")];
-            let rest = start(&[("a", 0.0), ("drum", 0.0), ("c", 0.0)], &[]);
-            let run = simulate(&compile(elements), &signals, &rest, &grid(1.0, 11), &outputs);
-            assert_eq!(run.status, Status::Completed);
-            let [a, c] = accelerations;
-            for (column, expected) in run.columns.iter().zip([a, c, c, c]) {
-                assert!((column[10] - expected).abs() < 1e-5, "{} not {expected}", column[10]);
-            }
-        }
-    }
-}
-
-#[test]
-fn of_equal_clutches_in_series_one_slips_and_the_other_holds_at_its_capacity() {
-    for (mu_c, also_slips) in [(1.0, false), (0.8, false), (1.2, true)] {
-        let friction = FrictionLaw::Stribeck(Stribeck { mu_c, mu_s: 1.0, v_s: 5.0, mu_v: 0.0 });
-        let alike = |name, a, b| {
-            Element::Clutch(Clutch { friction: friction.clone(), ..clutch(name, a, b) })
-        };
-        // The one that is looked at first too.
-        let network = compile(vec![
-            inertia("a", 1.0),
-            inertia("b", 2.0),
-            torque("a", "T"),
-            alike("second", "b", "ground"),
-            alike("first", "a", "b"),
-        ]);
-        let pressures = ["P first", "P second"].map(|name| constant(name, 50.0, 1.0));
-        let [first, second] = pressures;
-        let signals = [constant("T", 90.0, 1.0), first, second];
-        let rest = start(&[("a", 0.0), ("b", 0.0)], &[]);
-        for settings in [Settings::default(), Settings::exact()] {
-            let (times, options) = (grid(0.5, 51), (settings, false));
-            let run = simulate_by(options, &network, &signals, &rest, &times, &[speed("b")]);
-            assert_eq!(run.status, Status::Completed);
-            assert_eq!(run.columns[0][50] > 0.1, also_slips, "{} rad/s", run.columns[0][50]);
-        }
-    }
 }
 
 #[test]

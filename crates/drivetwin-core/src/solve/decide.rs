@@ -46,14 +46,10 @@ impl<T: Number> Regime<'_, T> {
         self.look_ahead();
         let candidates = self.at_zero_speed();
         let mut trial = self.assignment();
-        for &row in &candidates {
-            // An overload asks for more: what is at its capacity already stays there.
-            if overloaded.is_none() || !trial.is_at_capacity(row) {
-                trial.rest(row);
-            }
-        }
-        if let Some((row, sign)) = overloaded {
-            self.give_way(&mut trial, (row, sign), &candidates);
+        match overloaded {
+            // An overload asks for more: what has just moved off, or is at its capacity, stays so.
+            Some((row, sign)) => self.give_way(&mut trial, (row, sign), &candidates),
+            None => candidates.iter().for_each(|&row| trial.rest(row)),
         }
         let mut visited: Vec<Assignment> = Vec::new();
         loop {
@@ -128,7 +124,8 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// Let friction elements rest that move off without acceleration, where that is right too: at exactly its
-    /// capacity an element holds. After an overload something else must move off in their place.
+    /// capacity an element holds. After an overload only those that rested before it, and with something else
+    /// that moves off in their place.
     fn hold_what_stays(
         &mut self,
         (mut trial, mut mode, basis): (Assignment, Arc<Mode<T>>, Vec<T>),
@@ -136,12 +133,13 @@ impl<T: Number> Regime<'_, T> {
         overloaded: bool,
     ) -> (Assignment, Arc<Mode<T>>) {
         let before = self.assignment();
-        for &row in candidates {
-            if matches!(row, Row::Gear(_)) || trial.direction(row).is_none() {
-                continue;
-            }
+        let moving = |&&row: &&Row| {
+            let moves = |assignment: &Assignment| assignment.direction(row).is_some();
+            matches!(row, Row::Friction(_)) && moves(&trial) && !(overloaded && moves(&before))
+        };
+        for row in candidates.iter().filter(moving).copied().collect::<Vec<_>>() {
             let moves_as_before = |held: &Assignment| {
-                let same = |row: &Row| held.direction(*row) == before.direction(*row);
+                let same = |&row: &Row| held.direction(row) == before.direction(row);
                 overloaded && candidates.iter().all(same)
             };
             let mut held = trial.clone();
