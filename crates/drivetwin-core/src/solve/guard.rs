@@ -208,16 +208,16 @@ fn without_direction<T: Number>(regime: &Regime<'_, T>, i: usize) -> T {
 }
 
 /// Slip in its direction. What is released at this instant starts from exact zero, and where static
-/// and kinetic capacities agree also from zero acceleration: what is left of these against its direction is
-/// round-off and would look like an immediate return.
+/// and kinetic capacities agree also from zero acceleration: what is left of these beside the next term, or
+/// against its direction, is round-off and would look like an immediate return.
 fn departing<T: Number>(slip: &Series<T>, sign: f64, released: bool) -> Series<T> {
     let mut guard = scaled(slip, T::of(sign));
     if released {
         guard[0] = T::zero_();
         let (rate, bend) = (guard[1].re(), guard[2].re().magnitude());
-        let most = bend.larger(T::Values::of(1.0)) * 1e-9;
-        let against = rate.those(|rate| rate < 0.0) & (rate + most).those(|left| left >= 0.0);
-        guard[1] = guard[1].with(against, T::zero_());
+        let small = (rate.magnitude() - bend * 1e-9).those(|left| left <= 0.0);
+        let against = rate.those(|rate| (-1e-9..0.0).contains(&rate));
+        guard[1] = guard[1].with(small | against, T::zero_());
     }
     guard
 }
