@@ -5,7 +5,6 @@
 use super::constraints::{Coordinates, force_map};
 use super::linalg::{Matrix, independent_rows, least_norm, solve};
 use crate::number::Number;
-use std::borrow::Cow;
 
 /// Motion under held speeds: `A a + B τ = f`, `G a = g`, without `g` zero.
 ///
@@ -40,14 +39,13 @@ impl<T: Number> Hold<'_, T> {
     ) -> Option<Held<T>> {
         let kept = self.independent();
         let (left, acceleration) = self.motion(&kept, (f, g))?;
-        let mut balance = f.clone();
-        balance.subtract(&self.inertia.times(&acceleration));
         let redundant = kept.len() < self.rows.rows;
         let torque = if redundant {
-            self.shared(&balance, &weights())
+            let all: Vec<usize> = (0..f.rows).collect();
+            self.shared(&self.balance(&all, f, &acceleration), &weights())
         } else {
-            let acting = self.acting().select_columns(&kept).select_rows(&left.dependent);
-            let found = solve(acting, balance.select_rows(&left.dependent)).ok()?;
+            let balance = self.balance(&left.dependent, f, &acceleration);
+            let found = solve(self.acting(&kept).select_rows(&left.dependent), balance).ok()?;
             let place = |row| kept.iter().position(|&k| k == row);
             found.select_rows(&(0..kept.len()).filter_map(place).collect::<Vec<_>>())
         };
@@ -64,8 +62,8 @@ impl<T: Number> Hold<'_, T> {
 
     /// Impulses of the rows that change the speeds so.
     pub fn impulses(&self, change: &Matrix<T>) -> Matrix<T> {
-        let mut balance = Matrix::zeros(change.rows, 1);
-        balance.subtract(&self.inertia.times(change));
+        let all: Vec<usize> = (0..change.rows).collect();
+        let balance = self.balance(&all, &Matrix::zeros(change.rows, 1), change);
         self.shared(&balance, &vec![T::of(1.0); self.rows.rows])
     }
 
@@ -83,20 +81,19 @@ impl<T: Number> Hold<'_, T> {
         (f, g): (&Matrix<T>, Option<&Matrix<T>>),
     ) -> Option<(Coordinates<T>, Matrix<T>)> {
         let all: Vec<usize> = (0..self.inertia.rows).collect();
-        let rows = self.rows.select_rows(kept);
-        let left = Coordinates::under(rows.clone(), &all)?;
+        let left = Coordinates::under(self.rows.select_rows(kept), &all)?;
         let forces = match &self.acting {
-            Some(acting) => force_map(acting.select_columns(kept).transposed(), &left)?,
-            None => left.speeds.clone(),
+            Some(_) => force_map(self.acting(kept).transposed(), &left)?.transposed(),
+            None => left.speeds.transposed(),
         };
-        let forces = forces.transposed();
         let mass = forces.times(self.inertia).times(&left.speeds);
         let Some(g) = g else {
             let free = solve(mass, forces.times(f)).ok()?;
             let acceleration = left.speeds.times(&free);
             return Some((left, acceleration));
         };
-        let given = solve(rows.select_columns(&left.dependent), g.select_rows(kept)).ok()?;
+        let rows = self.rows.select_rows(kept).select_columns(&left.dependent);
+        let given = solve(rows, g.select_rows(kept)).ok()?;
         let mut driving = f.clone();
         driving.subtract(&self.inertia.select_columns(&left.dependent).times(&given));
         let mut acceleration = left.speeds.times(&solve(mass, forces.times(&driving)).ok()?);
@@ -106,14 +103,25 @@ impl<T: Number> Hold<'_, T> {
         Some((left, acceleration))
     }
 
-    fn acting(&self) -> Cow<'_, Matrix<T>> {
-        let acting = self.acting.as_ref().map(Cow::Borrowed);
-        acting.unwrap_or_else(|| Cow::Owned(self.rows.transposed()))
+    /// Of some speeds, the force that the torques take away: `f - A a`.
+    fn balance(&self, speeds: &[usize], f: &Matrix<T>, acceleration: &Matrix<T>) -> Matrix<T> {
+        let mut balance = f.select_rows(speeds);
+        balance.subtract(&self.inertia.select_rows(speeds).times(acceleration));
+        balance
+    }
+
+    /// B of some rows.
+    fn acting(&self, rows: &[usize]) -> Matrix<T> {
+        match &self.acting {
+            Some(acting) => acting.select_columns(rows),
+            None => self.rows.select_rows(rows).transposed(),
+        }
     }
 
     /// Torques of all rows that exert `balance` together.
     fn shared(&self, balance: &Matrix<T>, weights: &[T]) -> Matrix<T> {
-        let mut scaled = self.acting().into_owned();
+        let all: Vec<usize> = (0..self.rows.rows).collect();
+        let mut scaled = self.acting(&all);
         for r in 0..scaled.rows {
             scaled.row_mut(r).iter_mut().zip(weights).for_each(|(b, &weight)| *b *= weight);
         }
