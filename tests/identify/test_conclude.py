@@ -77,6 +77,26 @@ def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identifi
     assert "11 times the noise power" in told[touched].reason
 
 
+@pytest.mark.parametrize(("count", "named"), [(1, "shift 2-3"), (4, "4 shifts")])
+def test_what_many_shifts_have_in_common_is_told_once(count: int, named: str) -> None:
+    found = stepped()
+    (shift,), (signals,) = found.evidence.integral, found.evidence.signals
+    driveline = likelihood_of(found)[0].problem.parts[0].structure.driveline
+    shifts, every = [], []
+    for i in range(count):
+        fit = replace(shift.load.fit, chi2=2.0 + i)
+        load = replace(shift.load, fit=fit, speed_trend=10.0 + i)
+        shifts.append(replace(shift, load=load))
+        every.append(replace(signals, shift=replace(signals.shift, lockup_time=10.0 + i)))
+    told = conclude(shifts, every, [driveline] * count, {}).warnings
+    noisy = [text for text in told if "times the noise power" in text]
+    trends = [text for text in told if "changes with speed" in text]
+    power, trend = ("2.0", "10.0") if count == 1 else ("2.0 to 5.0", "10.0 to 13.0")
+    assert len(noisy) == len(trends) == 1
+    assert noisy[0].startswith(f"{named}: the load leaves {power} times")
+    assert trends[0].startswith(f"{named}: the load torque changes with speed (t = {trend})")
+
+
 def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> None:
     found = stepped()
     (shift,), signals = found.evidence.integral, found.evidence.signals

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +29,10 @@ from drivetwin.vehicle.spec import PriorValue
 METHOD = "integral"
 CHI2_WARN = 1.6
 """Residual power over stated noise above which a warning is due."""
+TREND_WARN = 4.0
+"""Trend of the load torque over speed, in standard deviations, above which a warning is due."""
+NAMED = 3
+"""Most shifts that one warning names."""
 MISFIT = 10.0
 """Residual power over stated noise above which the model does not hold: an interval, however
 widened, counts what scatters and not what is missing."""
@@ -241,22 +245,47 @@ def _width(curve: FrictionCurve) -> float:
 def _warnings(
     shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: dict[str, str]
 ) -> tuple[str, ...]:
-    texts = list(dict.fromkeys(notes.values()))
-    for shift, s, label in zip(shifts, signals, labels_of(signals), strict=True):
-        texts += list(s.shift.warnings)
-        texts += [
-            f"{label}: the {name} leaves {chi2:.1f} times the noise power; intervals are widened"
-            for name, chi2 in _residual_powers(shift).items()
-            if chi2 > CHI2_WARN
-        ]
-        if abs(shift.load.speed_trend) > 4.0:
-            texts.append(
-                f"{label}: the load torque changes with speed (t = {shift.load.speed_trend:.1f}); "
-                f"T_v/i_f holds at {shift.load.mean_speed:.3g} rad/s of the wheel"
-            )
+    """What is told once, then what each shift brought along, then what several have in common."""
+    labels = labels_of(signals)
+    noisy: dict[str, dict[str, float]] = {}
+    refused: dict[str, list[str]] = {}
+    for shift, label in zip(shifts, labels, strict=True):
+        for name, chi2 in _residual_powers(shift).items():
+            if chi2 > CHI2_WARN:
+                noisy.setdefault(name, {})[label] = chi2
         if "friction" in shift.refusals:
-            texts.append(f"{label}: no friction curve, {shift.refusals['friction']}")
+            refused.setdefault(shift.refusals["friction"], []).append(label)
+    trends = {label: s.load for s, label in zip(shifts, labels, strict=True)}
+    trends = {label: load for label, load in trends.items() if abs(load.speed_trend) > TREND_WARN}
+
+    texts = list(dict.fromkeys(notes.values()))
+    texts += [text for s in signals for text in s.shift.warnings]
+    texts += [
+        f"{_named(found)}: the {name} leaves {_from_to(found.values(), '.1f')} times the noise "
+        "power; intervals are widened"
+        for name, found in noisy.items()
+    ]
+    if trends:
+        significance = _from_to((load.speed_trend for load in trends.values()), ".1f")
+        speeds = _from_to((load.mean_speed for load in trends.values()), ".3g")
+        texts.append(
+            f"{_named(trends)}: the load torque changes with speed (t = {significance}); "
+            f"T_v/i_f holds at {speeds} rad/s of the wheel"
+        )
+    texts += [f"{_named(found)}: no friction curve, {why}" for why, found in refused.items()]
     return tuple(texts)
+
+
+def _named(labels: Collection[str]) -> str:
+    """The shifts by name, or how many they are."""
+    return ", ".join(labels) if len(labels) <= NAMED else f"{len(labels)} shifts"
+
+
+def _from_to(values: Iterable[float], style: str) -> str:
+    """The least and the largest value, or the only one."""
+    known = sorted(values)
+    low, high = format(known[0], style), format(known[-1], style)
+    return low if low == high else f"{low} to {high}"
 
 
 def with_systematic_band(curve: FrictionCurve, std: FloatArray) -> FrictionCurve:
