@@ -5,7 +5,8 @@
 mod common;
 
 use common::{
-    clutch, compile, constant, grid, inertia, load, shaft, simulate, simulate_by, start, torque,
+    clutch, compile, constant, gear, grid, inertia, load, shaft, simulate, simulate_by, start,
+    torque,
 };
 use drivetwin_core::model::elements::{Clutch, Element};
 use drivetwin_core::model::{FrictionLaw, Stribeck};
@@ -153,5 +154,29 @@ fn a_member_heavier_than_the_others_beyond_measure_is_held_like_them() {
         for (held, expected) in held.zip([5.0, 0.0, 5.0]) {
             assert!((held - expected).abs() < 1e-9, "{held} at {inertia_of_c} kg m²");
         }
+    }
+}
+
+#[test]
+fn brakes_hold_side_by_side_whatever_ratio_lies_before_one_of_them() {
+    for ratio in [1.0, 1e-5, 1e-10, 1e10] {
+        let network = compile(vec![
+            inertia("a", 1.0),
+            inertia("b", 1.0),
+            torque("a", "T a"),
+            torque("b", "T b"),
+            gear("a", "far", ratio),
+            Element::Clutch(clutch("behind", "far", "ground")),
+            Element::Clutch(clutch("beside", "b", "ground")),
+        ]);
+        let pressures = [constant("P behind", 9e10, 1.0), constant("P beside", 9.0, 1.0)];
+        let [behind, beside] = pressures;
+        let signals = [constant("T a", 5.0, 1.0), constant("T b", 5.0, 1.0), behind, beside];
+        let rest = start(&[("a", 0.0), ("b", 0.0), ("far", 0.0)], &[]);
+        let outputs = [friction_torque("behind"), friction_torque("beside")];
+        let run = simulate(&network, &signals, &rest, &grid(1.0, 11), &outputs);
+        assert_eq!(run.status, Status::Completed, "{ratio}");
+        assert!((run.columns[0][5] / (5.0 * ratio) - 1.0).abs() < 1e-9, "{}", run.columns[0][5]);
+        assert!((run.columns[1][5] - 5.0).abs() < 1e-9, "{}", run.columns[1][5]);
     }
 }

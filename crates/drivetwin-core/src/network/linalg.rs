@@ -171,10 +171,6 @@ impl<T> std::ops::IndexMut<(usize, usize)> for Matrix<T> {
 /// the same measure. Sparse matrices are solved in fewer operations.
 pub fn solve<T: Number>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usize> {
     let mut x = b;
-    let largest = |row: &[T]| {
-        let floor = T::Values::of(f64::MIN_POSITIVE);
-        row.iter().fold(floor, |largest, v| v.re().magnitude().larger(largest))
-    };
     let one = T::Values::of(1.0);
     let mut weights: SmallVec<[_; 8]> = (0..a.rows).map(|i| one / largest(a.row(i))).collect();
     for c in 0..a.rows {
@@ -203,10 +199,10 @@ pub fn solve<T: Number>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usi
 }
 
 /// Bring `a` to a form in which those of the columns `order` that are linearly independent of the ones
-/// before them, to `1e-9` of the largest entry, are unit vectors: number i of those that are returned has
+/// before them, to `1e-9` of the size of their row, are unit vectors: number i of those that are returned has
 /// its 1 in row i. Sparse matrices take fewer operations.
 pub fn eliminate<T: Number>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
-    let least = a.max_abs() * 1e-9;
+    let mut least: SmallVec<[_; 8]> = (0..a.rows).map(|i| largest(a.row(i)) * 1e-9).collect();
     let mut units = Vec::with_capacity(a.rows);
     for &column in order {
         let row = units.len();
@@ -215,9 +211,10 @@ pub fn eliminate<T: Number>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
         }
         let size = |i: usize| a[(i, column)].re().magnitude();
         let pivot = largest_of(size, row..a.rows);
-        if size(pivot).decide_with(least, |entry, least| entry <= least) {
+        if size(pivot).decide_with(least[pivot], |entry, least| entry <= least) {
             continue;
         }
+        least.swap(row, pivot);
         a.swap_rows(row, pivot);
         let inverse = a[(row, column)].recip();
         for r in 0..a.rows {
@@ -330,6 +327,12 @@ fn orthogonalised<T: Number>(a: &Matrix<T>) -> Orthogonalised<T> {
         }
     }
     Orthogonalised { kept, q, l }
+}
+
+/// Largest magnitude of a row, above zero.
+fn largest<T: Number>(row: &[T]) -> T::Values {
+    let floor = T::Values::of(f64::MIN_POSITIVE);
+    row.iter().fold(floor, |largest, v| v.re().magnitude().larger(largest))
 }
 
 /// The row of the largest size; of equal ones the last.

@@ -172,28 +172,25 @@ impl<T: Number> Network<T> {
     pub fn mode(&self, key: ModeKey, capacity: &[T]) -> Option<Mode<T>> {
         let motion = self.motion_of(key)?;
         let stuck = key.rows();
-        let (acceleration, stuck_torque, redundant) =
-            if stuck.is_empty() && self.prescribed.is_empty() {
-                (motion.free.clone(), Matrix::zeros(0, self.basis()), false)
-            } else {
-                let (speeds, nodes) = self.held_speeds(&stuck);
-                let hold = self.hold(&motion, (speeds, &nodes), stuck.len());
-                let rates = self.rates(stuck.len());
-                let weights = || self.weights(&stuck, capacity);
-                let Held { acceleration, torque, redundant } =
-                    hold.solve((&motion.forces, rates.as_ref()), weights)?;
-                (acceleration, torque, redundant)
-            };
-        let derivative = self.with_other_states(&acceleration);
+        let found = if stuck.is_empty() && self.prescribed.is_empty() {
+            let (acceleration, torque) = (motion.free.clone(), Matrix::zeros(0, self.basis()));
+            Held { acceleration, torque, redundant: false }
+        } else {
+            let (speeds, nodes) = self.held_speeds(&stuck);
+            let hold = self.hold(&motion, (speeds, &nodes), stuck.len());
+            let rates = self.rates(stuck.len());
+            hold.solve((&motion.forces, rates.as_ref()), || self.weights(&stuck, capacity))?
+        };
+        let derivative = self.with_other_states(&found.acceleration);
         Some(Mode {
             key,
             rates: SparseRows::of(&derivative),
             radius: T::lifted(radius(&derivative)),
             derivative,
             gear_torque: OnceLock::new(),
-            stuck_torque,
+            stuck_torque: found.torque,
             stuck,
-            redundant,
+            redundant: found.redundant,
         })
     }
 

@@ -50,6 +50,7 @@ impl<T: Real> Recorded<T> {
         let first = block.count == 0;
         block.count = count;
         if first && !T::DERIVATIVES && samples.1.are_all() {
+            // Without clearing the column beforehand.
             let terms = samples.0.take(count).map(|sample| sample.borrow().re() * factor.re());
             values.extend(terms);
             return;
@@ -155,10 +156,9 @@ impl<T: Real> Block<T> {
         (mut samples, mut picked): (impl Iterator<Item: Borrow<T>>, Picked),
         factor: T,
     ) {
-        if !T::DERIVATIVES && picked.are_all() {
+        if !FIRST && !T::DERIVATIVES && picked.are_all() {
             for (value, sample) in values.iter_mut().zip(samples) {
-                let term = sample.borrow().re() * factor.re();
-                *value = if FIRST { term } else { *value + term };
+                *value += sample.borrow().re() * factor.re();
             }
             return;
         }

@@ -30,19 +30,13 @@ impl Assignment {
         }
     }
 
-    /// Whether a row at zero speed carries all it can.
-    pub fn is_at_capacity(&self, row: Row) -> bool {
-        match row {
-            Row::Friction(j) => self.rows[j].is_saturated(),
-            Row::Gear(i) => matches!(self.gears[i], GearState::Rolling { .. }),
-        }
-    }
-
     /// How many of the friction elements move off, and how many do not rest.
     pub fn moving_off(&self, candidates: &[Row]) -> (usize, usize) {
-        let rows = || candidates.iter().filter(|row| matches!(row, Row::Friction(_)));
-        let moving = rows().filter(|&&row| self.direction(row).is_some()).count();
-        (moving, moving + rows().filter(|&&row| self.is_at_capacity(row)).count())
+        let friction =
+            |row: &Row| if let Row::Friction(j) = *row { Some(self.rows[j]) } else { None };
+        let rows = || candidates.iter().filter_map(friction);
+        let moving = rows().filter(|row| matches!(row, RowState::Slipping { .. })).count();
+        (moving, moving + rows().filter(RowState::is_saturated).count())
     }
 
     /// Let power through a rolling gear flow the other way.

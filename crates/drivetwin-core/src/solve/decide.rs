@@ -21,7 +21,7 @@ pub(super) const NO_TORQUE: f64 = 1e-7;
 /// Part of their torques that elements must have left up to their bounds where holding is to last.
 const ROOM: f64 = 1e-9;
 /// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
-const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
+pub(super) const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
 /// How far ahead a decision looks, s.
 const LOOK_AHEAD: f64 = 1e-10;
 /// Most trials before every assignment is tried in turn.
@@ -133,22 +133,20 @@ impl<T: Number> Regime<'_, T> {
         overloaded: bool,
     ) -> (Assignment, Arc<Mode<T>>) {
         let before = self.assignment();
-        let moving = |&&row: &&Row| {
-            let moves = |assignment: &Assignment| assignment.direction(row).is_some();
-            matches!(row, Row::Friction(_)) && moves(&trial) && !(overloaded && moves(&before))
-        };
-        for row in candidates.iter().filter(moving).copied().collect::<Vec<_>>() {
-            let moves_as_before = |held: &Assignment| {
-                let same = |&row: &Row| held.direction(row) == before.direction(row);
-                overloaded && candidates.iter().all(same)
-            };
+        let moves = |assignment: &Assignment, row| assignment.direction(row).is_some();
+        let frictions = candidates.iter().copied().filter(|row| matches!(row, Row::Friction(_)));
+        let moving: Vec<Row> = frictions
+            .filter(|&row| moves(&trial, row) && !(overloaded && moves(&before, row)))
+            .collect();
+        if overloaded && moving.len() < 2 {
+            return (trial, mode);
+        }
+        for row in moving {
             let mut held = trial.clone();
             held.rest(row);
-            if moves_as_before(&held) {
-                continue;
-            }
             self.tell_slipping_from_held(&mut held, candidates);
-            if moves_as_before(&held) || !self.stays(row, (&mode, &basis)) {
+            let same = |&row: &Row| held.direction(row) == before.direction(row);
+            if overloaded && candidates.iter().all(same) || !self.stays(row, (&mode, &basis)) {
                 continue;
             }
             let Ok(mode_held) = self.mode(self.key_of(&held)) else { continue };
@@ -308,9 +306,7 @@ impl<T: Number> Regime<'_, T> {
         let returns = |&row: &Row| {
             trial.direction(row).is_some_and(|sign| {
                 let (a, scale) = self.acceleration(row, mode, basis);
-                (a * sign).decide_with(scale, |a, scale| {
-                    a < -(ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION)
-                })
+                (a * sign).decide_with(scale, |a, scale| a < -negligible(scale))
             })
         };
         candidates.iter().copied().find(returns)
@@ -319,7 +315,7 @@ impl<T: Number> Regime<'_, T> {
     /// Whether a row has no acceleration but round-off.
     fn stays(&self, row: Row, (mode, basis): (&Mode<T>, &[T])) -> bool {
         let (a, scale) = self.acceleration(row, mode, basis);
-        a.decide_with(scale, |a, scale| a.abs() <= ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION)
+        a.decide_with(scale, |a, scale| a.abs() <= negligible(scale))
     }
 
     /// The row at rest that exceeds its bounds most, relative to their size.
@@ -484,6 +480,11 @@ impl<T: Number> Regime<'_, T> {
         }
         self.mode = mode;
     }
+}
+
+/// Acceleration [rad/s²] without meaning, of the size `scale` of the terms that it is the sum of.
+fn negligible(scale: f64) -> f64 {
+    ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION
 }
 
 /// Real part of the scalar product and of the sum of the magnitudes of its terms, which tells

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Guards: polynomials that must stay positive while a mode holds, and the earliest that falls.
 
-use super::decide::{NO_TORQUE, NOTHING, ROUND_OFF, sum_and_scale};
+use super::decide::{NEGLIGIBLE_ACCELERATION, NO_TORQUE, NOTHING, ROUND_OFF, sum_and_scale};
 use super::first_fall::first_fall;
 use super::formation::each;
 use super::lanes::{Task, dispatch};
@@ -216,7 +216,7 @@ fn departing<T: Number>(slip: &Series<T>, sign: f64, released: bool) -> Series<T
         guard[0] = T::zero_();
         let (rate, bend) = (guard[1].re(), guard[2].re().magnitude());
         let small = (rate.magnitude() - bend * 1e-9).those(|left| left <= 0.0);
-        let against = rate.those(|rate| (-1e-9..0.0).contains(&rate));
+        let against = rate.those(|rate| (-NEGLIGIBLE_ACCELERATION..0.0).contains(&rate));
         guard[1] = guard[1].with(small | against, T::zero_());
     }
     guard
