@@ -318,7 +318,10 @@ def test_formulas_are_evaluated_in_real_numbers(
     assert found == pytest.approx(value(np.arange(60000.0, 60050.0)), rel=1e-15)
 
 
-@pytest.mark.parametrize("formula", ["pow(X, 2)", "IF(X > 2, 1, 0)", "X^2", "X2 + 1", "X +"])
+@pytest.mark.parametrize(
+    "formula",
+    ["pow(X, 2)", "IF(X > 2, 1, 0)", "X^2", "X2 + 1", "X +", "X.__class__", "X if X else X"],
+)
 def test_raw_values_are_none_where_a_formula_cannot_be_evaluated(
     tmp_path: Path, formula: str
 ) -> None:

@@ -38,8 +38,7 @@ def shifts(
         recording, card = load(log, vehicle, channels)
         found = find_shifts(recording, card)
     closings = lock_ups(recording, card)
-    with step("looking at the gears held"):
-        seen = _from_speeds(recording, card, found.shifts)
+    seen = _from_speeds(recording, card, found.shifts)
     if as_json:
         print_json(_document(found, closings, seen) | {"warnings": recording.warnings})
         return
@@ -66,8 +65,9 @@ def _from_speeds(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> _
 
     if "output_torque" in log:
         return _Seen()
-    gears = held_gears(log, card, shifts)
-    return _Seen(gears, tuple((shift, after_shift(log, shift)) for shift in shifts))
+    with step("looking at the gears held"):
+        gears = held_gears(log, card, shifts)
+        return _Seen(gears, tuple((shift, after_shift(log, shift)) for shift in shifts))
 
 
 def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from drivetwin.identify.combine import combine
 from drivetwin.identify.design import contradictions, design_of, held_against
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.known import with_known
+from drivetwin.identify.load import LoadFit
 from drivetwin.identify.result import Z95, Estimate, FrictionCurve, LoadLaw
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import (
@@ -24,6 +26,7 @@ from drivetwin.identify.uncertainty import (
     refused,
 )
 from drivetwin.parameters import spec_of
+from drivetwin.shifts.labels import shift_labels
 from drivetwin.vehicle.spec import PriorValue
 
 METHOD = "integral"
@@ -135,12 +138,10 @@ def _impossible(name: str, value: float, prior: PriorValue | None) -> Estimate |
 
 def labels_of(signals: Sequence[ShiftSignals]) -> list[str]:
     """What the shifts are called: by gears, and by lock-up where a log has the same shift twice."""
-    gears = [(s.log, s.shift.start_gear, s.shift.end_gear) for s in signals]
-    labels = []
-    for s, same in zip(signals, gears, strict=True):
-        label = f"shift {s.shift.start_gear}-{s.shift.end_gear}"
-        label += f" at {s.shift.lockup_time:.2f} s" if gears.count(same) > 1 else ""
-        labels.append(f"log {s.log}, {label}" if s.log else label)
+    labels: list[str] = []
+    for log, group in groupby(signals, key=lambda one: one.log):
+        names = shift_labels([one.shift for one in group], to="-")
+        labels += [f"log {log}, shift {name}" if log else f"shift {name}" for name in names]
     return labels
 
 
@@ -248,15 +249,16 @@ def _warnings(
     """What is told once, then what each shift brought along, then what several have in common."""
     labels = labels_of(signals)
     noisy: dict[str, dict[str, float]] = {}
+    trends: dict[str, LoadFit] = {}
     refused: dict[str, list[str]] = {}
     for shift, label in zip(shifts, labels, strict=True):
         for name, chi2 in _residual_powers(shift).items():
             if chi2 > CHI2_WARN:
                 noisy.setdefault(name, {})[label] = chi2
+        if abs(shift.load.speed_trend) > TREND_WARN:
+            trends[label] = shift.load
         if "friction" in shift.refusals:
             refused.setdefault(shift.refusals["friction"], []).append(label)
-    trends = {label: s.load for s, label in zip(shifts, labels, strict=True)}
-    trends = {label: load for label, load in trends.items() if abs(load.speed_trend) > TREND_WARN}
 
     texts = list(dict.fromkeys(notes.values()))
     texts += [text for s in signals for text in s.shift.warnings]

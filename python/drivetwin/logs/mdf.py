@@ -261,7 +261,9 @@ class MdfRecording:
         try:
             numbers = np.asarray(raw, dtype=np.float64)
             names = {"X": numbers, "X1": numbers, "INF": np.inf, "NaN": np.nan}
-            return np.broadcast_to(numexpr.evaluate(formula, names, {}), numbers.shape)
+            return np.broadcast_to(
+                numexpr.evaluate(formula, names, {}, sanitize=True), numbers.shape
+            )
         except Exception:
             raise DamagedChannelError(
                 f"its formula {formula!r} is none that can be evaluated",

@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""How parameters, channels and shifts are called in tables and figures."""
+"""How parameters and channels are called in tables and figures."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 from drivetwin.logs.pressure import pressed_element
 from drivetwin.logs.roles import quantity_of
 from drivetwin.parameters import OVER_ETA, spec_of
-from drivetwin.shifts.shift import Shift
 
 
 def parameter_label(parameter_id: str) -> str:
@@ -16,17 +13,6 @@ def parameter_label(parameter_id: str) -> str:
     spec = spec_of(parameter_id)
     suffix = parameter_id.removeprefix(spec.stem).removesuffix(OVER_ETA).lstrip("_.")
     return f"{spec.symbol} ({suffix})" if suffix else spec.symbol
-
-
-def shift_labels(shifts: Sequence[Shift]) -> list[str]:
-    """The shifts of a log by their gears, `2→3`; of those between the same gears each with the
-    time of its lock-up, `2→3 at 3.34 s`.
-    """
-    names = [f"{one.start_gear}→{one.end_gear}" for one in shifts]
-    return [
-        f"{name} at {one.lockup_time:.2f} s" if names.count(name) > 1 else name
-        for name, one in zip(names, shifts, strict=True)
-    ]
 
 
 def channel_label(role: str) -> str:

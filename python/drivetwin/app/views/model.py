@@ -34,9 +34,10 @@ from drivetwin.errors import MissingParameterError
 from drivetwin.identify.method import Method
 from drivetwin.identify.result import Z95
 from drivetwin.parameters import spec_of
-from drivetwin.report.labels import parameter_label, shift_labels
+from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.trust import TONES
 from drivetwin.report.units import display_of, with_uncertainty
+from drivetwin.shifts.labels import shift_labels
 from drivetwin.validate import Validation
 
 _KINDS = {kind.value: kind.value for kind in LockKind}

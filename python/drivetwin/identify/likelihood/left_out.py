@@ -29,7 +29,7 @@ from drivetwin.identify.result import Z95, Estimate, FrictionCurve
 from drivetwin.identify.signals import FloatArray, Sampled
 from drivetwin.identify.uncertainty import doubted
 
-TORQUE = "output_torque"
+OUTPUT_TORQUE = "output_torque"
 SIGNIFICANT = 5.0
 """Size of an effect in its standard deviations from which it is told; of several columns together
 what is as rare."""
@@ -142,7 +142,7 @@ def late_torque(fit: LikelihoodFit) -> Step:
     def columns(part: Part, run: Trajectory) -> FloatArray:
         rate = np.gradient(run.shaft_torque, run.time)
         shown = [
-            -out.seen(run.time, rate) if out.name == TORQUE else np.zeros(out.values.size)
+            -out.seen(run.time, rate) if out.name == OUTPUT_TORQUE else np.zeros(out.values.size)
             for out in part.record.outputs
         ]
         return np.concatenate(shown)[:, None]
@@ -236,7 +236,7 @@ def _torque_told(found: Step) -> Iterator[LeftOut]:
         return
     text = (
         f"the output torque is {_delay(found)} against the speeds, if the model of the shaft "
-        f"holds: c_o, ζ and the age of the engine torque hang on it; {_shift(found, TORQUE)}"
+        f"holds: c_o, ζ and the age of the engine torque hang on it; {_shift(found, OUTPUT_TORQUE)}"
     )
     yield LeftOut(text, "the output torque in time", found.moves)
 

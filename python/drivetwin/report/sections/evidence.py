@@ -15,7 +15,6 @@ from drivetwin.report.figures.load import load_figure
 from drivetwin.report.figures.momentum import momentum_figure
 from drivetwin.report.figures.ringdown import ringdown_figure
 from drivetwin.report.figures.wlse import WlseLabels, wlse_figure
-from drivetwin.report.labels import shift_labels
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -26,6 +25,7 @@ from drivetwin.report.sections.blocks import (
     Tone,
 )
 from drivetwin.report.units import significant
+from drivetwin.shifts.labels import shift_labels
 
 INERTIA_LABELS = WlseLabels(
     grid="η",

@@ -21,7 +21,7 @@ from drivetwin.identify.signals import ShiftSignals
 from drivetwin.report.figures.residuals import residual_figure, residual_panels
 from drivetwin.report.figures.sensitivity import sensitivity_figure
 from drivetwin.report.figures.shift_phases import shift_spans
-from drivetwin.report.labels import channel_label, shift_labels
+from drivetwin.report.labels import channel_label
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -32,6 +32,7 @@ from drivetwin.report.sections.blocks import (
     link_of,
 )
 from drivetwin.report.units import significant
+from drivetwin.shifts.labels import shift_labels
 
 
 def likelihood_sections(found: Identification) -> list[Section]:

@@ -9,7 +9,6 @@ from drivetwin.report.figures.friction import friction_figure
 from drivetwin.report.figures.recording import log_figure, log_panels
 from drivetwin.report.figures.shift_phases import shift_panels, shift_phases
 from drivetwin.report.figures.validation import validation_figure, validation_panels
-from drivetwin.report.labels import shift_labels
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -22,6 +21,7 @@ from drivetwin.report.sections.blocks import (
     link_of,
 )
 from drivetwin.report.units import significant
+from drivetwin.shifts.labels import shift_labels
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.validate import Validation
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin.report.labels import shift_labels
+from drivetwin.shifts.labels import shift_labels
 from tests.report.sample import identification
 
 
