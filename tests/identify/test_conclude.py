@@ -34,7 +34,7 @@ def test_the_same_shift_twice_is_told_apart_by_its_lock_up() -> None:
     assert labels_of(apart) == ["log 1, shift 2-3", "log 2, shift 2-3"]
 
 
-def _with_J_out(value: float, known: PriorValue | None) -> Conclusions:
+def _with_J_out(value: float, known: PriorValue | None, sensors: float = 0.0) -> Conclusions:
     """The conclusions of the linear fit of a log as if it had found Jo′ to be `value`."""
     found = stepped()
     (shift,), signals = found.evidence.integral, found.evidence.signals
@@ -42,7 +42,7 @@ def _with_J_out(value: float, known: PriorValue | None) -> Conclusions:
     values[shift.ids.index("J_out")] = value
     driveline = likelihood_of(found)[0].problem.parts[0].structure.driveline
     driveline = replace(driveline, J_out=known)
-    return conclude([replace(shift, values=values)], signals, [driveline], {})
+    return conclude([replace(shift, values=values)], signals, [driveline], {"J_out": sensors})
 
 
 def test_where_the_linear_fit_gives_the_impossible_the_card_stands() -> None:
@@ -56,6 +56,14 @@ def test_a_value_far_off_the_cards_is_no_design_value_however_wide() -> None:
     assert told.estimates["J_out"].verdict is Verdict.WEAK
     assert "contradicts" in told.estimates["J_out"].reason
     assert any(text.startswith("J_out: the vehicle card says 1.35") for text in told.warnings)
+
+
+def test_sensors_that_tell_less_than_the_card_leave_its_value_alone() -> None:
+    card = PriorValue(1.35, 0.1)
+    told = _with_J_out(1.4, card, sensors=0.3).estimates["J_out"]
+    assert (told.value, told.std_total, told.verdict) == (1.35, 0.1, Verdict.DESIGN)
+    assert "sensors' tolerances" in told.reason
+    assert _with_J_out(1.4, card, sensors=0.05).estimates["J_out"].value == 1.4
 
 
 @pytest.mark.parametrize(

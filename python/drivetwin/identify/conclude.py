@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -18,6 +18,7 @@ from drivetwin.identify.result import Z95, Estimate, FrictionCurve, LoadLaw
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import (
     KNOWN,
+    SENSORS_TELL_LESS,
     correlation,
     designed,
     doubted,
@@ -96,6 +97,7 @@ def conclude(
         for told in zip(ids, values.tolist(), std.tolist(), strict=True)
     }
     against = contradictions(ids, values, covariance, designs, systematic)
+    estimates |= _better_by_design(estimates, designs, {one.id for one in against})
     estimates = held_against(estimates, against, METHOD)
     for name, why in _misfits(shifts, signals, ids).items():
         estimates[name] = doubted(estimates[name], why)
@@ -120,6 +122,23 @@ def _estimate(
     if design is not None:
         return judge_with_design(told, design, METHOD, systematic, note)
     return judge(name, value, std, METHOD, systematic, note)
+
+
+def _better_by_design(
+    estimates: Mapping[str, Estimate],
+    designs: Mapping[str, PriorValue],
+    contradicted: Collection[str],
+) -> dict[str, Estimate]:
+    """The card's own values where the log, as wrong as its sensors may be, knows them less well.
+
+    The fit weighs log and card by noise alone. What the log contradicts is not the card's.
+    """
+    return {
+        name: designed(name, prior.value, prior.std, SENSORS_TELL_LESS)
+        for name, prior in designs.items()
+        if name not in contradicted
+        and (estimates[name].std_total or 0.0) > prior.std > 0.0
+    }
 
 
 def _impossible(name: str, value: float, prior: PriorValue | None) -> Estimate | None:

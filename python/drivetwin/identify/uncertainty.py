@@ -26,6 +26,7 @@ CALIBRATE = (
 )
 KNOWN = "known from design, as the card says"
 ADDS_LITTLE = "design value of the card, to which the log adds little"
+SENSORS_TELL_LESS = "design value of the card; the sensors' tolerances leave the log less certain"
 
 _EXPERIMENT = {
     "eta": "step the pedal in the lower gear: engine torque must change while the gear is held",
