@@ -107,6 +107,49 @@ fn case() -> impl Strategy<Value = Case> {
         })
 }
 
+/// Cases as written by hand, of few round numbers: equal capacities, torques exactly at them, members at rest,
+/// events of several elements at one instant.
+fn case_by_hand() -> impl Strategy<Value = Case> {
+    let pick = |values: &'static [f64]| prop::sample::select(values);
+    let torques = move || pick(&[0.0, 0.0, 10.0, 50.0, -50.0, 90.0, 100.0]);
+    let clutch = (0..4usize, 0..5usize, pick(&[1.0, 1.2]), any::<bool>())
+        .prop_filter("different sides", |c| c.0 != c.1);
+    let levels = prop::collection::vec(pick(&[0.0, 50.0, 50.0, 100.0]), 5);
+    let clutch = (clutch, levels).prop_map(|((a, b, peak, stribeck), pressure)| RandomClutch {
+        a,
+        b,
+        peak,
+        stribeck,
+        pressure,
+    });
+    let other = prop_oneof![
+        (0..4usize, 0..4usize, pick(&[100.0, 1000.0]), pick(&[0.0, 1.0, 100.0]))
+            .prop_filter("different ends", |s| s.0 != s.1)
+            .prop_map(|(a, b, k, c)| RandomElement::Shaft(a, b, k, c)),
+        (0..4usize, pick(&[-1.0, 1.0, 2.0])).prop_map(|(a, z)| RandomElement::Gear(a, z, None)),
+        pick(&[-2.0, 2.0, 3.0]).prop_map(RandomElement::Planetary),
+        (0..4usize, 0..5usize)
+            .prop_filter("different sides", |s| s.0 != s.1)
+            .prop_map(|(a, b)| RandomElement::OneWay(a, b)),
+        (0..4usize, pick(&[0.0, 10.0, 50.0]), pick(&[0.0, 5.0]))
+            .prop_map(|(a, constant, rolling)| RandomElement::Load(a, constant, rolling, 0.0)),
+    ];
+    (
+        prop::array::uniform4(pick(&[0.5, 1.0, 2.0])),
+        prop::array::uniform4(pick(&[0.0, 0.0, 1.0, 10.0, -10.0])),
+        prop::collection::vec(torques(), 5),
+        prop::collection::vec(clutch, 1..5),
+        prop::collection::vec(other, 0..4),
+    )
+        .prop_map(|(inertias, speeds, drive, clutches, others)| Case {
+            inertias,
+            speeds,
+            drive,
+            clutches,
+            others,
+        })
+}
+
 fn friction(stribeck: bool) -> FrictionLaw<f64> {
     if stribeck {
         FrictionLaw::Stribeck(Stribeck { mu_c: 0.8, mu_s: 1.0, v_s: 5.0, mu_v: 1e-3 })
@@ -268,6 +311,16 @@ proptest! {
             let largest = exact.iter().fold(1.0, |largest: f64, slip| largest.max(slip.abs()));
             for (k, (a, b)) in fast.iter().zip(exact).enumerate() {
                 prop_assert!((a - b).abs() < 1e-4 * largest, "clutch {i}, sample {k}: {a}, {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_happens_at_one_instant_is_decided_and_not_again_and_again(case in case_by_hand()) {
+        for settings in [Settings::default(), Settings::exact()] {
+            if let Some(trajectory) = simulate(&case, SAMPLES, (settings, true)) {
+                prop_assert_eq!(&trajectory.status, &Status::Completed);
+                check(&case, &trajectory);
             }
         }
     }
