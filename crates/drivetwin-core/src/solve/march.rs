@@ -45,6 +45,12 @@ pub fn room<U: Lane>() -> Room<U> {
     [[U::all(0.0); 2]; MAX_INPUTS]
 }
 
+/// What a line, value and rate, comes to after `h` [s], without derivatives.
+#[inline(always)]
+fn line_end<U: Lane>([start, rate]: [U; 2], h: f64) -> U::Values {
+    rate.values().times(h) + start.values()
+}
+
 /// A carried channel at the start of a sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Carry<L> {
@@ -148,7 +154,6 @@ pub fn march<
     (trail, at, live): (&mut Trail<L, N>, usize, u32),
 ) -> (usize, u32) {
     let mut room = room();
-    let mut ends = [[<S::Input as Lane>::Values::all(0.0); W]; MAX_INPUTS];
     // Of its own, for the processor's registers.
     let (mut x, mut carry) = (*state, *carried);
     let mut outcome = (count, 0);
@@ -166,16 +171,16 @@ pub fn march<
             }
             *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, &mut carry));
             trail.put(op, at + from + k + 1, (&x, &carry));
-            let end = |[start, rate]: [S::Input; 2]| rate.values().times(h) + start.values();
             if W == 1 {
-                left[k] = op.leaves::<_, F, A>(guards, (|i| end(u[i]), !loaded), (&x, &carry));
-            } else if looks {
-                ends.iter_mut().zip(u).for_each(|(ends, &line)| ends[k] = end(line));
+                let end = |i: usize| line_end(u[i], h);
+                left[k] = op.leaves::<_, F, A>(guards, (end, !loaded), (&x, &carry));
             }
         }
-        if W > 1 {
+        if W > 1 && looks {
             let to = (&*trail, at + from, some);
-            left = op.left::<_, F, A, W>(guards, (&ends, !loaded), to);
+            // Apart, which leaves the step the processor's registers.
+            let ends = |input| ends_of(source, input, (first + from, some), h);
+            left = op.left::<_, F, A, W>(guards, (ends, !loaded), to);
         }
         for k in 0..some {
             let fallen = fallen[k].negative_with(left[k]);
@@ -192,6 +197,22 @@ pub fn march<
         (0, unbounded) if unbounded != 0 => (count.saturating_sub(1), unbounded),
         _ => outcome,
     }
+}
+
+/// An input at the ends of samples of length `h` [s], `count` of at most `W` from segment `first` on, without
+/// derivatives.
+#[inline(always)]
+fn ends_of<L: Lane, S: Source<L>, const W: usize>(
+    source: &S,
+    input: usize,
+    (first, count): (usize, usize),
+    h: f64,
+) -> [<S::Input as Lane>::Values; W] {
+    let (mut room, mut ends) = (room(), [Lane::all(0.0); W]);
+    for (k, end) in ends.iter_mut().enumerate().take(count) {
+        *end = line_end(source.read(first + k, &mut room)[input], h);
+    }
+    ends
 }
 
 impl<L: Lane> Carry<L> {

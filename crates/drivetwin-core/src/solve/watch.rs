@@ -3,7 +3,7 @@
 
 use super::march::{Carry, Column, Source, Trail};
 use super::operators::{Bound, MAX_WATCHED, Operators, Watched};
-use crate::network::smooth::{Line, MAX_INPUTS, Sample};
+use crate::network::smooth::{Line, Sample};
 use crate::number::{Factor, Lane, Values};
 
 /// Of the watched forms at the start of a sample, what torques are off their limits by or what speeds are,
@@ -14,9 +14,6 @@ pub type Guards<V> = [[V; 2]; MAX_WATCHED];
 pub fn idle_guards<V: Values>() -> Guards<V> {
     [[V::all(1.0), V::all(0.0)]; MAX_WATCHED]
 }
-
-/// Inputs at the ends of `W` samples.
-type Ends<V, const W: usize> = [[V; W]; MAX_INPUTS];
 
 impl<L: Lane, const N: usize> Operators<L, N> {
     /// Whether every normal load stays above zero over samples, in all runs.
@@ -59,23 +56,23 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         left[0]
     }
 
-    /// The same of `some` samples together, by what the trail has of them.
+    /// The same of `some` samples together, by what the trail has of them and by the inputs at their ends.
     #[inline(always)]
     pub fn left<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
         &self,
         guards: &mut Guards<L::Values>,
-        (ends, loads): (&Ends<V, W>, bool),
+        (ends, loads): (impl Fn(usize) -> [V; W], bool),
         (trail, from, some): (&Trail<L, N>, usize, usize),
     ) -> [L::Values; W] {
         let mut left = [L::Values::all(0.0); W];
         for (place, before) in guards.iter_mut().enumerate().take(self.watched.len()) {
-            let after = self.guards_after::<_, F, A, W>(place, ends, (trail, from));
+            let after = self.guards_after::<_, F, A, W>(place, &ends, (trail, from));
             self.falls::<F, _>(place, (before, &after), &mut left);
             *before = after.map(|values| values[some - 1]);
         }
         if loads {
             for load in &self.loads {
-                load.falls::<_, F, W>(&ends[load.input % MAX_INPUTS], &mut left);
+                load.falls::<_, F, W>(&ends(load.input), &mut left);
             }
         }
         left
@@ -136,14 +133,13 @@ impl<L: Lane, const N: usize> Operators<L, N> {
     fn guards_after<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
         &self,
         place: usize,
-        ends: &Ends<V, W>,
+        ends: &impl Fn(usize) -> [V; W],
         (trail, from): (&Trail<L, N>, usize),
     ) -> [[L::Values; W]; 2] {
         let Watched { form, bound } = &self.watched[place];
-        let of_input = |input: usize| &ends[input % MAX_INPUTS];
         let mut values = [form.constant.values(); W];
         for drive in &self.drives {
-            add::<L, V, F, W>(&mut values, drive.watched[place], of_input(drive.input));
+            add::<L, V, F, W>(&mut values, drive.watched[place], &ends(drive.input));
         }
         self.add_states::<F, W>(&mut values, &form.state, (trail, from));
         for a in 0..A {
@@ -155,7 +151,7 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         match bound {
             Bound::Within { limit, side } => {
                 let mut margins = [limit.offset.values(); W];
-                add::<L, V, F, W>(&mut margins, limit.gain, of_input(limit.input));
+                add::<L, V, F, W>(&mut margins, limit.gain, &ends(limit.input));
                 for k in 0..W {
                     margins[k] = margin::<L, F>(*side, margins[k], values[k]);
                 }
