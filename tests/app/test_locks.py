@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivetwin.app.locks import Lock, LockKind, card_lock, checked, lockable, locked
+from drivetwin.app.locks import Lock, LockKind, card_lock, checked, lockable, locked, typed
 from drivetwin.app.session import Session
 from drivetwin.errors import InputError
 from drivetwin.vehicle.spec import PriorValue
@@ -53,6 +53,16 @@ def test_the_lock_of_the_card_is_shown(identified: Session) -> None:
 def test_impossible_locks_are_refused(name: str, lock: Lock) -> None:
     with pytest.raises(InputError):
         checked(name, lock)
+
+
+def test_an_empty_field_is_no_value_of_zero() -> None:
+    for kind in (FIXED, LockKind.PRIOR):
+        with pytest.raises(InputError, match="no value is stated"):
+            typed("J_out", kind, None, 0.1)
+    assert typed("J_out", LockKind.FREE, None, None) == Lock(LockKind.FREE)
+    assert typed("te_delay", FIXED, 0.0, None) == Lock(FIXED, 0.0)
+    prior = typed("te_delay", LockKind.PRIOR, 10.0, 2.0)
+    assert (prior.value, prior.std) == pytest.approx((0.010, 0.002))
 
 
 def test_what_follows_from_others_cannot_be_locked() -> None:

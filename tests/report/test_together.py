@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from drivetwin.report.together import render_together
 from tests.identify.several.made import loaded, together
@@ -19,6 +20,20 @@ def test_the_page_shows_logs_predictions_and_every_shift_once() -> None:
     assert "as noise allows" in page
     assert "log 1 alone" in page
     assert page == render_together(made.found, made.fitted)
+
+
+def test_a_log_that_could_not_be_simulated_does_not_show_the_runs_of_another() -> None:
+    made = together()
+    several = made.found.evidence.several
+    assert several is not None
+    second = several.logs[1].shifts
+    runs = tuple(one for one in made.found.evidence.validation if one.shift in second)
+    assert 0 < len(runs) < len(made.found.evidence.validation)
+    evidence = replace(made.found.evidence, validation=runs)
+    page = render_together(replace(made.found, evidence=evidence), made.fitted)
+    anchors = re.findall(r'<section id="([^"]+)"', page)
+    assert "validation-2" in anchors
+    assert "validation-1" not in anchors
 
 
 def test_a_disagreement_stands_on_the_first_page() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from drivetwin.display import display_of, in_units
 from drivetwin.errors import InputError, Where
 from drivetwin.parameters import spec_of
 from drivetwin.vehicle.spec import PriorValue, VehicleCard
@@ -57,7 +58,8 @@ def checked(parameter_id: str, lock: Lock) -> Lock:
         raise InputError("this follows from other parameters", "lock those", where)
     if lock.kind is not LockKind.FREE and not spec.lower <= lock.value <= spec.upper:
         raise InputError(
-            f"{lock.value:.4g} lies outside {spec.lower:g} to {spec.upper:g} {spec.unit}",
+            f"{in_units(lock.value, spec.unit)} lies outside {in_units(spec.lower, spec.unit)} to "
+            f"{in_units(spec.upper, spec.unit)}",
             "lock it at a possible value",
             where,
         )
@@ -66,6 +68,19 @@ def checked(parameter_id: str, lock: Lock) -> Lock:
             "a prior needs a standard deviation above 0", "state one, or fix the value", where
         )
     return lock
+
+
+def typed(parameter_id: str, kind: LockKind, value: float | None, std: float | None) -> Lock:
+    """The lock of numbers in display units; None where a field is empty.
+
+    Raises InputError where no value is stated that is needed.
+    """
+    if kind is LockKind.FREE:
+        return Lock(kind)
+    if value is None:
+        raise InputError("no value is stated", "type one first", Where(key=parameter_id))
+    factor = display_of(spec_of(parameter_id).unit).factor
+    return Lock(kind, value / factor, (std or 0.0) / factor)
 
 
 def card_lock(card: VehicleCard, parameter_id: str) -> Lock:

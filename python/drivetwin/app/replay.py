@@ -11,6 +11,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from drivetwin.display import Display, display_of
 from drivetwin.driveline import DualClutch, FloatArray, FrictionTable, ShiftElement, Stribeck
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.parameters import spec_of
@@ -20,7 +21,6 @@ from drivetwin.report.figures.validation import validation_panels
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.blocks import link_of
 from drivetwin.report.style import MUTED
-from drivetwin.report.units import Display, display_of
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin import Twin
 from drivetwin.validate import Validation, simulated_again, validate

@@ -124,7 +124,7 @@ def figure_json(block: FigureBlock, store: Store) -> Markup:
         for panel in block.panels
         for curve in panel.curves
     ]
-    for trace in figure["data"] if curves else ():
+    for trace in figure["data"][: len(curves)]:
         del trace["x"], trace["y"]
     if buttons:
         figure["layout"]["margin"]["t"] = _BELOW_BUTTONS

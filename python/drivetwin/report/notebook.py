@@ -11,6 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import escape
 
+from drivetwin.display import display_of, significant, with_uncertainty
 from drivetwin.identify.result import Z95, Estimate, Identification, SignalFit
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.figures.comparison import friction_overlay
@@ -18,7 +19,6 @@ from drivetwin.report.figures.parameters import interval_figure
 from drivetwin.report.figures.recording import QUANTITIES, log_figure
 from drivetwin.report.figures.validation import validation_figure
 from drivetwin.report.labels import channel_label, channel_unit
-from drivetwin.report.units import display_of, significant, with_uncertainty
 from drivetwin.twin import Twin
 from drivetwin.validate import Validation
 

@@ -38,13 +38,17 @@ def render_together(found: Identification, logs: Sequence[ShiftLog]) -> str:
     if held:
         sections.insert(1 if several is None else 2, held_out_section(found, held))
     names = " and ".join(Path(log.source).name for log in logs)
-    predicted = f" · {len(held)} shifts predicted" if held else ""
+    predicted = f" · {_shifts(len(held))} predicted" if held else ""
     return render_page(
         title=f"Driveline model from {names}",
-        subtitle=f"{len(found.shifts)} shifts fitted{predicted} · method {found.method.value} · "
+        subtitle=f"{_shifts(len(found.shifts))} fitted{predicted} · method {found.method.value} · "
         f"loss law {found.loss_law}",
         sections=[section for section in sections if section.blocks],
     )
+
+
+def _shifts(count: int) -> str:
+    return "1 shift" if count == 1 else f"{count} shifts"
 
 
 def _of_several(
@@ -53,11 +57,11 @@ def _of_several(
     """The sections of all logs in reading order; stages of single shifts are in their reports."""
     yield trust_section(found)
     yield several_section(found, several)
-    runs = iter(found.evidence.validation)
     for share, log in zip(several.logs, logs, strict=True):
         yield of_log(shift_section(of_one_log(found, share), log), share)
-        mine = tuple(run for _, run in zip(share.shifts, runs, strict=False))
-        yield of_log(validation_section(mine), share)
+        own = {id(shift) for shift in share.shifts}  # a log that was not simulated has no runs
+        runs = tuple(run for run in found.evidence.validation if id(run.shift) in own)
+        yield of_log(validation_section(runs), share)
     yield friction_section(found)
     yield from likelihood_sections(found)
     yield limits_section(found)

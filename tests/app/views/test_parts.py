@@ -38,3 +38,21 @@ def test_faults_of_a_callback_become_a_message(
 
 def test_what_works_is_handed_on() -> None:
     assert parts.told(lambda: 3)() == 3
+
+
+@pytest.mark.parametrize(
+    ("fault", "shifts", "says", "bad"),
+    [
+        ("", 1, "a.csv is open: 1 usable shift", False),
+        ("", 2, "a.csv is open: 2 usable shifts", False),
+        ("", 0, "a.csv is open, but holds no usable shift: the view Log says why", True),
+        ("no unit", 0, "The log cannot be read as mapped. no unit", True),
+    ],
+)
+def test_a_log_without_a_shift_is_no_success(
+    fault: str, shifts: int, says: str, bad: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[tuple[str, bool]] = []
+    monkeypatch.setattr(parts, "tell", lambda text, fault=False: told.append((text, fault)))
+    parts.tell_read("a.csv is open", fault, shifts)
+    assert told == [(says, bad)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from drivetwin.app.folder import Folder
 from drivetwin.app.server import Start, build
 from drivetwin.app.session import Session
-from drivetwin.report.units import significant
+from drivetwin.display import significant
 
 
 def test_shift_quality_is_told_in_units_of_engineers(identified: Session, tmp_path: Path) -> None:

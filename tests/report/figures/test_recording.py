@@ -17,6 +17,12 @@ def test_each_shift_has_a_button_and_its_phases() -> None:
     ]
 
 
+def test_a_shift_is_named_once_where_its_phases_have_no_room_for_numbers() -> None:
+    (name,) = log_figure(log(), [SHIFT]).layout.annotations
+    assert name.text == "<b>2→3</b>"
+    assert SHIFT.torque_phase[0] < name.x < SHIFT.inertia_phase[1]
+
+
 def test_without_shifts_nothing_is_shaded() -> None:
     figure = log_figure(log())
     assert not figure.layout.shapes

@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drivetwin.identify.ringdown import RingDown
-from drivetwin.report.figures.ringdown import ringdown_figure
+from drivetwin.report.figures.ringdown import ringdown_figure, ringdown_panels
+from drivetwin.report.html import figure_json
+from drivetwin.report.packing import Store
+from drivetwin.report.sections.blocks import FigureBlock
 
 
 def _ring() -> RingDown:
@@ -30,5 +34,19 @@ def test_residual_stands_under_the_fit() -> None:
 def test_extremes_are_marked() -> None:
     read = replace(_ring(), extremes_time=np.array([0.04]), extremes_torque=np.array([1650.0]))
     figure = ringdown_figure(read)
-    assert [trace.mode for trace in figure.data] == [None, "markers"]
+    assert [trace.mode for trace in figure.data] == ["lines", "markers"]
+    assert [trace.showlegend for trace in figure.data] == [True, True]
     assert figure.data[1].y == pytest.approx([1650.0])
+
+
+def test_the_page_packs_the_samples_and_keeps_the_extremes() -> None:
+    """The samples are most of a report of many shifts; the marks stand behind them in the data."""
+    read = replace(_ring(), extremes_time=np.array([0.04]), extremes_torque=np.array([1650.0]))
+    store = Store()
+    block = FigureBlock(ringdown_figure(read), "", ringdown_panels(read))
+    measured, extremes = json.loads(figure_json(block, store))["data"]
+    assert "x" not in measured
+    assert "y" not in measured
+    assert len(store.index) == 2
+    assert extremes["name"] == "extremes of 10 ms means"
+    assert "x" in extremes

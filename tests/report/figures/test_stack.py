@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from drivetwin.display import BAR, NM, RPM
 from drivetwin.report.figures.shift_phases import shift_phases, shift_spans
 from drivetwin.report.figures.stack import Curve, Panel, over_time, stacked, y_ranges
 from drivetwin.report.figures.validation import validation_figure
 from drivetwin.report.style import MEASURED, SIMULATED
-from drivetwin.report.units import BAR, NM, RPM
 from tests.report.sample import SHIFT, TIME, log, validation
 
 
@@ -86,6 +86,13 @@ def test_an_empty_view_has_no_range() -> None:
     panels = [Panel("torque", NM, [Curve("T", TIME, np.full_like(TIME, np.nan), MEASURED)])]
     assert y_ranges(panels, (0.0, 2.0)) == {}
     assert "range" not in over_time(panels, (0.0, 2.0), 300).layout.yaxis.to_plotly_json()
+
+
+def test_late_in_a_long_recording_samples_keep_their_distance() -> None:
+    time = np.linspace(50_000.0, 50_000.999, 1000)
+    panel = Panel("torque", NM, [Curve("T_e", time, np.sin(time), MEASURED)])
+    drawn = np.asarray(over_time([panel], (time[0], time[-1]), 300).data[0].x, np.float64)
+    assert np.diff(drawn) == pytest.approx(np.full(999, 1e-3), rel=0.1)
 
 
 def test_a_held_value_counts_until_the_next() -> None:

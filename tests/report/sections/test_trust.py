@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from drivetwin.display import RPM, significant
 from drivetwin.identify.result import SignalFit, Verdict
 from drivetwin.report.figures.parameters import interval_figure
 from drivetwin.report.sections.blocks import TilesBlock, Tone
 from drivetwin.report.sections.trust import fit_table, parameter_table, trust_section
-from drivetwin.report.units import RPM, significant
 from drivetwin.validate import with_fit
 from tests.report.sample import identification, validation
 

@@ -25,7 +25,7 @@ from drivetwin.app.views.parts import (
     notes,
     row,
     table,
-    tell,
+    tell_read,
     told,
 )
 from drivetwin.report.figures.recording import log_figure
@@ -89,10 +89,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         )
         opened = session.work.require_opened()
         announce(Topic.LOG)
-        if opened.fault:
-            tell(f"The log cannot be read as mapped. {opened.fault}", fault=True)
-        else:
-            tell(f"The log is read as mapped: {len(session.work.shifts)} usable shift(s)")
+        tell_read("The log is read as mapped", opened.fault, len(session.work.shifts))
 
 
 def _content(opened: Opened) -> list[Component]:

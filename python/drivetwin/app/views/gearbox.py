@@ -23,8 +23,8 @@ from drivetwin.app.views.parts import (
     told,
     upload_button,
 )
+from drivetwin.display import NM, RPM, significant
 from drivetwin.gearbox import Gearbox, builtin_gearboxes
-from drivetwin.report.units import NM, RPM, significant
 
 _ROUND_OFF = 1e-12
 _FIRST = "three-set-4000cr"

@@ -21,7 +21,7 @@ from drivetwin.app.views.parts import (
     notes,
     row,
     table,
-    tell,
+    tell_read,
     told,
     upload_button,
 )
@@ -93,10 +93,7 @@ def register(app: Dash, sessions: Sessions) -> None:
         session.open(_source(session, log, log_up), _source(session, card, card_up))
         opened = session.work.require_opened()
         announce(Topic.LOG)
-        if opened.fault:
-            tell(f"The log cannot be read as mapped. {opened.fault}", fault=True)
-        else:
-            tell(f"{log} is open: {len(session.work.shifts)} usable shift(s)")
+        tell_read(f"{log} is open", opened.fault, len(session.work.shifts))
 
     @app.callback(
         Output("log-content", "children"),

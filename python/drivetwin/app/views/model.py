@@ -10,7 +10,7 @@ from typing import Any
 from dash import ALL, MATCH, Dash, Input, Output, Patch, State, ctx, html, no_update
 from dash.development.base_component import Component
 
-from drivetwin.app.locks import Lock, LockKind, lockable
+from drivetwin.app.locks import Lock, LockKind, lockable, typed
 from drivetwin.app.replay import Slider, changes_of, display_for, sliders_of
 from drivetwin.app.session import Live, Session, Sessions
 from drivetwin.app.views.parts import (
@@ -30,13 +30,13 @@ from drivetwin.app.views.parts import (
     told,
 )
 from drivetwin.app.work import Work
+from drivetwin.display import display_of, with_uncertainty
 from drivetwin.errors import MissingParameterError
 from drivetwin.identify.method import Method
 from drivetwin.identify.result import Z95
 from drivetwin.parameters import spec_of
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.trust import TONES
-from drivetwin.report.units import display_of, with_uncertainty
 from drivetwin.shifts.labels import shift_labels
 from drivetwin.validate import Validation
 
@@ -200,10 +200,7 @@ def _register_locks(app: Dash, sessions: Sessions) -> None:
             return
         name = ctx.triggered_id["id"]
         place = [one["id"] for one in ids].index(name)
-        factor = display_of(spec_of(name).unit).factor
-        wanted = Lock(
-            LockKind(kinds[place]), (values[place] or 0.0) / factor, (stds[place] or 0.0) / factor
-        )
+        wanted = typed(name, LockKind(kinds[place]), values[place], stds[place])
         if _same(wanted, session.work.lock_of(name)):
             return
         session.set_lock(name, wanted)

@@ -76,6 +76,16 @@ def tell(text: str, *, fault: bool = False) -> None:
     )
 
 
+def tell_read(how: str, fault: str, shifts: int) -> None:
+    """Show what came of reading a log, `how` in words: its fault, or how many shifts it holds."""
+    if fault:
+        tell(f"The log cannot be read as mapped. {fault}", fault=True)
+    elif shifts:
+        tell(f"{how}: {shifts} usable {'shift' if shifts == 1 else 'shifts'}")
+    else:
+        tell(f"{how}, but holds no usable shift: the view Log says why", fault=True)
+
+
 def told(callback: Callable[P, R]) -> Callable[P, R]:
     """A callback whose faults become the message of the page; it then changes nothing."""
 

@@ -34,8 +34,8 @@ from drivetwin.app.views.parts import (
     told,
 )
 from drivetwin.app.work import Work
+from drivetwin.display import display_of, significant
 from drivetwin.report.sections.story import phase_key
-from drivetwin.report.units import display_of, significant
 from drivetwin.shifts.labels import shift_labels
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import plotly.graph_objects as go
 
+from drivetwin.display import BAR, NM, RPM, Display
 from drivetwin.drive.result import DriveRun, Maneuver
 from drivetwin.driveline import FloatArray
 from drivetwin.report.figures.stack import Curve, Panel, over_time, whole
@@ -21,7 +22,6 @@ from drivetwin.report.style import (
     axis,
     layout,
 )
-from drivetwin.report.units import BAR, NM, RPM, Display
 
 _COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 _RATIO = Display("–")

@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
+from drivetwin.display import NM
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.observed import Band, FloatArray, Observation
 from drivetwin.report.figures.stack import Curve, Panel
 from drivetwin.report.style import MEASURED, MUTED, SIMULATED
-from drivetwin.report.units import NM
 
 
 def observer_panels(one: Observation, log: ShiftLog) -> list[Panel]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A whole log: every mapped channel over time, with the phases of its shifts."""
+"""A whole log: every mapped channel over time, with its shifts."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ from collections.abc import Sequence
 
 import plotly.graph_objects as go
 
+from drivetwin.display import BAR, NM, RPM, Display
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.report.figures.shift_phases import shift_spans
 from drivetwin.report.figures.stack import (
     Curve,
     Panel,
-    mark_phases,
     over_time,
+    shade_phases,
     shift_view,
     whole,
+    write_above,
     zoom_buttons,
 )
 from drivetwin.report.labels import channel_label
 from drivetwin.report.style import ACCENT, COMPARED, MEASURED, MUTED, SECOND, SIMULATED
-from drivetwin.report.units import BAR, NM, RPM, Display
 from drivetwin.shifts.shift import Shift
 
 QUANTITIES: dict[Quantity, tuple[str, Display]] = {
@@ -36,14 +37,19 @@ _COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 
 
 def log_figure(log: ShiftLog, shifts: Sequence[Shift] = ()) -> go.Figure:
-    """All channels by quantity; the phases of `shifts` are shaded, with a button for each."""
+    """All channels by quantity; `shifts` are shaded and named, with a button for each.
+
+    A shift is too short in a whole log for the numbers of its phases to stand side by side.
+    """
     panels = log_panels(log)
     figure = over_time(panels, whole(panels), 120 + 170 * len(panels))
     zooms = {"whole": whole(panels)}
     for shift in shifts:
         spans = shift_spans(shift)
-        mark_phases(figure, spans)
-        zooms[f"{shift.start_gear}→{shift.end_gear}, {shift.lockup_time:.1f} s"] = shift_view(spans)
+        name = f"{shift.start_gear}→{shift.end_gear}"
+        shade_phases(figure, spans)
+        write_above(figure, 0.5 * (spans["torque"][0] + spans["inertia"][1]), name)
+        zooms[f"{name}, {shift.lockup_time:.1f} s"] = shift_view(spans)
     if shifts:
         figure.update_layout(updatemenus=[zoom_buttons(panels, zooms)], margin={"t": 64})
     return figure

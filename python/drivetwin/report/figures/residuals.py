@@ -8,12 +8,12 @@ from collections.abc import Mapping
 import numpy as np
 import plotly.graph_objects as go
 
+from drivetwin.display import Display
 from drivetwin.identify.likelihood.slow import block_means
 from drivetwin.identify.result import Z95, FloatArray
 from drivetwin.report.figures.stack import Curve, Panel, Phases, stacked
 from drivetwin.report.labels import channel_label
 from drivetwin.report.style import FITTED, MEASURED
-from drivetwin.report.units import Display
 
 _SIGMA = Display("σ")
 

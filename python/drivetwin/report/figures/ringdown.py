@@ -4,50 +4,36 @@
 from __future__ import annotations
 
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
+from drivetwin.display import NM
 from drivetwin.identify.ringdown import RingDown
-from drivetwin.report.decimate import envelope
-from drivetwin.report.style import FITTED, MEASURED, MUTED, axis, layout
+from drivetwin.report.figures.stack import Curve, Panel, over_time, whole
+from drivetwin.report.style import FITTED, MEASURED, MUTED
 
 
 def ringdown_figure(ring: RingDown) -> go.Figure:
     """Measured output torque with the extremes read from it, or with the fit and its residual."""
-    return _with_extremes(ring) if ring.extremes_time.size else _with_fit(ring)
-
-
-def _measured(ring: RingDown) -> go.Scatter:
-    time, torque = envelope(ring.time, ring.torque)
-    return go.Scatter(x=time, y=torque, name="measured", line={"color": MEASURED, "width": 1.1})
-
-
-def _with_extremes(ring: RingDown) -> go.Figure:
-    figure = go.Figure(_measured(ring))
+    panels = ringdown_panels(ring)
+    if not ring.extremes_time.size:
+        return over_time(panels, whole(panels), 460)
+    figure = over_time(panels, whole(panels), 360)
     figure.add_scatter(
         x=ring.extremes_time,
         y=ring.extremes_torque,
         mode="markers",
         name="extremes of 10 ms means",
         marker={"color": FITTED, "size": 9, "symbol": "circle-open", "line": {"width": 2}},
+        xaxis="x",
+        yaxis="y",
     )
-    figure.update_layout(layout(360, xaxis=axis("time [s]"), yaxis=axis("output torque [Nm]")))
-    return figure
+    return figure.update_traces(showlegend=True)
 
 
-def _with_fit(ring: RingDown) -> go.Figure:
-    figure = make_subplots(rows=2, shared_xaxes=True, row_heights=[0.72, 0.28])
-    figure.add_trace(_measured(ring), row=1, col=1)
-    time, fitted = envelope(ring.time, ring.fitted)
-    line = {"color": FITTED, "width": 1.8}
-    figure.add_scatter(x=time, y=fitted, name="fitted", line=line, row=1, col=1)
-    time, left = envelope(ring.time, ring.torque - ring.fitted)
-    line = {"color": MUTED, "width": 1}
-    figure.add_scatter(x=time, y=left, showlegend=False, line=line, row=2, col=1)
-    figure.update_layout(layout(460, hovermode="x"))
-    figure.update_layout(
-        xaxis=axis("", matches="x2", showticklabels=False),
-        xaxis2=axis("time [s]"),
-        yaxis=axis("output torque [Nm]"),
-        yaxis2=axis("residual<br>[Nm]"),
-    )
-    return figure
+def ringdown_panels(ring: RingDown) -> list[Panel]:
+    """The curves over time that `ringdown_figure` shows, from top to bottom."""
+    measured = Curve("measured", ring.time, ring.torque, MEASURED, 1.1)
+    if ring.extremes_time.size:
+        return [Panel("output torque", NM, [measured])]
+    fitted = Curve("fitted", ring.time, ring.fitted, FITTED, 1.8)
+    left = Curve("measured − fitted", ring.time, ring.torque - ring.fitted, MUTED, 1.0)
+    return [Panel("output torque", NM, [measured, fitted], 2.6), Panel("residual", NM, [left])]

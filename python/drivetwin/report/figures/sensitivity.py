@@ -7,11 +7,12 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from drivetwin.display import display_of, significant
 from drivetwin.identify.likelihood.sensitivity import FRICTION, SIZE, Sensitivity
 from drivetwin.identify.result import FloatArray
+from drivetwin.parameters import spec_of
 from drivetwin.report.labels import channel_symbol, channel_unit, parameter_label
 from drivetwin.report.style import DIVERGING, axis, layout
-from drivetwin.report.units import display_of, significant
 
 _FULL_COLOUR = 3.0
 """Change [% of the value] at which the colour is full; the number stands in the cell."""
@@ -19,8 +20,6 @@ _DOT = 0.05
 """Change below which a dot stands in place of a number."""
 _UPRIGHT = 9
 """Letters of a sensor's name that fit above its column; longer ones are turned."""
-_TIMES = ("te_delay",)
-"""Results whose value may be zero: their change is told in ms, not in per cent."""
 
 
 def sensitivity_figure(found: Sensitivity) -> go.Figure:
@@ -43,7 +42,7 @@ def sensitivity_figure(found: Sensitivity) -> go.Figure:
                 zmax=np.sqrt(_FULL_COLOUR),
                 colorscale=DIVERGING,
                 showscale=False,
-                hovertemplate="%{y} by %{x}: %{text} %<extra></extra>",
+                hovertemplate="%{y} by %{x}: %{text}<extra></extra>",
             ),
             row=1,
             col=column,
@@ -66,15 +65,27 @@ def sensitivity_figure(found: Sensitivity) -> go.Figure:
 
 def _shown(found: Sensitivity) -> FloatArray:
     """Change (q, e) in per cent of the value; of times in ms."""
-    scale = [
-        1e3 if one in _TIMES else 100.0 / value
-        for one, value in zip(found.ids, found.values, strict=True)
+    rows = [
+        1e3 * change if _is_time(name) else _percent(change, value)
+        for name, value, change in zip(found.ids, found.values, found.change, strict=True)
     ]
-    return np.asarray(found.change * np.abs(np.array(scale))[:, None])
+    return np.array(rows)
+
+
+def _is_time(result_id: str) -> bool:
+    """Whether a result is a time, whose value may be zero: its change is told in ms."""
+    return spec_of(result_id).unit == "s"
+
+
+def _percent(change: FloatArray, value: float) -> FloatArray:
+    """Change (e,) in per cent of the value; of a value of 0 there is none, but where none is."""
+    if value == 0.0:
+        return np.where(change == 0.0, 0.0, np.nan)
+    return 100.0 * change / abs(value)
 
 
 def _label(result_id: str, found: Sensitivity) -> str:
-    if result_id in _TIMES:
+    if _is_time(result_id):
         return f"{parameter_label(result_id)} [ms]"
     if result_id.startswith(FRICTION):
         element = result_id.removeprefix(FRICTION)
@@ -93,6 +104,8 @@ def _sensor(found: Sensitivity, k: int) -> str:
 
 
 def _number(value: float) -> str:
+    if not np.isfinite(value):
+        return "–"
     if abs(value) < _DOT:
         return "·"
     return f"{value:+.{0 if abs(value) >= 9.95 else 1}f}".replace("-", "−")

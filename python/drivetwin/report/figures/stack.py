@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from drivetwin.display import Display
 from drivetwin.identify.result import FloatArray
 from drivetwin.report.decimate import focused
 from drivetwin.report.style import PHASE_FILL, PHASE_NUMBER, axis, layout
-from drivetwin.report.units import Display
 
 Phases = Mapping[str, tuple[float, float]]
 
@@ -27,6 +27,8 @@ _MARGIN = 0.06
 """Room above and below the curves, in shares of their span."""
 _LEAST_SPAN = 0.04
 """Smallest span of a y axis in shares of its largest value: what hardly moves stays quiet."""
+_FINE = 500.0
+"""Time [s] below which single precision tells apart what lies 0.03 ms apart."""
 _ZOOMS = {"torque": "torque phase", "inertia": "inertia phase", "after": "lock-up"}
 
 
@@ -149,7 +151,7 @@ def _domains(weights: Sequence[float]) -> list[tuple[float, float]]:
 def _trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -> go.Scatter:
     time, values = focused(curve.time, curve.values, view)
     return go.Scatter(
-        x=time.astype("float32"),
+        x=time.astype("float32" if np.abs(time).max(initial=0.0) < _FINE else "float64"),
         y=panel.display.of(values).astype("float32"),
         name=curve.name,
         mode="lines",
@@ -217,31 +219,42 @@ def zoom_buttons(
 
 def mark_phases(figure: go.Figure, phases: Phases) -> None:
     """Shade torque and inertia phase and number all four phases above the top panel."""
+    shade_phases(figure, phases)
     for phase, (start, end) in phases.items():
-        if phase in ("torque", "inertia"):
-            figure.add_shape(
-                type="rect",
-                xref="x",
-                yref="paper",
-                x0=start,
-                x1=end,
-                y0=0,
-                y1=1,
-                fillcolor=PHASE_FILL[phase],
-                line={"width": 0},
-                layer="below",
-            )
         place, anchor = {
             "before": (end, "right"),
             "after": (start, "left"),
         }.get(phase, (0.5 * (start + end), "center"))
-        figure.add_annotation(
-            x=place,
+        write_above(figure, place, PHASE_NUMBER[phase], anchor)
+
+
+def shade_phases(figure: go.Figure, phases: Phases) -> None:
+    """Shade torque and inertia phase through all panels."""
+    for phase in ("torque", "inertia"):
+        start, end = phases[phase]
+        figure.add_shape(
+            type="rect",
             xref="x",
-            y=1.0,
             yref="paper",
-            yanchor="bottom",
-            xanchor=anchor,
-            text=f"<b>{PHASE_NUMBER[phase]}</b>",
-            showarrow=False,
+            x0=start,
+            x1=end,
+            y0=0,
+            y1=1,
+            fillcolor=PHASE_FILL[phase],
+            line={"width": 0},
+            layer="below",
         )
+
+
+def write_above(figure: go.Figure, time: float, text: str, anchor: str = "center") -> None:
+    """Write a few letters above the top panel at a time [s]."""
+    figure.add_annotation(
+        x=time,
+        xref="x",
+        y=1.0,
+        yref="paper",
+        yanchor="bottom",
+        xanchor=anchor,
+        text=f"<b>{text}</b>",
+        showarrow=False,
+    )

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 import plotly.graph_objects as go
 
+from drivetwin.display import BAR, NM, RPM, Display
 from drivetwin.report.figures.stack import Curve, Panel, stacked
 from drivetwin.report.style import COMPARED, MEASURED, MUTED, SECOND, SIMULATED
-from drivetwin.report.units import BAR, NM, RPM, Display
 from drivetwin.validate import SignalTrace, Validation
 
 OUTPUTS: Mapping[str, tuple[str, Display, float]] = {

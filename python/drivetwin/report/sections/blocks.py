@@ -44,8 +44,8 @@ class Cell:
 class FigureBlock:
     """A figure with its caption.
 
-    Of a figure over time `panels` hold all samples, in the order of its traces; the page draws
-    from them. `link` names the figures that zoom together.
+    Of a figure over time `panels` hold all samples, in the order of its first traces; the page
+    draws from them. `link` names the figures that zoom together.
     """
 
     figure: go.Figure

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from drivetwin.display import Display, display_of, significant, with_uncertainty
 from drivetwin.identify.result import Z95, Estimate
 from drivetwin.report.candidates import DIFFER, Agreement, Candidate, Trial, agreements
 from drivetwin.report.figures.comparison import (
@@ -29,7 +30,6 @@ from drivetwin.report.sections.blocks import (
     cells,
 )
 from drivetwin.report.sections.trust import PHASES, SIGNALS, fit_cell
-from drivetwin.report.units import Display, display_of, significant, with_uncertainty
 from drivetwin.shifts.shift import Shift
 
 

@@ -7,13 +7,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from drivetwin.display import significant
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.literal import PaperShift
 from drivetwin.identify.result import Identification
 from drivetwin.identify.wlse import GridFit
 from drivetwin.report.figures.load import load_figure
 from drivetwin.report.figures.momentum import momentum_figure
-from drivetwin.report.figures.ringdown import ringdown_figure
+from drivetwin.report.figures.ringdown import ringdown_figure, ringdown_panels
 from drivetwin.report.figures.wlse import WlseLabels, wlse_figure
 from drivetwin.report.sections.blocks import (
     Block,
@@ -24,7 +25,6 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     Tone,
 )
-from drivetwin.report.units import significant
 from drivetwin.shifts.labels import shift_labels
 
 INERTIA_LABELS = WlseLabels(
@@ -186,7 +186,7 @@ def _ring_blocks(shifts: Iterable[_AnyStages]) -> list[Block]:
             else "from a decaying sine on a parabola, the engine torque's own motion included"
         )
         text = f"{one.by}: {ring.f_d:.3f} Hz, damping ratio {ring.zeta:.4f}, {how}."
-        blocks.append(FigureBlock(ringdown_figure(ring), text))
+        blocks.append(FigureBlock(ringdown_figure(ring), text, ringdown_panels(ring)))
     return blocks
 
 

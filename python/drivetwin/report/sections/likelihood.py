@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
+from drivetwin.display import significant
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.residuals import (
     EXCESS,
@@ -31,7 +32,6 @@ from drivetwin.report.sections.blocks import (
     Tone,
     link_of,
 )
-from drivetwin.report.units import significant
 from drivetwin.shifts.labels import shift_labels
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import isfinite
 
+from drivetwin.display import Display, display_of, significant
 from drivetwin.identify.experiment.suggest import Suggestion
 from drivetwin.identify.result import Estimate, Identification, Verdict
 from drivetwin.identify.uncertainty import advice_for
@@ -21,7 +22,6 @@ from drivetwin.report.sections.blocks import (
     cells,
 )
 from drivetwin.report.sections.trust import TONES
-from drivetwin.report.units import Display, display_of, significant
 
 _INSEPARABLE = (
     "μ and the clutch geometry N·D·A·r: only their product acts.",

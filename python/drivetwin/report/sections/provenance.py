@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from drivetwin.display import BAR, NM, RAD_PER_S, RPM, Display, significant
 from drivetwin.identify.result import Identification
 from drivetwin.report.sections.blocks import (
     Block,
@@ -14,7 +15,6 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     cells,
 )
-from drivetwin.report.units import BAR, NM, RAD_PER_S, RPM, Display, significant
 from drivetwin.results.result_file import plain
 from drivetwin.results.twin_build import borrowed_friction
 from drivetwin.results.version import program_version

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from drivetwin.display import significant
 from drivetwin.identify.result import Z95, FrictionCurve, Identification
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.report.figures.friction import friction_figure
@@ -20,7 +21,6 @@ from drivetwin.report.sections.blocks import (
     cells,
     link_of,
 )
-from drivetwin.report.units import significant
 from drivetwin.shifts.labels import shift_labels
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.validate import Validation
@@ -151,7 +151,8 @@ def validation_section(validations: tuple[Validation, ...]) -> Section:
             f"Shift {name}: the measured engine torque and pressures "
             "drive the identified model; nothing else is fed in after the start. Below each output "
             "stands what is left, measured minus simulated. While an element slips, the "
-            "noise of its pressure sensor passes into the simulated torque and output speed."
+            "noise of its pressure sensor passes into the simulated torque and output speed, and "
+            "moves the lock-up by a millisecond or two: the residual then swings on after it."
         )
         blocks.append(
             FigureBlock(validation_figure(one), text, validation_panels(one), link_of(one.shift))

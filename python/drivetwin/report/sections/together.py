@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from drivetwin.display import display_of, significant
 from drivetwin.held_out import HeldOut, Outcome
 from drivetwin.identify.result import Estimate, Identification
 from drivetwin.identify.several.consistency import FAR, Consistency
@@ -31,7 +32,6 @@ from drivetwin.report.sections.blocks import (
 )
 from drivetwin.report.sections.comparison import value_cell
 from drivetwin.report.sections.trust import PHASES, SIGNALS, fit_cell
-from drivetwin.report.units import display_of, significant
 from drivetwin.validate import Validation
 
 _TONES = {

@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 
+from drivetwin.display import NM, RPM, Display, display_of, significant, with_uncertainty
 from drivetwin.identify.likelihood.residuals import residual_tests
 from drivetwin.identify.result import Z95, Estimate, Identification, SignalFit, Verdict
 from drivetwin.parameters import spec_of
@@ -23,7 +24,6 @@ from drivetwin.report.sections.blocks import (
     TilesBlock,
     Tone,
 )
-from drivetwin.report.units import NM, RPM, Display, display_of, significant, with_uncertainty
 
 TONES = {
     Verdict.IDENTIFIED: Tone.GOOD,

@@ -119,7 +119,8 @@
     const room = (span[1] - span[0]) / 2;
     const parts = plot.curves.map((curve) => drawn(curve, span[0] - room, span[1] + room));
     const data = { x: parts.map(([x]) => x), y: parts.map(([, y]) => y) };
-    return Plotly.update(plot, data, { "xaxis.range": span, ...layout });
+    const traces = plot.curves.map((_, k) => k);
+    return Plotly.update(plot, data, { "xaxis.range": span, ...layout }, traces);
   }
 
   function showTogether(plot, span, own) {

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Display units and number formats of the report; everything inside stays SI."""
+"""Units and number formats in which people read; everything inside stays SI."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from drivetwin.identify.result import FloatArray
+import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -18,7 +17,7 @@ class Display:
     label: str
     factor: float = 1.0
 
-    def of(self, values: FloatArray) -> FloatArray:
+    def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (n,) in the display unit."""
         return values * self.factor
 
@@ -34,9 +33,13 @@ _BY_SI = {
     "N*m": NM,
     "N*m/rad": Display("Nm/rad"),
     "N*m*s/rad": Display("Nm·s/rad"),
+    "N*m*s^2/rad^2": Display("Nm·s²/rad²"),
     "Hz": Display("Hz"),
     "Pa": BAR,
     "rad/s": RPM,
+    "rad/s^2": Display("rad/s²"),
+    "rad/s^3": Display("rad/s³"),
+    "rad/s^1.75": Display("rad/s¹·⁷⁵"),
     "s": Display("ms", 1e3),
     "N*m*s": Display("Nm·s"),
     "N*m/s": Display("kNm/s", 1e-3),
@@ -48,6 +51,19 @@ _BY_SI = {
 def display_of(si_unit: str) -> Display:
     """Display unit of an SI unit from the parameter table; the unit itself where none is set."""
     return _BY_SI.get(si_unit, Display(si_unit))
+
+
+def in_units(value: float, si_unit: str, half_width: float | None = None, digits: int = 4) -> str:
+    """A quantity [SI] in a sentence: `0.963 ± 0.074 bar`; one without dimension has no unit.
+
+    With a `half_width` [SI] both have its two digits, as in tables; without one, so many `digits`.
+    """
+    display = display_of(si_unit)
+    unit = "" if si_unit == "1" else f" {display.label}"
+    if half_width is None:
+        return significant(value * display.factor, digits) + unit
+    number, half = with_uncertainty(value * display.factor, half_width * display.factor)
+    return (f"{number} ± {half}" if half else number) + unit
 
 
 def with_uncertainty(value: float, half_width: float | None) -> tuple[str, str]:

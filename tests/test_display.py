@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from drivetwin.display import BAR, RPM, display_of, in_units, significant, with_uncertainty
 from drivetwin.parameters import SPECS
-from drivetwin.report.units import BAR, RPM, display_of, significant, with_uncertainty
+from drivetwin.shifts.quality import QUALITY_UNITS
 
 
 def test_si_is_converted_for_display() -> None:
@@ -47,3 +48,24 @@ def test_value_and_half_width_share_their_last_digit(
 )
 def test_significant_digits(value: float, text: str) -> None:
     assert significant(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "half", "text"),
+    [
+        (96_300.0, "Pa", 7400.0, "0.963 ± 0.074 bar"),
+        (0.0144, "s", None, "14.40 ms"),
+        (0.85, "1", 0.012, "0.850 ± 0.012"),
+        (4.9, "N*m*s^2/rad^2", 0.31, "4.90 ± 0.31 Nm·s²/rad²"),
+        (17.5, "kg*m^2", 0.0, "17.50 kg·m²"),
+    ],
+)
+def test_a_sentence_has_the_units_of_the_tables(
+    value: float, unit: str, half: float | None, text: str
+) -> None:
+    assert in_units(value, unit, half) == text
+
+
+@pytest.mark.parametrize("unit", sorted(set(QUALITY_UNITS.values())))
+def test_no_figure_of_shift_quality_has_a_unit_in_ascii(unit: str) -> None:
+    assert not set("*^") & set(display_of(unit).label)
