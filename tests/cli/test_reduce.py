@@ -4,10 +4,15 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 
 import pytest
 
+import drivetwin.gearbox
 from drivetwin.cli import main
+
+CARDS = Path(drivetwin.gearbox.__file__).parent / "cards"
 
 
 def test_the_table_names_ratios_members_and_errors(capsys: pytest.CaptureFixture[str]) -> None:
@@ -37,6 +42,18 @@ def test_a_shift_of_dogs_is_reduced_without_an_error(capsys: pytest.CaptureFixtu
     shown = capsys.readouterr().out
     assert "Condition (1) holds" in shown
     assert "states no capacity" in shown
+
+
+def test_a_reference_shift_that_does_not_complete_hides_no_reduction(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (CARDS / "three-set-3000.toml").read_text(encoding="utf-8")
+    card = tmp_path / "falling.toml"
+    card.write_text(re.sub(r"(?m)^mu_v_s = .*$", "mu_v_s = -2e-3", text), encoding="utf-8")
+    assert main(["reduce", str(card), "--shift", "2-3", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["on_coming"]["i_c"] == pytest.approx(0.41, abs=1e-3)
+    assert "the whole gearbox ended" in document["no_error_because"]
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,18 @@ def test_several_results_are_compared_on_one_page(
     assert capsys.readouterr().out.strip() == f"wrote {page}"
     text = page.read_text(encoding="utf-8")
     assert "Comparison of first, second, first 2" in text
+
+
+def test_sources_of_one_name_are_numbered_after_it(
+    made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folders = [tmp_path / "a" / "run 1", tmp_path / "b" / "run 1", tmp_path / "a" / "run 2"]
+    for folder in folders:
+        shutil.copytree(made[0], folder)
+    page = tmp_path / "page.html"
+    assert main(["report", *map(str, folders), "-o", str(page)]) == 0
+    capsys.readouterr()
+    assert "Comparison of run 1, run 1 2, run 2" in page.read_text(encoding="utf-8")
 
 
 def test_a_twin_is_shown_over_logs(

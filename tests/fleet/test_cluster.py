@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -17,7 +18,8 @@ import pytest
 
 from drivetwin.errors import SchedulerError
 from drivetwin.fleet.cluster import DaskPool
-from drivetwin.fleet.task import WorkerSpec
+from drivetwin.fleet.task import Recipe, Task, WorkerSpec
+from drivetwin.identify.method import Method
 from tests.fleet.test_coordinator_faults import COUNT, takes_long, undisturbed
 from tests.fleet.toys import ROOT, contents, make_logs
 
@@ -99,3 +101,37 @@ def test_a_scheduler_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) 
     with pytest.raises(SchedulerError, match="no Dask scheduler answers"):
         DaskPool(f"tcp://127.0.0.1:{free_port()}", WorkerSpec(), lambda _: None)
     assert time.monotonic() - started < 20.0
+
+
+@takes_long
+def test_two_runs_over_the_same_logs_share_a_cluster_and_no_task(tmp_path: Path) -> None:
+    logs, port = make_logs(tmp_path / "logs", COUNT, word="slow"), free_port()
+    stores = tmp_path / "one", tmp_path / "other"
+    with ExitStack() as cluster:
+        cluster.enter_context(process(*scheduler(port)))
+        cluster.enter_context(process(*worker(port)))
+        runs = [
+            cluster.enter_context(
+                process("tests.fleet.toys", str(logs), str(store), f"tcp://127.0.0.1:{port}")
+            )
+            for store in stores
+        ]
+        assert [run.wait(100.0) for run in runs] == [0, 0]
+    assert contents(stores[0]) == contents(stores[1]) == undisturbed(logs, tmp_path / "calm")
+
+
+def test_tasks_of_two_runs_have_no_key_in_common(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask takes tasks of one key for one: the second run would get the answer and no part."""
+    keys: list[str] = []
+
+    class Client:
+        def submit(self, *_: object, key: str, **__: object) -> Future[None]:
+            keys.append(key)
+            return Future()
+
+    monkeypatch.setattr(DaskPool, "_connect", lambda *_: Client())
+    recipe = Recipe("card", None, Method.PAPER, (), "1")
+    for store in ("one", "other"):
+        pool = DaskPool("tcp://nowhere", WorkerSpec(), lambda _: None)
+        pool.submit(Task("0123", "log", "content", recipe, f"{store}/0123.parquet"))
+    assert len(set(keys)) == 2

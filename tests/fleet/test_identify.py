@@ -12,9 +12,10 @@ import pytest
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.errors import StoreError
+from drivetwin.errors import FileFormatError, StoreError
 from drivetwin.fleet.identify import identify_log
 from drivetwin.fleet.rows import RowKind
+from drivetwin.fleet.scan import inputs_of
 from drivetwin.fleet.task import Recipe, Task
 from drivetwin.identify.method import Method
 from drivetwin.results.version import program_version
@@ -32,9 +33,9 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _task(log: Path, *means: tuple[str, str]) -> Task:
-    recipe = Recipe(
-        str(log.with_suffix(".card.toml")), None, Method.PAPER, (), program_version(), means
-    )
+    card = str(log.with_suffix(".card.toml"))
+    inputs = inputs_of(card, None)
+    recipe = Recipe(card, None, Method.PAPER, inputs, program_version(), means)
     content = hashlib.sha256(log.read_bytes()).hexdigest()
     return Task("0123", str(log), content, recipe, str(log.with_suffix(".parquet")))
 
@@ -53,3 +54,22 @@ def test_what_cannot_be_written_besides_is_the_stores_fault(log: Path) -> None:
     for asked in (replace(task, report=below_a_file), replace(task, traces=below_a_file)):
         with pytest.raises(StoreError, match="a worker cannot write"):
             identify_log(asked)
+
+
+def test_a_log_that_changed_meanwhile_is_refused(log: Path) -> None:
+    """Its rows would stand under the key of the file as it was."""
+    with pytest.raises(FileFormatError, match="changed while the fleet was at work"):
+        identify_log(replace(_task(log), content="0" * 64))
+
+
+def test_a_card_that_changed_meanwhile_stops_the_run(log: Path, tmp_path: Path) -> None:
+    """The key of a log's rows stands for the card as it was: another one makes other rows."""
+    task = _task(log)
+    card = tmp_path / "card.toml"
+    card.write_bytes(Path(task.recipe.vehicle).read_bytes())
+    ours = replace(task, recipe=replace(task.recipe, vehicle=str(card)))
+    assert identify_log(ours).rows
+    for text in (card.read_text() + "# corrected\n", "no TOML"):
+        card.write_text(text)
+        with pytest.raises(StoreError, match="changed while the fleet was at work"):
+            identify_log(ours)

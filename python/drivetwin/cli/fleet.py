@@ -206,7 +206,7 @@ def estimate(
 
 def _print_estimates(found: list[JointEstimate]) -> None:
     from drivetwin.cli.numbers import shown
-    from drivetwin.report.units import display_of, significant
+    from drivetwin.display import display_of, significant
 
     rules = {one.rule for one in found}
     table = table_of(

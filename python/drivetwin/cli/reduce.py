@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -75,7 +75,7 @@ def _errors(reduction: Reduction) -> _Errors:
 
     try:
         return _Errors(estimate(reduction), compare(reduction).error)
-    except InputError as error:
+    except (InputError, SimulationError) as error:
         return _Errors(reason=error.what)
 
 

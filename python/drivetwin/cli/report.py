@@ -107,11 +107,11 @@ def _names(made: Sequence[Path]) -> dict[str, Path]:
     ]
     names: dict[str, Path] = {}
     for place, source in zip(plain, made, strict=True):
-        name = (place.resolve().name if place.is_dir() else place.stem) or str(source)
-        number = 2
+        called = (place.resolve().name if place.is_dir() else place.stem) or str(source)
+        name, number = called, 1
         while name in names:
-            name = f"{name.removesuffix(f' {number - 1}')} {number}"
             number += 1
+            name = f"{called} {number}"
         names[name] = source
     return names
 

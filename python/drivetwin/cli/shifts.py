@@ -119,8 +119,8 @@ def _said(swing: Resonance | str) -> str:
 
 def _spread(value: float, std: float) -> str:
     """A value ± the half width of its 95 % interval."""
+    from drivetwin.display import with_uncertainty
     from drivetwin.identify.result import Z95
-    from drivetwin.report.units import with_uncertainty
 
     return " ± ".join(filter(None, with_uncertainty(value, Z95 * std)))
 

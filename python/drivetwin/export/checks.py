@@ -6,14 +6,18 @@ from __future__ import annotations
 from drivetwin.border import as_json
 from drivetwin.driveline import DualClutch, FrictionTable, State
 from drivetwin.errors import InputError
+from drivetwin.export.entries import Entry, entries_of
 
 MAX_POINTS = 64
 """DT_POINTS of `dt_model.h`."""
+_NOT_ZERO = ("eta", "J_out", "J_v", "v_s", "i_in", "i_f", "i_c", "i_out")
+"""Fields that `dt_check` wants other than zero, which their range does not say."""
 
 
 def check_exportable(model: DualClutch, start: State) -> None:
-    """Raises InputError for a model that is not two shift elements with laws that C can hold."""
-
+    """Raises InputError for a model that is not two shift elements with laws that C can hold, and
+    for numbers that `dt_check` would refuse.
+    """
     as_json(model)  # names every number that is not finite
     if len(model.elements) != 2:
         raise InputError(
@@ -29,3 +33,15 @@ def check_exportable(model: DualClutch, start: State) -> None:
                 f"the friction table of {element.name} has {len(law.slip)} points",
                 f"thin it out to at most {MAX_POINTS}, or fit a Stribeck law",
             )
+    for entry in entries_of(model):
+        _check_range(entry)
+
+
+def _check_range(entry: Entry) -> None:
+    field = entry.name.rpartition(".")[2]
+    inside = entry.least <= entry.value <= entry.most
+    if not inside or (field in _NOT_ZERO and entry.value == 0.0):
+        raise InputError(
+            f"{entry.name} = {entry.value:g} {entry.unit} is impossible ({entry.meaning})",
+            "correct the value in the twin",
+        )

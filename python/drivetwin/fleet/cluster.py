@@ -14,6 +14,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from time import monotonic, sleep
 from typing import Any
+from uuid import uuid4
 
 from drivetwin.errors import SchedulerError, Where
 from drivetwin.fleet.cell import Cell
@@ -58,6 +59,8 @@ class DaskPool:
         self._replies: SimpleQueue[tuple[int, Any]] = SimpleQueue()
         self._out: dict[int, tuple[Task, Any]] = {}
         self._submitted = 0
+        # Dask takes tasks of one key for one task: two runs of the same logs must not share them.
+        self._run = uuid4().hex
         self._client = self._connect(_FIRST_CONTACT)
         self._counted = 0.0
         self._threads = 0
@@ -84,8 +87,8 @@ class DaskPool:
         self._out[number] = (task, None)
         try:
             future = self._client.submit(
-                run_in_cell, task.to_json(), self._spec, key=f"{task.log}-{number}", pure=False,
-                retries=0,
+                run_in_cell, task.to_json(), self._spec, key=f"{task.log}-{self._run}-{number}",
+                pure=False, retries=0,
             )  # fmt: skip
         except Exception as fault:
             # The client raises many types when its scheduler is gone; `next` then reconnects.

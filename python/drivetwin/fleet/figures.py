@@ -7,6 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from drivetwin.display import display_of
 from drivetwin.fleet.joint.mixed import FloatArray
 from drivetwin.fleet.joint.result import Drift, JointEstimate, UnitValue
 from drivetwin.fleet.readings import moment, reading_text
@@ -14,7 +15,6 @@ from drivetwin.fleet.rules import is_date
 from drivetwin.identify.result import Z95
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, axis, layout
-from drivetwin.report.units import display_of
 
 _MOST_POINTS = 4000
 _BAND = "rgba(213,94,0,0.18)"

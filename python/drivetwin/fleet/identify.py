@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drivetwin.errors import MissingChannelError, TimeError, Where
+from drivetwin.errors import FileFormatError, InputError, MissingChannelError, StoreError, Where
 from drivetwin.fleet.free import free_friction
 from drivetwin.fleet.parts import writing
 from drivetwin.fleet.rows import MU, Found, Row, RowKind
+from drivetwin.fleet.scan import inputs_of
 from drivetwin.fleet.task import Recipe, ShiftRow, Task
 from drivetwin.identify.pipeline import identify
 from drivetwin.identify.result import Z95, Estimate, FrictionCurve, Identification, Verdict
@@ -41,14 +42,17 @@ def identify_log(task: Task) -> Found:
     """Identify one log, and write what is wanted besides its rows.
 
     Raises the typed errors of each stage for a log that cannot be used, StoreError where the report
-    or the traces cannot be written, OSError where the drive fails that the log is on.
+    or the traces cannot be written or the card is another by now, OSError where the drive fails
+    that the log is on.
     """
     recipe = task.recipe
+    _check_inputs(recipe)  # before, for what is broken by now is not the log's fault
     card = _card(recipe)
     mapping = None if recipe.channels is None else Path(recipe.channels)
     log = read_log(Path(task.path), card, mapping)
+    _check_inputs(recipe)
     if log.sha256 != task.content:
-        raise TimeError(
+        raise FileFormatError(
             "the file changed while the fleet was at work",
             "run the same command again when it is complete",
             Where(file=task.path),
@@ -66,6 +70,20 @@ def identify_log(task: Task) -> Found:
 def _card(recipe: Recipe) -> VehicleCard:
     """The card of a recipe, which holds the file's hash: a changed card is another recipe."""
     return load_card(Path(recipe.vehicle))
+
+
+def _check_inputs(recipe: Recipe) -> None:
+    """Raise StoreError where card or mapping are no longer those that the log's key stands for."""
+    try:
+        same = inputs_of(recipe.vehicle, recipe.channels) == recipe.inputs
+    except (OSError, InputError):
+        same = False
+    if not same:
+        raise StoreError(
+            "the vehicle card or the channel mapping changed while the fleet was at work",
+            "run the same command again: what was done with the old ones is done anew",
+            Where(file=recipe.vehicle),
+        )
 
 
 def _artefacts(task: Task, found: Identification, log: ShiftLog) -> None:

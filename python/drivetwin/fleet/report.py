@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin.atomic import write_text
+from drivetwin.display import display_of, significant, with_uncertainty
 from drivetwin.fleet.figures import drift_figure, unit_label, units_figure
 from drivetwin.fleet.friction import fleet_friction
 from drivetwin.fleet.joint.estimate import joint_estimates, untold
@@ -37,7 +38,6 @@ from drivetwin.report.sections.blocks import (
     Tone,
     cells,
 )
-from drivetwin.report.units import display_of, significant, with_uncertainty
 
 PAGE = "report.html"
 

@@ -110,20 +110,25 @@ class Scan:
 
     def _read_recipe(self, vehicle: str, channels: str | None) -> Recipe:
         """The recipe of a rule; its files are read once."""
-        inputs = [("vehicle", _digest(Path(vehicle)))]
-        if channels is not None:
-            inputs.append(("channels", _digest(Path(channels))))
-            databases = read_mapping(Path(channels)).options.bus.databases
-            inputs += [("database", _digest(each)) for each in databases]
         return Recipe(
             vehicle=vehicle,
             channels=channels,
             method=self._method,
-            inputs=tuple(inputs),
+            inputs=inputs_of(vehicle, channels),
             version=program_version(),
             means=self._rules.means(),
             mu_slip=self._rules.mu_slip_rad_s,
         )
+
+
+def inputs_of(vehicle: str, channels: str | None) -> tuple[tuple[str, str], ...]:
+    """SHA-256 of a card, a channel mapping and the DBC files behind it, as they are now."""
+    inputs = [("vehicle", _digest(Path(vehicle)))]
+    if channels is not None:
+        inputs.append(("channels", _digest(Path(channels))))
+        databases = read_mapping(Path(channels)).options.bus.databases
+        inputs += [("database", _digest(each)) for each in databases]
+    return tuple(inputs)
 
 
 def settings_document(recipe: Recipe) -> str:

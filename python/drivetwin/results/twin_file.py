@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 import tomlkit
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat, field_validator, model_validator
 
 from drivetwin.atomic import write_text
 from drivetwin.converter import Converter
+from drivetwin.errors import ResultFileError
 from drivetwin.identify.result import Method
 from drivetwin.results.reading import read_record
 from drivetwin.results.records import (
@@ -23,6 +24,8 @@ from drivetwin.results.records import (
     Record,
     SchemaName,
 )
+from drivetwin.results.twin_check import twin_faults
+from drivetwin.tomlfile import raise_faults
 from drivetwin.vehicle.spec import ElementKind
 
 TWIN_SCHEMA = "drivetwin/twin-2"
@@ -35,7 +38,7 @@ _HEADER = (
 class GearRecord(Record):
     """One gear: overall ratio (input gear included) and the shift element that holds it."""
 
-    ratio: FiniteFloat
+    ratio: FiniteFloat = Field(gt=0)
     element: str
 
 
@@ -49,6 +52,13 @@ class ElementRecord(Record):
     P0_Pa: FiniteFloat
     peak: FiniteFloat = Field(ge=1)
     drum_inertia_kgm2: FiniteFloat = Field(ge=0)
+
+    @field_validator("i_c", "i_out")
+    @classmethod
+    def _not_zero(cls, ratio: float) -> float:
+        if ratio == 0.0:
+            raise ValueError("a ratio must not be 0")
+        return ratio
 
 
 class ChannelRecord(Record):
@@ -151,9 +161,17 @@ def write_twin_file(path: Path | str, content: TwinFile) -> None:
 def read_twin_file(path: Path | str) -> TwinFile:
     """Read and check `twin.toml`.
 
-    Raises ResultFileError where the file is missing, damaged or of a newer schema.
+    Raises ResultFileError where the file is missing, damaged or of a newer schema, or where its
+    tables contradict each other.
     """
-    return read_record(path, tomllib.loads, TWIN_SCHEMA, TwinFile)
+    content = read_record(path, tomllib.loads, TWIN_SCHEMA, TwinFile)
+    raise_faults(
+        twin_faults(content),
+        ResultFileError,
+        str(path),
+        "correct these entries, or write the file again with `drivetwin identify`",
+    )
+    return content
 
 
 def _without_null(value: Any) -> Any:

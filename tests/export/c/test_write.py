@@ -101,6 +101,22 @@ def test_runner_is_clean_under_sanitizers_and_within_the_reference(tmp_path: Pat
         assert (deviation < 1e-3) == (not arguments)
 
 
+@pytest.mark.parametrize(
+    ("row", "code", "told"),
+    [("0.01,100,8e5", 6, "no row of four numbers"), ("0.01,nan,0,0", 2, "out of range after 0 s")],
+)
+def test_runner_tells_a_row_that_it_cannot_take(
+    sources: list[Path], tmp_path: Path, row: str, code: int, told: str
+) -> None:
+    program = tmp_path / "run"
+    call(compiler("gcc"), "-std=c99", *sources, "-lm", "-o", program)
+    text = f"time,torque,off,on\n\n0,100,8e5,0\n{row}\n0.02,100,8e5,0\n"
+    done = subprocess.run([program], input=text, capture_output=True, text=True, check=False)
+    assert done.returncode == code
+    assert told in done.stderr
+    assert len(done.stdout.splitlines()) == 2
+
+
 def test_the_same_twin_gives_the_same_files(tmp_path: Path) -> None:
     first, second = (write_c(paper_subject(), tmp_path / name) for name in ("a", "b"))
     assert [p.name for p in first] == [p.name for p in second]
@@ -128,7 +144,7 @@ def test_the_stated_bound_of_operations_follows_from_the_limits_of_the_loops(
 def test_a_table_of_friction_is_written_point_by_point() -> None:
     subject = paper_subject()
     off, on = subject.model.elements
-    law = FrictionTable((0.0, 5.0, 40.0), (0.14, 0.12, 0.11))
+    law = FrictionTable((0.0, 5.0, 40.0), tuple(np.array((0.14, 0.12, 0.11))))
     model = replace(subject.model, elements=(off, replace(on, friction=law)))
     text = twin_source(replace(subject, model=model))
     assert ".clutch[1].friction.points = 3," in text
@@ -148,6 +164,18 @@ def test_what_c_cannot_hold_is_refused() -> None:
         twin_source(replace(subject, model=three))
     with pytest.raises(InputError, match="not a finite number: k_o"):
         twin_source(replace(subject, model=replace(subject.model, k_o=float("nan"))))
+
+
+def test_what_the_model_would_refuse_at_its_begin_is_refused() -> None:
+    subject = paper_subject()
+    for told, model in (
+        ("k_o = -1 N", replace(subject.model, k_o=-1.0)),
+        ("eta = 85 1", replace(subject.model, eta=85.0)),
+        ("J_out = 0 kg", replace(subject.model, J_out=0.0)),
+        ("i_f = 0 1", replace(subject.model, i_f=0.0)),
+    ):
+        with pytest.raises(InputError, match=f"{told}.* is impossible"):
+            twin_source(replace(subject, model=model))
 
 
 @given(st.text(max_size=30))

@@ -81,7 +81,8 @@ class CModel:
         status = self.library.dt_begin(
             *map(ctypes.byref, (state, self.params, self.start, rows[0], outputs))
         )
-        table[0] = _row(outputs)
+        if status == 0:
+            table[0] = _row(outputs)
         for i in range(1, len(time)):
             if status != 0:
                 break

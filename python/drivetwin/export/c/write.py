@@ -89,4 +89,5 @@ def _comment(text: str) -> str:
 
 
 def _initialiser(entry: Entry) -> str:
-    return f"    .{entry.field} = DT_C({entry.value!r}), /* {entry.unit}: {entry.meaning} */"
+    value = float(entry.value)  # that of a numpy array would name its type
+    return f"    .{entry.field} = DT_C({value!r}), /* {entry.unit}: {entry.meaning} */"

@@ -48,7 +48,7 @@ typedef enum {
     DT_BAD_STATE,       /**< a state, input or step is not a finite number in range */
     DT_TOO_MANY_EVENTS, /**< DT_PIECES pieces did not reach the end of the step */
     DT_UNDECIDED,       /**< no friction mode fits; efficiencies that lock themselves */
-    DT_ENGINE_STALLED   /**< engine speed reached zero under the dissipative loss law */
+    DT_ENGINE_STALLED   /**< under the dissipative loss law the engine stands or turns backward */
 } dt_status;
 
 /** How losses depend on the direction of power. */

@@ -4,7 +4,9 @@
  *     dt_run [hold] < inputs.csv > outputs.csv
  *
  * Input rows: time [s], engine torque [N m], pressure of the off-going and of the on-coming element
- * [Pa]; lines that start with a letter are skipped. Inputs are linear between rows, or held. */
+ * [Pa]; blank lines and those that start with a letter are skipped. Inputs are linear between rows,
+ * or held. A failure is told on stderr: 1 to 5 are those of dt_status, 6 a row that cannot be
+ * read. */
 
 #include <ctype.h>
 #include <stdio.h>
@@ -12,16 +14,19 @@
 
 #include "dt_twin.h"
 
-/* 1: a row was read; 0: no more rows. */
-static int read_row(double row[4]) {
+typedef enum { ROW, NO_MORE, NO_ROW } reading;
+
+static reading read_row(double row[4]) {
     char line[256];
     while (fgets(line, sizeof line, stdin) != 0) {
-        if (!isalpha((unsigned char)line[0]) && sscanf(line, "%lf,%lf,%lf,%lf", &row[0], &row[1],
-                                                       &row[2], &row[3]) == 4) {
-            return 1;
+        const int skipped = isalpha((unsigned char)line[0]) || line[strspn(line, " \t\r\n")] == 0;
+        if (!skipped) {
+            const int read =
+                sscanf(line, "%lf,%lf,%lf,%lf", &row[0], &row[1], &row[2], &row[3]) == 4;
+            return read ? ROW : NO_ROW;
         }
     }
-    return 0;
+    return NO_MORE;
 }
 
 static dt_inputs inputs_of(const double row[4]) {
@@ -42,26 +47,41 @@ static void print_row(double time, const dt_outputs *y) {
     printf(",%d\n", y->pieces);
 }
 
+static int failed(const char *what, int code, double time) {
+    fprintf(stderr, "dt_run: %s after %.17g s\n", what, time);
+    return code;
+}
+
 int main(int argc, char **argv) {
+    static const char *const faults[] = {
+        "completed",          "a parameter is out of range", "an input or step is out of range",
+        "too many events",    "no friction mode fits",       "the engine stalled"};
     const int hold = argc > 1 && strcmp(argv[1], "hold") == 0;
     double before[4], now[4];
     dt_state state;
     dt_outputs y;
-    if (!read_row(before)) {
-        return 2;
+    if (read_row(before) != ROW) {
+        return failed("no row of four numbers", 6, 0.0);
     }
     dt_inputs from = inputs_of(before);
     dt_status status = dt_begin(&state, &dt_twin_params, &dt_twin_start, &from, &y);
+    if (status != DT_OK) {
+        return failed(faults[status], (int)status, before[0]);
+    }
     printf("time,engine_speed,output_speed,wheel_speed,twist,output_torque,"
            "clutch_torque_1,slip_1,mode_1,clutch_torque_2,slip_2,mode_2,pieces\n");
     print_row(before[0], &y);
-    while (status == DT_OK && read_row(now)) {
+    reading next_row;
+    while ((next_row = read_row(now)) == ROW) {
         const dt_inputs next = inputs_of(now);
         status = dt_step(&state, &dt_twin_params, &from, hold ? &from : &next,
                          (dt_real)(now[0] - before[0]), &y);
+        if (status != DT_OK) {
+            return failed(faults[status], (int)status, before[0]);
+        }
         print_row(now[0], &y);
         from = next;
         memcpy(before, now, sizeof now);
     }
-    return (int)status;
+    return next_row == NO_MORE ? 0 : failed("no row of four numbers", 6, before[0]);
 }

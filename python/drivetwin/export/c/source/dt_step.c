@@ -114,6 +114,14 @@ static dt_status change_mode(dt_state *s, const dt_params *p, dt_expansion *e, d
     return status;
 }
 
+/* Whether the engine stands still or turns backward, where the dissipative law would need the
+ * direction of motion of the gear and its friction at rest. It may start from rest. */
+static int has_stalled(const dt_state *s, const dt_params *p, const dt_expansion *e) {
+    const dt_real speed = s->x[DT_ENGINE];
+    return p->loss_law == DT_DISSIPATIVE &&
+           (speed < DT_C(0) || (!(speed > DT_C(0)) && !(e->x[DT_ENGINE][1] > DT_C(0))));
+}
+
 /* State at t after the start of the expansion, without losing what rounding cuts off. */
 static int advance(dt_state *s, const dt_expansion *e, dt_real t) {
     int finite = 1;
@@ -194,6 +202,9 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
     dt_set_inputs(&e, params, inputs, &still);
     dt_mechanism_of(&m, params, state->power_backward);
     (void)dt_expand(&e, &m, params, state, DT_C(0));
+    if (has_stalled(state, params, &e)) {
+        return DT_ENGINE_STALLED;
+    }
     fill_outputs(outputs, state, params, &e, DT_C(0));
     outputs->pieces = 0;
     return DT_OK;
@@ -232,6 +243,9 @@ dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *fro
         dt_set_inputs(&e, params, &at, &rate); /* a decision looks ahead and moves them on */
         dt_mechanism_of(&m, params, state->power_backward);
         const dt_real length = dt_expand(&e, &m, params, state, remaining);
+        if (has_stalled(state, params, &e)) {
+            return DT_ENGINE_STALLED;
+        }
         event = dt_earliest(&e, &m, params, state, length);
         status = advance(state, &e, event.at) ? DT_OK : DT_BAD_STATE;
         t += event.at;

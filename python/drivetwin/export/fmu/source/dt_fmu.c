@@ -38,7 +38,7 @@ static const char *const faults[] = {
     "a state or input is not a finite number in range",
     "more events in one step than can be told apart",
     "no friction mode fits",
-    "the engine came to rest, which the dissipative loss law does not cover"};
+    "the engine stands or turns backward, which the dissipative loss law does not cover"};
 
 static int fail(dt_fmu *fmu, const char *text, const char *detail) {
     snprintf(fmu->message, sizeof fmu->message, "%s: %s%s", fmu->name, text, detail);
