@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from drivetwin.driveline import Stribeck
+from drivetwin.errors import DamagedChannelError
 from drivetwin.identify.result import Estimate, FloatArray, FrictionCurve, Method, Verdict
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.shift import Shift, ShiftKind
@@ -202,6 +203,36 @@ def test_start_state_keeps_the_gear_and_the_measured_twist(
     without = replace(log, channels={k: c for k, c in log.channels.items() if k != "output_torque"})
     guessed = start_state(model, without, shift, 0.0)
     assert guessed.twist == pytest.approx(initial["twist"], rel=0.1)
+
+
+def _until(log: ShiftLog, role: str, end: float) -> ShiftLog:
+    """The log with one channel that stops at `end` [s]."""
+    one = log[role]
+    kept = one.time <= end
+    cut = replace(one, time=one.time[kept], values=one.values[kept])
+    return replace(log, channels={**log.channels, role: cut})
+
+
+def test_a_wheel_speed_that_stopped_before_the_shift_takes_no_part(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    late = replace(shift, before=(0.1, shift.before[1]))
+    without = replace(log, channels={k: c for k, c in log.channels.items() if k != "wheel_speed"})
+    told = validate(twin, _until(log, "wheel_speed", 0.05), late)
+    assert np.array_equal(
+        told.trajectory.shaft_torque, validate(twin, without, late).trajectory.shaft_torque
+    )
+
+
+def test_a_torque_that_stopped_before_the_shift_is_named(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    stopped = _until(log, "output_torque", 0.2)
+    with pytest.raises(DamagedChannelError, match=r"'T_o_Nm' .* 0\.000 s to 0\.200 s"):
+        validate(twin, stopped, shift)
+    told = validated(replace(identification(), shifts=(shift,)), twin, stopped)
+    assert told.fit == {}
+    assert "no validation: 'T_o_Nm'" in told.warnings[-1]
 
 
 def test_fit_percent_is_measured_against_the_mean_of_the_whole_log() -> None:

@@ -18,7 +18,7 @@ from drivetwin.identify.uncertainty import judge
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.converter import behind_converter, require_closed
-from drivetwin.shifts.recorded import recorded
+from drivetwin.shifts.recorded import near, recorded
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin import Twin
 from drivetwin.validate import Validation, validate
@@ -103,7 +103,7 @@ def _one(
         require_closed(log, card, shift)
         log = behind_converter(log, card, shift)
         fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
-        shift = recorded(log, shift, fills)
+        shift = near(recorded(log, shift, fills, card.i_in))
         told = _expected(fit, card, log, shift, number)
         mine, own = _of_log(found, log, number, told)
         mine, notes = _with_law(mine, shift)

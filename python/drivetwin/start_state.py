@@ -59,19 +59,20 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
     """State at `time` [s] with the off-going element of `shift` locked.
 
     Output torque and its slope give the shaft's twist and twist rate; the speeds are then pooled
-    by their noise into one motion that keeps the gear ratio exactly. Without an output-torque
-    channel the shaft is taken to transmit the engine torque in steady state.
+    by their noise into one motion that keeps the gear ratio exactly. A channel that is not recorded
+    at that time takes no part; without an output torque the shaft is taken to transmit the engine
+    torque in steady state.
     Raises MissingChannelError where neither input nor output speed is there.
     """
     ratio = model.ratio(shift.offgoing)
-    torque = _local(log["output_torque"], time) if "output_torque" in log else None
+    torque = _local(log["output_torque"], time) if _runs(log, "output_torque", time) else None
     rate = torque.slope / model.k_o if torque is not None else 0.0
     motions = []
-    if "input_speed" in log:
+    if _runs(log, "input_speed", time):
         motions.append((_local(log["input_speed"], time), ratio / model.i_in, 0.0))
-    if "output_speed" in log:
+    if _runs(log, "output_speed", time):
         motions.append((_local(log["output_speed"], time), 1.0, 0.0))
-    if "wheel_speed" in log:
+    if _runs(log, "wheel_speed", time):
         motions.append((_local(log["wheel_speed"], time), 1.0 / model.i_f, rate))
     if not motions:
         raise MissingChannelError(
@@ -95,6 +96,11 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
         twist=carried / model.k_o,
         locked=(shift.offgoing,),
     )
+
+
+def _runs(log: ShiftLog, role: str, time: float) -> bool:
+    """Whether a channel is recorded at `time` [s]."""
+    return role in log and bool(log[role].time[0] - _SPAN <= time <= log[role].time[-1])
 
 
 def _local(channel: Channel, time: float) -> _Local:

@@ -124,7 +124,12 @@ def _simulated(
         replace(share, fit=view.fit) for share, view in zip(several.logs, views, strict=True)
     )
     runs = [run for view in views for run in view.evidence.validation]
-    missing = [text for view in views if not view.fit for text in view.warnings]
+    missing = [
+        f"log {share.number}: {text}"
+        for share, view in zip(several.logs, views, strict=True)
+        if not view.fit
+        for text in view.warnings
+    ]
     found = with_fit(replace(found, warnings=(*found.warnings, *missing)), runs)
     evidence = replace(found.evidence, several=replace(several, logs=shares))
     return replace(found, evidence=evidence), twins

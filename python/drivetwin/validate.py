@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.driveline import DualClutch, Signal, State, Trajectory, simulate
-from drivetwin.errors import MissingParameterError
+from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.identify.result import FloatArray, Identification, SignalFit
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.pressure import pressure_role
@@ -17,7 +17,7 @@ from drivetwin.logs.shiftlog import Channel, ShiftLog
 from drivetwin.progress import tell
 from drivetwin.shifts.converter import behind_converter
 from drivetwin.shifts.pressures import shift_pressures
-from drivetwin.shifts.recorded import recorded
+from drivetwin.shifts.recorded import near, recorded
 from drivetwin.shifts.shift import Shift
 from drivetwin.shown import Shown
 from drivetwin.start_state import calm_moment, start_state
@@ -79,10 +79,12 @@ def validate(
     measured moments, unless `start` gives it. `model` replaces the twin's own (e.g. the other loss
     law).
     Raises MissingChannelError, MissingParameterError, DamagedChannelError where an input has a gap
-    in the shift; a run that fails returns its status.
+    in the shift or a compared channel knows nothing of it; a run that fails returns its status.
     """
     model = model or twin.dual_clutch(shift)
-    shift = recorded(log, shift, {one.name: PriorValue(one.P0) for one in model.elements})
+    fills = {one.name: PriorValue(one.P0) for one in model.elements}
+    seen = behind_converter(log, twin.card(), shift)
+    shift = near(recorded(seen, shift, fills, model.i_in))
     window = _window(log, shift)
     if start is None:
         return _simulated(twin, log, shift, model, window)
@@ -164,12 +166,13 @@ def with_fit(found: Identification, validations: Sequence[Validation]) -> Identi
 def validated(found: Identification, twin: Twin, log: ShiftLog) -> Identification:
     """Identification with all its shifts simulated and compared.
 
-    Where the log could not tell a parameter that the simulation needs, the fit stays empty and a
-    warning says which: the other parameters stand all the same. Raises MissingChannelError.
+    Where the log could not tell a parameter that the simulation needs, or holds nothing of a shift
+    to compare with, the fit stays empty and a warning says which: the parameters stand all the
+    same. Raises MissingChannelError.
     """
     try:
         return with_fit(found, list(_runs(twin, log, found.shifts)))
-    except MissingParameterError as incomplete:
+    except (MissingParameterError, DamagedChannelError) as incomplete:
         return replace(found, warnings=(*found.warnings, f"no validation: {incomplete.what}"))
 
 
@@ -205,9 +208,20 @@ def phases_of(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[floa
 
 
 def _window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
-    """Span of the shift's four phases that all channels cover, from a calm moment on."""
+    """Span of the shift's four phases that all channels cover, from a calm moment on.
+
+    Raises DamagedChannelError for a channel that knows nothing of the shift itself.
+    """
     roles = ["engine_torque", *map(pressure_role, (shift.offgoing, shift.oncoming))]
     channels = [log[role] for role in (*roles, *(name for name in SIGNALS if name in log))]
+    for channel in channels:
+        if not channel.time[0] < shift.before[1] < channel.time[-1]:
+            raise DamagedChannelError(
+                f"{channel.source_name!r} was recorded from {channel.time[0]:.3f} s to "
+                f"{channel.time[-1]:.3f} s only, the shift begins at {shift.before[1]:.3f} s",
+                "map another sensor to that channel, or none",
+                Where(file=log.source, channel=channel.source_name),
+            )
     start = max(shift.before[0], *(channel.time[0] for channel in channels))
     end = min(shift.after[1], *(channel.time[-1] for channel in channels))
     return calm_moment(log, (float(start), shift.before[1])), float(end)

@@ -48,7 +48,7 @@ def _with_J_out(value: float, known: PriorValue | None, sensors: float = 0.0) ->
 def test_where_the_linear_fit_gives_the_impossible_the_card_stands() -> None:
     told = _with_J_out(-0.2, PriorValue(0.9, 0.09)).estimates["J_out"]
     assert (told.value, told.std_noise, told.verdict) == (0.9, 0.09, Verdict.DESIGN)
-    assert "-0.2 kg*m^2, which is impossible" in told.reason
+    assert "−0.200 kg·m², which is impossible" in told.reason
 
 
 def test_a_value_far_off_the_cards_is_no_design_value_however_wide() -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.display import in_units
 from drivetwin.identify.design import Contradiction, contradictions, held_against, outside_ranges
 from drivetwin.identify.known import CONTRADICTS, without_prior
 from drivetwin.identify.result import Estimate, Verdict
@@ -52,7 +53,7 @@ def test_a_contradiction_is_the_distance_from_what_the_log_alone_tells(
         assert (one.log.value, one.log.std) == pytest.approx((LOG[0], STD), rel=1e-6)
         assert list(one.without) == list(IDS)
         assert list(one.without.values()) == pytest.approx(LOG, rel=1e-9)
-        assert f"{design.value:.4g}" in one.text
+        assert f"says {in_units(design.value, 'kg*m^2', design.std)}" in one.text
         assert "1.2" in one.text
 
 
@@ -84,7 +85,7 @@ def test_what_rests_on_a_contradicted_value_is_not_identified() -> None:
     assert estimates["J_prime_2"].verdict is Verdict.IDENTIFIED
     told = held_against(estimates, _found(design), "likelihood with design prior")
     assert told["J_out"].verdict is told["J_prime_2"].verdict is Verdict.WEAK
-    assert "the log gives 14.3 kg*m^2" in told["J_prime_2"].reason
+    assert "the log gives 14.300 kg·m²" in told["J_prime_2"].reason
     assert told["Tv_over_if"] == estimates["Tv_over_if"]
 
 
@@ -108,8 +109,8 @@ def test_an_inertia_whose_interval_lies_outside_the_design_range_is_told(
     texts = outside_ranges({"J_prime_2": estimate, "J_prime_2_over_eta": ratio}, card)
     assert len(texts) == int(told)
     for text in texts:
-        assert f"J_prime_2 = {value:.4g} kg m^2" in text
-        assert "3 to 9 kg m^2" in text
+        assert f"J_prime_2 = {value:#.4g} kg·m²" in text
+        assert "3 to 9 kg·m²" in text
     design = replace(estimate, verdict=Verdict.DESIGN)
     refused = Estimate("J_vehicle", None, None, Verdict.NOT_IDENTIFIABLE, "likelihood")
     assert outside_ranges({"J_prime_2": design, "J_vehicle": refused}, card) == ()

@@ -64,3 +64,10 @@ def test_gaps_are_left_out() -> None:
     assert one.verdict is Verdict.NOT_IDENTIFIABLE
     assert one.reason.startswith("only 0.0 s")
     assert one.span == pytest.approx((0.0, 20.0))
+
+
+def test_a_torque_that_stays_zero_tells_nothing() -> None:
+    time = np.arange(0.0, 20.0, 0.02)
+    still, speed = Sampled(time, np.zeros_like(time)), Sampled(time, 100.0 + np.sin(time))
+    one = held_gear("3", RATIO, (0.0, 20.0), still, speed)
+    assert one.verdict is Verdict.NOT_IDENTIFIABLE

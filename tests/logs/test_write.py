@@ -129,3 +129,7 @@ def test_what_a_format_cannot_hold_is_refused(tmp_path: Path) -> None:
     odd = RawChannel("n ab", "rpm", one.time, one.values)
     with pytest.raises(FileFormatError, match="'n ab' is no variable name in MATLAB"):
         write_log(tmp_path / "log.mat", [odd])
+    named_as_time = RawChannel(f"{one.name}_t", "Nm", one.time, one.values)
+    for pair in ([one, named_as_time], [named_as_time, one]):
+        with pytest.raises(FileFormatError, match=f"'{one.name}_t' would be a channel, and time"):
+            write_log(tmp_path / "log.mat", pair)

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import DamagedChannelError, MissingChannelError, MissingParameterError
+from drivetwin.identify.likelihood.derived import TORQUE_LIKE
 from drivetwin.identify.result import Verdict
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.observe import observed
 from drivetwin.observer.observed import Band, FloatArray
+from drivetwin.parameters import OVER_ETA, spec_of
 from tests.observer.conftest import Bench, brief
 
 
@@ -80,13 +82,19 @@ def test_a_single_pressure_is_not_used_and_the_missing_one_is_named(bench: Bench
     assert np.array_equal(single.output_torque.value, none.output_torque.value)
 
 
-def test_a_twin_without_scale_is_refused(bench: Bench) -> None:
+@pytest.mark.parametrize("by", Observer)
+def test_a_twin_without_scale_is_refused(bench: Bench, by: Observer) -> None:
     """A twin from a log without output torque has ratios over η only."""
-    eta = bench.twin.parameters["eta"]
-    unknown = replace(eta, value=None, std_noise=None, verdict=Verdict.NOT_IDENTIFIABLE)
-    twin = replace(bench.twin, parameters={**bench.twin.parameters, "eta": unknown})
-    with pytest.raises(MissingParameterError, match="eta"):
-        observed(twin, bench.log, bench.shift)
+    told = {}
+    for name, one in bench.twin.parameters.items():
+        told[name] = one
+        if spec_of(name).stem in ("eta", *TORQUE_LIKE):
+            told[name] = replace(one, value=None, std_noise=None, verdict=Verdict.NOT_IDENTIFIABLE)
+            told[name + OVER_ETA] = replace(one, id=name + OVER_ETA)
+    twin = replace(bench.twin, parameters=told)
+    assert twin.over_eta
+    with pytest.raises(MissingParameterError, match="over η only"):
+        observed(twin, bench.log, bench.shift, by)
 
 
 def test_a_log_without_engine_torque_is_refused(bench: Bench) -> None:
@@ -112,6 +120,15 @@ def test_a_gear_counts_as_far_as_its_torque_was_recorded(bench: Bench) -> None:
     assert end - 0.5 < one.time[0] < end - 0.4
     assert "counts from there on" in one.notes[0]
     assert _deviates(one.output_torque, bench.truth(one)["output_torque"]) < 2.0
+
+
+def test_of_a_long_gear_what_is_near_the_shift_is_told(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("drivetwin.observer.observe.FAR", 0.4)
+    one = observed(bench.twin, bench.log, bench.shift)
+    assert one.time[0] == pytest.approx(bench.shift.before[1] - 0.4, abs=0.01)
+    assert one.time[-1] == pytest.approx(bench.shift.lockup_time + 0.4, abs=0.01)
 
 
 def test_simulation_repeats_with_its_seed(bench: Bench) -> None:

@@ -15,6 +15,7 @@ from drivetwin.shifts.converter import (
     behind_converter,
     converter_slip,
     lock_ups,
+    open_spans,
     require_closed,
 )
 from drivetwin.shifts.find import find_shifts
@@ -66,6 +67,21 @@ def test_a_late_engine_speed_is_no_opening() -> None:
     inlet = made["input_speed"]
     late = replace(inlet, role="engine_speed", time=inlet.time + 0.03)
     assert lock_ups(replace(made, channels={**made.channels, "engine_speed": late}), CARD) == ()
+
+
+def test_the_speeds_tell_where_it_is_open() -> None:
+    ((start, end),) = open_spans(log(closing(2.0)), 1.0)
+    assert start == pytest.approx(0.0, abs=0.06)
+    assert end == pytest.approx(2.0, abs=0.1)
+    assert open_spans(log(INLET), 1.0) == ()
+    assert open_spans(ShiftLog({}, "made", ""), 1.0) == ()
+
+
+def test_a_late_engine_speed_is_not_open() -> None:
+    made = PLAN.log()
+    inlet = made["input_speed"]
+    late = replace(inlet, role="engine_speed", time=inlet.time + 0.08)
+    assert open_spans(replace(made, channels={**made.channels, "engine_speed": late}), 1.0) == ()
 
 
 def test_closed_throughout_is_no_event() -> None:

@@ -76,3 +76,14 @@ def test_the_flag_bounds_a_torque_phase_that_nothing_else_tells() -> None:
     assert onset == pytest.approx(1.25, abs=0.01)
     assert abs(onset - (1.5 - PLAN.torque_phase)) < 2.0 * sigma
     assert "shift flag at 1.000 s" in shift.warnings[-1]
+
+
+def test_a_flag_where_a_speed_is_missing_says_which() -> None:
+    log = with_states(PLAN.log(), shift_in_process=flag((1.1, 2.1), (2.9, 3.4)))
+    outlet = log["output_speed"]
+    keep = outlet.time < 2.5
+    dead = replace(outlet, time=outlet.time[keep], values=outlet.values[keep])
+    _, (empty,) = find_shifts(
+        replace(log, channels={**log.channels, "output_speed": dead}), PLAN.card()
+    )
+    assert f"{outlet.source_name!r} has no samples" in empty.reason

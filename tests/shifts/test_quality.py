@@ -134,3 +134,19 @@ def test_cut_or_damaged_torque_gives_no_torque_figures() -> None:
     torque = np.full_like(_TIME, 1500.0)
     torque[1100:1500] = np.nan
     assert "torque_hole_depth" not in shift_quality(_log(torque), _CARD, _SHIFT)
+
+
+def test_speeds_too_slow_for_the_inertia_phase_tell_no_flare() -> None:
+    """A phase set by hand may lie between two samples of a bus."""
+    log = _log()
+    slow = {role: (one.time[::50], one.values[::50]) for role, one in log.channels.items()}
+    between = replace(_SHIFT, inertia_phase=(1.21, 1.24), lockup_time=1.24, after=(1.24, 3.0))
+    figures = shift_quality(make_log(slow), _CARD, between)
+    assert figures["inertia_phase_time"] == pytest.approx(0.03)
+    assert not {"flare_speed", "undershoot_speed"} & set(figures)
+
+
+def test_a_vehicle_of_which_next_to_nothing_is_known_has_its_figures() -> None:
+    unknown = replace(_CARD, J_vehicle_range=(0.0, 9000.0))
+    jerk = shift_quality(_log(np.sin(40.0 * _TIME)), unknown, _SHIFT)["wheel_jerk_max"]
+    assert np.isfinite(jerk)

@@ -12,7 +12,17 @@ from hypothesis import strategies as st
 
 from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
-from drivetwin.shifts.recorded import LEAST, OLDEST, YOUNGEST, parts_between, recorded
+from drivetwin.shifts.recorded import (
+    AFTER,
+    BEFORE,
+    LEAST,
+    LETS_GO,
+    OLDEST,
+    YOUNGEST,
+    near,
+    parts_between,
+    recorded,
+)
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 
@@ -129,3 +139,35 @@ def test_pressure_that_crosses_the_fill_point_in_its_gap_cuts() -> None:
     risen = replace(channel, values=np.where(channel.time > 3.5, 1e6, channel.values))
     cut = recorded(ShiftLog({**whole.channels, "pressure.B2": risen}, "made", ""), SHIFT, FILLS)
     assert cut.after == pytest.approx((2.5, 3.0), abs=2e-3)
+
+
+def with_converter(opened: tuple[float, float]) -> ShiftLog:
+    """The log with speeds of engine and input that differ by 10 % in the span `opened`."""
+    time = np.linspace(0.0, 5.0, 501)
+    inlet = np.full(time.size, 150.0)
+    slips = (time >= opened[0]) & (time <= opened[1])
+    speeds = {"input_speed": inlet, "engine_speed": np.where(slips, 1.1, 1.0) * inlet}
+    channels = {k: Channel(k, Quantity.SPEED, time, v, k, "rad/s") for k, v in speeds.items()}
+    return ShiftLog({**log().channels, **channels}, "made", "")
+
+
+def test_a_gear_counts_while_the_converter_is_closed() -> None:
+    cut = recorded(with_converter((-1.0, 1.2)), SHIFT, FILLS)
+    assert cut.before == pytest.approx((1.2 + LETS_GO, 2.0), abs=0.06)
+    assert "the converter is open" in cut.warnings[-1]
+    cut = recorded(with_converter((3.8, 6.0)), SHIFT, FILLS)
+    assert cut.after == pytest.approx((2.5, 3.8 - LETS_GO), abs=0.06)
+
+
+def test_a_shift_with_the_converter_opening_is_refused() -> None:
+    with pytest.raises(DamagedChannelError, match=r"converter is open .* during the shift"):
+        recorded(with_converter((2.1, 4.0)), SHIFT, FILLS)
+
+
+def test_of_long_gears_what_is_near_the_shift_counts() -> None:
+    assert near(SHIFT) is SHIFT
+    cut = near(replace(SHIFT, before=(-60.0, 2.0), after=(2.5, 90.0)))
+    assert cut.before == (2.0 - BEFORE, 2.0)
+    assert cut.after == (2.5, 2.5 + AFTER)
+    cut = near(replace(SHIFT, before=(-60.0, 2.0), after=(2.5, 90.0)), (15.0, 20.0))
+    assert (cut.before, cut.after) == ((-13.0, 2.0), (2.5, 22.5))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.shifts.sparse import begun, ended
@@ -115,3 +115,19 @@ def test_a_slip_that_turns_after_a_flare_began_with_the_flare(
     assert found is not None
     assert found.time < start + duration
     assert abs(found.time - start) < 3.0 * found.sigma
+
+
+@given(
+    slip=st.lists(st.floats(-50.0, 50.0), min_size=4, max_size=20),
+    noise=st.floats(0.01, 10.0),
+)
+@example(slip=[0.9, 1.1, -1.2, 1.3, 1.2, -1.4], noise=0.25)
+def test_whatever_the_slip_a_boundary_is_told_within_it_or_none(
+    slip: list[float], noise: float
+) -> None:
+    time = np.linspace(0.0, STEP * (len(slip) - 1), len(slip))
+    for find in (begun, ended):
+        found = find(time, np.array(slip), noise)
+        if found is not None:
+            assert 0.0 <= found.time <= time[-1] + STEP or find is ended
+            assert found.sigma > 0.0

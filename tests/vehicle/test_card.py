@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -184,11 +185,14 @@ def test_unknown_names_are_told_by_the_card(tmp_path: Path) -> None:
         card.clutch_ratios("K1")
 
 
-def test_a_gear_of_two_elements_has_no_single_one(tmp_path: Path) -> None:
+def test_a_gear_of_two_elements_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
     clutch = 'elements.K1 = { kind = "clutch", gain_m3 = 1, P0_bar = 1, i_c = 1, i_out = 1.8 }'
-    card = load(tmp_path, changed('["B2"]', '["B2", "K1"]') + clutch)
-    with pytest.raises(CardError, match="gear '2' is held by B2, K1"):
-        card.element_of("2")
+    with pytest.raises(CardError, match=r"gears\[0\].elements': gear '2' is held by B2, K1"):
+        load(tmp_path, changed('["B2"]', '["B2", "K1"]') + clutch)
+    card = load(tmp_path, CARD)
+    both = replace(card, gears=tuple(replace(one, elements=("B2", "B3")) for one in card.gears))
+    with pytest.raises(CardError, match="gear '2' is held by B2, B3"):
+        both.element_of("2")
 
 
 @pytest.mark.parametrize("name", ["truck_a", "truck_b", "truck_c", "paper_like"])

@@ -31,6 +31,7 @@ PYTHON_LAYERS = (
             "atomic",
             "progress",
             "shown",
+            "display",
             "parameters",
             "border",
             "driveline",
@@ -65,7 +66,7 @@ PYTHON_LAYERS = (
 """From the bottom up: a module may import from its own layer and those below."""
 
 _WITH_UNITS = frozenset(
-    {"logs", "vehicle", "gearbox", "report", "export", "fleet", "app", "cli", "__main__"}
+    {"display", "logs", "vehicle", "gearbox", "report", "export", "fleet", "app", "cli", "__main__"}
 )
 """What reads files and cards, and what shows or exports; everything else is SI."""
 _CONVERSIONS = (1e5, 1e-5, 273.15, 60 / math.tau, math.tau / 60, 9.549, 0.10472)

@@ -67,9 +67,10 @@ class Scenario:
     With a `converter` the model is behind it, and `engine_speed` is that of the turbine.
     `engine_speed` [rad/s] is the speed at time 0, where the start gear is in quasi-steady
     acceleration. `engine_torque` [N m] is the driver's demand, without the TCU's `reductions`.
-    `rate` [Hz] is the sampling of the inputs, linear between samples. `drive_range` are plausible
-    ranges for the vehicle card: of J' at the engine and of J3 at the wheel [kg m^2]. With
-    `one_clutch` the elements are one and the same in two gears, and a log has its pressure once.
+    `rate` [Hz] is the sampling of the inputs, linear between samples. `J_prime_range` and
+    `J_vehicle_range` are plausible ranges for the vehicle card: of J' at the engine and of J3 at
+    the wheel [kg m^2]. With `one_clutch` the elements are one and the same in two gears, and a log
+    has its pressure once.
     """
 
     name: str

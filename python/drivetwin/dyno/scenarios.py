@@ -55,7 +55,7 @@ def scenario_of(name: ScenarioName, drum: float | None = None) -> Scenario:
         return SCENARIOS[name]()
     if name not in _WITH_DRUMS or not drum >= 0.0:
         raise InputError(
-            f"a drum of {drum:g} kg m^2 in scenario {name}",
+            f"a drum of {drum:g} kg·m² in scenario {name}",
             f"state a drum of 0 or more in one of {', '.join(_WITH_DRUMS)}",
             Where(key="drum"),
         )

@@ -19,11 +19,11 @@ from drivetwin.identify.likelihood.derived import parameters
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import Record
-from drivetwin.identify.likelihood.smooth import local_cubic
+from drivetwin.identify.likelihood.smooth import smooth_pressure
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.result import Identification
-from drivetwin.identify.signals import FloatArray
+from drivetwin.identify.signals import FloatArray, Sampled
 from drivetwin.progress import part as piece
 
 FEWEST = 10
@@ -123,10 +123,11 @@ def _noisy(record: Record, measured: FloatArray, rng: np.random.Generator) -> Re
     jitter = record.input_sigma["engine torque"] * rng.standard_normal(torque.values.size)
     pressures, held_back = {}, {}
     for name, signal in record.pressures.items():
-        noise = record.input_sigma[name] * rng.standard_normal(signal.values.size)
-        left = local_cubic(signal.time, noise)
-        pressures[name] = Signal(signal.time, signal.values + left)
-        held_back[name] = noise - left
+        sigma = record.input_sigma[name]
+        read = signal.values + sigma * rng.standard_normal(signal.values.size)
+        driving = smooth_pressure(Sampled(signal.time, read, sigma), record.fills.get(name))
+        pressures[name] = Signal(signal.time, driving)
+        held_back[name] = read - driving
     return replace(
         record,
         outputs=outputs,

@@ -9,6 +9,7 @@ from itertools import groupby
 
 import numpy as np
 
+from drivetwin.display import in_units
 from drivetwin.identify.combine import combine
 from drivetwin.identify.design import contradictions, design_of, held_against
 from drivetwin.identify.integral import IntegralShift
@@ -136,8 +137,7 @@ def _better_by_design(
     return {
         name: designed(name, prior.value, prior.std, SENSORS_TELL_LESS)
         for name, prior in designs.items()
-        if name not in contradicted
-        and (estimates[name].std_total or 0.0) > prior.std > 0.0
+        if name not in contradicted and (estimates[name].std_total or 0.0) > prior.std > 0.0
     }
 
 
@@ -149,7 +149,7 @@ def _impossible(name: str, value: float, prior: PriorValue | None) -> Estimate |
     spec = spec_of(name)
     if spec.lower <= value <= spec.upper:
         return None
-    text = f"the linear fit gives {value:.3g} {spec.unit}, which is impossible"
+    text = f"the linear fit gives {in_units(value, spec.unit, digits=3)}, which is impossible"
     if prior is None:
         return refused(name, METHOD, text)
     return designed(name, prior.value, prior.std, f"design value of the card: {text}")

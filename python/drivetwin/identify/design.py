@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin.display import in_units
 from drivetwin.identify.known import CONTRADICTS, without_prior
 from drivetwin.identify.result import Z95, Estimate, Verdict
 from drivetwin.identify.signals import Driveline, FloatArray
@@ -48,9 +49,9 @@ class Contradiction:
     def text(self) -> str:
         """The same in words."""
         unit = spec_of(self.id).unit
+        card, log = (in_units(one.value, unit, one.std) for one in (self.design, self.log))
         return (
-            f"{self.id}: the vehicle card says {self.design.value:.4g} ± {self.design.std:.2g} "
-            f"{unit}, the log {self.log.value:.4g} ± {self.log.std:.2g} (1 sigma), "
+            f"{self.id}: the vehicle card says {card}, the log {log} (1 sigma), "
             f"{self.apart:.1f} standard deviations apart: correct the card, or find what the "
             "model or a sensor lacks"
         )
@@ -108,8 +109,9 @@ def held_against(
             if name == one.id or other.value is None or other.std_total is None:
                 continue
             if abs(free - other.value) > Z95 * other.std_total:
-                why = f"without the card's {one.id} the log gives {free:.5g} {other.unit}"
-                told[name] = doubted(other, why.removesuffix(" 1"))
+                value = in_units(free, other.unit, digits=5)
+                why = f"without the card's {one.id} the log gives {value}"
+                told[name] = doubted(other, why)
     return told
 
 
@@ -133,6 +135,6 @@ def outside(symbol: str, value: float, design: tuple[float, float]) -> str:
     if design[0] <= value <= design[1]:
         return ""
     return (
-        f"{symbol} = {value:.4g} kg m^2 lies outside its design range "
-        f"{design[0]:g} to {design[1]:g} kg m^2"
+        f"{symbol} = {in_units(value, 'kg*m^2')} lies outside its design range "
+        f"{design[0]:g} to {design[1]:g} kg·m²"
     )

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.sparse import csr_array
 
 from drivetwin.driveline import Stribeck
@@ -360,15 +361,17 @@ def paper_friction(signals: ShiftSignals, driveline: Driveline, points: int = 40
 def fit_law(slip: FloatArray, mu: FloatArray) -> Stribeck:
     """Stribeck law by least squares on μ-slip points (n,): linear in three, v_s on a grid.
 
-    v_s is not taken below the least slip seen, where nothing would show the law's rise.
+    v_s is not taken below the least slip seen, where nothing would show the law's rise. mu_c and
+    mu_s are no less than zero: a few points hardly tell the law's parts from each other, and would
+    leave one that no clutch has.
     """
     best: tuple[float, FloatArray, float] | None = None
     for v_s in np.geomspace(max(2.0, float(slip.min())), 100.0, 40):
-        basis = np.column_stack([np.ones_like(slip), np.exp(-slip / v_s), slip])
-        found = np.linalg.lstsq(basis, mu, rcond=1e-8)[0]
-        error = float(np.sum((basis @ found - mu) ** 2))
-        if best is None or error < best[0]:
-            best = (error, found, float(v_s))
+        fall = np.exp(-slip / v_s)
+        basis = np.column_stack([1.0 - fall, fall, slip])
+        found = lsq_linear(basis, mu, ([0.0, 0.0, -np.inf], np.inf), method="bvls")
+        if best is None or found.cost < best[0]:
+            best = (float(found.cost), found.x, float(v_s))
     assert best is not None
-    mu_c, drop, mu_v = (float(v) for v in best[1])
-    return Stribeck(mu_c, mu_c + drop, best[2], mu_v)
+    mu_c, mu_s, mu_v = (float(v) for v in best[1])
+    return Stribeck(mu_c, mu_s, best[2], mu_v)

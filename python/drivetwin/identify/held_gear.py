@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
+from drivetwin.display import in_units
 from drivetwin.identify.inputs import sampled
 from drivetwin.identify.modulating import Windows, hann_kernels, join, windows_in
 from drivetwin.identify.result import Verdict
@@ -111,18 +112,19 @@ def held_gear(gear: str, ratio: float, span: Span, torque: Sampled, speed: Sampl
     columns = np.column_stack([rate, one, growth])
     grown: FloatArray = np.linalg.lstsq(columns, drive, rcond=None)[0].astype(np.float64)
     plain = np.linalg.lstsq(columns[:, :2], drive, rcond=None)[0]
-    left, value = drive - columns @ grown, float(grown[0])
+    value = float(grown[0])
     spread = float(np.hypot(_jackknife(columns, drive), 0.5 * (plain[0] - value)))
     half = float(student.ppf(0.975, BLOCKS - 1)) * spread
-    explained = 1.0 - float(left @ left) / float(np.sum((drive - drive.mean()) ** 2))
     if value <= 0.0 or half > WEAK * value:
         return _refused(
             gear,
             span,
-            f"{value:.3g} ± {half:.2g} kg m^2 (95 %) says nothing: the vehicle's "
-            f"acceleration varies by {float(rate.std()):.2g} rad/s^2 only",
+            f"{in_units(value, 'kg*m^2', half)} (95 %) says nothing: the vehicle's "
+            f"acceleration varies by {in_units(float(rate.std()), 'rad/s^2', digits=2)} only",
         )
     verdict = Verdict.IDENTIFIED if half < IDENTIFIED * value else Verdict.WEAK
+    left = drive - columns @ grown
+    explained = 1.0 - float(left @ left) / float(np.sum((drive - drive.mean()) ** 2))
     return HeldGear(gear, span, verdict, value, half, float(grown[1]), explained)
 
 

@@ -29,6 +29,7 @@ def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
             spec.gain,
             spec.P0,
             spec.drum_inertia,
+            spec.peak,
         )
     return Driveline(
         i_f=card.final_drive,
@@ -39,6 +40,11 @@ def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
         loss_law=card.loss_law,
         known=card.known,
     )
+
+
+BESIDE = 10.0
+"""What the estimators see of a long log before and after a shift's held gears [s]: smoothing and
+ages of channels reach no further."""
 
 
 def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
@@ -65,8 +71,28 @@ def pressures_of(log: ShiftLog, shift: Shift) -> dict[str, Sampled]:
 def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
     """The signals of a log that the estimators need, around `shift`.
 
-    Raises MissingChannelError for a missing channel. The output torque may be missing.
+    The noise is that of whole channels. Raises MissingChannelError for a missing channel. The
+    output torque may be missing.
     """
+    span = shift.before[0] - BESIDE, shift.after[1] + BESIDE
+    whole = _whole_signals(log, card, shift)
+
+    def near(signal: Sampled) -> Sampled:
+        within = signal.time.size == 0 or (span[0] <= signal.time[0] and signal.time[-1] <= span[1])
+        return signal if within else signal.within(span)
+
+    return replace(
+        whole,
+        engine_torque=near(whole.engine_torque),
+        output_torque=near(whole.output_torque),
+        engine_speed=near(whole.engine_speed),
+        output_speed=near(whole.output_speed),
+        wheel_speed=None if whole.wheel_speed is None else near(whole.wheel_speed),
+        pressures={name: near(one) for name, one in whole.pressures.items()},
+    )
+
+
+def _whole_signals(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
     if "engine_speed" in log:
         engine_speed = sampled(log["engine_speed"])
     else:

@@ -28,9 +28,9 @@ def paper_conclusions(
     them as known.
     """
     estimates: dict[str, Estimate] = {}
-    for shift, s in zip(shifts, signals, strict=True):
+    for shift in shifts:
         for name, value in shift.values.items():
-            if name in estimates:
+            if name in estimates and estimates[name].value is not None:
                 continue
             doubt = shift.doubts.get(name, "")
             if not spec_of(name).lower <= value <= spec_of(name).upper:
@@ -38,6 +38,7 @@ def paper_conclusions(
                 continue
             reason = f"{doubt}; {experiment_for(name)}" if doubt else _NO_INTERVAL
             estimates[name] = Estimate(name, value, None, Verdict.WEAK, METHOD, reason=reason)
+    for shift, s in zip(shifts, signals, strict=True):
         gear = s.shift.end_gear
         for name in ("k_o", "c_o", f"f_d_{gear}", f"zeta_{gear}"):
             if name not in shift.values and name not in estimates:

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.modulating import Quadrature, hann_kernels, join, windows_in
 from drivetwin.identify.regression import Fit, Prior, Term, solve
-from drivetwin.identify.signals import FloatArray, ShiftSignals, Span
+from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
 from drivetwin.identify.wlse import (
     GridFit,
     GridRow,
@@ -73,6 +73,10 @@ def paper_load(
     return GridFit(rows, best, acceleration, torque, output_torque - rows[0].value, weights)
 
 
+WIDTH = 0.4
+"""Width of a window [s]."""
+UNKNOWNS = 3
+"""Load, inertia and the part of the load that grows with speed."""
 SETTLING = 0.5
 """Time after lock-up [s] in which the output speed cannot stand in for the wheel speed."""
 
@@ -104,8 +108,41 @@ class LoadFit:
         return float(self.fit.theta[1])
 
 
+def load_left(torque: Sampled, wheel: Sampled, i_f: float, span: Span) -> float:
+    """Noise power (1: noise alone) that eq. 11 leaves over `span` [s] with the best load.
+
+    The load is constant but for a part that grows with the square of the speed `wheel` [rad/s].
+    Much more than noise is left where something else moves the vehicle: brake, change of grade.
+    Infinite where the span holds nothing to tell it from.
+    """
+    parts = parts_between(span, (*torque.unrecorded, *wheel.unrecorded))
+    windows = join([windows_in(part, WIDTH, WIDTH / 16.0) for part in parts])
+    if windows.count <= UNKNOWNS:
+        return float("inf")
+    psi = hann_kernels(torque.time, windows).psi
+    kernels = hann_kernels(wheel.time, windows)
+    area, one = 0.5 * windows.width, np.ones(windows.count)
+    constant = Quadrature(csr_array(area[:, None]))
+    square = wheel.at(windows.centre) ** 2
+    grown = (square - square.mean()) / max(float(np.ptp(square)), np.finfo(float).tiny)
+
+    def terms(theta: FloatArray) -> list[Term]:
+        load = -(theta[0] + theta[2] * grown)
+        inertia = {1: (-one / i_f, kernels.slope)}
+        return [
+            Term(torque.values, torque.sigma, psi, one, {}),
+            Term(np.ones(1), 0.0, constant, load, {0: (-one, constant), 2: (-grown, constant)}),
+            Term(wheel.values, wheel.sigma, kernels.slope, -theta[1] / i_f * one, inertia),
+        ]
+
+    try:
+        return solve(terms, np.zeros(UNKNOWNS), Prior.independent(UNKNOWNS, {})).chi2
+    except IdentificationError:
+        return float("inf")
+
+
 def momentum_load(
-    signals: ShiftSignals, i_f: float, spans: tuple[Span, ...], width: float = 0.4
+    signals: ShiftSignals, i_f: float, spans: tuple[Span, ...], width: float = WIDTH
 ) -> LoadFit:
     """Estimate (T_v/i_f, J3) from ∫ψ·T_o - (T_v/i_f)·∫ψ = (J3/i_f)·∫ψ·ω_w' over all windows.
 

@@ -9,12 +9,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from drivetwin.display import in_units
 from drivetwin.errors import (
     DamagedChannelError,
     IdentificationError,
     NoShiftError,
     Where,
 )
+from drivetwin.identify.chosen import chosen
 from drivetwin.identify.conclude import Conclusions, conclude, with_systematic_band
 from drivetwin.identify.design import outside_ranges
 from drivetwin.identify.evidence import Evidence
@@ -25,7 +27,7 @@ from drivetwin.identify.likelihood.run import likelihood, likelihood_alone
 from drivetwin.identify.literal import PaperShift, paper_shift
 from drivetwin.identify.literal_result import paper_conclusions
 from drivetwin.identify.method import DEFAULT_METHOD, Method
-from drivetwin.identify.momentum import MomentumSettings
+from drivetwin.identify.momentum import MomentumSettings, stretches
 from drivetwin.identify.result import FloatArray, Identification
 from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.identify.uncertainty import doubted, systematic_std
@@ -33,9 +35,9 @@ from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.parameters import spec_of
 from drivetwin.progress import part
 from drivetwin.shifts.converter import behind_converter, open_slip, require_closed
-from drivetwin.shifts.recorded import recorded
+from drivetwin.shifts.recorded import AFTER, BEFORE, near, recorded
 from drivetwin.shifts.shift import RejectedShift, Shift
-from drivetwin.vehicle.spec import PriorValue, VehicleCard
+from drivetwin.vehicle.spec import PriorValue, VehicleCard, middle_of
 
 NO_AGE = PriorValue(0.0)
 """Age of a torque [s] that is computed from speeds."""
@@ -52,6 +54,15 @@ ALL_BEFORE_LOSS = (
     "J′ wrong by up to J2e·(1/η² - 1) where the log both drives and overruns"
 )
 """What the law `dissipative` could tell apart and the unknowns do not (THEORY section 3)."""
+NEAR = (
+    f"of longer gears no more than {BEFORE:g} s before a shift and {AFTER:g} s after it count, as "
+    "far as the converter is closed and all inputs are recorded"
+)
+ONE_LOAD = (
+    "; all shifts of a log share one load: on a hilly road cut it into a log for each shift and "
+    "fit these with --together"
+)
+"""What helps where each shift could be explained, but not all of them."""
 LOADS = {
     False: "is constant over the log",
     True: "grows with the square of the wheel speed and else is constant over the log",
@@ -89,6 +100,7 @@ def identify(
             Where(file=log.source),
         )
     usable, refused = _recorded(log, card, shifts.shifts)
+    usable, left_out = chosen(log, card, usable)
     recorded_log, log = log, behind_converter(log, card, usable[0])
     is_open = log is not recorded_log
     if is_open:
@@ -96,6 +108,9 @@ def identify(
     signals = [signals_of(log, card, shift) for shift in usable]
     drivelines = [driveline_of(card, shift) for shift in usable]
     if all(s.scale_known for s in signals):
+        if method is not Method.PAPER:
+            signals, drivelines, without = _balanced(signals, drivelines)
+            usable, left_out = tuple(s.shift for s in signals), (*left_out, *without)
         found, method, evidence = _with_torque(signals, drivelines, card, method)
     else:
         found, evidence = _without_torque(log, signals, drivelines, card, method)
@@ -106,7 +121,7 @@ def identify(
         estimates=found.estimates,
         friction=found.friction,
         shifts=usable,
-        rejected=(*shifts.rejected, *refused),
+        rejected=tuple(sorted((*shifts.rejected, *refused, *left_out), key=lambda one: one.time)),
         fit={},
         method=method,
         loss_law=card.loss_law,
@@ -114,10 +129,11 @@ def identify(
         inputs={**log.inputs, **card.inputs},
         settings=_settings(card, method),
         evidence=replace(evidence, signals=tuple(signals)),
-        warnings=(*log.warnings, *found.warnings, *ranges),
+        warnings=(*log.warnings, *_not_fitted(shifts, usable), *found.warnings, *ranges),
         assumptions=(
             *((BEHIND_CONVERTER,) if is_open else ()),
             *_assumptions(card, method, found.load is not None),
+            *((NEAR,) if any(one not in shifts.shifts for one in usable) else ()),
         ),
         correlation_ids=found.correlation_ids,
         correlation=found.correlation,
@@ -128,7 +144,7 @@ def identify(
 def _recorded(
     log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
-    """The shifts that can be used, cut to where their inputs were recorded, and those refused.
+    """The shifts that can be used, cut to what a model may be driven over, and those refused.
 
     Refused for a gap, for an open converter without a map, and for one with a map where other
     shifts of the log have it closed: the inertia on the engine's side is another. Where none is
@@ -140,7 +156,8 @@ def _recorded(
         fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
         try:
             require_closed(log, card, shift)
-            usable.append(recorded(log, shift, fills))
+            seen = behind_converter(log, card, shift)
+            usable.append(near(recorded(seen, shift, fills, card.i_in)))
         except (DamagedChannelError, IdentificationError) as refusal:
             if len(shifts) == len(refused) + 1:
                 raise
@@ -155,6 +172,38 @@ def _recorded(
         if shift not in closed
     ]
     return closed, tuple(refused)
+
+
+def _not_fitted(shifts: Shifts, usable: Sequence[Shift]) -> list[str]:
+    """How many shifts that were found take no part in the fit."""
+    count = len(shifts.shifts) - len(usable)
+    if count == 0:
+        return []
+    return [
+        f"{count} of {len(shifts.shifts)} shifts are not fitted: report and `rejected` of the "
+        "result say why"
+    ]
+
+
+def _balanced(
+    signals: list[ShiftSignals], drivelines: list[Driveline]
+) -> tuple[list[ShiftSignals], list[Driveline], tuple[RejectedShift, ...]]:
+    """The shifts from which a fit can start, and those left out with the reason.
+
+    All where there would be none: in overrun the dissipative law leaves no momentum balance.
+    """
+    kept, refused = [], []
+    for k, (one, driveline) in enumerate(zip(signals, drivelines, strict=True)):
+        try:
+            stretches(one, driveline, MomentumSettings())
+        except IdentificationError as fault:
+            span = (one.shift.before[1], one.shift.lockup_time)
+            refused.append(RejectedShift(span, f"{fault.what}; other shifts of the log have one"))
+        else:
+            kept.append(k)
+    if not kept:
+        return signals, drivelines, ()
+    return [signals[k] for k in kept], [drivelines[k] for k in kept], tuple(refused)
 
 
 _Stage = tuple[Conclusions, Method, Evidence]
@@ -181,6 +230,7 @@ def _with_torque(
         except IdentificationError as error:
             method = Method.INTEGRAL
             text = f"likelihood: {error.what}; the values are those of the integral method"
+            text += ONE_LOAD if len(signals) > 1 else ""
             estimates = {name: doubted(one, GAVE_UP) for name, one in found.estimates.items()}
             found = replace(found, estimates=estimates, warnings=(text, *found.warnings))
     try:
@@ -224,7 +274,7 @@ def _paper_shifts(
 def _integral(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
 ) -> tuple[Conclusions, tuple[IntegralShift, ...]]:
-    start = float(np.sqrt(card.J_prime_range[0] * card.J_prime_range[1]))
+    start = middle_of(card.J_prime_range)
     shifts = tuple(identify_shift(s, d, start) for s, d in zip(signals, drivelines, strict=True))
     systematic, bands = _systematic(signals, drivelines, shifts, card, start)
     found = conclude(shifts, signals, drivelines, systematic)
@@ -301,7 +351,7 @@ def _settings(card: VehicleCard, method: Method) -> dict[str, Any]:
 
 def _assumptions(card: VehicleCard, method: Method, growing: bool) -> tuple[str, ...]:
     texts = [
-        f"loss law `{card.loss_law}` (THEORY section 3)",
+        f"loss law {card.loss_law} (theory page, section 3)",
         "gear ratios, final drive and clutch gains are as on the card",
         f"the load torque {LOADS[growing]}",
         "the off-going element carries no torque once its pressure is below P0",
@@ -315,13 +365,12 @@ def _assumptions(card: VehicleCard, method: Method, growing: bool) -> tuple[str,
     if not card.sensors:
         texts.append("no sensor gain or offset tolerance is stated: intervals cover noise only")
     texts += [
-        f"known beforehand: {name} = {prior.value:g} {spec_of(name).unit}"
-        + (f" ± {prior.std:g} (1 sigma)" if prior.std > 0.0 else ", fixed")
+        f"known beforehand: {name} = {in_units(prior.value, spec_of(name).unit, prior.std)}"
+        + (" (1 sigma)" if prior.std > 0.0 else ", fixed")
         for name, prior in card.known.items()
         if method is not Method.PAPER
     ]
     if card.J_out is not None:
-        texts.append(
-            f"design prior of J_out: {card.J_out.value:g} ± {card.J_out.std:g} kg m^2 (1 sigma)"
-        )
+        design = in_units(card.J_out.value, "kg*m^2", card.J_out.std)
+        texts.append(f"design prior of J_out: {design} (1 sigma)")
     return tuple(texts)

@@ -24,7 +24,7 @@ def stiffness_and_damping(decay_rate: float, omega_d: float, J4: float, J5: floa
     """
     if not (J4 > 0.0 and J5 > 0.0):
         raise IdentificationError(
-            f"inertias {J4:.4g} and {J5:.4g} kg m^2 on the two sides of the output shaft",
+            f"inertias {J4:.4g} and {J5:.4g} kg·m² on the two sides of the output shaft",
             "check the inertia and load fits of this log: both must be positive",
         )
     J = in_series(J4, J5)

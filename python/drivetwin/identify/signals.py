@@ -60,7 +60,8 @@ class Coupling:
     """A shift element in the dual-clutch form: slip = a·ω_e - b·ω_out (eq. 15).
 
     `a` = 1/(i_in·i_c), `b` = i_out; its torque acts as -a·T on the engine and b·T on the output
-    side. `gain` N·D·A·r [m^3]; `drum` [kg m^2] is the inertia that turns with the slip.
+    side. `gain` N·D·A·r [m^3]; `drum` [kg m^2] is the inertia that turns with the slip; `peak` is
+    the static over the kinetic capacity at zero slip.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Coupling:
     gain: float
     P0: PriorValue
     drum: PriorValue = NO_DRUM
+    peak: float = 1.0
 
     @property
     def ratio(self) -> float:

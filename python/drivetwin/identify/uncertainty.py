@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
+from drivetwin.display import in_units
 from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.result import Z95, Estimate, Verdict
 from drivetwin.identify.signals import FloatArray, ShiftSignals
@@ -86,7 +87,7 @@ def judge(
     inside = spec.lower <= value <= spec.upper
     advice = advice_for(parameter_id, std_noise, std_systematic)
     if not np.isfinite(width) or width > end or not inside:
-        shown = f"the 95 % interval {value:.4g} ± {half:.2g} {spec.unit} says nothing"
+        shown = f"the 95 % interval {in_units(value, spec.unit, half)} says nothing"
         return Estimate(
             parameter_id,
             None,
@@ -96,7 +97,7 @@ def judge(
             reason=f"{shown}; {advice}",
         )
     if width > limit:
-        reason = f"the 95 % interval is ± {half:.2g} {spec.unit}; {advice}"
+        reason = f"the 95 % interval is ± {in_units(half, spec.unit, digits=2)}; {advice}"
         verdict = Verdict.WEAK
     else:
         reason, verdict = "", Verdict.IDENTIFIED
@@ -126,7 +127,8 @@ def judge_with_design(
     if one.value is not None or not spec.lower <= value <= spec.upper:
         return one
     half = Z95 * float(np.hypot(std, std_systematic or 0.0))
-    wide = f"the 95 % interval is ± {half:.2g} {spec.unit}, with the card's design value in it"
+    width = in_units(half, spec.unit, digits=2)
+    wide = f"the 95 % interval is ± {width}, with the card's design value in it"
     text = "; ".join(part for part in (note, wide, advice_for(name, std, std_systematic)) if part)
     return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, text)
 
@@ -179,6 +181,14 @@ def propagate(
 def independent(*blocks: FloatArray) -> FloatArray:
     """Covariance of estimates whose errors are independent between the blocks."""
     return np.asarray(block_diag(*blocks), dtype=float)
+
+
+def root_of(covariance: FloatArray) -> FloatArray:
+    """L (p, p) with L·Lᵀ the covariance, formed on its correlation; what has no spread has none."""
+    scale = np.sqrt(np.diag(covariance))
+    divisor = np.where(scale > 0.0, scale, 1.0)
+    power, directions = np.linalg.eigh(covariance / np.outer(divisor, divisor))
+    return np.asarray(scale[:, None] * directions * np.sqrt(np.maximum(power, 0.0)))
 
 
 def correlation(covariance: FloatArray) -> FloatArray:

@@ -119,10 +119,16 @@ def _write_mat(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> No
             raise FileFormatError(
                 f"{channel.name!r} is no variable name in MATLAB", "rename it", Where(str(path))
             )
-        content[channel.name] = channel.values
-        content[f"{channel.name}_t"] = channel.time
+        mine: dict[str, object] = {
+            channel.name: channel.values,
+            f"{channel.name}_t": channel.time,
+        }
         if channel.unit:
-            content[f"{channel.name}_unit"] = channel.unit
+            mine[f"{channel.name}_unit"] = channel.unit
+        if twice := [name for name in mine if name in content]:
+            what = f"{twice[0]!r} would be a channel, and time or unit of another"
+            raise FileFormatError(what, "rename the channel", Where(str(path)))
+        content |= mine
     # An open file is taken; the type stubs of SciPy do not say so.
     savemat(file, content, long_field_names=True, do_compression=True)  # type: ignore[arg-type]
 

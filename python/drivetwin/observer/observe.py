@@ -10,10 +10,14 @@ from drivetwin.observer.ensemble import simulate_observed
 from drivetwin.observer.observed import Observation, Observer
 from drivetwin.observer.smooth import smooth
 from drivetwin.shifts.converter import behind_converter
-from drivetwin.shifts.recorded import recorded
+from drivetwin.shifts.recorded import near, recorded
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin import Twin
 from drivetwin.vehicle.spec import PriorValue
+
+FAR = 15.0
+"""Longest time [s] of the gears held before and after a shift: a second of the smoother takes some
+25 MB, and what happens so far away says nothing of the shift."""
 
 
 def observed(
@@ -22,14 +26,15 @@ def observed(
     """Torques of one shift of a log with 95 % bands; an output torque in the log is not used.
 
     Where the converter is open and the twin has its map, its turbine stands for the engine. The
-    gears before and after the shift count as far as its inputs were recorded, which the notes say.
+    gears before and after the shift count as far as its inputs were recorded, which the notes say,
+    and for FAR at most.
     Raises MissingParameterError where the twin is incomplete, MissingChannelError and InputError
     where the log is, DamagedChannelError where an input has a gap in the shift, SimulationError
     where the twin's own run fails.
     """
     log = behind_converter(log, twin.card(), shift)
     fills = {one.name: PriorValue(one.P0) for one in twin.dual_clutch(shift).elements}
-    whole = recorded(log, shift, fills)
+    whole = near(recorded(log, shift, fills, twin.i_in), (FAR, FAR))
     found = (smooth if by is Observer.SMOOTHER else simulate_observed)(twin, log, whole)
     cuts = whole.warnings[len(shift.warnings) :]
     return replace(found, notes=(*cuts, *found.notes))

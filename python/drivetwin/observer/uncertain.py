@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.driveline import DualClutch, ShiftElement, Stribeck
+from drivetwin.errors import MissingParameterError, Where
 from drivetwin.observer.observed import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin import Twin
@@ -53,16 +54,20 @@ class Uncertain:
 def uncertain(
     twin: Twin, shift: Shift, stems: tuple[str, ...], more: Mapping[str, float] | None = None
 ) -> Uncertain:
-    """The parameters `stems` of the twin; `J_prime` stands for that of a gear of the shift.
+    """The parameters `stems` of the twin; `J_prime` stands for that of its `inertia_gear`.
 
     `more` are further standard deviations by id, of errors that are not the twin's.
     Raises MissingParameterError where the twin has no value for one of them.
     """
+    if twin.over_eta:
+        raise MissingParameterError(
+            "the twin knows torques over η only: the log behind it had no output torque",
+            "identify from a log that has one, or state eta on the vehicle card",
+            Where(file=twin.name),
+        )
     model = twin.dual_clutch(shift)
-    gear = next(
-        g for g in (shift.start_gear, shift.end_gear) if twin.value(f"J_prime_{g}", -1.0) > 0.0
-    )
-    ids = tuple(f"J_prime_{gear}" if stem == "J_prime" else stem for stem in stems)
+    inertia = f"J_prime_{twin.inertia_gear(shift)}"
+    ids = tuple(inertia if stem == "J_prime" else stem for stem in stems)
     fallback = {f"P0.{one.name}": one.P0 for one in model.elements}
     values = np.array([twin.value(name, fallback.get(name, 0.0)) for name in ids])
     covariance = np.zeros((len(ids), len(ids)))

@@ -15,6 +15,7 @@ from drivetwin.errors import IdentificationError, Where
 from drivetwin.logs.damage import runs
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.flags import set_spans
+from drivetwin.shifts.kinematics import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import VehicleCard
 
@@ -24,6 +25,8 @@ CLOSED = 0.02
 """Relative slip between engine and input below which the lock-up clutch counts as closed."""
 _HOLD = 0.3
 """Time [s] over which the slip must stay closed."""
+_LASTS = 1.0
+"""Time [s] from which on slip is no late speed in a shift."""
 _BESIDE = 0.5
 """Span before a shift [s] over which its converter is looked at."""
 _STEP = 0.01
@@ -131,10 +134,7 @@ def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
 
     It has to be there for as long before.
     """
-    start, end = max(engine.time[0], inlet.time[0]), min(engine.time[-1], inlet.time[-1])
-    time = np.arange(start, end, _STEP)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slip = engine.at(time) / (i_in * inlet.at(time)) - 1.0
+    time, slip = _slip(engine, inlet, i_in)
     width = round(_HOLD / _STEP / 3.0)
     if time.size < 4 * width:
         return ()
@@ -149,3 +149,34 @@ def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
         for first, stop in runs(closed)
         if (stop - first) * _STEP >= _HOLD and first > width
     )
+
+
+def open_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
+    """Spans [s] in which the speeds of engine and input show the converter open, for _LASTS on.
+
+    Less may be a late engine speed while a shift changes the speeds. Empty where the log lacks one
+    of the speeds, as one does that sees the turbine as its engine.
+    """
+    if "engine_speed" not in log or "input_speed" not in log:
+        return ()
+    time, slip = _slip(log["engine_speed"], log["input_speed"], i_in)
+    width = round(_HOLD / _STEP / 3.0)
+    if time.size < 4 * width:
+        return ()
+    mean = np.convolve(np.where(np.isfinite(slip), slip, 0.0), np.ones(width) / width, "same")
+    return tuple(
+        (float(time[first]), float(time[stop - 1]))
+        for first, stop in runs(np.abs(mean) > CLOSED)
+        if (stop - first) * _STEP >= _LASTS
+    )
+
+
+def _slip(engine: Channel, inlet: Channel, i_in: float) -> tuple[FloatArray, FloatArray]:
+    """ω_e/(i_in·ω_in) - 1 (n,) at times (n,) [s] every _STEP that both speeds share.
+
+    Not finite in a gap and where the input stands.
+    """
+    start, end = max(engine.time[0], inlet.time[0]), min(engine.time[-1], inlet.time[-1])
+    time = np.arange(start, end, _STEP)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return time, engine.at(time) / (i_in * inlet.at(time)) - 1.0

@@ -51,4 +51,11 @@ def own_samples(
 
 
 def _borders(shifts: Sequence[Shift]) -> list[float]:
-    return [0.5 * (max(a.after[0], b.before[0]) + b.before[1]) for a, b in pairwise(shifts)]
+    """Middle of each gear held between two shifts; where what counts of it for the one ends before
+    what counts for the other begins, the beginning of the latter."""
+    return [
+        b.before[0]
+        if a.after[1] <= b.before[0]
+        else 0.5 * (max(a.after[0], b.before[0]) + b.before[1])
+        for a, b in pairwise(shifts)
+    ]

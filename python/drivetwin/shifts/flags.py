@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.logs.damage import runs
-from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.logs.shiftlog import Channel, ShiftLog, open_ends
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 Span = tuple[float, float]
@@ -53,19 +53,25 @@ def checked(
     seen = [(s.torque_phase[0], s.lockup_time) for s in shifts] + [r.time for r in rejected]
     flag = log["shift_in_process"]
     empty = [
-        RejectedShift(span, _unseen(flag, span))
+        RejectedShift(span, _unseen(log, flag, span))
         for span in set_spans(flag)
         if not any(low <= span[1] and high >= span[0] for low, high in seen)
     ]
     return told, (*rejected, *empty)
 
 
-def _unseen(flag: Channel, span: Span) -> str:
+def _unseen(log: ShiftLog, flag: Channel, span: Span) -> str:
     """Why a flag that is set over `span` [s] has no shift."""
     if span[0] <= flag.time[0]:
         return "the shift flag is set where the recording begins: the shift is not all in it"
     if span[1] >= flag.time[-1]:
         return "the shift flag is set where the recording ends: the shift is not all in it"
+    for role, substitute in (("input_speed", "engine_speed"), ("output_speed", "wheel_speed")):
+        speed = log[role if role in log else substitute]
+        for low, high in (*speed.gaps, *open_ends(speed.time, span)):
+            if low < span[1] and high > span[0]:
+                missing = f"{speed.source_name!r} has no samples from {low:.3f} s to {high:.3f} s"
+                return f"the shift flag is set, but {missing}: no change of gear can be seen"
     return "the shift flag is set, but the speeds show no change of gear"
 
 

@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from drivetwin.logs.shiftlog import Channel, ShiftLog, gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, gear_ratios, gearbox_speeds
 from drivetwin.shifts.shift import Shift, ShiftKind
-from drivetwin.vehicle.spec import VehicleCard
+from drivetwin.vehicle.spec import VehicleCard, middle_of
 
 FloatArray = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def shift_quality(
     `wheel_jerk_max` = torque_rate_max·i_f/J_v; `vibration_dose` = (∫ a^4 dt)^¼ over the same time
     with a = i_f·(T_o - straight line through both ends)/J_v, the wheel's angular acceleration (eq.
     9; times the wheel radius: m/s^1.75 of ISO 2631-1, unweighted). J_v is `J_vehicle` [kg m2], or
-    the geometric mean of the card's range. `friction_work`, `friction_power_max`: of the on-coming
+    the middle of the card's range. `friction_work`, `friction_power_max`: of the on-coming
     element in the inertia phase, T_c = T_o/iout (eq. 16; leaves out the output
     side's inertia and the drums) times the slip (eq. 15). Friction makes no energy: where more
     than 5 % of the work comes out negative the off-going element carries T_o, as in a power-on
@@ -92,7 +92,7 @@ def shift_quality(
     figures |= _slip_left(speeds, card.clutch_ratios(shift.oncoming), shift)
     torque = _output_torque(log, shift)
     if torque is not None:
-        J_v = J_vehicle or float(np.sqrt(np.prod(card.J_vehicle_range)))
+        J_v = J_vehicle or middle_of(card.J_vehicle_range)
         figures |= _torque_hole(torque, gear_ratios(card), shift)
         figures |= _vibration(torque, shift, card.final_drive / J_v)
         figures |= _friction(torque, speeds, card.clutch_ratios(shift.oncoming), shift)
@@ -144,6 +144,8 @@ def _speed_excess(
     inside = (speeds.time[near] >= shift.inertia_phase[0]) & (
         speeds.time[near] <= shift.lockup_time
     )
+    if not inside.any():
+        return {}
     above = (inlet - pair[1] * outlet)[inside]
     below = (pair[0] * outlet - inlet)[inside]
     return {

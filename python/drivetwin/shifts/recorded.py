@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The part of a shift over which all that drives it was recorded.
+"""The part of a shift over which all that drives it was recorded, and that one load holds for.
 
 A gap in the engine torque or in a pressure is no input that a model could be driven by, so the
 gears held before and after the shift are cut at it, and a shift with a gap inside is refused. A
 pressure counts only while an element may slip: one that stays above or below P0 on both sides of
 its gap, while the speeds show a held gear, decides nothing. An input that starts after the gear
-before the shift, or ends before the gear after it, has a gap there.
+before the shift, or ends before the gear after it, has a gap there. So has the torque that drives
+the gearbox where the converter is open: the engine torque is not it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from drivetwin.errors import DamagedChannelError, Where
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import Channel, ShiftLog, open_ends
+from drivetwin.shifts.converter import open_spans
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
 
@@ -29,6 +31,13 @@ OLDEST, YOUNGEST = 0.08, 0.02
 
 LEAST = 0.15
 """Shortest time [s] of a held gear before and after the shift that anything is told from."""
+
+LETS_GO = 0.3
+"""Time [s] before the converter is seen open, and after it is, in which its clutch may slip."""
+
+BEFORE, AFTER = 8.0, 5.0
+"""Longest time [s] of the gears held before and after the shift over which a load is taken as
+constant: on a drive grade and service brake change it."""
 
 
 def parts_between(span: Span, gaps: tuple[Span, ...]) -> tuple[Span, ...]:
@@ -47,24 +56,47 @@ def parts_between(span: Span, gaps: tuple[Span, ...]) -> tuple[Span, ...]:
 
 @dataclass(frozen=True, eq=False)
 class _Gap:
-    """A gap [s] of one channel, and the `reach` of what it leaves unknown."""
+    """A gap [s] of one channel, and the `reach` of what it leaves unknown.
 
-    channel: Channel
+    Without a channel it is the converter that is open.
+    """
+
+    channel: Channel | None
     span: Span
     reach: Span
 
     def __str__(self) -> str:
         low, high = self.span
+        if self.channel is None:
+            return f"the converter is open from {low:.3f} s to {high:.3f} s"
         return f"{self.channel.source_name!r} has no samples from {low:.3f} s to {high:.3f} s"
 
 
-def recorded(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> Shift:
+def near(shift: Shift, most: tuple[float, float] = (BEFORE, AFTER)) -> Shift:
+    """Return `shift` with no more of the gears before and after it than `most` [s].
+
+    Unless stated, that is what one load holds for.
+    """
+    before = max(shift.before[0], shift.before[1] - most[0]), shift.before[1]
+    after = shift.after[0], min(shift.after[1], shift.after[0] + most[1])
+    if (before, after) == (shift.before, shift.after):
+        return shift
+    return replace(shift, before=before, after=after)
+
+
+def recorded(
+    log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue], i_in: float = 1.0
+) -> Shift:
     """Return `shift` with `before` and `after` cut to what its inputs were recorded for.
 
-    `fills` is P0 [Pa] of both elements by name. A cut is told in the warnings of the shift. Raises
-    DamagedChannelError where a gap lies in the shift itself or leaves less than LEAST of a gear.
+    `fills` is P0 [Pa] of both elements by name, `i_in` the ratio of the input gear. A cut is told
+    in the warnings of the shift. Raises DamagedChannelError where a gap lies in the shift itself or
+    leaves less than LEAST of a gear.
     """
     gaps = _gaps(log, shift, fills)
+    gaps += [
+        _Gap(None, span, (span[0] - LETS_GO, span[1] + LETS_GO)) for span in open_spans(log, i_in)
+    ]
     start, end = shift.before[1], shift.lockup_time
     inside = [gap for gap in gaps if gap.reach[0] < end and gap.reach[1] > start]
     if inside:
@@ -114,6 +146,13 @@ def _decides(pressure: Channel, gap: Span, shift: Shift, fill: PriorValue) -> bo
 
 
 def _refused(log: ShiftLog, gap: _Gap, where: str) -> DamagedChannelError:
+    if gap.channel is None:
+        return DamagedChannelError(
+            f"{gap}, {where}: the engine torque does not drive the gearbox there",
+            "state the map of the converter as [converter] on the card, or record the shift with "
+            "the lock-up clutch closed",
+            Where(file=log.source, time=gap.span[0]),
+        )
     return DamagedChannelError(
         f"{gap}, {where}",
         "record the shift again: what drives a model must be there throughout",

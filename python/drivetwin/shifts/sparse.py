@@ -51,7 +51,8 @@ def begun(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
     # A slip that creeps is seen before it is large.
     at = min(at, float(time[min(rest + _LASTING, len(time) - 1)]))
     # The capacity falls steadily, so a slip grows at least with the square of the time.
-    steep = _passes(time, moved, min(_STEEP * limit, 0.5 * float(moved[last:].max())), last)
+    far = max(min(_STEEP * limit, 0.5 * float(moved[last:].max())), limit)
+    steep = _passes(time, moved, far, last)
     hidden = (steep - at) / (np.sqrt(_STEEP) - 1.0)
     early = 0.5 * max(at - float(time[rest]), hidden)
     return Crossing(at, float(np.hypot(early, _step_error(time, last))))

@@ -63,6 +63,14 @@ def _gear_faults(gears: Mapping[int, GearTable]) -> list[Fault]:
         if gear.name in names:
             faults.append(Fault(f"gears[{index}].name", f"gear {gear.name!r} is given twice"))
         names.add(gear.name)
+        if len(gear.elements) > 1:
+            faults.append(
+                Fault(
+                    f"gears[{index}].elements",
+                    f"gear {gear.name!r} is held by {', '.join(gear.elements)}: name only the "
+                    "element that changes in the shift; the others are common to both gears",
+                )
+            )
         lower = gears.get(index - 1)
         if lower is not None and gear.ratio >= lower.ratio:
             faults.append(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -68,6 +69,12 @@ def brake_ratios(ratio: float) -> tuple[float, float]:
     negative for i < 1. Raises ZeroDivisionError for i = 1, which no brake can make.
     """
     return ratio - 1.0, ratio / (ratio - 1.0)
+
+
+def middle_of(limits: tuple[float, float]) -> float:
+    """A value in the midst of a design range: its geometric mean, a tenth of one from 0 on."""
+    low, high = limits
+    return math.sqrt(low * high) if low > 0.0 else 0.1 * high
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,11 @@ import pytest
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.experiment.catalogue import Experiment
 from drivetwin.identify.experiment.suggest import LEAST_KNOWN, examined, suggest
+from drivetwin.identify.likelihood.derived import of_log
 from drivetwin.identify.likelihood.noise_power import noise_power
+from drivetwin.identify.likelihood.unknowns import Point, own_of
 from drivetwin.identify.profile import likelihood_of
-from drivetwin.identify.result import Verdict
+from drivetwin.identify.result import Identification, Verdict
 from tests.identify.asked import by_the_paper, slowed, stepped, still
 
 
@@ -86,3 +88,31 @@ def test_an_experiment_has_the_slow_errors_of_the_log() -> None:
         power.append(noise_power(fit, np.eye(len(fit.point.names))[[fit.point.names.index("c_o")]]))
     assert power[1] > 2.0 * power[0]
     assert half[1] / half[0] == pytest.approx(np.sqrt(power[1] / power[0]), rel=1e-6)
+
+
+def _numbered(found: Identification, log: int) -> Identification:
+    """The identification as if its log were number `log` of several."""
+    fit, signals = likelihood_of(found)
+    own = own_of(log)
+    point = Point(tuple(own.get(name, name) for name in fit.point.names), fit.point.values)
+    parts = tuple(
+        replace(one, structure=replace(one.structure, log=log)) for one in fit.problem.parts
+    )
+    problem = replace(fit.problem, parts=parts)
+    evidence = replace(
+        found.evidence,
+        likelihood=replace(fit, problem=problem, point=point, mean=point),
+        signals=tuple(replace(one, log=log) for one in signals),
+    )
+    estimates = [replace(one, id=of_log(one.id, log)) for one in found.estimates.values()]
+    return replace(found, evidence=evidence, estimates={one.id: one for one in estimates})
+
+
+def test_of_several_logs_the_age_of_a_still_torque_is_promised_no_more_than_of_one() -> None:
+    alone, one_of_two = suggest(still())[0], suggest(_numbered(still(), 2))[0]
+    assert one_of_two.parameter == "te_delay.2"
+    assert [(p.experiment, p.verdict) for p in one_of_two.prospects] == [
+        (p.experiment, p.verdict) for p in alone.prospects
+    ]
+    widths = [p.half_width for p in one_of_two.prospects]
+    assert widths == pytest.approx([p.half_width for p in alone.prospects], rel=1e-6)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,10 +11,18 @@ import pytest
 
 from benchmarks.estimation.bench import realise
 from drivetwin.dyno.scenarios import paper_steps, throttle_steps
+from drivetwin.identify.likelihood import kinds as of_signals
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
-from drivetwin.identify.likelihood.kinds import averaged, with_kinds
+from drivetwin.identify.likelihood.kinds import (
+    SPEEDS,
+    averaged,
+    with_either_speeds,
+    with_kinds,
+)
+from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from tests.identify.likelihood.made import ROUGH, problem
+from drivetwin.identify.signals import Sampled
+from tests.identify.likelihood.made import ROUGH, problem, truth_of
 
 MEANS = frozenset({"output_torque"})
 UNDECIDED = 78
@@ -83,3 +92,52 @@ def test_the_expansion_foretells_the_other_minimum() -> None:
     assert 0.0 < share < 1.0
     assert added[k, k] >= 0.99 * share * (1.0 - share) * apart**2
     assert np.all(np.linalg.eigvalsh(added) > -1e-9 * np.max(np.linalg.eigvalsh(added)))
+
+
+def test_what_another_search_alone_lowers_speaks_for_no_kind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here, there = _fit(MEANS), _fit(frozenset[str]())
+
+    def told(fall: float) -> float:
+        """The age where every search after the first ends so much lower in Q."""
+        lower = fall / _posed().size
+        again = {one.problem.kinds: replace(one, chi2=one.chi2 - lower) for one in (here, there)}
+        monkeypatch.setattr(of_signals, "_nearby", lambda posed, _: again.get(posed.kinds))
+        return averaged(_posed(), here)[0].mean["te_delay"]
+
+    std = _age(here)[1]
+    assert abs(told(0.0) - here.point["te_delay"]) > 0.1 * std
+    assert told(8.0) == pytest.approx(told(0.0), abs=0.02 * std)
+
+
+def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = realise(throttle_steps(), 0, ROUGH)
+    signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
+    eta = made.truth["eta"]
+    scaled = ("J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+    guess = {
+        name: value / eta if name in scaled or ".mu_" in name else value
+        for name, value in truth_of(made).items()
+    }
+    law = made.run.scenario.model.loss_law
+    posed, start = problem_of([signals], [made.driveline], law, guess)
+    best = nearest(posed, start)
+    assert best is not None
+    monkeypatch.setattr(of_signals, "UNTOLD", np.inf)
+    wide, doubts = with_either_speeds(posed, best)
+    other = nearest(posed.of_kinds(frozenset(SPEEDS)), best.point)
+    assert other is not None
+    far = abs(other.point["te_delay"] - best.point["te_delay"])
+    assert far == pytest.approx(0.5e-3, rel=0.3)  # half a period of the speeds
+    assert far < 1.96 * _age(wide)[1]
+    assert "engine speed" in doubts[0]
+    monkeypatch.setattr(of_signals, "UNTOLD", -np.inf)
+    assert with_either_speeds(posed, best) == (best, [])
+
+
+def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
+    fit = _fit(MEANS)
+    assert with_either_speeds(_posed(), fit) == (fit, [])

@@ -47,7 +47,7 @@ def test_a_wrong_law_is_told_with_what_the_right_one_gives(true: LossLaw) -> Non
     (text,) = _said(_made(true), wrong)
     assert f"loss_law = '{true}'" in text
     assert "speaks for it" in text
-    told = float(text.split("k_o = ")[1].split()[0])
+    told = float(text.split("k_o = ")[1].split(" Nm")[0].replace("\u202f", ""))
     k = right.point.names.index("k_o")
     std = float(np.sqrt(right.covariance[k, k]))
     assert abs(told - right.point["k_o"]) < 0.5 * std

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.identify.likelihood.smooth import local_cubic, smooth_pressure
-from drivetwin.identify.signals import Sampled
+from drivetwin.identify.signals import FloatArray, Sampled
+from drivetwin.vehicle.spec import PriorValue
 
 P0 = 8e4
 TIME = np.arange(0.0, 1.0, 1e-3)
@@ -48,3 +49,27 @@ def test_slow_samples_are_left_as_they_are() -> None:
     time = np.arange(0.0, 2.0, 1e-2)
     values = np.random.default_rng(5).standard_normal(time.size)
     assert np.array_equal(local_cubic(time, values), values)
+
+
+def _flicker(values: FloatArray) -> float:
+    """Share of the samples at which an element closed in the mean would be open."""
+    return float(np.mean(values[TIME < 0.45] < P0))
+
+
+def test_about_p0_a_steady_pressure_does_not_flicker_with_its_noise() -> None:
+    rng = np.random.default_rng(6)
+    held = np.where(TIME < 0.5, P0 + 5e3, 6e5)
+    noisy = Sampled(TIME, held + 7e3 * rng.standard_normal(TIME.size), 7e3)
+    assert _flicker(smooth_pressure(noisy)) > 0.02
+    smooth = smooth_pressure(noisy, PriorValue(P0, 5e3))
+    assert _flicker(smooth) < 0.003
+    assert np.std((smooth - held)[TIME < 0.45]) < 0.2 * 7e3
+    assert np.array_equal(smooth[TIME > 0.55], smooth_pressure(noisy)[TIME > 0.55])
+
+
+def test_about_p0_a_pressure_that_moves_keeps_its_motion() -> None:
+    rng = np.random.default_rng(7)
+    falling = P0 + 2e5 * (0.5 - TIME) + 2e4 * np.sin(2.0 * np.pi * 15.0 * TIME)
+    noisy = Sampled(TIME, falling + 2e3 * rng.standard_normal(TIME.size), 2e3)
+    smooth = smooth_pressure(noisy, PriorValue(P0, 5e3))
+    assert np.sqrt(np.mean((smooth - falling) ** 2)) < 0.5 * 2e3

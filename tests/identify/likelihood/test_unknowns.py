@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.identify.inputs import driveline_of
 from drivetwin.identify.likelihood.derived import oscillation, parameters
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.signals import Coupling
 from drivetwin.vehicle.spec import PriorValue
 from tests.identify.likelihood.made import bench, truth_of
+from tests.shifts.made import make_card
 
 IDLE = Coupling("K2", 1.4, 1.4, 4.6e-2, PriorValue(8e4), PriorValue(0.2, 0.1))
 DRUM = "K2.drum"
@@ -44,3 +46,13 @@ def test_an_idle_drum_turns_with_the_shift() -> None:
     assert told["drum.K2"] == pytest.approx(0.2)
     frequency, _ = oscillation(part.structure, point)
     assert frequency < oscillation(part.structure, point.moved(point.values - 100.0 * step))[0]
+
+
+def test_an_element_breaks_away_at_the_peak_that_the_card_states() -> None:
+    """The twin is simulated with it, so a fit without it would tell another friction."""
+    made, card = bench(), make_card({"2": 1.91, "3": 1.43})
+    elements = {**card.elements, "B3": replace(card.elements["B3"], peak=1.25)}
+    driveline = driveline_of(replace(card, elements=elements), made.signals.shift)
+    posed, point = problem_of([made.signals], [driveline], "paper", truth_of(made))
+    model = posed.parts[0].structure.model(point)
+    assert {one.name: one.peak for one in model.elements} == {"B2": 1.0, "B3": 1.25}

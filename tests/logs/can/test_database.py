@@ -25,8 +25,16 @@ BO_ 292 Switched: 8 A
  SG_ which M : 0|4@1+ (1,0) [0|15] "" A
  SG_ one m1 : 8|16@1+ (1,0) [0|0] "" A
  SG_ two m2 : 8|16@1+ (2,0) [0|0] "" A
+BO_ 293 Nested: 8 A
+ SG_ outer M : 0|8@1+ (1,0) [0|255] "" A
+ SG_ inner m0M : 8|8@1+ (1,0) [0|255] "" A
+ SG_ deep m1 : 16|16@1+ (1,0) [0|0] "rpm" A
+ SG_ wide m1 : 8|32@1+ (1,0) [0|0] "rpm" A
 
 SIG_VALTYPE_ 291 single : 1;
+SG_MUL_VAL_ 293 inner outer 0-0;
+SG_MUL_VAL_ 293 deep inner 1-1;
+SG_MUL_VAL_ 293 wide outer 1-1;
 """
 
 
@@ -81,6 +89,18 @@ def test_a_multiplexer_admits_its_own(path: Path) -> None:
     assert admitted(data, length, by_name["one"]).tolist() == [True, False]
     assert admitted(data, length, by_name["two"]).tolist() == [False, True]
     assert admitted(data, np.array([2, 2]), by_name["one"]).tolist() == [False, False]
+
+
+def test_a_multiplexer_inside_another_admits_only_where_it_is_sent(path: Path) -> None:
+    nested = next(one for one in read_database((path,)) if one.name == "Nested")
+    database = cantools.database.load_file(path)
+    assert isinstance(database, cantools.database.can.Database)
+    reference = database.get_message_by_name("Nested")
+    payloads = [bytes((outer, 1, 7, 0, 0, 0, 0, 0)) for outer in (0, 1)]
+    data = np.array([list(one) for one in payloads], np.uint8)
+    for signal in nested.signals:
+        sent = [signal.name in reference.decode_simple(one) for one in payloads]
+        assert admitted(data, np.array([8, 8]), signal).tolist() == sent, signal.name
 
 
 def test_what_does_not_fit_is_refused() -> None:

@@ -18,9 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.identify.experiment.catalogue import Base, Experiment, Planned, planned
-from drivetwin.identify.likelihood.derived import parameters, slopes
+from drivetwin.identify.likelihood.derived import of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.noise_power import noise_power
+from drivetwin.identify.likelihood.null_space import reduced
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.method import Method
 from drivetwin.identify.momentum import MomentumSettings
@@ -28,6 +29,7 @@ from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Z95, Estimate, Identification, Verdict
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import CALIBRATE, DELAY_IDENTIFIED, judge, sensors_decide
+from drivetwin.parameters import spec_of
 from drivetwin.progress import part, tell
 
 AGE = "te_delay"
@@ -103,7 +105,7 @@ def _relative_width(one: Estimate) -> float:
     """Standard deviation over the value; that of a delay over what counts as known of one."""
     if one.value is None or one.std_total is None:
         return 0.0
-    whole = DELAY_IDENTIFIED if one.id == AGE else abs(one.value)
+    whole = DELAY_IDENTIFIED if spec_of(one.id).stem == AGE else abs(one.value)
     return one.std_total / max(whole, 1e-300)
 
 
@@ -132,13 +134,18 @@ def _gains(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> list[_Gain]:
     return found
 
 
+def _age_of(fit: LikelihoodFit) -> str:
+    """Unknown for the age of the engine torque in the last log, whose sensors experiments have."""
+    return fit.problem.parts[-1].structure.unknown(AGE)
+
+
 def _with_age(fit: LikelihoodFit) -> Point:
     """The minimum with the torque's age among the unknowns, though the log may not show it."""
-    point = fit.point
-    if AGE in point.names:
+    point, name = fit.point, _age_of(fit)
+    if name in point.names:
         return point
-    age = fit.problem.parts[0].structure.value(point, AGE)
-    return Point((*point.names, AGE), np.append(point.values, age))
+    age = fit.problem.parts[-1].structure.value(point, AGE)
+    return Point((*point.names, name), np.append(point.values, age))
 
 
 def _gain(plan: Planned) -> _Gain | None:
@@ -161,8 +168,8 @@ def _covariance(
     information = np.zeros((size, size))
     own = len(fit.point.names)
     information[:own, :own] = fit.normal.information
-    if AGE not in fit.point.names:
-        k = names.index(AGE)
+    if _age_of(fit) not in fit.point.names:
+        k = names.index(_age_of(fit))
         information[k, k] += MomentumSettings().delay_prior.std ** -2
     if gain is not None:
         information += repeats * _without_start(gain, size)
@@ -170,13 +177,9 @@ def _covariance(
 
 
 def _without_start(gain: _Gain, size: int) -> FloatArray:
-    """Information (size, size) of an experiment whose start is unknown (Schur complement)."""
-    whole = gain.information
-    scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
-    unit = whole / np.outer(scale, scale)
-    inner = np.linalg.pinv(unit[size:, size:], rcond=1e-13, hermitian=True)
-    reduced = unit[:size, :size] - unit[:size, size:] @ inner @ unit[size:, :size]
-    return np.asarray(reduced * np.outer(scale[:size], scale[:size]))
+    """Information (size, size) of an experiment whose start is unknown."""
+    own, start = list(range(size)), list(range(size, len(gain.information)))
+    return reduced(gain.information, own, start)
 
 
 def _suggestion(
@@ -194,6 +197,8 @@ def _suggestion(
         return Suggestion(one.id, one.verdict, half, (), CALIBRATE)
     names = _with_age(fit).names
     row = _row(one.id, fit, signals, names)
+    if not row.any():  # what another log has of its own
+        return Suggestion(one.id, one.verdict, half, ())
     loud = np.sqrt(_noise_power(fit, row))
     prospects = []
     for gain in gains:
@@ -228,8 +233,8 @@ def _row(
 ) -> FloatArray:
     """Derivative (r,) of a parameter by the unknowns `names`."""
     row = np.zeros(len(names))
-    if name == AGE:
-        row[names.index(AGE)] = 1.0
+    if name == of_log(AGE, fit.problem.parts[-1].structure.log):
+        row[names.index(_age_of(fit))] = 1.0
         return row
     std = np.sqrt(np.diag(fit.covariance))
     matrix = slopes(fit.problem, fit.point, std, signals)

@@ -53,3 +53,14 @@ def contact_of(part: Part, point: Point, run: Trajectory, name: str) -> Contact:
     slipping = np.minimum(np.abs(slips[1:]), np.abs(slips[:-1])) > SLIPPING
     per_mu = np.where(slipping, np.sign(slip) * one.gain * above, 0.0)
     return Contact(middle, slip, above, one.friction.at(slip), per_mu, direction(model, one))
+
+
+def carried_slip(part: Part, point: Point, name: str) -> FloatArray:
+    """Sizes of the slip (n,) [rad/s] over the steps in which element `name` slips under pressure.
+
+    Empty where the part does not have it. `point` is one that can be simulated.
+    """
+    run = part.run(point)
+    assert run is not None, "a fit can be simulated"
+    contact = contact_of(part, point, run, name)
+    return np.asarray(np.abs(contact.slip[contact.per_mu != 0.0]))

@@ -10,15 +10,13 @@ import numpy as np
 
 from drivetwin.driveline import Stribeck
 from drivetwin.identify.friction import stribeck
+from drivetwin.identify.likelihood.contact import carried_slip
 from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.unknowns import LAW
 from drivetwin.identify.result import Z95, FrictionCurve
 from drivetwin.identify.signals import FloatArray
 
 METHOD = "likelihood"
-LOCKED = 1e-6
-"""Slip [rad/s] below which a simulated element is locked."""
 POINTS = 60
 
 
@@ -32,11 +30,11 @@ def curves_of(
     covariance from the sensors' tolerances; it widens the band.
     """
     found: dict[str, FrictionCurve] = {}
-    pairs = [(part, one.name) for part in fit.problem.parts for one in part.structure.elements]
-    for part, name in pairs:
-        if f"{name}.{LAW[-1]}" not in fit.point.names or name in found:
+    parts = fit.problem.parts
+    for name in dict.fromkeys(one.name for part in parts for one in part.structure.elements):
+        if f"{name}.{LAW[-1]}" not in fit.point.names:
             continue
-        base = linear.get(name) or _seen(fit, part, name)
+        base = linear.get(name) or _seen(fit, name)
         index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
         theta, square = fit.mean.values[index], np.ix_(index, index)
         mu, slopes = stribeck(theta, base.slip)
@@ -53,17 +51,14 @@ def curves_of(
             stribeck=Stribeck(mu_c, mu_c + drop, v_s, mu_v),
             method=METHOD,
             stribeck_covariance=to_law @ fit.covariance[square] @ to_law.T,
-            over_eta=not part.scale_known,
+            over_eta=not parts[0].scale_known,
         )
     return found
 
 
-def _seen(fit: LikelihoodFit, part: Part, name: str) -> FrictionCurve:
-    """An empty curve over the slips at which the simulated element carried torque."""
-    run = part.run(fit.point)
-    assert run is not None
-    slip = np.abs(run.slip[name])
-    slip = slip[(np.abs(run.clutch_torque[name]) > 0.0) & (slip > LOCKED)]
+def _seen(fit: LikelihoodFit, name: str) -> FrictionCurve:
+    """An empty curve over the slips at which the element carried torque in any simulated shift."""
+    slip = np.concatenate([carried_slip(part, fit.point, name) for part in fit.problem.parts])
     grid = np.linspace(float(slip.min()), float(slip.max()), POINTS)
     nothing, empty = np.zeros(POINTS), np.empty(0)
     return FrictionCurve(grid, nothing, nothing, nothing, empty, empty, None, METHOD)

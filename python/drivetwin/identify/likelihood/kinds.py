@@ -36,6 +36,10 @@ rare, at odds of e⁴. Half a millisecond of the torque is six standard deviatio
 TIE = 6.0
 """Rise of Q below which the 95 % interval reaches the minimum of the other kind, whatever its
 weight: odds of 20."""
+UNTOLD = 20.0
+"""Rise of Q below which, without an output torque, the speeds may be of the other kind. Half their
+period is then nearly an age of the engine torque, and how the values of that are joined, which no
+model has quite, has been seen to speak for the wrong kind by 13."""
 UNLIKELY = 0.01
 """Weight of a kind below which it is not fitted."""
 MATTERS = 0.5
@@ -111,6 +115,40 @@ def averaged(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list
     return told, _doubts(choices, weight, np.sqrt(np.diag(best.covariance)))
 
 
+def with_either_speeds(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
+    """In a log without an output torque, the fit with its covariance widened up to the minimum that
+    has the speeds of the other kind, and that in words; as it is where Q rises much to there."""
+    if problem.parts[0].scale_known:
+        return best, []
+    kinds, start = best.problem.kinds ^ frozenset(SPEEDS), _as_old(best)
+    try:
+        other = nearest(problem.of_kinds(kinds), start, WORSE * best.normal.cost / problem.size)
+    except OutOfWork:  # nobody knows: what shows the same may be as good
+        far = start.values - best.point.values
+    else:
+        if other is None:
+            return best, []
+        prices = _price(problem, kinds) - _price(problem, best.problem.kinds)
+        if (other.chi2 - best.chi2) * problem.size + prices > UNTOLD:
+            return best, []
+        far = other.point.values - best.point.values
+    names = ", ".join(name.replace("_", " ") for name in SPEEDS if name in _shown(problem))
+    widened = replace(best, covariance=best.covariance + np.outer(far, far) / Z95**2)
+    return widened, [UNSURE.format(names)]
+
+
+def _as_old(best: LikelihoodFit) -> Point:
+    """The minimum, with ages of the torque by which speeds of the other kind show the same."""
+    values = best.point.values.copy()
+    ages = {part.structure.unknown("te_delay"): part.record for part in best.problem.parts}
+    for name, record in ages.items():
+        if name in best.point.names:
+            speed = next(out for out in record.outputs if out.name in SPEEDS)
+            half = 0.5 * speed.period(record.time)
+            values[best.point.names.index(name)] += half if speed.window == 0.0 else -half
+    return best.point.moved(np.clip(values, best.problem.lower, best.problem.upper))
+
+
 def _weights(choices: _Choices, best: LikelihoodFit) -> FloatArray:
     """Likelihood (q,) of each choice, all together 1."""
     weight = np.exp(-0.5 * (choices.left - np.min(choices.left)) / max(best.chi2, 1.0))
@@ -119,7 +157,11 @@ def _weights(choices: _Choices, best: LikelihoodFit) -> FloatArray:
 
 def _fitted(problem: Problem, best: LikelihoodFit, choices: _Choices) -> _Choices:
     """The choices as seen from the minimum of the first, those fitted that would matter: what an
-    expansion says of a minimum far away is too rough to weigh it by."""
+    expansion says of a minimum far away is too rough to weigh it by.
+
+    Of its many kinks Q may end some lower by another search alone, so the first kinds are searched
+    again from where those went that seem as likely.
+    """
     left = np.maximum(choices.left - choices.left[0], 0.0)
     steps = choices.steps - choices.steps[0]
     seen = replace(choices, left=left, steps=steps)
@@ -133,6 +175,8 @@ def _fitted(problem: Problem, best: LikelihoodFit, choices: _Choices) -> _Choice
         prices = _price(problem, kinds) - _price(problem, best.problem.kinds)
         left[k] = (other.chi2 - best.chi2) * problem.size + prices
         steps[k] = other.point.values - best.point.values
+        if left[k] < TIE and (back := _nearby(problem.of_kinds(best.problem.kinds), other)):
+            left[0] = min(left[0], (back.chi2 - best.chi2) * problem.size)
     return seen
 
 

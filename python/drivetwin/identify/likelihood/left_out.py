@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
+from drivetwin.display import in_units
 from drivetwin.driveline import Trajectory
 from drivetwin.identify.conclude import with_systematic_band
 from drivetwin.identify.friction import stribeck
-from drivetwin.identify.likelihood.contact import contact_of
+from drivetwin.identify.likelihood.contact import carried_slip, contact_of
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of, spread_of
 from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.problem import Part
@@ -112,8 +113,8 @@ class LeftOut:
             one = told[name]
             if one.value is None or one.std_total is None or abs(move) <= Z95 * one.std_total:
                 continue
-            why = f"with {self.corrected} the log gives {one.value + move:.5g} {one.unit}"
-            told[name] = doubted(one, why.removesuffix(" 1"))
+            value = in_units(one.value + move, one.unit, digits=5)
+            told[name] = doubted(one, f"with {self.corrected} the log gives {value}")
         return told
 
     def widened(self, fit: LikelihoodFit, name: str, curve: FrictionCurve) -> FrictionCurve:
@@ -180,11 +181,8 @@ def other_shape(fit: LikelihoodFit, name: str, shapes: Shapes) -> Step:
 
 def _shapes(fit: LikelihoodFit, name: str) -> Shapes:
     """Shapes beside the law of an element, over the slips at which it carries torque."""
-    largest = 0.0
-    for part in fit.problem.parts:
-        contact = contact_of(part, fit.point, _run(fit, part), name)
-        carrying = np.abs(contact.slip[contact.per_mu != 0.0])
-        largest = max(largest, float(np.max(carrying, initial=0.0)))
+    slips = [carried_slip(part, fit.point, name) for part in fit.problem.parts]
+    largest = float(np.max(np.concatenate(slips), initial=0.0))
     law = np.array([fit.point[f"{name}.{key}"] for key in LAW])
     return Shapes(law, max(largest, 1.0))
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from drivetwin.display import in_units
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.signals import FloatArray
 from drivetwin.parameters import spec_of
@@ -28,6 +29,6 @@ def at_limits(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -> dic
         if acting.size != 1 or not (below | above)[acting[0]]:
             continue
         side = "more" if above[acting[0]] else "less"
-        limit = f"{values[acting[0]]:.4g} {spec_of(name).unit}"
+        limit = in_units(float(values[acting[0]]), spec_of(name).unit)
         found[name] = f"{limit} is the limit of the search: the log speaks for {side}"
     return found

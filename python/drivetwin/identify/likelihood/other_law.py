@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from drivetwin.display import in_units
 from drivetwin.driveline import LossLaw
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.newton import step_of
@@ -42,7 +43,7 @@ def other_law_in_words(
     rise = normal.cost - fit.normal.cost + float(normal.gradient @ step)
     moves = slopes @ step
     apart = [
-        f"{name} = {value + move:.5g} {spec_of(name).unit}".removesuffix(" 1")
+        f"{name} = {in_units(value + move, spec_of(name).unit, digits=5)}"
         for (name, value), move, one in zip(values.items(), moves, std, strict=True)
         if abs(move) > 2.0 * Z95 * one
     ]

@@ -96,7 +96,7 @@ def problem_of(
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
         label = f"start{k}"
-        record = record_of(s, span)
+        record = record_of(s, span, {e.name: e.P0 for e in (d.offgoing, d.oncoming)})
         same = [one for one in signals if one.log == s.log]
         own = {name: fixed[n] for name, n in own_of(s.log).items() if n in fixed}
         speed = mean_speed_of(same, d.i_f)

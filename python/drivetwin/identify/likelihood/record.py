@@ -18,6 +18,7 @@ from drivetwin.identify.likelihood.smooth import (
     smooth_pressure,
 )
 from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
+from drivetwin.vehicle.spec import PriorValue
 
 IndexArray = NDArray[np.intp]
 
@@ -25,12 +26,16 @@ TORQUE = ENGINE_TORQUE
 """Name of the engine torque among the inputs; the others are pressures by element."""
 OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
 """Compared signals, in the order in which residuals are stacked."""
+ESSENTIAL = ("engine_speed", "output_speed")
+"""Outputs without which no shift can be fitted."""
 LATEST = 0.06
 """Greatest age of an engine torque value [s]: so much of the end of a log has no input."""
 GRID = 1e-3
 """Step of the simulation's grid [s] where outputs are sampled more slowly."""
 SLOW = 1.5 * GRID
 """Distance of outputs' stamps [s] above which there are points of the grid between them."""
+SHORTEST = 0.1
+"""Time [s] that an output must cover of a shift's span to be compared there."""
 FLOOR = 2e-5
 """Least noise of a compared signal as a share of its range, and of an input as a share of its
 largest value: what an ideal sensor is given. With none at all the weighting loses its digits."""
@@ -118,6 +123,8 @@ class Record:
     held_back: Mapping[str, FloatArray] = field(default_factory=dict)
     """What was taken off the samples of an input before it drives a run, by name: read less
     driving. An input without an entry drives as it was read."""
+    fills: Mapping[str, PriorValue] = field(default_factory=dict)
+    """P0 [Pa] of the elements as the card has it: about it more noise is taken off a pressure."""
     curved: bool = False
 
     @property
@@ -208,10 +215,13 @@ def columns_of(run: Trajectory) -> dict[str, FloatArray]:
     }
 
 
-def record_of(signals: ShiftSignals, span: Span) -> Record:
-    """The record of one shift over `span` [s].
+def record_of(
+    signals: ShiftSignals, span: Span, fills: Mapping[str, PriorValue] | None = None
+) -> Record:
+    """The record of one shift over `span` [s]; `fills` is P0 [Pa] by element as the card has it.
 
-    Raises IdentificationError where the span holds too little to compare.
+    An output that stopped before it, or starts at its end, is not compared in it. Raises
+    IdentificationError where the span holds too little to compare.
     """
     channels = {
         "output_torque": signals.output_torque,
@@ -222,8 +232,14 @@ def record_of(signals: ShiftSignals, span: Span) -> Record:
     inputs = (signals.engine_torque, *signals.pressures.values())
     start = max(span[0], *(s.time[0] for s in inputs))
     end = min(span[1], *(s.time[-1] for s in inputs)) - LATEST
-    present = {name: s for name, s in channels.items() if s is not None and s.time.size}
-    parts = {name: s.within((start, end)) for name, s in present.items()}
+    inside = {n: s.within((start, end)) for n, s in channels.items() if s is not None}
+    parts = {name: s for name, s in inside.items() if s.time.size and np.ptp(s.time) >= SHORTEST}
+    if missing := [name for name in ESSENTIAL if name not in parts]:
+        raise IdentificationError(
+            f"{' and '.join(missing).replace('_', ' ')} hardly recorded between {start:.3f} s and "
+            f"{end:.3f} s",
+            "record engine and output speed throughout the shift",
+        )
     time = _filled(np.unique(np.concatenate([part.time for part in parts.values()])))
     if time.size < 100:
         raise IdentificationError(
@@ -240,7 +256,8 @@ def record_of(signals: ShiftSignals, span: Span) -> Record:
         for name, part in parts.items()
     )
     torque = signals.engine_torque
-    smooth = {name: smooth_pressure(p) for name, p in signals.pressures.items()}
+    fills = fills or {}
+    smooth = {n: smooth_pressure(p, fills.get(n)) for n, p in signals.pressures.items()}
     return Record(
         time,
         _held(torque),
@@ -250,6 +267,7 @@ def record_of(signals: ShiftSignals, span: Span) -> Record:
         np.pad(bend_of(torque.time, torque.values), 1),
         {TORQUE: _noise(torque)} | {n: _noise(p) for n, p in signals.pressures.items()},
         {name: p.values - smooth[name] for name, p in signals.pressures.items()},
+        fills,
     )
 
 

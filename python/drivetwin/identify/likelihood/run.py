@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.display import in_units
 from drivetwin.identify.conclude import Conclusions
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.likelihood.conclude import conclude
@@ -71,8 +72,9 @@ def _disagreements(told: Conclusions, linear: Conclusions) -> list[str]:
             continue
         spread = float(np.hypot(estimate.std_noise or 0.0, other.std_noise or 0.0))
         if spread > 0.0 and abs(estimate.value - other.value) > DISAGREE * spread:
+            a, b = (in_units(value, estimate.unit) for value in (estimate.value, other.value))
             texts.append(
-                f"{name}: the likelihood gives {estimate.value:.4g}, the linear method "
-                f"{other.value:.4g} {estimate.unit}; their noise does not explain the difference"
+                f"{name}: the likelihood gives {a}, the linear method {b}; "
+                "their noise does not explain the difference"
             )
     return texts

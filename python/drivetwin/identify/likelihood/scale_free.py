@@ -19,7 +19,7 @@ from drivetwin.identify.momentum import MomentumSettings
 from drivetwin.identify.ringdown import pencil_start
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals, Span
 from drivetwin.identify.wlse import whole
-from drivetwin.vehicle.spec import VehicleCard
+from drivetwin.vehicle.spec import VehicleCard, middle_of
 
 STEP = 0.1
 """Time over which speeds are differenced [s]: about a period of the driveline's oscillation."""
@@ -66,7 +66,7 @@ def _inertias(
     of the slopes would make the vehicle too light by least squares; the slopes that the torque lets
     expect are their instruments.
     """
-    J_e = float(np.sqrt(card.J_prime_range[0] * card.J_prime_range[1]))
+    J_e = middle_of(card.J_prime_range)
     shift, age = signals.shift, MomentumSettings().delay_prior.value
     spans = ((shift.before, driveline.i_before), (shift.after, driveline.i_after))
     ratios, slopes, torques = [], [], []

@@ -5,20 +5,29 @@ A valve and a clutch volume are slow, sensor noise is not. Noise left on a press
 simulation makes elements lock and break away many times where the real one did so once, adds up to
 0.4·σ to max(0, P - P0) about the fill point, and, since it enters the derivatives too, favours
 parameters that attenuate it (Jo′ before all). A local cubic takes off what lies above the
-actuator's band.
+actuator's band. About P0, where what is left would still open and close the element, more is taken
+off a pressure that stays or goes evenly.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
-from scipy.signal import savgol_filter
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from drivetwin.identify.signals import FloatArray, Sampled
+from drivetwin.vehicle.spec import PriorValue
 
 WINDOW = 0.015
 """Length of the local cubic [s]: it passes what a valve can do, up to about 60 Hz."""
 CUBIC = 3
+LONGER = (0.03, 0.06, 0.12, 0.24)
+"""Lengths of the cubics [s] that are tried about P0."""
+AGREE = 1.5
+"""Half width of the interval of a cubic's middle, in standard deviations: those of all shorter
+cubics must meet it. Narrower than of means: a corner that is cut opens the element elsewhere."""
+ABOUT = 3.0
+"""Distance from P0, in the noise of a sample, within which noise may open or close the element."""
 CORNER = 5.0
 """Distance of a sample from the local cubic, in standard deviations, that shows a corner."""
 GAP = 1.5
@@ -29,11 +38,49 @@ INTERVAL = 2.5
 """Half width of an interval in standard deviations of its mean."""
 
 
-def smooth_pressure(pressure: Sampled) -> FloatArray:
-    """Pressure (n,) without its fast noise; as read about corners too sharp for a local cubic."""
+def smooth_pressure(pressure: Sampled, fill: PriorValue | None = None) -> FloatArray:
+    """Pressure (n,) without its fast noise; as read about corners too sharp for a local cubic.
+
+    `fill` is P0 [Pa] as the card has it: about it the noise is taken off that a longer cubic takes.
+    """
     smooth = local_cubic(pressure.time, pressure.values)
     apart = np.abs(pressure.values - smooth) > CORNER * pressure.sigma
+    if fill is not None:
+        steady = _steady(pressure, smooth)
+        band = ABOUT * pressure.sigma + 2.0 * fill.std
+        smooth = np.where(np.abs(steady - fill.value) < band, steady, smooth)
     return np.where(maximum_filter1d(apart, _samples(pressure.time)), pressure.values, smooth)
+
+
+def _steady(pressure: Sampled, smooth: FloatArray) -> FloatArray:
+    """Middle (n,) of the longest cubic about each sample that agrees with all shorter ones and with
+    `smooth`, that over `WINDOW` (as `local_mean`).
+
+    Noise that flickers about P0 gives the fit many minima, and in each a torque that comes and goes
+    with the noise seems to tell P0 from μ: 5 kPa above P0 an estimate may be four standard
+    deviations off.
+    """
+    values, steady = pressure.values, smooth
+    margin = AGREE * pressure.sigma * _noise_left(_samples(pressure.time))
+    low, high = smooth - margin, smooth + margin
+    open_ = np.ones(values.size, dtype=bool)
+    for window in LONGER:
+        size = _samples(pressure.time, window)
+        if not CUBIC + 1 < size <= values.size:
+            continue
+        trial = savgol_filter(values, size, CUBIC)
+        margin = AGREE * pressure.sigma * _noise_left(size)
+        low, high = np.maximum(low, trial - margin), np.minimum(high, trial + margin)
+        open_ &= low <= high
+        steady = np.where(open_, trial, steady)
+    return np.asarray(steady)
+
+
+def _noise_left(size: int) -> float:
+    """Noise of the middle of a cubic over `size` samples, over that of a sample."""
+    if size <= CUBIC + 1:
+        return 1.0
+    return float(np.linalg.norm(savgol_coeffs(size, CUBIC)))
 
 
 def local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
@@ -61,9 +108,9 @@ def bend_of(time: FloatArray, values: FloatArray) -> FloatArray:
     return np.pad(np.where(even, -second * before * after / 12.0, 0.0), 1)
 
 
-def _samples(time: FloatArray) -> int:
-    """Odd number of samples in `WINDOW`."""
-    return 2 * int(0.5 * WINDOW / float(np.median(np.diff(time)))) + 1
+def _samples(time: FloatArray, window: float = WINDOW) -> int:
+    """Odd number of samples in a `window` [s]."""
+    return 2 * int(0.5 * window / float(np.median(np.diff(time)))) + 1
 
 
 def local_mean(signal: Sampled) -> FloatArray:

@@ -139,6 +139,7 @@ class Structure:
             gain=one.gain,
             P0=self.value(point, f"{one.name}.P0"),
             friction=Stribeck(c, c + drop, float(np.exp(ln_v_s)), v),
+            peak=one.peak,
             drum_inertia=self.value(point, f"{one.name}.drum"),
         )
 

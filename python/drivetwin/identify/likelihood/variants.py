@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.display import in_units
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.fit import (
@@ -25,7 +26,14 @@ from drivetwin.identify.likelihood.fit import (
     fit,
     spread_of,
 )
-from drivetwin.identify.likelihood.kinds import averaged, in_words, likely_kinds, with_kinds
+from drivetwin.identify.likelihood.kinds import (
+    averaged,
+    in_words,
+    likely_kinds,
+    with_either_speeds,
+    with_kinds,
+)
+from drivetwin.identify.likelihood.lingering import lowest
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
@@ -41,6 +49,9 @@ WORK = 700.0
 """Passes over the log that the search may take: from a bad start and to the end it takes 450."""
 LESS_WORK = 200.0
 """Passes that the search may take which starts from a minimum of the wider model: it takes 160."""
+LINGER_WORK = 400.0
+"""Passes that may be spent on other minima of an element that lingers about P0, of what the search
+has left: each takes about 100."""
 DOUBT_WORK = 400.0
 """Passes that may be spent on kinds of signals that the log hardly tells, of what the search has
 left: each takes about 100."""
@@ -74,9 +85,13 @@ def choose(
             with suppress(OutOfWork):  # the wider model is right all the same
                 best = fit(of_kinds, _taken(start, best.point), shifts, thorough=False)
                 problem = narrower
+    with at_most(min(LINGER_WORK, search.left)):
+        best = lowest(problem, best)
     with at_most(min(DOUBT_WORK, search.left)):
         best, doubts = averaged(problem, best)
-    return best, (*notes, *in_words(best.problem.kinds), *doubts)
+    with at_most(DOUBT_WORK):
+        best, either = with_either_speeds(problem, best)
+    return best, (*notes, *in_words(best.problem.kinds), *(either or doubts))
 
 
 def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:
@@ -158,8 +173,9 @@ def _growth(best: LikelihoodFit) -> str:
     half = Z95 * float(np.sqrt(best.covariance[k, k]))
     speed = best.problem.parts[0].structure.mean_speed
     return (
-        f"the load grows with the square of the speed ({best.point[AERO]:.2g} ± {half:.1g} "
-        f"N m s^2/rad^2 at the wheel); T_v/i_f holds at {speed:.3g} rad/s of the wheel"
+        f"the load grows with the square of the speed "
+        f"({in_units(best.point[AERO], 'N*m*s^2/rad^2', half)} at the wheel); "
+        f"T_v/i_f holds at {speed:.3g} rad/s of the wheel"
     )
 
 

@@ -31,6 +31,7 @@ from drivetwin.identify.likelihood.unknowns import LAW, START, own_of
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.result import FrictionCurve
 from drivetwin.identify.signals import FloatArray, ShiftSignals
+from drivetwin.identify.uncertainty import root_of
 
 TOLD = 0.02
 """Share of the joint information on a direction below which a log says nothing of it."""
@@ -101,7 +102,7 @@ def consistency(
     logs = tuple(dict.fromkeys(s.log for s in signals))
     shared = shared_of(fit)
     covariance = covariance_of(fit.normal.information)
-    root = _root(covariance[np.ix_(shared, shared)])
+    root = root_of(covariance[np.ix_(shared, shared)])
     pulls = [_pull(fit, log, shared, root) for log in logs]
     square, freedom = homogeneity(pulls)
     power = noise_power(fit, np.eye(len(covariance))[shared])
@@ -118,13 +119,6 @@ def shared_of(fit: LikelihoodFit) -> list[int]:
     own = {name for one in structures for name in own_of(one.log).values()}
     starts = {f"{one.label}.{key}" for one in structures for key in START}
     return [k for k, name in enumerate(fit.point.names) if name not in own | starts]
-
-
-def _root(covariance: FloatArray) -> FloatArray:
-    """L (s, s) with L·Lᵀ the covariance, formed on its correlation."""
-    scale = np.sqrt(np.diag(covariance))
-    power, directions = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return np.asarray(scale[:, None] * directions * np.sqrt(np.maximum(power, 0.0)))
 
 
 def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray) -> Pull:

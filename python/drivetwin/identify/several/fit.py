@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drivetwin.display import in_units
 from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.identify.conclude import Conclusions
 from drivetwin.identify.design import outside_ranges
@@ -229,7 +230,7 @@ def farthest(alone: Sequence[Identification]) -> list[str]:
                 continue
             spread = float(np.hypot(a.std_noise or 0.0, b.std_noise or 0.0))
             if spread > 0.0 and abs(a.value - b.value) > FAR * spread:
-                text = f"{name} {a.value:.4g} and {b.value:.4g} {a.unit}"
+                text = f"{name} {in_units(a.value, a.unit)} and {in_units(b.value, b.unit)}"
                 found.append((abs(a.value - b.value) / spread, text))
     return [text for _, text in sorted(found, reverse=True)[:NAMED]]
 

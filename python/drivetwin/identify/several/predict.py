@@ -31,6 +31,7 @@ from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.unknowns import AERO, LAW, OWN, START, Point, own_of
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
+from drivetwin.identify.uncertainty import root_of
 from drivetwin.vehicle.spec import VehicleCard
 
 DRAWS = 120
@@ -183,25 +184,17 @@ def _moved(fit: LikelihoodFit, problem: Problem, before: _Before, unseen: list[i
     for i, k in enumerate(known):
         if i not in both:
             spread[i, i] = _inverse(float(problem.prior.precision[k, k]))
-    root = _root(spread)
+    root = root_of(spread)
     whole = np.zeros((len(names), len(known) + len(unseen)))
     whole[known, : len(known)] = root
     whole[unseen, : len(known)] = before.along @ root
-    whole[unseen, len(known) :] = _root(before.own)
+    whole[unseen, len(known) :] = root_of(before.own)
     return whole
 
 
 def _inverse(precision: float) -> float:
     """Variance of what a prior alone tells; 0 where it tells nothing, which then stays."""
     return 1.0 / precision if precision > 0.0 else 0.0
-
-
-def _root(covariance: FloatArray) -> FloatArray:
-    """A root (p, p) of a covariance, formed on its correlation; unknowns without spread stay."""
-    scale = np.sqrt(np.diag(covariance))
-    divisor = np.where(scale > 0.0, scale, 1.0)
-    power, directions = np.linalg.eigh(covariance / np.outer(divisor, divisor))
-    return np.asarray(scale[:, None] * directions * np.sqrt(np.maximum(power, 0.0)))
 
 
 def _bounds(

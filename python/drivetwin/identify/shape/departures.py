@@ -87,7 +87,8 @@ class _Effect:
 def departures(found: Identification, temperature: Sampled | None = None) -> tuple[Departure, ...]:
     """Departures of all elements of a likelihood identification.
 
-    `temperature` [K] is that of the oil over the log. Raises IdentificationError where the
+    `temperature` [K] is that of the oil over the log, which changes so slowly that it is also told
+    across a gap. Raises IdentificationError where the
     identification is by another method.
     """
     fit, signals = likelihood_of(found)
@@ -160,7 +161,9 @@ def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) ->
         yield _Effect(Kind.DRAG, name, slip, DRAG_SHARE * largest / reach)
         yield _level(Kind.PRESSURE, name, seen, [one.above for one in seen])
         if temperature is not None:
-            yield _level(Kind.TEMPERATURE, name, seen, [temperature.at(one.middle) for one in seen])
+            known = temperature.time, temperature.values
+            courses = [np.interp(one.middle, *known) for one in seen]
+            yield _level(Kind.TEMPERATURE, name, seen, courses)
 
 
 def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray]) -> _Effect:

@@ -104,7 +104,7 @@ def _problem(
     signals: Sequence[ShiftSignals],
     tables: Mapping[str, Table],
 ) -> tuple[Problem, Point]:
-    """The problem with knots and drags in place of laws, and where its search starts."""
+    """The problem with knots in place of laws, and where its search starts."""
     laws = {f"{name}.{key}" for name in tables for key in LAW}
     kept = [k for k, name in enumerate(base.point.names) if name not in laws]
     names = [base.point.names[k] for k in kept]
@@ -120,7 +120,6 @@ def _problem(
     )
     size = point.values.size
     lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
-    mean, precision = np.zeros(size), np.zeros((size, size))
     lower[: len(kept)], upper[: len(kept)] = base.problem.lower[kept], base.problem.upper[kept]
     for name, table in tables.items():
         first = names.index(table.names(name)[0])
@@ -156,7 +155,7 @@ def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
 
 def _measured(part: Part, signals: ShiftSignals, span: Span) -> Record:
     """The record with its inputs as measured: those of a fit are the expected ones."""
-    return record_of(signals, span).of_kinds(part.record.kinds)
+    return record_of(signals, span, part.record.fills).of_kinds(part.record.kinds)
 
 
 def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) -> Prior:

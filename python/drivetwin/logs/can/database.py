@@ -95,7 +95,7 @@ def _message(source: Any) -> Message:
 def _signal(source: Any, by_name: dict[str, Any]) -> Signal:
     selector = None
     if source.multiplexer_ids and source.multiplexer_signal in by_name:
-        switch = _signal(by_name[source.multiplexer_signal], {})
+        switch = _signal(by_name[source.multiplexer_signal], by_name)
         selector = (switch, frozenset(int(each) for each in source.multiplexer_ids))
     low, high = source.minimum, source.maximum
     stated = low is not None and high is not None and low < high
@@ -160,9 +160,12 @@ def _floats(data: Bytes, signal: Signal) -> FloatArray:
 def admitted(
     data: Bytes, length: NDArray[np.uint8] | NDArray[np.intp], signal: Signal
 ) -> NDArray[np.bool_]:
-    """Tell for each payload (n,) whether it is long enough and its multiplexer fits the signal."""
+    """Tell for each payload (n,) whether it is long enough and its multiplexer fits the signal.
+
+    A multiplexer may be multiplexed itself, and then is in some payloads only.
+    """
     there: NDArray[np.bool_] = np.asarray(length >= signal.end)
     if signal.selector is not None:
         switch, allowed = signal.selector
-        there &= np.isin(codes(data, switch), list(allowed))
+        there &= np.isin(codes(data, switch), list(allowed)) & admitted(data, length, switch)
     return there

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""From a drive to what the estimators see of one shift: what is near it, and the fitted shifts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.identify import pipeline
+from drivetwin.identify.inputs import BESIDE, sampled, signals_of
+from drivetwin.identify.signals import ShiftSignals
+from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.shifts.find import FoundShifts
+from drivetwin.shifts.recorded import AFTER, BEFORE
+from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
+from tests.shifts.made import make_card
+
+CARD = make_card({"2": 1.91, "3": 1.43})
+KINDS = {
+    "engine_torque": Quantity.TORQUE,
+    "output_torque": Quantity.TORQUE,
+    "input_speed": Quantity.SPEED,
+    "output_speed": Quantity.SPEED,
+    "wheel_speed": Quantity.SPEED,
+    "pressure.B2": Quantity.PRESSURE,
+    "pressure.B3": Quantity.PRESSURE,
+}
+
+
+def shift(start: float) -> Shift:
+    """A shift of 0.6 s between gears held for a minute and half a minute."""
+    middle, lockup = start + 0.2, start + 0.6
+    return Shift(
+        "2", "3", "B2", "B3", ShiftKind.POWER_ON_UP,
+        before=(start - 60.0, start), torque_phase=(start, middle), inertia_phase=(middle, lockup),
+        after=(lockup, lockup + 30.0), lockup_time=lockup,
+    )  # fmt: skip
+
+
+def drive() -> ShiftLog:
+    """200 s of channels that are noise about 100."""
+    rng = np.random.default_rng(0)
+    time = np.arange(0.0, 200.0, 0.01)
+    channels = {
+        role: Channel(role, kind, time, 100.0 + rng.normal(0.0, 1.0, time.size), role, "")
+        for role, kind in KINDS.items()
+    }
+    return ShiftLog(channels, "made", "")
+
+
+def test_of_a_long_log_the_estimators_see_what_is_near_the_shift() -> None:
+    log, one = drive(), replace(shift(100.0), before=(95.0, 100.0), after=(100.6, 104.0))
+    signals = signals_of(log, CARD, one)
+    seen = [
+        signals.engine_torque,
+        signals.output_torque,
+        signals.engine_speed,
+        signals.output_speed,
+        signals.pressures["B2"],
+    ]
+    for signal in seen:
+        assert signal.time[0] == pytest.approx(95.0 - BESIDE, abs=0.011)
+        assert signal.time[-1] == pytest.approx(104.0 + BESIDE, abs=0.011)
+    assert signals.engine_torque.sigma == sampled(log["engine_torque"]).sigma
+    whole = signals_of(log, CARD, replace(one, before=(0.0, 100.0), after=(100.6, 200.0)))
+    assert whole.engine_torque.time.size == log["engine_torque"].time.size
+
+
+class Fitted(Exception):
+    """Stands in place of a fit."""
+
+
+def test_what_is_fitted_is_near_the_shifts_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[Sequence[ShiftSignals]] = []
+
+    def chosen(
+        _log: ShiftLog, _card: object, shifts: Sequence[Shift]
+    ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
+        return tuple(shifts[1:]), (RejectedShift(shifts[0].inertia_phase, "left out"),)
+
+    def fitted(signals: Sequence[ShiftSignals], *_: object) -> None:
+        told.append(signals)
+        raise Fitted
+
+    monkeypatch.setattr(pipeline, "chosen", chosen)
+    monkeypatch.setattr(pipeline, "_with_torque", fitted)
+    with pytest.raises(Fitted):
+        pipeline.identify(drive(), CARD, FoundShifts((shift(80.0), shift(150.0)), ()))
+    ((one,),) = told
+    assert one.shift.before == (150.0 - BEFORE, 150.0)
+    assert one.shift.after == (150.6, 150.6 + AFTER)
+
+
+def test_a_shift_in_overrun_does_not_stop_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[Sequence[ShiftSignals]] = []
+
+    def fitted(signals: Sequence[ShiftSignals], *_: object) -> None:
+        told.append(signals)
+        raise Fitted
+
+    log = drive()
+    torque = log["output_torque"]
+    coasting = np.where(torque.time < 115.0, -100.0, 100.0) + (torque.values - 100.0)
+    changed = {**log.channels, "output_torque": replace(torque, values=coasting)}
+    monkeypatch.setattr(pipeline, "_with_torque", fitted)
+    monkeypatch.setattr(pipeline, "chosen", lambda _log, _card, shifts: (tuple(shifts), ()))
+    shifts = FoundShifts((shift(80.0), shift(150.0)), ())
+    with pytest.raises(Fitted):
+        pipeline.identify(
+            replace(log, channels=changed), replace(CARD, loss_law="dissipative"), shifts
+        )
+    ((one,),) = told
+    assert one.shift.before[1] == 150.0
