@@ -91,7 +91,7 @@ def choose(
         best, doubts = averaged(problem, best)
     with at_most(DOUBT_WORK):
         best, either = with_either_speeds(problem, best)
-    return best, (*notes, *in_words(best.problem.kinds), *(either or doubts))
+    return best, (*notes, *in_words(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
 
 
 def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:
