@@ -89,6 +89,18 @@ fn element() -> impl Strategy<Value = RandomElement> {
     ]
 }
 
+fn assembled(
+    (inertias, speeds, drive, clutches, others): (
+        [f64; 4],
+        [f64; 4],
+        Vec<f64>,
+        Vec<RandomClutch>,
+        Vec<RandomElement>,
+    ),
+) -> Case {
+    Case { inertias, speeds, drive, clutches, others }
+}
+
 fn case() -> impl Strategy<Value = Case> {
     let speed = prop_oneof![Just(0.0), -50.0..50.0];
     (
@@ -98,13 +110,7 @@ fn case() -> impl Strategy<Value = Case> {
         prop::collection::vec(clutch(), 1..5),
         prop::collection::vec(element(), 0..4),
     )
-        .prop_map(|(inertias, speeds, drive, clutches, others)| Case {
-            inertias,
-            speeds,
-            drive,
-            clutches,
-            others,
-        })
+        .prop_map(assembled)
 }
 
 /// Cases as written by hand, of few round numbers: equal capacities, torques exactly at them, members at rest,
@@ -141,13 +147,7 @@ fn case_by_hand() -> impl Strategy<Value = Case> {
         prop::collection::vec(clutch, 1..5),
         prop::collection::vec(other, 0..4),
     )
-        .prop_map(|(inertias, speeds, drive, clutches, others)| Case {
-            inertias,
-            speeds,
-            drive,
-            clutches,
-            others,
-        })
+        .prop_map(assembled)
 }
 
 fn friction(stribeck: bool) -> FrictionLaw<f64> {
