@@ -89,15 +89,10 @@ fn element() -> impl Strategy<Value = RandomElement> {
     ]
 }
 
-fn assembled(
-    (inertias, speeds, drive, clutches, others): (
-        [f64; 4],
-        [f64; 4],
-        Vec<f64>,
-        Vec<RandomClutch>,
-        Vec<RandomElement>,
-    ),
-) -> Case {
+/// The fields of a case in their order.
+type Fields = ([f64; 4], [f64; 4], Vec<f64>, Vec<RandomClutch>, Vec<RandomElement>);
+
+fn assembled((inertias, speeds, drive, clutches, others): Fields) -> Case {
     Case { inertias, speeds, drive, clutches, others }
 }
 
