@@ -8,7 +8,8 @@ use common::{
     clutch, compile, constant, gear, grid, inertia, load, shaft, simulate, simulate_by, start,
     torque,
 };
-use drivetwin_core::model::elements::{Clutch, Element};
+use drivetwin_core::model::elements::{Clutch, Element, Gear, GearLoss};
+use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::{FrictionLaw, Stribeck};
 use drivetwin_core::simulate::Output;
 use drivetwin_core::solve::{Settings, Status};
@@ -178,5 +179,35 @@ fn brakes_hold_side_by_side_whatever_ratio_lies_before_one_of_them() {
         assert_eq!(run.status, Status::Completed, "{ratio}");
         assert!((run.columns[0][5] / (5.0 * ratio) - 1.0).abs() < 1e-9, "{}", run.columns[0][5]);
         assert!((run.columns[1][5] - 5.0).abs() < 1e-9, "{}", run.columns[1][5]);
+    }
+}
+
+#[test]
+fn of_two_drags_that_no_efficiency_tells_apart_the_larger_counts_either_way() {
+    for (drag, drag_backward) in [(4.0, 1.0), (1.0, 4.0)] {
+        let loss = GearLoss {
+            law: LossLaw::Dissipative,
+            eta: 1.0,
+            eta_backward: None,
+            drag: Some(drag),
+            drag_backward: Some(drag_backward),
+        };
+        let (name, [a, b]) = ("g".into(), ["a", "b"].map(Into::into));
+        let network = compile(vec![
+            inertia("a", 1.0),
+            inertia("b", 1.0),
+            torque("a", "T"),
+            Element::Gear(Gear { name, a, b, ratio: 1.0, loss: Some(loss) }),
+        ]);
+        for settings in [Settings::default(), Settings::exact()] {
+            for (drive, rest) in [(10.0, 3.0), (0.0, -2.0), (-10.0, -7.0), (1.0, -1.5)] {
+                let signals = [constant("T", drive, 1.0)];
+                let (from, times) = (start(&[("a", 50.0), ("b", 50.0)], &[]), grid(1.0, 11));
+                let how = (settings, false);
+                let run = simulate_by(how, &network, &signals, &from, &times, &[speed("b")]);
+                assert_eq!(run.status, Status::Completed);
+                assert!((run.columns[0][10] - 50.0 - rest).abs() < 1e-9, "{:?}", run.columns[0]);
+            }
+        }
     }
 }

@@ -4,7 +4,7 @@
 use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::mechanism::{Constraint, Loss, LossLaw, Mechanism};
-use crate::number::Number;
+use crate::number::{Number, Values};
 use serde::{Deserialize, Serialize};
 
 /// Lumped efficiency of a gear.
@@ -45,15 +45,19 @@ impl<T: Number> GearLoss<T> {
     }
 
     fn state(&self, driving: usize) -> Loss<T> {
+        let eta_backward = self.eta_backward.unwrap_or(self.eta);
         let drag = self.drag.unwrap_or(T::zero_());
-        Loss {
-            law: self.law,
-            eta: self.eta,
-            eta_backward: self.eta_backward.unwrap_or(self.eta),
-            drag,
-            drag_backward: self.drag_backward.unwrap_or(drag),
-            driving,
-        }
+        let drag_backward = self.drag_backward.unwrap_or(drag);
+        // Lines that are parallel meet nowhere: the larger loss counts whatever the torque, as it does at any
+        // given one where they all but are.
+        let parallel = (self.eta - eta_backward.recip()).re().decide(|slope| slope == 0.0);
+        let least = drag.re().decide_with(drag_backward.re(), |forward, back| forward < back);
+        let (drag, drag_backward) = match (parallel, least) {
+            (true, true) => (drag_backward, drag_backward),
+            (true, false) => (drag, drag),
+            (false, _) => (drag, drag_backward),
+        };
+        Loss { law: self.law, eta: self.eta, eta_backward, drag, drag_backward, driving }
     }
 }
 
