@@ -2,7 +2,7 @@
 """The Cramér-Rao bound of a scenario: Fisher information at the truth with input noise.
 
 Nothing of the fit's own covariance is used. G, the response of all outputs to every input sample,
-comes from simulating each sample's disturbance; R + G·Q·Gᵀ is then inverted as a dense matrix by
+comes from simulating each sample's disturbance; R + G·U·Gᵀ is then inverted as a dense matrix by
 Woodbury's identity.
 """
 

@@ -31,3 +31,21 @@ class Converter:
     def turbine_torque(self, pump: FloatArray | float, turbine: FloatArray | float) -> FloatArray:
         """Torque that the turbine gives [N m] at speeds of pump and turbine [rad/s], pump > 0."""
         return self.ratio(pump, turbine) * self.pump_torque(pump, turbine)
+
+    def turbine_slopes(
+        self, pump: FloatArray, turbine: FloatArray, steps: tuple[float, float]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the turbine's torque (n,) [N m s/rad] by the speeds of pump and turbine.
+
+        As secants over ± `steps` [rad/s] of either speed, so that at a corner of the map the mean
+        of both sides counts.
+        """
+        of_pump = np.minimum(steps[0], 0.5 * pump)
+        of_turbine = np.full_like(turbine, steps[1])
+        by_pump = self.turbine_torque(pump + of_pump, turbine) - self.turbine_torque(
+            pump - of_pump, turbine
+        )
+        by_turbine = self.turbine_torque(pump, turbine + of_turbine) - self.turbine_torque(
+            pump, turbine - of_turbine
+        )
+        return by_pump / (2.0 * of_pump), by_turbine / (2.0 * of_turbine)

@@ -134,6 +134,7 @@ class Twin(Shown):
         *,
         overrides: Mapping[str, float] | None = None,
         loss_law: LossLaw | None = None,
+        load: float | None = None,
     ) -> DualClutch:
         """Model for the simulation of one shift (eqs. 2-9).
 
@@ -142,6 +143,7 @@ class Twin(Shown):
         `model_ids`, of the two J′ one.
         What is known over η only counts times the twin's own η, else times that of the overrides.
         Without either (`over_eta`) η is 1: the speeds are the same, all torques are then over η.
+        `load` [N m] is T_v/i_f on the road of this shift, known as the twin's own is.
         Raises MissingParameterError naming every parameter that neither source gives, and
         InputError for a gear or element the twin does not know and for an override without effect.
         """
@@ -150,6 +152,8 @@ class Twin(Shown):
         gear = self.inertia_gear(shift, given)
         inertia_id = f"J_prime_{gear}"
         scale = self.value("eta", given.get("eta", 1.0))
+        if load is not None:
+            given = {"Tv_over_if": scale * load if self.over_eta else load, **given}
         values = self._values((*COMMON, inertia_id), given, scale)
         J_e = values[inertia_id] - values["J_out"] / self.gear(gear).ratio ** 2
         return DualClutch(

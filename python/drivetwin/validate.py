@@ -171,16 +171,18 @@ def validated(found: Identification, twin: Twin, log: ShiftLog) -> Identificatio
     same. Raises MissingChannelError.
     """
     try:
-        return with_fit(found, list(_runs(twin, log, found.shifts)))
+        return with_fit(found, list(_runs(twin, log, found)))
     except (MissingParameterError, DamagedChannelError) as incomplete:
         return replace(found, warnings=(*found.warnings, f"no validation: {incomplete.what}"))
 
 
-def _runs(twin: Twin, log: ShiftLog, shifts: Sequence[Shift]) -> Iterator[Validation]:
-    """Simulate one shift after the other, telling how far it is."""
-    for count, shift in enumerate(shifts):
-        tell(count / len(shifts))
-        yield validate(twin, log, shift)
+def _runs(twin: Twin, log: ShiftLog, found: Identification) -> Iterator[Validation]:
+    """Simulate one shift after the other, telling how far it is; on hills with its own load."""
+    loads = found.evidence.loads
+    for count, shift in enumerate(found.shifts):
+        tell(count / len(found.shifts))
+        model = twin.dual_clutch(shift, load=loads[count]) if loads else None
+        yield validate(twin, log, shift, model)
 
 
 def fit_of(measured: FloatArray, simulated: FloatArray, mean: FloatArray | float) -> SignalFit:

@@ -6,8 +6,15 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin.app.identifying import Refusal, Task, identify_all
+import numpy as np
+import pytest
+
+from drivetwin.app import identifying
+from drivetwin.app.identifying import Outcome, Refusal, Task, identify_all
+from drivetwin.errors import DamagedChannelError
 from drivetwin.identify.method import Method
+from drivetwin.identify.pipeline import identify
+from drivetwin.identify.result import Identification
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.find import find_shifts
 from drivetwin.vehicle.card import load_card
@@ -26,3 +33,31 @@ def test_a_method_that_finds_nothing_says_what_to_do(place: Path) -> None:
     assert isinstance(refusal, Refusal)
     assert "the log has no output torque" in refusal.text
     assert refusal.text.endswith("or use the likelihood method")
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        (DamagedChannelError("the pressure has a gap", "record it again"), "-> record it again"),
+        (np.linalg.LinAlgError("singular"), "a fault of its own (LinAlgError: singular)"),
+    ],
+)
+def test_what_ends_one_method_is_told_beside_what_the_others_find(
+    place: Path, monkeypatch: pytest.MonkeyPatch, fault: Exception, told: str
+) -> None:
+    def faulty(*task: object) -> Identification:
+        if task[-1] is Method.PAPER:
+            raise fault
+        return identify(*task)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(identifying, "identify", faulty)
+    card = load_card(place / CARD)
+    log = read_log(place / LOG, card)
+    found: list[object] = []
+    methods = [Method.PAPER, Method.INTEGRAL]
+    identify_all(found.append, Task(log, card, find_shifts(log, card).shifts, methods))
+    refusal, outcome = found
+    assert isinstance(refusal, Refusal)
+    assert told in refusal.text
+    assert isinstance(outcome, Outcome)
+    assert outcome.method is Method.INTEGRAL

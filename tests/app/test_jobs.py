@@ -37,6 +37,10 @@ def _greedy(_: Emit) -> None:
     raise MemoryError
 
 
+def _broken(_: Emit) -> None:
+    raise ValueError("odd")
+
+
 def _alive(pid: int) -> bool:
     try:
         os.kill(pid, 0)
@@ -66,7 +70,10 @@ def test_a_typed_error_keeps_its_parts() -> None:
     assert caught.value.where.channel == "p"
 
 
-@pytest.mark.parametrize(("work", "says"), [(_dying, "exit code 3"), (_greedy, "expands")])
+@pytest.mark.parametrize(
+    ("work", "says"),
+    [(_dying, "exit code 3"), (_greedy, "more memory"), (_broken, "ValueError: odd")],
+)
 def test_a_process_that_dies_is_a_fault(work: object, says: str) -> None:
     with pytest.raises(InputError) as caught:
         call(work, limit=30.0)  # type: ignore[arg-type]

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from drivetwin.app.locks import Lock, LockKind, card_lock, checked, lockable, locked, typed
+from drivetwin.app.locks import WIDE, Lock, LockKind, card_lock, checked, lockable, locked, typed
 from drivetwin.app.session import Session
 from drivetwin.errors import InputError
 from drivetwin.vehicle.spec import PriorValue
@@ -26,7 +28,7 @@ def test_fixed_and_prior_are_known_beforehand(identified: Session, name: str) ->
 
 def test_what_the_card_states_itself_is_replaced_there(identified: Session) -> None:
     card = identified.work.require_card()
-    element = next(iter(card.elements))
+    element, spec = next(iter(card.elements.items()))
     locks = {"J_out": Lock(FIXED, 1.1), f"P0.{element}": Lock(LockKind.PRIOR, 7e4, 1e3)}
     fresh = locked(card, locks)
     assert fresh.J_out == PriorValue(1.1)
@@ -34,7 +36,19 @@ def test_what_the_card_states_itself_is_replaced_there(identified: Session) -> N
     assert (P0.value, P0.std) == (7e4, 1e3)
     free = locked(card, {"J_out": Lock(LockKind.FREE), f"P0.{element}": Lock(LockKind.FREE)})
     assert free.J_out is None
-    assert free.elements[element].P0.std == free.elements[element].P0.value
+    assert PriorValue(spec.P0.value, WIDE) == free.elements[element].P0
+
+
+@pytest.mark.parametrize(("value", "std"), [(0.0, WIDE), (5e3, WIDE), (2.5e5, 2.5e5)])
+def test_a_free_fill_pressure_is_no_known_one_whatever_the_card_says(
+    identified: Session, value: float, std: float
+) -> None:
+    card = identified.work.require_card()
+    element, spec = next(iter(card.elements.items()))
+    stated = replace(card, elements={element: replace(spec, P0=PriorValue(value))})
+    assert card_lock(stated, f"P0.{element}") == Lock(FIXED, value)
+    freed = locked(stated, {f"P0.{element}": Lock(LockKind.FREE)})
+    assert PriorValue(value, std) == freed.elements[element].P0
 
 
 def test_the_lock_of_the_card_is_shown(identified: Session) -> None:

@@ -58,6 +58,19 @@ def test_cancelling_leaves_nothing_running(session: Session) -> None:
     assert session.work.method is None
 
 
+def test_why_an_identification_ended_early_is_kept_until_the_next(session: Session) -> None:
+    _open(session)
+    session.identify([Method.INTEGRAL])
+    assert session.job is not None
+    session.job.process.kill()
+    with pytest.raises(InputError, match="stopped") as ended:
+        finish(session)
+    assert session.work.ended == str(ended.value)
+    session.identify([Method.PAPER])
+    assert not session.work.ended
+    session.cancel()
+
+
 def test_a_log_is_given_up_after_the_time_for_its_size(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -327,6 +327,28 @@ def test_bad_uploads_are_refused_with_a_message(refusing: Page, bench: Bench) ->
     _message(page, "is open")
 
 
+def test_a_message_goes_with_the_next_thing_that_is_done(shown: Page, bench: Bench) -> None:
+    page, message = shown, shown.locator("#message")
+    _open(page, bench)
+    expect(message).to_have_class("message fault")
+    _view(page, "channels")
+    expect(message).to_be_empty()
+    page.get_by_label(f"unit of {bench.wrong}").fill("furlong")
+    page.click("#apply-mapping")
+    expect(message).to_have_class("message fault")
+    page.get_by_label(f"unit of {bench.wrong}").fill("bar")
+    page.click("#apply-mapping")
+    _message(page, "1 usable shift")
+    _view(page, "model")
+    expect(message).to_be_empty()
+    value = page.get_by_label(re.compile("locked value of .*B3"))
+    stated = value.input_value()
+    for typed, told in (("-1", "lies outside"), (stated, "")):
+        value.fill(typed)
+        page.keyboard.press("Enter")
+        expect(message).to_have_text(re.compile(told) if told else "")
+
+
 def test_a_typed_time_of_any_detail_counts(shown: Page, bench: Bench) -> None:
     page = shown
     _open(page, bench)

@@ -47,6 +47,14 @@ def test_energy_of_a_launch_to_the_highest_gear_closes(gearbox: Gearbox, truck: 
     assert motion.warnings == ()
 
 
+def test_a_drive_begins_without_a_jerk(drive: DriveRun, gearbox: Gearbox) -> None:
+    """At rest the shaft carries what the turbine pulls in first gear, from the first instant on."""
+    still = drive.time < 0.9
+    pull = drive.turbine_torque[still] * gear_statics(gearbox, "1").ratio
+    assert pull.min() > 1000.0
+    assert drive.shaft_torque[still] == pytest.approx(pull, rel=0.02)
+
+
 def test_all_four_kinds_of_shift_end_in_their_gear(drive: DriveRun, gearbox: Gearbox) -> None:
     shifts = [each for each in drive.maneuvers if each.action.kind in list(ShiftKind)]
     assert {each.action.kind for each in shifts} == set(ShiftKind)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,28 @@ def test_the_turbine_torque_moves_the_dual_clutch_as_the_converter_does() -> Non
     for name, size in (("engine_speed", 2e-3), ("output_speed", 1e-3), ("shaft_torque", 1.0)):
         expected = np.interp(crank.time, motion.time, getattr(motion, name))
         assert getattr(alone, name) == pytest.approx(expected, abs=size), name
+
+
+def test_all_inertias_of_the_model_turn_behind_the_converter() -> None:
+    scenario = open_converter()
+    assert scenario.converter is not None
+    model = replace(scenario.model, eta=1.0, i_in=1.2, J1=2.0, J2e=1.5)
+    time = np.linspace(0.0, 0.5, 501)
+    ends = np.array([0.0, 0.5])
+    held = {
+        each.name: Signal(ends, np.full(2, 1.5e6 if each.name in scenario.start().locked else 0.0))
+        for each in model.elements
+    }
+    torque = Signal(np.array([0.0, 0.1, 0.5]), np.array([1545.0, 1545.0, 800.0]))
+    start = replace(scenario.start(), engine_speed=1.2 * scenario.start().engine_speed)
+    ran, _ = scenario.converter.simulate(model, torque, held, start, time)
+    # Without losses it is all one on which side of the input gear an inertia turns.
+    before = replace(model, J1=3.5, J2e=0.0)
+    same, _ = scenario.converter.simulate(before, torque, held, start, time)
+    assert ran.status == same.status == "completed"
+    assert ran.engine_speed == pytest.approx(same.engine_speed, abs=1e-6)
+    lighter, _ = scenario.converter.simulate(replace(model, J2e=0.0), torque, held, start, time)
+    assert np.max(np.abs(lighter.engine_speed - ran.engine_speed)) > 0.01
 
 
 def test_the_engine_starts_where_its_torque_is_steady() -> None:

@@ -28,13 +28,20 @@ RATE = 400.0
 """Hz of the logger: less than usual, so that the many fits of a test take less time."""
 
 
-def _identified(scenario: Callable[[], Scenario], method: Method) -> Identification:
+def _identified(
+    scenario: Callable[[], Scenario], method: Method, P0_std: float = 0.0
+) -> Identification:
     base = scenario()
     sensors = tuple(replace(s, rate=min(s.rate, RATE)) for s in base.sensors)
     made = run(replace(base, duration=DURATION, sensors=sensors), seed=3)
     with tempfile.TemporaryDirectory() as folder:
         log_file, card_file, _ = write_run(Path(folder) / "log.csv", made)
         card = drivetwin.load_card(card_file)
+        elements = {
+            name: replace(one, P0=replace(one.P0, std=P0_std))
+            for name, one in card.elements.items()
+        }
+        card = replace(card, elements=elements)
         log = drivetwin.read_log(log_file, card)
         return identify(log, card, drivetwin.find_shifts(log, card), method)
 
@@ -49,6 +56,12 @@ def still() -> Identification:
 def stepped() -> Identification:
     """The same driveline with throttle steps before the shift."""
     return _identified(paper_steps, Method.LIKELIHOOD)
+
+
+@cache
+def uncertain_fills() -> Identification:
+    """The log at constant engine torque, by a card that leaves P0 a tenth of a bar of spread."""
+    return _identified(paper, Method.LIKELIHOOD, P0_std=1e4)
 
 
 @cache

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from drivetwin.identify.chosen import MOST, chosen
-from drivetwin.identify.load import load_left
 from drivetwin.identify.signals import Sampled
+from drivetwin.identify.steady import own_load
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity, ShiftLog
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.vehicle.spec import VehicleCard
@@ -42,8 +42,11 @@ def drive(braked: tuple[float, float] = BRAKED) -> tuple[FloatArray, FloatArray,
     return time, *noisy
 
 
-def log() -> ShiftLog:
-    time, torque, wheel = drive()
+def log(torque: FloatArray | None = None, wheel: FloatArray | None = None) -> ShiftLog:
+    """A log of the `drive`, or of another torque and speed at its times."""
+    time, *braked = drive()
+    torque = braked[0] if torque is None else torque
+    wheel = braked[1] if wheel is None else wheel
     channels = [
         Channel("output_torque", Quantity.TORQUE, time, torque, "T_o", "N*m"),
         Channel("wheel_speed", Quantity.SPEED, time, wheel, "n_w", "rad/s"),
@@ -54,9 +57,32 @@ def log() -> ShiftLog:
 def test_a_brake_leaves_much_of_the_vehicles_balance() -> None:
     time, torque, wheel = drive()
     torque_, wheel_ = Sampled(time, torque, 20.0), Sampled(time, wheel, 0.03)
-    assert load_left(torque_, wheel_, CARD.final_drive, (15.0, 25.0)) < 1.5
-    assert load_left(torque_, wheel_, CARD.final_drive, (39.0, 47.0)) > 100.0
-    assert np.isinf(load_left(torque_, wheel_, CARD.final_drive, (39.0, 39.3)))
+    steady, braked, brief = (
+        own_load(torque_, wheel_, CARD.final_drive, span)
+        for span in ((15.0, 25.0), (39.0, 47.0), (39.0, 39.3))
+    )
+    assert steady is not None
+    assert steady.left < 1.5
+    assert abs(steady.J_vehicle[0] - J_VEHICLE) < 4.0 * steady.J_vehicle[1]
+    assert braked is not None
+    assert braked.left > 100.0
+    assert brief is None
+
+
+def test_a_brake_that_looks_like_inertia_is_seen_against_the_other_shifts() -> None:
+    """It follows the acceleration: by itself such a shift tells another J3, and no more."""
+    time, torque, wheel = drive((0.0, 0.1))
+    span = (time > 38.0) & (time < 48.0)
+    torque = torque.copy()
+    torque[span] += 0.3 * (torque[span] - 800.0)
+    torque_, wheel_ = Sampled(time, torque, 20.0), Sampled(time, wheel, 0.03)
+    alone = own_load(torque_, wheel_, CARD.final_drive, (38.5, 47.5))
+    assert alone is not None
+    assert alone.left < 1.5
+    spans = [shift(20.0), shift(43.0), shift(60.0), shift(75.0)]
+    kept, refused = chosen(log(torque, wheel), CARD, spans)
+    assert kept == (spans[0], *spans[2:])
+    assert "load is not constant" in refused[0].reason
 
 
 def test_a_braked_shift_is_left_out_where_others_do_without() -> None:

@@ -104,3 +104,20 @@ def test_one_shift_stays_as_it_is() -> None:
     one = _shift(("eta",), [0.85], np.array([[1e-4]]))
     ids, values, covariance = combine([one])
     assert (ids, values[0], covariance[0, 0]) == (("eta",), 0.85, 1e-4)
+
+
+def test_loads_that_differ_leave_the_inertia_as_it_is() -> None:
+    """J3 and load go together in each shift: one load for two grades would move J3."""
+    ids = ("eta", "J_vehicle", "Tv_over_if")
+
+    def shift(J3: float, load: float, with_J3: float) -> IntegralShift:
+        rows = np.array([[0.01, 0.0, 0.0], [0.0, 40.0, 0.0], [0.0, with_J3, 4.0]])
+        return _shift(ids, [0.9, J3, load], rows @ rows.T)
+
+    told, values, covariance = combine([shift(4010.0, 900.0, 8.0), shift(3990.0, 300.0, -8.0)])
+    assert told == ids
+    assert values == pytest.approx([0.9, 4000.0, 598.0])
+    assert covariance[1, 1] == pytest.approx(40.0**2 / 2.0, rel=1e-3)
+    _, values, covariance = combine([shift(4010.0, 604.0, 8.0), shift(3990.0, 596.0, -8.0)])
+    assert values[1] == pytest.approx(4000.0 - 16.0, abs=5.0)
+    assert covariance[1, 1] < 0.5 * 40.0**2 / 2.0

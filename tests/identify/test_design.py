@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from drivetwin.display import in_units
-from drivetwin.identify.design import Contradiction, contradictions, held_against, outside_ranges
+from drivetwin.identify.design import (
+    Contradiction,
+    contradictions,
+    held_against,
+    outside_ranges,
+    without_gain,
+)
 from drivetwin.identify.known import CONTRADICTS, without_prior
 from drivetwin.identify.result import Estimate, Verdict
 from drivetwin.identify.signals import FloatArray
@@ -114,3 +120,13 @@ def test_an_inertia_whose_interval_lies_outside_the_design_range_is_told(
     design = replace(estimate, verdict=Verdict.DESIGN)
     refused = Estimate("J_vehicle", None, None, Verdict.NOT_IDENTIFIABLE, "likelihood")
     assert outside_ranges({"J_prime_2": design, "J_vehicle": refused}, card) == ()
+
+
+@pytest.mark.parametrize(("eta", "std", "told"), [(1.06, 2e-4, True), (1.01, 0.01, False)])
+def test_an_efficiency_above_one_is_not_identified(eta: float, std: float, told: bool) -> None:
+    estimates = {"eta": Estimate("eta", eta, std, Verdict.IDENTIFIED, "likelihood")}
+    found, texts = without_gain(estimates, "dissipative")
+    assert found["eta"].verdict is (Verdict.WEAK if told else Verdict.IDENTIFIED)
+    assert [("1.06" in text, "overrun" in text) for text in texts] == [(True, False)] * told
+    assert ["overrun" in text for text in without_gain(estimates, "paper")[1]] == [True] * told
+    assert without_gain({}, "paper") == ({}, ())

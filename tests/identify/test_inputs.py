@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from drivetwin.identify import pipeline
-from drivetwin.identify.inputs import BESIDE, sampled, signals_of
+from drivetwin.identify.inputs import BESIDE, disturbed, sampled, signals_of, tolerances_of
 from drivetwin.identify.signals import ShiftSignals
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.find import FoundShifts
 from drivetwin.shifts.recorded import AFTER, BEFORE
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
+from drivetwin.vehicle.spec import SensorTolerance
 from tests.shifts.made import make_card
 
 CARD = make_card({"2": 1.91, "3": 1.43})
@@ -67,6 +68,33 @@ def test_of_a_long_log_the_estimators_see_what_is_near_the_shift() -> None:
     assert signals.engine_torque.sigma == sampled(log["engine_torque"]).sigma
     whole = signals_of(log, CARD, replace(one, before=(0.0, 100.0), after=(100.6, 200.0)))
     assert whole.engine_torque.time.size == log["engine_torque"].time.size
+
+
+def test_the_tolerance_of_the_speed_sensor_that_is_read_is_one_of_the_engine_speed() -> None:
+    sensors = {
+        "input_speed": SensorTolerance(1e-3, 0.5),
+        "engine_speed": SensorTolerance(2e-3, 0.1),
+        "output_torque": SensorTolerance(0.01, 30.0),
+    }
+    log, card = drive(), replace(CARD, i_in=1.2, sensors=sensors)
+    other = {"output_torque": sensors["output_torque"]}
+    found = tolerances_of(log, card, shift(100.0))
+    assert found == {**other, "engine_speed": SensorTolerance(1e-3, 0.6)}
+    # What such an error does to the log is what it does to the signals.
+    wrong = replace(log["input_speed"], values=1.001 * log["input_speed"].values + 0.5)
+    there = signals_of(
+        replace(log, channels={**log.channels, "input_speed": wrong}), card, shift(100.0)
+    )
+    here = disturbed(signals_of(log, card, shift(100.0)), "engine_speed", 1e-3, 0.6)
+    assert here.engine_speed.values == pytest.approx(there.engine_speed.values)
+    engine = replace(
+        log["input_speed"], role="engine_speed", values=1.2 * log["input_speed"].values
+    )
+    both = replace(log, channels={**log.channels, "engine_speed": engine})
+    assert tolerances_of(both, card, shift(100.0)) == {
+        **other,
+        "engine_speed": sensors["engine_speed"],
+    }
 
 
 class Fitted(Exception):

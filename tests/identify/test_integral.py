@@ -12,7 +12,7 @@ import pytest
 
 from drivetwin.identify.friction import stribeck_at
 from drivetwin.identify.integral import IntegralShift, identify_shift
-from drivetwin.identify.momentum import MomentumSettings, rounding_error
+from drivetwin.identify.momentum import MomentumSettings, off_going_free, rounding_error
 from drivetwin.identify.noise import white_noise
 from drivetwin.identify.signals import Sampled, ShiftSignals
 from drivetwin.shifts.shift import Shift, ShiftKind
@@ -61,6 +61,29 @@ def test_the_shift_alone_carries_eta_and_inertia(constant: Run) -> None:
     compare(found, Truth(), 5e-4, 5e-4)
     assert "te_delay" not in found.ids
     assert "age" in found.refusals["te_delay"]
+
+
+@pytest.mark.parametrize("P0", [PriorValue(8e4, 1e5), PriorValue(0.0, 1e5), PriorValue(0.0)])
+def test_an_off_going_element_of_unknown_or_no_fill_pressure_still_leaves_an_inertia_phase(
+    constant: Run, P0: PriorValue
+) -> None:
+    signals, driveline = constant.signals(), Truth().driveline()
+    unknown = replace(driveline, offgoing=replace(driveline.offgoing, P0=P0))
+    settings = MomentumSettings()
+    known, free = (off_going_free(signals, one, settings) for one in (driveline, unknown))
+    assert known < free < known + 0.05
+    compare(identify_shift(signals, unknown, 12.0), Truth(), 5e-4, 5e-4)
+
+
+def test_an_off_going_element_that_lingers_about_its_fill_pressure_is_never_free(
+    constant: Run,
+) -> None:
+    signals, driveline = constant.signals(), Truth().driveline(P0_std=5e3)
+    low = signals.pressures["B2"]
+    held = replace(low, values=np.maximum(low.values, Truth().P0 + 3e3))
+    lingering = replace(signals, pressures={**signals.pressures, "B2": held})
+    free = off_going_free(lingering, driveline, MomentumSettings())
+    assert free == pytest.approx(signals.shift.lockup_time, abs=2e-3)
 
 
 def test_truth_off_the_papers_grid_and_another_vehicle() -> None:

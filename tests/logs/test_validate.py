@@ -244,6 +244,17 @@ def test_a_channel_of_few_steps_is_told() -> None:
     assert check_channel(channel("pressure.B2", switched), "log.csv").warnings == ()
 
 
+def test_steep_ramps_between_exact_levels_are_no_coarse_steps() -> None:
+    levels = np.array([600.0, 1710.0, 905.0, 1433.0, 702.0, 1251.0])
+    corners = np.linspace(0.0, 1.0, levels.size)
+    held = np.repeat(np.linspace(0.0, 1.0, 26), -(-TIME.size // 26))[: TIME.size]
+    torque = np.interp(held, corners, levels)
+    jumps = np.abs(np.diff(torque))
+    assert jumps[jumps > 0.0].min() > 0.03 * levels.max()
+    checked = check_channel(channel("engine_torque", torque), "log.csv")
+    assert not any("in steps of" in text for text in checked.warnings)
+
+
 @pytest.mark.parametrize(("value", "words"), [(8191.0, "far beyond"), (0.0, "fell to zero")])
 def test_all_samples_that_repeat_a_damaged_update_are_left_out(value: float, words: str) -> None:
     """Engine torque every 10 ms in a table of 1 ms."""

@@ -12,11 +12,13 @@ from drivetwin.converter import Converter
 from drivetwin.errors import IdentificationError
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity, ShiftLog
 from drivetwin.shifts.converter import (
+    LETS_GO,
     behind_converter,
     converter_slip,
     lock_ups,
     open_spans,
     require_closed,
+    unseen,
 )
 from drivetwin.shifts.find import find_shifts
 from tests.shifts.made import Plan, make_card
@@ -127,3 +129,72 @@ def test_with_a_map_the_turbine_stands_for_the_engine() -> None:
         expected = 1.2 * 0.01 * engine.values**2
         assert found["engine_torque"].values == pytest.approx(expected)
         assert behind_converter(found, card, shift) is found
+
+
+def test_the_turbine_torque_is_told_from_fresh_speeds() -> None:
+    """A speed that the logger repeats is old until the next: the torque would be of another one."""
+    converter = Converter((0.0, 1.0), (0.05, 0.0), (2.0, 1.0))
+    card = replace(PLAN.card(), converter=converter)
+    made = PLAN.log()
+    inlet = made["input_speed"]
+    engine = replace(inlet, role="engine_speed", values=1.25 * inlet.values)
+    exact = replace(made, channels={**made.channels, "engine_speed": engine})
+    (shift,), _ = find_shifts(exact, card)
+    stale = np.arange(inlet.time.size) // 20 * 20
+    held = {one.role: replace(one, values=one.values[stale], held=True) for one in (engine, inlet)}
+    found = behind_converter(replace(made, channels={**made.channels, **held}), card, shift)
+    torque = found["engine_torque"]
+    expected = behind_converter(exact, card, shift)["engine_torque"].at(torque.time)
+    assert torque.time.size < inlet.time.size / 10
+    assert torque.values == pytest.approx(expected, rel=1e-9)
+
+
+CONVERTER = Converter((0.0, 1.0), (0.05, 0.0), (2.0, 1.0))
+
+
+def behind(slip: FloatArray, flag: FloatArray | None = None) -> ShiftLog:
+    """A shift at 1.5 s as it is seen behind a converter with `slip` (n,) of its input speed."""
+    made = PLAN.log()
+    inlet = made["input_speed"]
+    engine = replace(inlet, role="engine_speed", values=(1.0 + slip) * inlet.values)
+    channels = {**made.channels, "engine_speed": engine}
+    if flag is not None:
+        channels["lockup_engaged"] = replace(
+            inlet, role="lockup_engaged", quantity=Quantity.STATE, values=flag
+        )
+    card = replace(PLAN.card(), converter=CONVERTER)
+    whole = replace(made, channels=channels)
+    (shift,), _ = find_shifts(whole, card)
+    return behind_converter(whole, card, shift)
+
+
+def test_where_the_lock_up_clutch_closes_the_map_tells_nothing() -> None:
+    time = PLAN.log()["input_speed"].time
+    closes = time[-1] - 0.8
+    slip = np.clip(1.5 * (closes - time), 0.0, 0.25)
+    by_speeds = behind(slip)["engine_torque"].time
+    assert by_speeds[-1] == pytest.approx(closes - LETS_GO, abs=0.1)
+    flagged = behind(np.full(time.size, 0.25), (time > closes).astype(np.float64))
+    assert flagged["engine_torque"].time[-1] == pytest.approx(closes - LETS_GO, abs=0.01)
+    # The speeds may be the same for a while with the clutch open: its flag knows.
+    assert behind(slip, np.zeros(time.size))["engine_torque"].time[-1] == pytest.approx(time[-1])
+
+
+def test_a_map_that_ends_short_of_the_shift_is_refused() -> None:
+    time = PLAN.log()["input_speed"].time
+    with pytest.raises(IdentificationError, match=r"from 0 to 1; in the shift 2-3 it is 1\.250"):
+        behind(np.full(time.size, -0.2))
+    # Beyond the shift the torque is merely unknown.
+    late = behind(np.where(time > time[-1] - 0.5, -0.2, 0.25))["engine_torque"].time
+    assert late[-1] == pytest.approx(time[-1] - 0.5, abs=0.01)
+
+
+def test_a_converter_that_no_channel_shows_is_told() -> None:
+    card = replace(CARD, converter=CONVERTER)
+    assert unseen(log(INLET), card) == ()
+    blind = ShiftLog({"input_speed": log(INLET)["input_speed"]}, "made", "")
+    assert unseen(blind, CARD) == ()
+    (text,) = unseen(blind, card)
+    assert "no engine_speed" in text
+    flag = log(INLET, np.ones(TIME.size))["lockup_engaged"]
+    assert unseen(replace(blind, channels={**blind.channels, "lockup_engaged": flag}), card) == ()

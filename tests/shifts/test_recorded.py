@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.shifts.converter import LETS_GO
 from drivetwin.shifts.recorded import (
     AFTER,
     BEFORE,
     LEAST,
-    LETS_GO,
     OLDEST,
     YOUNGEST,
     near,

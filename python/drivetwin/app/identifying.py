@@ -6,8 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivetwin.app.jobs import Emit
-from drivetwin.errors import IdentificationError
+from drivetwin.app.jobs import Emit, fault_of
 from drivetwin.identify.experiment.suggest import examined
 from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import identify
@@ -57,18 +56,24 @@ class Refusal:
 def identify_all(emit: Emit, task: Task) -> None:
     """Run every method of the task and validate its twin; emits an Outcome or Refusal for each.
 
-    Raises the errors that concern all methods: a missing channel, no shift.
+    Whatever ends one method, a fault of the program included, leaves the others their turn.
     """
     whole, start = sum(_WEIGHTS[method] for method in task.methods), 0.0
     shifts = FoundShifts(task.shifts, ())
     for method in task.methods:
         end = start + _WEIGHTS[method] / whole
         with part(start, end, f"{method.value} method"):
-            try:
-                emit(_outcome(task, shifts, method))
-            except IdentificationError as error:
-                emit(Refusal(method, f"{error.what} -> {error.remedy}"))
+            emit(_tried(task, shifts, method))
         start = end
+
+
+def _tried(task: Task, shifts: FoundShifts, method: Method) -> Outcome | Refusal:
+    """What a method finds, or why it does not."""
+    try:
+        return _outcome(task, shifts, method)
+    except Exception as error:
+        fault = fault_of(error)
+        return Refusal(method, f"{fault.what} -> {fault.remedy}")
 
 
 def _outcome(task: Task, shifts: FoundShifts, method: Method) -> Outcome:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import multiprocessing
 import sys
 import time
+import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -43,6 +44,20 @@ class Fault:
     def error(self) -> InputError:
         """The same as an exception."""
         return InputError(self.what, self.remedy, self.where)
+
+
+def fault_of(error: Exception) -> Fault:
+    """What is told of an error; of one that nobody raised on purpose the terminal has more."""
+    match error:
+        case DrivetwinError():
+            return Fault(error.what, error.remedy, error.where)
+        case MemoryError() | RecursionError():
+            return Fault("this takes more memory than there is", "cut or split the file")
+    traceback.print_exception(error)
+    return Fault(
+        f"the workbench met a fault of its own ({type(error).__name__}: {error})",
+        "its terminal has the details: please report them",
+    )
 
 
 @dataclass(frozen=True)
@@ -185,9 +200,7 @@ def _child(pipe: Connection, work: Work, arguments: tuple[Any, ...]) -> None:
             with listening(tell):
                 work(pipe.send, *arguments)
             pipe.send(_Done())
-        except DrivetwinError as error:
-            pipe.send(Fault(error.what, error.remedy, error.where))
-        except (MemoryError, RecursionError):
-            pipe.send(
-                Fault("the file expands to more than this program takes", "cut or split the file")
-            )
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            pipe.send(fault_of(error))

@@ -25,8 +25,9 @@ LOCKABLE = frozenset(
     {"eta", "J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay", "P0"}
 )
 """Stems of parameters that can be locked; the others follow from these."""
-WIDE = 1.0
-"""Standard deviation of a P0 without design value, relative to the value on the card."""
+WIDE = 1e5
+"""Least standard deviation [Pa] of a P0 that is free: a fill ends at some tenths of a bar to two
+bar. Where the card's P0 is larger, so is the deviation."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def locked(card: VehicleCard, locks: Mapping[str, Lock]) -> VehicleCard:
             card = replace(card, J_out=None if lock.kind is LockKind.FREE else lock.prior())
         elif name.startswith("P0.") and element in card.elements:
             spec = card.elements[element]
-            free = PriorValue(spec.P0.value, WIDE * spec.P0.value)
+            free = PriorValue(spec.P0.value, max(spec.P0.value, WIDE))
             P0 = free if lock.kind is LockKind.FREE else lock.prior()
             card = replace(card, elements={**card.elements, element: replace(spec, P0=P0)})
         elif lock.kind is LockKind.FREE:

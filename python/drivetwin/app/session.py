@@ -121,7 +121,7 @@ class Session:
             work = self.work
             work.require_shift()
             task = Task(work.require_log(), work.locked_card(), work.shifts, tuple(methods))
-            self._set(replace(work, results={}, refusals={}, method=None, changes={}))
+            self._set(work.without_results())
             self.job = jobs.start(identify_all, task)
 
     def poll(self) -> bool:
@@ -136,7 +136,9 @@ class Session:
                 return bool(results)
             fault, self.job = self.job.fault, None
             if fault is not None:
-                raise fault.error()
+                error = fault.error()
+                self._set(replace(self.work, ended=str(error)))
+                raise error
             return True
 
     def cancel(self) -> None:

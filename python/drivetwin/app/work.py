@@ -35,7 +35,8 @@ class Work:
 
     `channels` are the corrections of the mapping, `moves` the boundaries set by hand [s] by number
     of the shift, `changes` the sliders (SI) away from what was identified. `method` and `shift`
-    say which result and which shift the sliders show.
+    say which result and which shift the sliders show. `ended` says why the last identification
+    ended before its last method; empty where it did not.
     """
 
     log: Source | None = None
@@ -48,6 +49,7 @@ class Work:
     locks: Mapping[str, Lock] = field(default_factory=dict)
     results: Mapping[Method, Outcome] = field(default_factory=dict)
     refusals: Mapping[Method, str] = field(default_factory=dict)
+    ended: str = ""
     method: Method | None = None
     shift: int = 0
     changes: Mapping[str, float] = field(default_factory=dict)
@@ -60,12 +62,8 @@ class Work:
             opened=opened,
             shifts=shifts,
             moves={},
-            results={},
-            refusals={},
-            method=None,
             shift=0,
-            changes={},
-        )
+        ).without_results()
 
     def with_moves(self, index: int, changes: Mapping[Boundary, float]) -> Work:
         """With boundaries of one shift set by hand; none: as detected. Raises InputError."""
@@ -83,6 +81,10 @@ class Work:
         if checked(parameter_id, lock) != card_lock(self.require_card(), parameter_id):
             kept[parameter_id] = lock
         return replace(self, locks=kept)
+
+    def without_results(self) -> Work:
+        """Before an identification."""
+        return replace(self, results={}, refusals={}, ended="", method=None, changes={})
 
     def with_result(self, result: Outcome | Refusal) -> Work:
         """With what one method found, which is shown from now on."""

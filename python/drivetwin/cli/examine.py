@@ -141,13 +141,15 @@ def _answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
 def _friction(outcome: Outcome, shape: Shape) -> Answer:
     """Friction of a shape, with the twin that has it."""
     from drivetwin.cli.tables import friction_table
+    from drivetwin.identify.inputs import tolerances_of
     from drivetwin.identify.shape.fit import shaped_friction
     from drivetwin.results.doubts import friction_text
     from drivetwin.twin import Twin
 
     found = outcome.found
     with step(f"fitting {shape} friction"):
-        one = shaped_friction(found, shape, outcome.card.sensors)
+        tolerances = tolerances_of(outcome.log, outcome.card, found.shifts[0])
+        one = shaped_friction(found, shape, tolerances)
     shaped = replace(found, friction={**found.friction, **one.curves})
     twin = Twin.from_identification(shaped, outcome.card)
     return Answer(FRICTION, friction_text(one), friction_table(one.curves), twin)

@@ -95,8 +95,8 @@ def suggestion_table(suggestions: Sequence[Suggestion], estimates: Mapping[str, 
     )  # fmt: skip
     for one in suggestions:
         estimate = estimates[one.parameter]
-        unit, best = estimate.unit, one.prospects[:1]
-        then = "" if one.limit or not best else around(estimate.value, best[0].half_width, unit)
+        unit, best = estimate.unit, one.best
+        then = "" if best is None else around(estimate.value, best.half_width, unit)
         now = around(estimate.value, one.half_width, unit)
         table.add_row(one.parameter, now, one.text, then, shown(None, None, unit)[2])
     return table

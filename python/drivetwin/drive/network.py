@@ -97,12 +97,18 @@ def _vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[Element]
     ]
 
 
-def standstill(gearbox: Gearbox, gear: str, idle: float) -> Start:
-    """Return the vehicle at rest in `gear`, the engine at `idle` [rad/s]."""
-    members: Mapping[str, float | None] = gear_statics(gearbox, gear).speeds
+def standstill(gearbox: Gearbox, gear: str, powertrain: Powertrain) -> Start:
+    """Return the vehicle at rest in `gear`, the engine idling against the converter.
+
+    The shaft is twisted by what the turbine pulls, else the drive would begin with a jerk.
+    """
+    idle, statics = powertrain.engine.idle, gear_statics(gearbox, gear)
+    members: Mapping[str, float | None] = statics.speeds
     speeds = dict.fromkeys(members, 0.0)
     locked = (*gearbox.gear(gear).elements, ROAD, BRAKE)
-    return Start(speeds | {CRANK: idle, WHEEL: 0.0}, locked=locked)
+    pull = float(powertrain.converter.turbine_torque(idle, 0.0)) * statics.ratio
+    twists = {SHAFT: pull / gearbox.require_drive().k_o}
+    return Start(speeds | {CRANK: idle, WHEEL: 0.0}, twists, locked)
 
 
 def friction_elements(gearbox: Gearbox) -> tuple[str, ...]:

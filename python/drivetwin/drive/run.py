@@ -95,7 +95,7 @@ class _Driver:
         self.powertrain = powertrain
         self.elements = driveline_elements(gearbox, powertrain)
         self.first = forward_gears(gearbox)[0]
-        self.start = standstill(gearbox, self.first, powertrain.engine.idle)
+        self.start = standstill(gearbox, self.first, powertrain)
         self.outputs = recorded(gearbox)
         self.reduced = cache(lambda old, new: reduce(gearbox, old, new))
 

@@ -93,6 +93,7 @@ class OpenConverter:
             ),
             element("inertia", "J1", node=_TURBINE, inertia=model.J1),
             element("gear", "input gear", a=_TURBINE, b=_INPUT, ratio=model.i_in, loss=loss),
+            element("inertia", "J2e", node=_INPUT, inertia=model.J2e * model.i_in**2),
             *(part for each in model.elements for part in _clutch(each)),
             element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
             element(

@@ -107,20 +107,25 @@ def _made_part(part: Part, base: LikelihoodFit, rng: np.random.Generator) -> Par
     run = part.run(base.point)
     assert run is not None
     record = part.record
-    exact = record.stacked(run)
-    measured = exact + record.sigma * rng.standard_normal(exact.size)
-    return Part.unweighted(part.structure, _noisy(record, measured, rng))
+    noise = record.sigma * rng.standard_normal(record.size)
+    return Part.unweighted(part.structure, _noisy(record, record.stacked(run), noise, rng))
 
 
-def _noisy(record: Record, measured: FloatArray, rng: np.random.Generator) -> Record:
-    """The record with outputs `measured` (n,) and noise on its inputs, as its sensors have it."""
+def _noisy(
+    record: Record, exact: FloatArray, noise: FloatArray, rng: np.random.Generator
+) -> Record:
+    """The record with outputs `exact` (n,) plus `noise` (n,), and noise on its inputs, as its
+    sensors have it."""
     ends = np.cumsum([out.values.size for out in record.outputs])[:-1]
     outputs = tuple(
         replace(out, values=values)
-        for out, values in zip(record.outputs, np.split(measured, ends), strict=True)
+        for out, values in zip(record.outputs, np.split(exact + noise, ends), strict=True)
     )
     torque = record.engine_torque
-    jitter = record.input_sigma["engine torque"] * rng.standard_normal(torque.values.size)
+    jitter = record.torque_sigma * rng.standard_normal(torque.values.size)
+    jitter += record.torque_noise(noise)
+    if record.rounding is not None:
+        jitter += record.rounding.drawn(rng)
     pressures, held_back = {}, {}
     for name, signal in record.pressures.items():
         sigma = record.input_sigma[name]

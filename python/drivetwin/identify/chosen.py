@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which shifts of a whole drive are fitted: those with one load, as many as tell something new.
+"""Which shifts of a whole drive are fitted: those that can be, as many as tell something new.
 
 On a road the vehicle is braked and hills come and go, which no channel tells. A shift over which
 the load is not constant spoils the fit of all others, so it is left out where others do without.
@@ -13,19 +13,79 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from drivetwin.errors import DamagedChannelError, IdentificationError
 from drivetwin.identify.inputs import BESIDE, sampled
-from drivetwin.identify.load import load_left
-from drivetwin.identify.signals import Sampled
+from drivetwin.identify.momentum import MomentumSettings, stretches
+from drivetwin.identify.signals import Driveline, ShiftSignals
+from drivetwin.identify.steady import own_load, vehicle_of
 from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.progress import tell
+from drivetwin.shifts.converter import behind_converter, open_slip, require_closed
+from drivetwin.shifts.recorded import near, recorded
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.spec import VehicleCard
 
 MOST = 12
 """Most shifts of one log in one fit."""
-CONSTANT = 20.0
+CONSTANT = 5.0
 """Noise power left by eq. 11 up to which a load counts as constant, over that of the best shift:
-braked ones leave 30 to 1000 times as much, others up to 4 times. That of the best is 1, or what a
-delay of the sensors makes of it, which is the same in all."""
+braked ones and those over a change of grade leave 30 to 10000 times as much, others 0.7 to 1.5
+times. That of the best is 1, or what a delay of the sensors makes of it, which is the same in all.
+"""
+
+
+def usable_of(
+    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
+) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
+    """The shifts that can be used, cut to what a model may be driven over, and those refused.
+
+    Refused for a gap, for an open converter without a map, and for one with a map where other
+    shifts of the log have it closed: the inertia on the engine's side is another. Where none is
+    left, the last refusal is raised (DamagedChannelError, IdentificationError).
+    """
+    usable: list[Shift] = []
+    refused: list[RejectedShift] = []
+    for shift in shifts:
+        fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
+        try:
+            require_closed(log, card, shift)
+            seen = behind_converter(log, card, shift)
+            usable.append(near(recorded(seen, shift, fills, card.i_in)))
+        except (DamagedChannelError, IdentificationError) as refusal:
+            if len(shifts) == len(refused) + 1:
+                raise
+            span = (shift.before[1], shift.lockup_time)
+            refused.append(RejectedShift(span, refusal.what))
+    closed = tuple(shift for shift in usable if open_slip(log, card, shift) is None)
+    if not closed:
+        return tuple(usable), tuple(refused)
+    refused += [
+        RejectedShift((shift.before[1], shift.lockup_time), "the converter is open in this shift")
+        for shift in usable
+        if shift not in closed
+    ]
+    return closed, tuple(refused)
+
+
+def balanced(
+    signals: list[ShiftSignals], drivelines: list[Driveline]
+) -> tuple[list[ShiftSignals], list[Driveline], tuple[RejectedShift, ...]]:
+    """The shifts from which a fit can start, and those left out with the reason.
+
+    All where there would be none: in overrun the dissipative law leaves no momentum balance.
+    """
+    kept, refused = [], []
+    for k, (one, driveline) in enumerate(zip(signals, drivelines, strict=True)):
+        try:
+            stretches(one, driveline, MomentumSettings())
+        except IdentificationError as fault:
+            span = (one.shift.before[1], one.shift.lockup_time)
+            refused.append(RejectedShift(span, f"{fault.what}; other shifts of the log have one"))
+        else:
+            kept.append(k)
+    if not kept:
+        return signals, drivelines, ()
+    return [signals[k] for k in kept], [drivelines[k] for k in kept], tuple(refused)
 
 
 def chosen(
@@ -64,7 +124,8 @@ def _reason(left: float, steady: bool) -> str:
 
 
 def _left(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> list[float]:
-    """What `load_left` says of each shift; 0 for all without an output torque."""
+    """Noise power that the best constant load leaves of each shift, the vehicle being the same in
+    all; infinite where a shift tells nothing of it, and 0 for all without an output torque."""
     if "output_torque" not in log:
         return [0.0] * len(shifts)
     torque = sampled(log["output_torque"])
@@ -72,13 +133,22 @@ def _left(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> list[flo
         wheel = sampled(log["wheel_speed"])
     else:
         wheel = sampled(log["output_speed"], 1.0 / card.final_drive)
-    found = []
-    for one in shifts:
-        span = one.before[0], one.after[1]
-        near = span[0] - BESIDE, span[1] + BESIDE
-        parts: list[Sampled] = [torque.within(near), wheel.within(near)]
-        found.append(load_left(parts[0], parts[1], card.final_drive, span))
-    return found
+    spans = [(one.before[0], one.after[1]) for one in shifts]
+    near = [(start - BESIDE, end + BESIDE) for start, end in spans]
+    seen = [(torque.within(span), wheel.within(span)) for span in near]
+    i_f, alone = card.final_drive, []
+    for k, (span, (T_o, w)) in enumerate(zip(spans, seen, strict=True)):
+        tell(0.5 * k / len(spans))
+        alone.append(own_load(T_o, w, i_f, span))
+    vehicle = vehicle_of([one for one in alone if one is not None])
+    left = [float("inf") if one is None else one.left for one in alone]
+    if vehicle is None:
+        return left
+    for k, (span, (T_o, w)) in enumerate(zip(spans, seen, strict=True)):
+        tell(0.5 + 0.5 * k / len(spans))
+        one = None if alone[k] is None else own_load(T_o, w, i_f, span, vehicle)
+        left[k] = float("inf") if one is None else one.left
+    return left
 
 
 def _first(shifts: Sequence[Shift], left: Sequence[float], steady: Sequence[int]) -> list[int]:

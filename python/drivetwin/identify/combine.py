@@ -1,14 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Several shifts of one log: one value per parameter, weighted by covariance."""
+"""Several shifts of one log: one value per parameter, weighted by covariance.
+
+On a hilly road each shift has a load of its own, and T_v/i_f is their mean.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from drivetwin.identify.integral import NUISANCES, IntegralShift
+from drivetwin.identify.load import are_one
 from drivetwin.identify.signals import FloatArray
+
+LOAD = "Tv_over_if"
+"""What is a shift's own on a hilly road; its number follows then, after `@`."""
 
 NUGGET = 1e-7
 """Variance, as a share of a parameter's own, by which derived parameters may leave the equation
@@ -23,9 +31,37 @@ def combine(
     A prior is in the estimate of every shift with its parameter but counts once: its information
     is taken out for all of them but the first. Nuisances that the shifts share are eliminated last.
     """
-    ids, values, covariance = _joined(shifts)
+    ids, values, covariance = _with_own_loads(shifts) or _joined(shifts)
     kept = [k for k, name in enumerate(ids) if name.split(".")[0] not in NUISANCES]
     return tuple(ids[k] for k in kept), values[kept], covariance[np.ix_(kept, kept)]
+
+
+def loads_of(shifts: Sequence[IntegralShift]) -> tuple[float, ...]:
+    """Load of each shift at the output shaft [N m] where they differ; else empty."""
+    return tuple(shift.load.load for shift in shifts) if _with_own_loads(shifts) else ()
+
+
+def _with_own_loads(
+    shifts: Sequence[IntegralShift],
+) -> tuple[tuple[str, ...], FloatArray, FloatArray] | None:
+    """The same with a load for each shift, of which the mean is told; None where one may do."""
+    if len(shifts) == 1 or not all(LOAD in shift.ids for shift in shifts):
+        return None
+    own = [
+        replace(shift, ids=tuple(f"{n}@{k}" if n == LOAD else n for n in shift.ids))
+        for k, shift in enumerate(shifts)
+    ]
+    ids, values, covariance = _joined(own)
+    first, *others = [ids.index(f"{LOAD}@{k}") for k in range(len(shifts))]
+    rows = np.eye(len(ids))
+    differences = rows[others] - rows[first]
+    if are_one(differences @ values, differences @ covariance @ differences.T):
+        return None
+    rows[first, [first, *others]] = 1.0 / len(shifts)
+    kept = [k for k in range(len(ids)) if k not in others]
+    rows = rows[kept]
+    told = tuple(LOAD if k == first else ids[k] for k in kept)
+    return told, rows @ values, rows @ covariance @ rows.T
 
 
 def _joined(

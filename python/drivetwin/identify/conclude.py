@@ -10,11 +10,11 @@ from itertools import groupby
 import numpy as np
 
 from drivetwin.display import in_units
-from drivetwin.identify.combine import combine
+from drivetwin.identify.combine import combine, loads_of
 from drivetwin.identify.design import contradictions, design_of, held_against
 from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.known import with_known
-from drivetwin.identify.load import LoadFit
+from drivetwin.identify.load import AERO, LoadFit, different_loads
 from drivetwin.identify.result import Z95, Estimate, FrictionCurve, LoadLaw
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import (
@@ -51,7 +51,10 @@ RESTS_ON = {
 
 @dataclass(frozen=True, eq=False)
 class Conclusions:
-    """What the pipeline puts into the Identification."""
+    """What the pipeline puts into the Identification.
+
+    `loads` are those of the shifts at the output shaft [N m] where they differ; else empty.
+    """
 
     estimates: dict[str, Estimate]
     friction: dict[str, FrictionCurve]
@@ -59,6 +62,7 @@ class Conclusions:
     correlation: FloatArray
     warnings: tuple[str, ...]
     load: LoadLaw | None = None
+    loads: tuple[float, ...] = ()
 
 
 def _low_gear_note(signals: ShiftSignals, gear: str) -> str:
@@ -88,6 +92,13 @@ def conclude(
     ids, values, covariance = combine(shifts)
     beforehand = drivelines[0].known
     values, covariance, doubts = with_known(ids, values, covariance, beforehand)
+    law = _load_law(shifts, ids, values, covariance, systematic)
+    kept = [k for k, name in enumerate(ids) if name != AERO]
+    ids, values, covariance = (
+        tuple(ids[k] for k in kept),
+        values[kept],
+        covariance[np.ix_(kept, kept)],
+    )
     std = np.sqrt(np.diag(covariance))
     notes = low_gear_notes(signals)
     designs = {name: one for name in ids if (one := _design(name, drivelines)) is not None}
@@ -98,6 +109,7 @@ def conclude(
         for told in zip(ids, values.tolist(), std.tolist(), strict=True)
     }
     against = contradictions(ids, values, covariance, designs, systematic)
+    loads = loads_of(shifts)
     estimates |= _better_by_design(estimates, designs, {one.id for one in against})
     estimates = held_against(estimates, against, METHOD)
     for name, why in _misfits(shifts, signals, ids).items():
@@ -109,8 +121,41 @@ def conclude(
         _curves(shifts),
         ids,
         correlation(covariance),
-        (*doubts, *(one.text for one in against), *_warnings(shifts, signals, notes)),
+        (
+            *doubts,
+            *(one.text for one in against),
+            *_warnings(shifts, signals, notes),
+            *(() if law is None else (growth_told(law.aero, law.std, law.mean_speed),)),
+            *different_loads(loads),
+        ),
+        law,
+        loads,
     )
+
+
+def growth_told(aero: float, std: float, mean_speed: float) -> str:
+    """What is said of a load that grows with speed, by AERO and its standard deviation."""
+    return (
+        "the load grows with the square of the speed "
+        f"({in_units(aero, 'N*m*s^2/rad^2', Z95 * std)} at the wheel); "
+        f"T_v/i_f holds at {mean_speed:.3g} rad/s of the wheel"
+    )
+
+
+def _load_law(
+    shifts: Sequence[IntegralShift],
+    ids: Sequence[str],
+    values: FloatArray,
+    covariance: FloatArray,
+    systematic: Mapping[str, float],
+) -> LoadLaw | None:
+    """How the load grows with speed; None where it does not."""
+    if AERO not in ids:
+        return None
+    k, mean_speed = ids.index(AERO), shifts[0].load.holds_at
+    assert mean_speed is not None, "a load that grows holds at a speed"
+    std = float(np.hypot(np.sqrt(covariance[k, k]), systematic.get(AERO, 0.0)))
+    return LoadLaw(float(values[k]), std, mean_speed)
 
 
 def _estimate(

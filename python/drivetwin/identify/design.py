@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.display import in_units
+from drivetwin.driveline import LossLaw
 from drivetwin.identify.known import CONTRADICTS, without_prior
 from drivetwin.identify.result import Z95, Estimate, Verdict
 from drivetwin.identify.signals import Driveline, FloatArray
@@ -128,6 +129,30 @@ def outside_ranges(estimates: Mapping[str, Estimate], card: VehicleCard) -> tupl
             text = outside(name, one.value, design)
             texts.append(f"{text}: correct the range, or check ratios, gains and units of the log")
     return tuple(texts)
+
+
+def without_gain(
+    estimates: Mapping[str, Estimate], law: LossLaw
+) -> tuple[dict[str, Estimate], tuple[str, ...]]:
+    """The estimates, an η whose whole interval lies above 1 doubted, and what is said of it.
+
+    More power would leave the gears than enters, however well the simulation follows the log. In
+    overrun the law `paper` has such an η rightly: it is that of the power's other way.
+    """
+    one = estimates.get("eta")
+    if one is None or one.value is None or one.verdict is Verdict.DESIGN:
+        return dict(estimates), ()
+    low, _ = one.ci95_total or (one.value, one.value)
+    if low <= 1.0:
+        return dict(estimates), ()
+    text = (
+        f"η = {in_units(one.value, one.unit)}: more power would leave the gears than enters; the "
+        "engine torque, or the map of an open converter, gives too little, or the output torque "
+        "reads too much"
+    )
+    if law == "paper":
+        text += '; of a shift in overrun loss_law = "dissipative" tells η'
+    return {**estimates, "eta": doubted(one, "an efficiency above 1")}, (text,)
 
 
 def outside(symbol: str, value: float, design: tuple[float, float]) -> str:

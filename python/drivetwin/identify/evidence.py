@@ -39,6 +39,9 @@ class Evidence:
     paper's method and without an output torque."""
     likelihood: LikelihoodFit | None = None
     """The fit of all shifts together; None by another method, and where it did not converge."""
+    loads: tuple[float, ...] = ()
+    """Load of each shift at the output shaft [N m] where they differ, as on hills, T_v/i_f is then
+    their mean; empty where the shifts of a log share one."""
     several: Several | None = None
     """The logs behind a fit of several, from `identify_several`; None of one log."""
     suggestions: tuple[Suggestion, ...] = ()

@@ -8,13 +8,20 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.identify.noise import resolution, white_noise
-from drivetwin.identify.signals import Coupling, Driveline, Sampled, ShiftSignals
+from drivetwin.identify.signals import (
+    Coupling,
+    Driveline,
+    Sampled,
+    ShiftSignals,
+    TorqueOfSpeeds,
+)
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.pressure import pressed_element
 from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.shifts.converter import behind_converter
 from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.spec import VehicleCard
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance, VehicleCard
 
 
 def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
@@ -42,9 +49,27 @@ def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
     )
 
 
+NO_AGE = PriorValue(0.0)
+"""Age of a torque [s] that is computed from speeds."""
+
+
+def driveline_behind(card: VehicleCard, signals: ShiftSignals) -> Driveline:
+    """Known structure during the shift of `signals`; a torque computed from speeds has no age."""
+    found = driveline_of(card, signals.shift)
+    if signals.torque_of_speeds is None:
+        return found
+    return replace(found, known={**found.known, "te_delay": NO_AGE})
+
+
 BESIDE = 10.0
 """What the estimators see of a long log before and after a shift's held gears [s]: smoothing and
 ages of channels reach no further."""
+
+
+ENGINE_SPEEDS = ("engine_speed", "input_speed")
+"""Roles of the sensors of which one tells ω_e."""
+SECANT = 1e-3
+"""Least change of a speed [rad/s] over which the slope of a converter's torque is taken."""
 
 
 def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
@@ -71,11 +96,15 @@ def pressures_of(log: ShiftLog, shift: Shift) -> dict[str, Sampled]:
 def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
     """The signals of a log that the estimators need, around `shift`.
 
-    The noise is that of whole channels. Raises MissingChannelError for a missing channel. The
-    output torque may be missing.
+    Where the converter is open the turbine stands for the engine (`behind_converter`). The noise
+    is that of whole channels. Raises MissingChannelError for a missing channel. The output torque
+    may be missing.
     """
     span = shift.before[0] - BESIDE, shift.after[1] + BESIDE
-    whole = _whole_signals(log, card, shift)
+    seen = behind_converter(log, card, shift)
+    whole = _whole_signals(seen, card, shift)
+    if seen is not log:
+        whole = replace(whole, torque_of_speeds=_torque_of_speeds(log, card, whole))
 
     def near(signal: Sampled) -> Sampled:
         within = signal.time.size == 0 or (span[0] <= signal.time[0] and signal.time[-1] <= span[1])
@@ -112,6 +141,30 @@ def _whole_signals(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSigna
 
 _NOTHING = Sampled(np.empty(0), np.empty(0))
 """What stands for a sensor that the log does not have."""
+
+
+def _torque_of_speeds(log: ShiftLog, card: VehicleCard, behind: ShiftSignals) -> TorqueOfSpeeds:
+    """How the turbine's torque hangs on its speed, with which the fit compares."""
+    assert card.converter is not None
+    engine, turbine = sampled(log["engine_speed"]), behind.engine_speed
+    time = behind.engine_torque.time
+    pump, speed = (np.interp(time, one.time, one.values) for one in (engine, turbine))
+    steps = max(engine.sigma, SECANT), max(turbine.sigma, SECANT)
+    by_pump, by_turbine = card.converter.turbine_slopes(pump, speed, steps)
+    return TorqueOfSpeeds(time, by_turbine, engine.sigma * np.abs(by_pump))
+
+
+def tolerances_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> dict[str, SensorTolerance]:
+    """The card's sensor tolerances by role, of the speed sensors that ω_e is from as one of ω_e.
+
+    An engine speed beside which the gearbox input's is not looked at, or the reverse, has none.
+    """
+    read = "engine_speed" if "engine_speed" in behind_converter(log, card, shift) else "input_speed"
+    found = {role: one for role, one in card.sensors.items() if role not in ENGINE_SPEEDS}
+    if read in card.sensors:
+        one, factor = card.sensors[read], card.i_in if read == "input_speed" else 1.0
+        found["engine_speed"] = replace(one, offset=factor * one.offset)
+    return found
 
 
 def disturbed(signals: ShiftSignals, role: str, gain: float, offset: float) -> ShiftSignals:

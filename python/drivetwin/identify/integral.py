@@ -10,7 +10,7 @@ import numpy as np
 
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.friction import FrictionFit, FrictionSettings, momentum_friction
-from drivetwin.identify.load import SETTLING, LoadFit, momentum_load
+from drivetwin.identify.load import AERO, AERO_SPREAD, LoadFit, load_spans, momentum_load
 from drivetwin.identify.momentum import (
     MomentumFit,
     MomentumSettings,
@@ -19,7 +19,7 @@ from drivetwin.identify.momentum import (
 )
 from drivetwin.identify.ringdown import Drive, RingDown, fit_ringdown, quiet
 from drivetwin.identify.shaft import stiffness_and_damping
-from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
+from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals
 from drivetwin.identify.uncertainty import independent, propagate
 from drivetwin.vehicle.spec import PriorValue
 
@@ -32,7 +32,8 @@ class IntegralShift:
     """All stages for one shift; a stage the data could not carry is None, and `refusals` says why.
 
     `ids`, `values` (q,), `covariance` (q, q): the parameters that follow, in SI, and those of the
-    `NUISANCES` that are uncertain. `priors` by id: what was known beforehand, which is in them.
+    `NUISANCES` that are uncertain, AERO where the load grows. `priors` by id: what was known
+    beforehand, which is in them.
     """
 
     momentum: MomentumFit
@@ -44,14 +45,6 @@ class IntegralShift:
     covariance: FloatArray
     priors: Mapping[str, PriorValue]
     refusals: dict[str, str]
-
-
-def load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
-    """Where eq. 11 is used: throughout with a wheel speed, else away from the shift."""
-    shift = signals.shift
-    if signals.wheel_speed is not None:
-        return ((shift.before[0], shift.after[1]),)
-    return (shift.before, (shift.lockup_time + SETTLING, shift.after[1]))
 
 
 def _gear_inertia(driveline: Driveline, momentum: MomentumFit, ratio: float) -> FloatArray:
@@ -93,7 +86,10 @@ def _ring(
 def _derived(
     driveline: Driveline, momentum: MomentumFit, load: LoadFit, ring: RingDown | None, gear: str
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-    """Shaft parameters and nuisances with all that they share: their ids, values, covariance."""
+    """Shaft parameters, nuisances and AERO with all that they share: ids, values, covariance.
+
+    Raises IdentificationError where the inertias beside the shaft are hardly told: none of it then.
+    """
     size = len(momentum.names)
     unknown = [name for name, one in momentum.priors.items() if one.std > 0.0]
     nuisances = tuple(name for name in unknown if name.split(".")[0] in NUISANCES)
@@ -106,26 +102,32 @@ def _derived(
         parts.append(np.array([ring.decay_rate, ring.omega_d]))
         blocks.append(ring.covariance)
         ids = ("k_o", "c_o", f"f_d_{gear}", f"zeta_{gear}")
+    end = size + load.fit.theta.size
 
     def values(x: FloatArray) -> FloatArray:
-        theta, (tv, J3) = x[:size], x[size : size + 2]
+        theta, (tv, J3, *aero) = x[:size], x[size:end]
         before, then = (theta[1] + theta[2] / i**2 for i in (driveline.i_before, driveline.i_after))
         common = [theta[0], before, then, theta[2], theta[3], J3, tv]
         if ring is None:
-            return np.array([*common, *theta[kept]])
-        rate, omega = x[size + 2 :]
+            return np.array([*common, *theta[kept], *aero])
+        rate, omega = x[end:]
         shaft = stiffness_and_damping(rate, omega, float(after @ theta), J3 / driveline.i_f**2)
         zeta = rate / np.hypot(rate, omega)
-        return np.array([*common, *shaft, omega / (2.0 * np.pi), zeta, *theta[kept]])
+        return np.array([*common, *shaft, omega / (2.0 * np.pi), zeta, *theta[kept], *aero])
 
     found, covariance = propagate(values, np.concatenate(parts), independent(*blocks))
-    return (*ids, *nuisances), found, covariance
+    grown = () if load.holds_at is None else (AERO,)
+    return (*ids, *nuisances, *grown), found, covariance
 
 
 def identify_shift(
-    signals: ShiftSignals, driveline: Driveline, start_inertia: float
+    signals: ShiftSignals,
+    driveline: Driveline,
+    start_inertia: float,
+    load_at: float | None = None,
 ) -> IntegralShift:
-    """Run all stages on one shift. `start_inertia` [kg m^2]: any plausible J′.
+    """Run all stages on one shift. `start_inertia` [kg m^2]: any plausible J′. The load grows with
+    speed where T_v/i_f is to hold at one, `load_at` [rad/s].
 
     Raises IdentificationError where inertia or load cannot be told; a missing oscillation or too
     short an inertia phase only costs its own parameters.
@@ -133,7 +135,7 @@ def identify_shift(
     settings = MomentumSettings()
     shift = signals.shift
     momentum = momentum_inertia(signals, driveline, settings, start_inertia)
-    load = momentum_load(signals, driveline.i_f, load_spans(signals))
+    load = momentum_load(signals, driveline.i_f, load_spans(signals), load_at)
     refusals: dict[str, str] = {}
     ring: RingDown | None = None
     friction: FrictionFit | None = None
@@ -146,7 +148,11 @@ def identify_shift(
         friction = momentum_friction(signals, driveline, momentum, free, FrictionSettings())
     except IdentificationError as error:
         refusals["friction"] = error.what
-    further, values, covariance = _derived(driveline, momentum, load, ring, shift.end_gear)
+    try:
+        further, values, covariance = _derived(driveline, momentum, load, ring, shift.end_gear)
+    except IdentificationError as error:
+        ring, refusals["shaft"] = None, error.what
+        further, values, covariance = _derived(driveline, momentum, load, None, shift.end_gear)
     gears = (f"J_prime_{shift.start_gear}", f"J_prime_{shift.end_gear}")
     ids: tuple[str, ...] = ("eta", *gears, "J_out", "te_delay", "J_vehicle", "Tv_over_if")
     ids = (*ids, *further)
@@ -156,6 +162,8 @@ def identify_shift(
         values, covariance = values[keep], covariance[np.ix_(keep, keep)]
         refusals["te_delay"] = "the engine torque moves too little for its age to show"
     priors = {name: one for name, one in momentum.priors.items() if name in ids}
+    if AERO in ids:
+        priors[AERO] = PriorValue(0.0, AERO_SPREAD)
     if friction is not None:
         ids = (*ids, f"P0.{friction.element}")
         priors[ids[-1]] = driveline.oncoming.P0

@@ -2,19 +2,23 @@
 """Load torque T_v/i_f and vehicle inertia J3 (eq. 11), the paper's way and in momentum form.
 
 T_o - T_v/i_f = (J3/i_f)·ω_w'
+
+Where the load grows with the square of the speed, T_v/i_f holds at the mean speed of the log.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
+from scipy.stats import chi2
 
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.modulating import Quadrature, hann_kernels, join, windows_in
 from drivetwin.identify.regression import Fit, Prior, Term, solve
-from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
+from drivetwin.identify.signals import FloatArray, ShiftSignals, Span
 from drivetwin.identify.wlse import (
     GridFit,
     GridRow,
@@ -73,21 +77,29 @@ def paper_load(
     return GridFit(rows, best, acceleration, torque, output_torque - rows[0].value, weights)
 
 
+ONE_LOAD = 0.05
+"""Probability under one load below which the shifts of a log have a load each. High: a load too
+many costs a little width, one too few puts what hills do into J3 and η."""
 WIDTH = 0.4
 """Width of a window [s]."""
-UNKNOWNS = 3
-"""Load, inertia and the part of the load that grows with speed."""
+AERO = "aero"
+"""The part of the load that grows with the square of the speed, at the wheel [N m s^2/rad^2]."""
+AERO_SPREAD = 10.0
+"""Plausible air drag at the wheel [N m s^2/rad^2]: of a lorry 1 to 3, of a car 0.1."""
+SIGNIFICANT = 3.0
+"""Size of the growing part of the load, in its standard deviations, from which it is kept."""
 SETTLING = 0.5
 """Time after lock-up [s] in which the output speed cannot stand in for the wheel speed."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoadFit:
-    """Regression of eq. 11: θ = (T_v/i_f, J3) in `fit`.
+    """Regression of eq. 11: θ = (T_v/i_f, J3) in `fit`, and AERO where the load may grow.
 
-    Evidence, one entry per window: `time` [s], `torque` = mean T_o - T_v/i_f [N m],
+    Evidence, one entry per window: `time` [s], `torque` = mean T_o less the load [N m],
     `acceleration` = mean ω_w' [rad/s^2]. `mean_speed` is that of the wheel [rad/s];
     `speed_trend` the t value of a residual proportional to the speed's deviation from it.
+    `holds_at` is the speed [rad/s] at which T_v/i_f holds, None where the load does not grow.
     """
 
     fit: Fit
@@ -96,6 +108,7 @@ class LoadFit:
     acceleration: FloatArray
     mean_speed: float
     speed_trend: float
+    holds_at: float | None = None
 
     @property
     def load(self) -> float:
@@ -108,45 +121,67 @@ class LoadFit:
         return float(self.fit.theta[1])
 
 
-def load_left(torque: Sampled, wheel: Sampled, i_f: float, span: Span) -> float:
-    """Noise power (1: noise alone) that eq. 11 leaves over `span` [s] with the best load.
+def are_one(differences: FloatArray, covariance: FloatArray) -> bool:
+    """Whether loads may be one that differ by `differences` (m,) with `covariance` (m, m)."""
+    scale = np.sqrt(np.diag(covariance))
+    inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
+    unit = differences / scale
+    return bool(unit @ inverse @ unit < chi2.isf(ONE_LOAD, differences.size))
 
-    The load is constant but for a part that grows with the square of the speed `wheel` [rad/s].
-    Much more than noise is left where something else moves the vehicle: brake, change of grade.
-    Infinite where the span holds nothing to tell it from.
+
+def different_loads(loads: Sequence[float]) -> list[str]:
+    """What is said of the loads of the shifts [N m]; nothing of one load, which is empty."""
+    if not loads:
+        return []
+    return [
+        "the load differs from shift to shift, as on hills: each has its own, "
+        f"{min(loads):.0f} to {max(loads):.0f} N·m; T_v/i_f is their mean"
+    ]
+
+
+def load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
+    """Where eq. 11 is used: throughout with a wheel speed, else away from the shift."""
+    shift = signals.shift
+    if signals.wheel_speed is not None:
+        return ((shift.before[0], shift.after[1]),)
+    return (shift.before, (shift.lockup_time + SETTLING, shift.after[1]))
+
+
+def growing_from(signals: Sequence[ShiftSignals], i_f: float) -> float | None:
+    """Mean wheel speed of the log [rad/s] where the load of its shifts grows with speed, else None.
+
+    Each shift tells by itself, so that hills between them say nothing. Raises IdentificationError
+    where torque and speed of a shift do not determine its load.
     """
-    parts = parts_between(span, (*torque.unrecorded, *wheel.unrecorded))
-    windows = join([windows_in(part, WIDTH, WIDTH / 16.0) for part in parts])
-    if windows.count <= UNKNOWNS:
-        return float("inf")
-    psi = hann_kernels(torque.time, windows).psi
-    kernels = hann_kernels(wheel.time, windows)
-    area, one = 0.5 * windows.width, np.ones(windows.count)
-    constant = Quadrature(csr_array(area[:, None]))
-    square = wheel.at(windows.centre) ** 2
-    grown = (square - square.mean()) / max(float(np.ptp(square)), np.finfo(float).tiny)
+    speed = mean_speed_of(signals, i_f)
+    fits = [momentum_load(s, i_f, load_spans(s), speed).fit for s in signals]
+    growth = np.array([fit.theta[2] for fit in fits])
+    weight = np.array([fit.std[2] ** -2 for fit in fits])
+    return speed if growth @ weight > SIGNIFICANT * np.sqrt(np.sum(weight)) else None
 
-    def terms(theta: FloatArray) -> list[Term]:
-        load = -(theta[0] + theta[2] * grown)
-        inertia = {1: (-one / i_f, kernels.slope)}
-        return [
-            Term(torque.values, torque.sigma, psi, one, {}),
-            Term(np.ones(1), 0.0, constant, load, {0: (-one, constant), 2: (-grown, constant)}),
-            Term(wheel.values, wheel.sigma, kernels.slope, -theta[1] / i_f * one, inertia),
-        ]
 
-    try:
-        return solve(terms, np.zeros(UNKNOWNS), Prior.independent(UNKNOWNS, {})).chi2
-    except IdentificationError:
-        return float("inf")
+def mean_speed_of(signals: Sequence[ShiftSignals], i_f: float) -> float:
+    """Mean wheel speed over the log [rad/s]."""
+    means = [
+        float(np.mean(s.output_speed.values)) / i_f
+        if s.wheel_speed is None
+        else float(np.mean(s.wheel_speed.values))
+        for s in signals
+    ]
+    return float(np.mean(means))
 
 
 def momentum_load(
-    signals: ShiftSignals, i_f: float, spans: tuple[Span, ...], width: float = WIDTH
+    signals: ShiftSignals,
+    i_f: float,
+    spans: tuple[Span, ...],
+    holds_at: float | None = None,
+    width: float = WIDTH,
 ) -> LoadFit:
     """Estimate (T_v/i_f, J3) from ∫ψ·T_o - (T_v/i_f)·∫ψ = (J3/i_f)·∫ψ·ω_w' over all windows.
 
-    Eq. 11 knows no gear, so `spans` may cover the whole log where the wheel speed is measured.
+    Eq. 11 knows no gear, so `spans` may cover the whole log where the wheel speed is measured. With
+    `holds_at` [rad/s] the load may grow with speed, and T_v/i_f is that at this speed.
     Raises IdentificationError where torque and speed do not determine both.
     """
     wheel = signals.wheel_speed
@@ -162,23 +197,33 @@ def momentum_load(
     scale = i_f**-2 if wheel is None else 1.0 / i_f
     torque = signals.output_torque
     psi = hann_kernels(torque.time, windows).psi
-    slope = hann_kernels(speed.time, windows).slope
+    kernels = hann_kernels(speed.time, windows)
     area = 0.5 * windows.width
     one = np.ones(windows.count)
     constant = Quadrature(csr_array(area[:, None]))
-
-    def terms(theta: FloatArray) -> list[Term]:
-        inertia = {1: (-scale * one, slope)}
-        return [
-            Term(torque.values, torque.sigma, psi, one, {}),
-            Term(np.ones(1), 0.0, constant, -theta[0] * one, {0: (-one, constant)}),
-            Term(speed.values, speed.sigma, slope, -theta[1] * scale * one, inertia),
-        ]
-
-    start = np.array([float(np.mean(torque.values)), 1.0])
-    fit = solve(terms, start, Prior.independent(2, {}))
     ratio = 1.0 if wheel is not None else 1.0 / i_f
     local = speed.at(windows.centre) * ratio
+    # By T_v/i_f and AERO; of squares the mean over a window: noise amid it would outweigh all else.
+    shares = {0: one}
+    if holds_at is not None:
+        square = (kernels.psi.matrix @ speed.values**2) * ratio**2 / area
+        shares[2] = (square - holds_at**2) / i_f
+
+    def load(theta: FloatArray) -> FloatArray:
+        return np.asarray(sum(theta[k] * share for k, share in shares.items()))
+
+    def terms(theta: FloatArray) -> list[Term]:
+        inertia = {1: (-scale * one, kernels.slope)}
+        acting = {k: (-share, constant) for k, share in shares.items()}
+        return [
+            Term(torque.values, torque.sigma, psi, one, {}),
+            Term(np.ones(1), 0.0, constant, -load(theta), acting),
+            Term(speed.values, speed.sigma, kernels.slope, -theta[1] * scale * one, inertia),
+        ]
+
+    start = np.array([float(np.mean(torque.values)), 1.0, 0.0])[: 1 + len(shares)]
+    known = {2: (0.0, AERO_SPREAD)} if 2 in shares else {}
+    fit = solve(terms, start, Prior.independent(start.size, known))
     centred = local - local.mean()
     z = fit.residual / fit.residual_std
     spread = float(np.sqrt(np.sum(centred**2)))
@@ -186,8 +231,9 @@ def momentum_load(
     return LoadFit(
         fit,
         windows.centre,
-        (psi.matrix @ torque.values) / area - fit.theta[0],
-        (slope.matrix @ speed.values) * ratio / area,
+        (psi.matrix @ torque.values) / area - load(fit.theta),
+        (kernels.slope.matrix @ speed.values) * ratio / area,
         float(local.mean()),
         float(z @ centred) / (spread * overlap) if spread > 0.0 else 0.0,
+        holds_at,
     )

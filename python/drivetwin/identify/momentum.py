@@ -73,6 +73,10 @@ class Stretch:
     windows: Windows
 
 
+SMOOTH = 5
+"""Samples over which a pressure is averaged before it is held against a limit."""
+VENTED = 0.5
+"""Share of P0 below which a pressure that is left after lock-up means an empty element."""
 LEAST_SPAN = 0.05
 """A shorter stretch [s] holds no window that says anything."""
 LEAST_BESIDE = 0.25
@@ -152,17 +156,30 @@ def off_going_free(
 ) -> float:
     """First instant of the inertia phase at which the off-going element carries nothing [s].
 
-    Its pressure must have fallen for good below P0, less two standard deviations of P0.
+    Its pressure must have fallen for good below P0, less two standard deviations of P0. Where P0
+    is so little known, or so low, that no pressure is below that, it must have fallen to what is
+    left of it after lock-up.
     """
     shift = signals.shift
     start = shift.inertia_phase[0] + settings.guard("inertia_start", shift)
     element = driveline.offgoing
     pressure = signals.pressures[element.name]
     limit = element.P0.value - 2.0 * element.P0.std
-    smooth = np.convolve(pressure.values, np.ones(5) / 5.0, mode="same")
+    rest, margin = _vented(pressure, shift)
+    if limit < rest + margin and rest < max(VENTED * element.P0.value, margin):
+        limit = rest + margin
+    smooth = np.convolve(pressure.values, np.ones(SMOOTH) / SMOOTH, mode="same")
     inside = (pressure.time >= start) & (pressure.time < shift.lockup_time)
     held = pressure.time[inside & (smooth >= limit)]
     return float(held[-1]) if held.size else start
+
+
+def _vented(pressure: Sampled, shift: Shift) -> tuple[float, float]:
+    """What is left of an off-going pressure after lock-up [Pa], and how near is as good as there:
+    what noise makes of a mean of so many samples, and a hundredth of the whole fall."""
+    spans = (np.linspace(*span, 100) for span in (shift.before, shift.after))
+    before, rest = (float(np.median(pressure.at(time))) for time in spans)
+    return rest, 5.0 * pressure.sigma / float(np.sqrt(SMOOTH)) + 0.01 * abs(before - rest)
 
 
 def _driving(torque: Sampled, windows: Windows) -> Windows:

@@ -46,11 +46,16 @@ def _without_corners(squares: FloatArray) -> float:
 
 
 def resolution(values: FloatArray) -> float:
-    """Rounding step of a channel: the smallest jump of which all others are multiples, or 0."""
-    jumps = np.abs(np.diff(values))
-    jumps = jumps[jumps > 1e-9 * max(float(np.max(np.abs(values))), 1e-9)]
-    if jumps.size < 10:
+    """Rounding step of a channel: the least distance of two of its numbers, of which all distances
+    are multiples; 0 where there is none, or the channel moves too seldom to show it.
+
+    Samples in a row need not show it: along a ramp all of them may be many steps apart.
+    """
+    least = 1e-9 * max(float(np.max(np.abs(values))), 1e-9)
+    gaps = np.diff(np.unique(values))
+    gaps = gaps[gaps > least]
+    if not gaps.size or np.count_nonzero(np.abs(np.diff(values)) > least) < 10:
         return 0.0
-    step = float(np.min(jumps))
-    multiples = jumps / step
+    step = float(np.min(gaps))
+    multiples = gaps / step
     return step if float(np.max(np.abs(multiples - np.round(multiples)))) < 1e-3 else 0.0

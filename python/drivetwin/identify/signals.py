@@ -55,6 +55,19 @@ class Sampled:
         return Sampled(self.time[keep], self.values[keep], self.sigma)
 
 
+@dataclass(frozen=True, eq=False)
+class TorqueOfSpeeds:
+    """How an engine torque that is a map of speeds hangs on the noise of the compared one.
+
+    `slope` (n,) [N m s/rad] is its derivative by ω_e at `time` (n,) [s], `rest` (n,) [N m] the
+    noise of its samples that is not from ω_e.
+    """
+
+    time: FloatArray
+    slope: FloatArray
+    rest: FloatArray
+
+
 @dataclass(frozen=True)
 class Coupling:
     """A shift element in the dual-clutch form: slip = a·ω_e - b·ω_out (eq. 15).
@@ -129,6 +142,8 @@ class ShiftSignals:
     """Rounding step of the engine torque [N m]; 0 where none shows."""
     log: int = 0
     """Number of the log, from 1, where several are fitted together; 0: there is one only."""
+    torque_of_speeds: TorqueOfSpeeds | None = None
+    """Where the engine torque is that of a converter's turbine, computed from speeds."""
 
     @property
     def output_gaps(self) -> tuple[Span, ...]:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Weighted least squares of the paper: weights from the plausible range of each sample's quotient.
 
-The derivative is the paper's: signals averaged over windows of 10 ms, speeds differenced
-centrally between the neighbouring windows. It is kept as the reference; THEORY section 5 and the
-modulating functions show how to do without a derivative.
+The paper does not say how it differentiates speeds. Here signals are averaged over windows of 10 ms
+and speeds differenced centrally between the neighbouring windows (THEORY section 4). The method is
+kept as the reference; section 5 and the modulating functions show how to do without a derivative.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.identify.signals import FloatArray, Sampled, Span
 
 WINDOW = 0.01
-"""Averaging window of the paper's procedure [s]."""
+"""Averaging window of speeds and torques in the paper's procedure [s]."""
 
 
 @dataclass(frozen=True)

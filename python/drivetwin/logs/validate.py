@@ -179,7 +179,9 @@ def _at_rest(channel: Channel) -> list[str]:
 
 def _coarse(channel: Channel) -> list[str]:
     """Words for a measured channel that was rounded so much that nothing precise rests on it."""
-    step, largest = resolution(channel.values), float(np.abs(channel.values).max())
+    # Not from one sample to the next: along a ramp of a slow channel all may be many steps apart.
+    numbers = np.unique(channel.values[np.isfinite(channel.values)])
+    step, largest = resolution(numbers), float(np.abs(numbers).max(initial=0.0))
     if channel.quantity in AUXILIARY or step <= COARSE * largest or _switched(channel.values):
         return []
     return [

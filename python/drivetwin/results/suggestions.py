@@ -11,16 +11,23 @@ from drivetwin.results.records import OptionalFloat, Record
 
 
 class ProspectRecord(Record):
-    """What an experiment, so many times repeated, would make of the 95 % half width."""
+    """What an experiment, so many times repeated, would make of the 95 % half width.
+
+    `shift` is the shift of the log that it is built on, by its gears; empty where all are alike.
+    """
 
     experiment: Experiment
     repeats: int
     half_width: OptionalFloat
     verdict: Verdict
+    shift: str = ""
 
 
 class SuggestionRecord(Record):
-    """A parameter, its 95 % half width now (null where open), and experiments in order of worth."""
+    """A parameter, its 95 % half width now (null where open), and all experiments by their worth.
+
+    `text` names the best one, or says that none helps or why.
+    """
 
     parameter: str
     unit: str

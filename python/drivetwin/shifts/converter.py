@@ -7,12 +7,15 @@ Closed means ω_e = i_in·ω_in. The flag on the bus tells when; the speeds deci
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.logs.damage import runs
+from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.flags import set_spans
 from drivetwin.shifts.kinematics import FloatArray
@@ -20,13 +23,24 @@ from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import VehicleCard
 
 Span = tuple[float, float]
+BoolArray = NDArray[np.bool_]
+
+TURBINE_TORQUE = "turbine torque"
+"""What the name of a torque starts with that is the turbine's, by the map."""
 
 CLOSED = 0.02
 """Relative slip between engine and input below which the lock-up clutch counts as closed."""
+_RIGID = 0.005
+"""The same where nothing else tells whether an open converter only runs through synchronism."""
 _HOLD = 0.3
 """Time [s] over which the slip must stay closed."""
 _LASTS = 1.0
 """Time [s] from which on slip is no late speed in a shift."""
+LETS_GO = 0.3
+"""Time [s] before the converter is seen open or closed, and after it is, in which its lock-up
+clutch may slip."""
+_BEYOND = 0.01
+"""Speed ratio by which noise may lead beyond the ends of a map."""
 _BESIDE = 0.5
 """Span before a shift [s] over which its converter is looked at."""
 _STEP = 0.01
@@ -65,28 +79,76 @@ def open_slip(log: ShiftLog, card: VehicleCard, shift: Shift) -> float | None:
     return slip if slip is not None and abs(slip) > CLOSED else None
 
 
+def unseen(log: ShiftLog, card: VehicleCard) -> tuple[str, ...]:
+    """What is said where the card has a converter and no channel tells whether it is open."""
+    lacks = [role for role in ("engine_speed", "input_speed") if role not in log]
+    if card.converter is None or not lacks or "lockup_engaged" in log:
+        return ()
+    return (
+        f"nothing tells whether the converter is open, for the log has no {lacks[0]}: it counts as "
+        f"closed, and values are wrong where it is not; map `{lacks[0]}`, or the lock-up flag as "
+        "`lockup_engaged`",
+    )
+
+
 def behind_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog:
     """The log as the gearbox sees it: where the converter is open, the turbine is its engine.
 
     Its torque, by the card's map from the speeds of engine and input, takes the place of
-    `engine_torque`, and its speed that of the engine. The log as it is where the converter is
-    closed before `shift` or the card has no map.
+    `engine_torque`, and its speed that of the engine. It has no samples where the lock-up clutch
+    may carry some of it, nor beyond the ends of the map. The log as it is where the converter is
+    closed before `shift` or the card has no map. Raises IdentificationError where the map ends
+    short of the shift.
     """
     if card.converter is None or open_slip(log, card, shift) is None:
         return log
-    engine = log["engine_speed"]
-    turbine = card.i_in * log["input_speed"].at(engine.time)
+    engine = fresh_samples(log["engine_speed"])
+    turbine = card.i_in * fresh_samples(log["input_speed"]).at(engine.time)
     known = np.isfinite(turbine) & (engine.values > 0.0)
+    ratio = np.divide(turbine, engine.values, out=np.zeros_like(turbine), where=known)
+    first, last = card.converter.speed_ratio[0], card.converter.speed_ratio[-1]
+    beyond = known & ((ratio < first - _BEYOND) | (ratio > last + _BEYOND))
+    _require_map(log, shift, engine.time[beyond], ratio[beyond], (first, last))
+    known &= ~beyond
+    for start, end in _closed_spans(log, card.i_in):
+        known &= (engine.time < start - LETS_GO) | (engine.time > end + LETS_GO)
     torque = Channel(
         role="engine_torque",
         quantity=Quantity.TORQUE,
         time=engine.time[known],
         values=card.converter.turbine_torque(engine.values[known], turbine[known]),
-        source_name=f"turbine torque from {engine.source_name}",
+        source_name=f"{TURBINE_TORQUE} from {engine.source_name}, lock-up clutch open",
         source_unit="Nm",
     )
     others = {role: c for role, c in log.channels.items() if role != "engine_speed"}
     return replace(log, channels={**others, "engine_torque": torque})
+
+
+def _require_map(
+    log: ShiftLog, shift: Shift, time: FloatArray, ratio: FloatArray, ends: Span
+) -> None:
+    """Raise IdentificationError where speed ratios (n,) beyond the `ends` of the map, at `time`
+    (n,) [s], lie in the shift or just beside it."""
+    near = (time > shift.before[1] - _HOLD) & (time < shift.lockup_time + _HOLD)
+    if not near.any():
+        return
+    worst = ratio[near][np.argmax(np.maximum(ends[0] - ratio[near], ratio[near] - ends[1]))]
+    raise IdentificationError(
+        f"the map of the converter on the card has speed ratios from {ends[0]:g} to {ends[1]:g}; "
+        f"in the shift {shift.start_gear}-{shift.end_gear} it is {worst:.3f}",
+        "give the map under [converter] as far as the log goes; in overrun the turbine is faster "
+        "than the pump, which is a ratio above 1",
+        Where(file=log.source, time=float(time[near][0])),
+    )
+
+
+def _closed_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
+    """Spans [s] in which the lock-up clutch is closed: by its flag, else by the speeds of engine
+    and input, the same for _HOLD on. An open converter seldom lingers there, and carries nothing.
+    """
+    if "lockup_engaged" in log:
+        return tuple(set_spans(log["lockup_engaged"]))
+    return _spans(log, i_in, lambda mean: np.abs(mean) < _RIGID, _HOLD)
 
 
 def require_closed(log: ShiftLog, card: VehicleCard, shift: Shift) -> None:
@@ -159,6 +221,13 @@ def open_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
     """
     if "engine_speed" not in log or "input_speed" not in log:
         return ()
+    return _spans(log, i_in, lambda mean: np.abs(mean) > CLOSED, _LASTS)
+
+
+def _spans(
+    log: ShiftLog, i_in: float, shows: Callable[[FloatArray], BoolArray], least: float
+) -> tuple[Span, ...]:
+    """Spans [s] of `least` or more in which the slip's mean over _HOLD/3 `shows` something."""
     time, slip = _slip(log["engine_speed"], log["input_speed"], i_in)
     width = round(_HOLD / _STEP / 3.0)
     if time.size < 4 * width:
@@ -166,8 +235,8 @@ def open_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
     mean = np.convolve(np.where(np.isfinite(slip), slip, 0.0), np.ones(width) / width, "same")
     return tuple(
         (float(time[first]), float(time[stop - 1]))
-        for first, stop in runs(np.abs(mean) > CLOSED)
-        if (stop - first) * _STEP >= _LASTS
+        for first, stop in runs(shows(mean))
+        if (stop - first) * _STEP >= least
     )
 
 

@@ -20,7 +20,7 @@ from drivetwin.errors import DamagedChannelError, Where
 from drivetwin.logs.held import fresh_samples
 from drivetwin.logs.pressure import pressure_role
 from drivetwin.logs.shiftlog import Channel, ShiftLog, open_ends
-from drivetwin.shifts.converter import open_spans
+from drivetwin.shifts.converter import LETS_GO, TURBINE_TORQUE, open_spans
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
 
@@ -31,9 +31,6 @@ OLDEST, YOUNGEST = 0.08, 0.02
 
 LEAST = 0.15
 """Shortest time [s] of a held gear before and after the shift that anything is told from."""
-
-LETS_GO = 0.3
-"""Time [s] before the converter is seen open, and after it is, in which its clutch may slip."""
 
 BEFORE, AFTER = 8.0, 5.0
 """Longest time [s] of the gears held before and after the shift over which a load is taken as
@@ -153,8 +150,15 @@ def _refused(log: ShiftLog, gap: _Gap, where: str) -> DamagedChannelError:
             "the lock-up clutch closed",
             Where(file=log.source, time=gap.span[0]),
         )
+    again = "record the shift again: what drives a model must be there throughout"
+    if gap.channel.source_name.startswith(TURBINE_TORQUE):
+        again = (
+            "keep the lock-up clutch open, or closed, from a second before the shift to a second "
+            "after it; where it was open at the same speeds on both sides, map its flag as "
+            "`lockup_engaged`"
+        )
     return DamagedChannelError(
         f"{gap}, {where}",
-        "record the shift again: what drives a model must be there throughout",
+        again,
         Where(file=log.source, channel=gap.channel.source_name, time=gap.span[0]),
     )

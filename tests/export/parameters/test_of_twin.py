@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.converter import Converter
+from drivetwin.driveline import Stribeck
 from drivetwin.export.parameters.content import Curve, Scalar
 from drivetwin.export.parameters.of_twin import converter_curves, parameters_of
 from drivetwin.identify.result import Estimate, Verdict
@@ -73,6 +74,19 @@ def test_the_curve_gives_the_law_of_the_simulation() -> None:
     slip = np.linspace(0.0, 95.0, 2000)
     law = STRIBECK.at(slip)
     assert np.interp(slip, curve.axis.points, curve.values) == pytest.approx(law, rel=1e-3)
+
+
+@pytest.mark.parametrize("v_s", [1.0, 5.0, 15.0, 60.0])
+@pytest.mark.parametrize("mu_s", [0.08, 0.20])
+def test_the_curve_keeps_to_a_law_that_bends_near_zero_slip(v_s: float, mu_s: float) -> None:
+    given, law = twin(), Stribeck(0.11, mu_s, v_s, 1e-4)
+    seen = replace(given.friction["B3"], slip=np.linspace(0.0, 300.0, 60), stribeck=law)
+    curve = parameters_of(replace(given, friction={**given.friction, "B3": seen}))["mu.B3"]
+    assert isinstance(curve, Curve)
+    assert (curve.axis.points[-1], len(curve.axis.points)) == (300.0, 33)
+    slip = np.linspace(0.0, 300.0, 20001)
+    told = np.interp(slip, curve.axis.points, curve.values)
+    assert told == pytest.approx(law.at(slip), rel=1e-3)
 
 
 def test_a_table_keeps_its_own_points() -> None:

@@ -4,19 +4,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.experiment.catalogue import Experiment
-from drivetwin.identify.experiment.suggest import LEAST_KNOWN, examined, suggest
+from drivetwin.identify.experiment.suggest import (
+    LEAST_KNOWN,
+    NONE_HELPS,
+    Prospect,
+    Suggestion,
+    examined,
+    suggest,
+)
 from drivetwin.identify.likelihood.derived import of_log
 from drivetwin.identify.likelihood.noise_power import noise_power
-from drivetwin.identify.likelihood.unknowns import Point, own_of
+from drivetwin.identify.likelihood.unknowns import LAW, Point, own_of
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification, Verdict
-from tests.identify.asked import by_the_paper, slowed, stepped, still
+from tests.identify.asked import by_the_paper, slowed, stepped, still, uncertain_fills
 
 
 def test_throttle_steps_tell_the_age_of_a_torque_that_stood_still() -> None:
@@ -51,6 +59,76 @@ def test_order_is_by_worth_and_least_known_are_told_too() -> None:
         widths = [p.half_width for p in one.prospects]
         assert widths == sorted(widths)
         assert widths[0] < one.half_width
+
+
+def _suggestion(now: float, *widths: float) -> Suggestion:
+    prospects = tuple(
+        Prospect(each, 1, width, Verdict.IDENTIFIED)
+        for each, width in zip(Experiment, widths, strict=False)
+    )
+    return Suggestion("P0.B2", Verdict.IDENTIFIED, now, prospects)
+
+
+def test_an_experiment_that_hardly_narrows_is_not_named() -> None:
+    useless = _suggestion(7428.0, 7423.0, 7424.0)
+    assert useless.best is None
+    assert useless.text == NONE_HELPS
+    useful = _suggestion(7428.0, 7423.0, 5000.0)
+    assert useful.best is useful.prospects[1]
+    assert useful.text == Experiment.THROTTLE_STEPS
+
+
+def test_of_an_open_parameter_an_experiment_that_leaves_it_open_is_not_named() -> None:
+    width = Prospect(Experiment.AGAIN, 4, 0.04, Verdict.NOT_IDENTIFIABLE)
+    one = Suggestion("te_delay", Verdict.NOT_IDENTIFIABLE, np.inf, (width,))
+    assert one.text == NONE_HELPS
+
+
+def _followed_by_another_shift(found: Identification) -> Identification:
+    """The identification as if its shift were followed by one to a gear 4, which K makes."""
+    fit, signals = likelihood_of(found)
+    (part,), (shown,) = fit.problem.parts, signals
+    first, record = part.structure, part.record
+    oncoming = replace(first.driveline.oncoming, name="K", a=5.0, b=6.0)  # a brake of ratio 1.2
+    held = {**first.driveline.couplings, "K": oncoming}
+    driveline = replace(
+        first.driveline, offgoing=first.driveline.oncoming, oncoming=oncoming, couplings=held
+    )
+    law = {f"K.{key}": fit.point[f"B3.{key}"] for key in LAW}
+    fixed = {**first.fixed, **law, "K.P0": oncoming.P0.value, "K.drum": 0.0}
+    renamed = {"B2": "B3", "B3": "K"}
+    by_element: dict[str, Any] = {
+        name: {renamed.get(key, key): each for key, each in one.items()}
+        for name, one in vars(record).items()
+        if isinstance(one, dict)
+    }
+    second = replace(
+        part,
+        structure=replace(first, driveline=driveline, fixed=fixed),
+        record=replace(record, **by_element),
+    )
+    shift = replace(shown.shift, start_gear="3", end_gear="4", offgoing="B3", oncoming="K")
+    problem = replace(fit.problem, parts=(part, second))
+    normal = replace(
+        fit.normal,
+        residuals=2 * tuple(fit.normal.residuals),
+        regressors=2 * tuple(fit.normal.regressors),
+    )
+    evidence = replace(
+        found.evidence,
+        likelihood=replace(fit, problem=problem, normal=normal),
+        signals=(shown, replace(shown, shift=shift)),
+    )
+    return replace(found, evidence=evidence)
+
+
+def test_of_several_shifts_an_element_is_told_by_one_that_moves_it() -> None:
+    both = _followed_by_another_shift(uncertain_fills())
+    (told,) = suggest(replace(both, estimates={"P0.B2": both.estimates["P0.B2"]}))
+    again = next(each for each in told.prospects if each.experiment is Experiment.AGAIN)
+    assert again.shift == "2→3"
+    assert again.half_width < 0.8 * told.half_width
+    assert told.text.endswith("(shift 2→3)")
 
 
 def test_what_sensors_decide_no_experiment_narrows() -> None:

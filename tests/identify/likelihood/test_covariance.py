@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The banded weighting is the dense R + G·Q·Gᵀ, and the expected inputs are the right way round."""
+"""The banded weighting is the dense R + G·U·Gᵀ, and the expected inputs are the right way round."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import TORQUE, Output
 from drivetwin.identify.likelihood.response import observed, response_of
 from drivetwin.identify.likelihood.unknowns import Point
-from drivetwin.identify.signals import FloatArray
+from drivetwin.identify.signals import FloatArray, TorqueOfSpeeds
 from tests.identify.likelihood.made import bench, fitted, problem
 
 
@@ -48,6 +48,74 @@ def test_weighting_equals_the_dense_covariance() -> None:
     expected = np.linalg.solve(dense, columns_in)
     found = whiteness.weighted(columns_in) * record.sigma[:, None]
     assert np.allclose(found, expected * record.sigma[:, None], rtol=1e-3, atol=1e-2)
+
+
+def _of_speeds(part: Part, slope: float, rest: float) -> Part:
+    """The part with an engine torque computed from ω_e, on which it hangs by `slope`."""
+    record, read = part.record, part.record.engine_torque
+    torque = Signal(record.time, np.interp(record.time, read.time, read.values))
+    size = np.linspace(0.5, 1.5, record.time.size)
+    share = TorqueOfSpeeds(record.time, size * slope, size * rest)
+    sigma = {**record.input_sigma, TORQUE: rest}
+    made = replace(record, engine_torque=torque, of_speeds=share, input_sigma=sigma, rounding=None)
+    return replace(part, record=made)
+
+
+def _torque_by_speed(part: Part) -> FloatArray:
+    """Noise of the engine torque over each step per that of a compared sample (N-1, n)."""
+    record, torque = part.record, part.record.engine_torque.time
+    assert record.of_speeds is not None
+    middle, columns = 0.5 * (record.time[1:] + record.time[:-1]), []
+    for out in record.outputs:
+        for k in range(out.values.size):
+            one = np.zeros(out.values.size)
+            one[k] = 1.0 if out.name == "engine_speed" else 0.0
+            of_torque = record.of_speeds.slope * np.interp(torque, record.time[out.place], one)
+            columns.append(np.interp(middle, torque, of_torque))
+    return np.column_stack(columns)
+
+
+def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
+    part, point = _short()
+    part = _of_speeds(part, slope=-400.0, rest=2.0)
+    run = part.run(point)
+    assert run is not None
+    model, record = part.structure.model(point), part.record
+    response = response_of(model, run, record)
+    whiteness = with_input_noise(model, record, response)
+    assert whiteness.path is not None
+    effect = {}
+    for name in response.drive:
+        steps = np.eye(record.time.size - 1)
+        answers = [response.to({name: step}) for step in steps]
+        effect[name] = np.column_stack([part.seen(point, z) for z in answers])
+    share, power = _torque_by_speed(part), whiteness.path.power
+    assert power[TORQUE][[0, -1]] == pytest.approx(np.array([1.0, 9.0]), rel=0.1)
+    own = np.eye(record.size) - effect[TORQUE] @ share
+    dense = own @ np.diag(record.sigma**2) @ own.T
+    dense += sum((effect[name] * power[name]) @ effect[name].T for name in effect)
+    columns = np.linalg.cholesky(dense) @ np.random.default_rng(0).standard_normal((record.size, 3))
+    expected = np.linalg.solve(dense, columns)
+    assert np.diag(columns.T @ whiteness.weighted(columns)) == pytest.approx(
+        np.diag(columns.T @ expected), rel=1e-4
+    )
+    told = whiteness.input_noise(columns[:, 0])[TORQUE]
+    common = share @ np.diag(record.sigma**2) @ own.T - power[TORQUE][:, None] * effect[TORQUE].T
+    best = common @ expected[:, 0]
+    assert np.max(np.abs(told - best)) < 1e-3 * np.max(np.abs(best))
+
+
+def test_its_determinant_is_that_of_the_dense_covariance() -> None:
+    part, point = _short()
+    weighting = part.weighted_by(point).weighting
+    assert weighting.path is not None
+    dense = np.linalg.inv(weighting.weighted(np.eye(part.record.size)))
+    sensors = part.weighting.log_determinant
+    assert sensors == pytest.approx(2.0 * np.sum(np.log(part.record.sigma)), rel=1e-12)
+    more = weighting.log_determinant - sensors
+    assert more > 1.0
+    expected = np.linalg.slogdet(0.5 * (dense + dense.T)).logabsdet
+    assert weighting.log_determinant == pytest.approx(expected, abs=1e-3 * more)
 
 
 def _sparse(every: int) -> tuple[Part, Point]:

@@ -12,15 +12,18 @@ import pytest
 from benchmarks.estimation.bench import realise
 from drivetwin.dyno.scenarios import paper_steps, throttle_steps
 from drivetwin.identify.likelihood import kinds as of_signals
-from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
+from drivetwin.identify.likelihood.covariance import Whiteness
+from drivetwin.identify.likelihood.fit import FAR, NEAR, LikelihoodFit, nearest
 from drivetwin.identify.likelihood.kinds import (
     SPEEDS,
-    averaged,
+    averaged_over_kinds,
+    likely_kinds,
+    with_best_kinds,
     with_either_speeds,
-    with_kinds,
 )
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
+from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import Sampled
 from tests.identify.likelihood.made import ROUGH, problem, truth_of
 
@@ -53,7 +56,7 @@ def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> N
     ages = [_fit(kinds).point["te_delay"] for kinds in (frozenset[str](), MEANS)]
     sharp = _age(_fit(MEANS))[1]
     assert abs(ages[0] - ages[1]) > 5.0 * sharp
-    told, doubts = averaged(_posed(), _fit(MEANS))
+    told, doubts = averaged_over_kinds(_posed(), _fit(MEANS))
     value, std = _age(told)
     assert all(abs(age - value) < 1.96 * std for age in ages)
     truth = realise(throttle_steps(), UNDECIDED, ROUGH).truth["te_delay"]
@@ -64,7 +67,7 @@ def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> N
 
 def test_it_does_not_matter_from_which_kind_one_comes() -> None:
     one, other = (
-        _age(averaged(_posed(), with_kinds(_posed(), _fit(kinds)))[0])
+        _age(averaged_over_kinds(_posed(), with_best_kinds(_posed(), _fit(kinds)))[0])
         for kinds in (frozenset[str](), MEANS)
     )
     assert one[0] == pytest.approx(other[0], abs=0.1 * one[1])
@@ -75,7 +78,7 @@ def test_a_clear_log_is_left_as_it_is() -> None:
     posed, start = problem(realise(paper_steps(), 0, ROUGH))
     fit = nearest(posed, start)
     assert fit is not None
-    told, doubts = averaged(posed, fit)
+    told, doubts = averaged_over_kinds(posed, fit)
     std = np.sqrt(np.diag(fit.covariance))
     assert doubts == []
     assert np.all(np.abs(told.mean.values - fit.point.values) < 1e-3 * std)
@@ -84,7 +87,7 @@ def test_a_clear_log_is_left_as_it_is() -> None:
 
 def test_the_expansion_foretells_the_other_minimum() -> None:
     here, there = _fit(MEANS), _fit(frozenset[str]())
-    told, _ = averaged(_posed(), here)
+    told, _ = averaged_over_kinds(_posed(), here)
     added = told.covariance - here.covariance
     k = here.point.names.index("te_delay")
     apart = there.point["te_delay"] - here.point["te_delay"]
@@ -101,19 +104,21 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
 
     def told(fall: float) -> float:
         """The age where every search after the first ends so much lower in Q."""
-        lower = fall / _posed().size
-        again = {one.problem.kinds: replace(one, chi2=one.chi2 - lower) for one in (here, there)}
-        monkeypatch.setattr(of_signals, "_nearby", lambda posed, _: again.get(posed.kinds))
-        return averaged(_posed(), here)[0].mean["te_delay"]
+        again = {
+            one.problem.kinds: replace(one, normal=replace(one.normal, cost=one.normal.cost - fall))
+            for one in (here, there)
+        }
+        monkeypatch.setattr(of_signals, "_nearby", lambda posed, *_: again.get(posed.kinds))
+        return averaged_over_kinds(_posed(), here)[0].mean["te_delay"]
 
     std = _age(here)[1]
     assert abs(told(0.0) - here.point["te_delay"]) > 0.1 * std
     assert told(8.0) == pytest.approx(told(0.0), abs=0.02 * std)
 
 
-def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@cache
+def _without_torque() -> tuple[Problem, Point, LikelihoodFit]:
+    """A problem of samples without an output torque, where its search starts, and its minimum."""
     made = realise(throttle_steps(), 0, ROUGH)
     signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
     eta = made.truth["eta"]
@@ -126,7 +131,51 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
     posed, start = problem_of([signals], [made.driveline], law, guess)
     best = nearest(posed, start)
     assert best is not None
-    monkeypatch.setattr(of_signals, "UNTOLD", np.inf)
+    return posed, start, best
+
+
+def test_a_weighting_with_more_room_that_leaves_less_is_no_better_kind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    posed, _, best = _without_torque()
+    parts = [
+        replace(part, weighting=Whiteness(2.0 * part.record.sigma**2))
+        for part in posed.of_kinds(SPEEDS).parts
+    ]
+    roomy = replace(
+        best,
+        problem=replace(posed, parts=tuple(parts)),
+        normal=replace(best.normal, cost=0.5 * best.normal.cost),
+        chi2=0.5 * best.chi2,
+    )
+    monkeypatch.setattr(of_signals, "_promising", lambda *_: frozenset(SPEEDS))
+    monkeypatch.setattr(of_signals, "_nearby", lambda *_: roomy)
+    assert with_best_kinds(posed, best) is best
+
+
+def test_kinds_are_compared_by_the_same_samples() -> None:
+    assert _posed().of_kinds(SPEEDS).size == _posed().size
+
+
+def test_from_far_off_signals_are_taken_as_read() -> None:
+    posed, start, best = _without_torque()
+    way = start.values - best.point.values
+    far = start.moved(best.point.values + 0.5 * way)
+    weighted = posed.weighted_by(far)
+    normal = weighted.normal(far)
+    assert normal is not None
+    assert FAR < normal.cost / posed.size < NEAR
+    assert of_signals._promising(weighted, far, normal)  # wrong: there are samples alone
+    likely, other = likely_kinds(posed, far)
+    assert likely.kinds == frozenset()
+    assert other.kinds == frozenset(SPEEDS)
+
+
+def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    posed, _, best = _without_torque()
+    monkeypatch.setattr(of_signals, "EITHER_SPEEDS", np.inf)
     wide, doubts = with_either_speeds(posed, best)
     other = nearest(posed.of_kinds(frozenset(SPEEDS)), best.point)
     assert other is not None
@@ -134,7 +183,7 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
     assert far == pytest.approx(0.5e-3, rel=0.3)  # half a period of the speeds
     assert far < 1.96 * _age(wide)[1]
     assert "engine speed" in doubts[0]
-    monkeypatch.setattr(of_signals, "UNTOLD", -np.inf)
+    monkeypatch.setattr(of_signals, "EITHER_SPEEDS", -np.inf)
     assert with_either_speeds(posed, best) == (best, [])
 
 

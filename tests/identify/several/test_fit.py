@@ -141,3 +141,15 @@ def test_a_disagreement_widens_and_weakens_what_it_concerns() -> None:
     light = scenario().model.J_v
     assert low < light < 1.03 * light < high
     assert found.estimates["eta"].verdict.value == "identified"
+
+
+def test_each_log_keeps_the_loads_of_its_own_shifts() -> None:
+    found = together().found
+    several = found.evidence.several
+    assert several is not None
+    counts = [len(share.shifts) for share in several.logs]
+    loads = tuple(float(k) for k in range(sum(counts)))
+    hilly = replace(found, evidence=replace(found.evidence, loads=loads))
+    told = [of_one_log(hilly, share).evidence.loads for share in several.logs]
+    assert [len(one) for one in told] == counts
+    assert tuple(load for one in told for load in one) == loads

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Selects hand over their value; upload buttons send a file; the browser's way back changes the
-   view; a server that is silent is told. */
+   view; a server that is silent is told; messages go when they are past. */
 "use strict";
 (() => {
   const idOf = (element) => (element.id.startsWith("{") ? JSON.parse(element.id) : element.id);
@@ -14,6 +14,16 @@
 
   const say = (text, fault) =>
     set("message", { children: text, className: `message ${fault ? "fault" : "good"}` });
+
+  /* A message is about what was done last: it goes with the next thing that is done. Not when a
+     field is left: all below would move up under the mouse before it lets go of a button. */
+  const past = (control) => (event) => {
+    if (event.target.closest(control) && document.getElementById("message")?.textContent) {
+      say("", false);
+    }
+  };
+  document.addEventListener("click", past("button"), true);
+  document.addEventListener("change", past("select"), true);
 
   window.addEventListener("popstate", () => {
     const view = location.hash.slice(1) || "log";

@@ -155,8 +155,11 @@ def _register_progress(app: Dash, sessions: Sessions) -> None:
 
 def _content(work: Work) -> list[Component]:
     content: list[Component] = [_before(work)]
-    for method, text in work.refusals.items():
-        content.append(notes(f"The {method.value} method found nothing", [text]))
+    for text in dict.fromkeys(work.refusals.values()):
+        methods = [method.value for method, why in work.refusals.items() if why == text]
+        content.append(notes(f"Nothing found by: {', '.join(methods)} method", [text]))
+    if work.ended:
+        content.append(notes("The identification ended early", [work.ended]))
     if work.method is None:
         return content
     outcome = work.results[work.method]

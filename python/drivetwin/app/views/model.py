@@ -202,6 +202,7 @@ def _register_locks(app: Dash, sessions: Sessions) -> None:
         place = [one["id"] for one in ids].index(name)
         wanted = typed(name, LockKind(kinds[place]), values[place], stds[place])
         if _same(wanted, session.work.lock_of(name)):
+            tell("")
             return
         session.set_lock(name, wanted)
         tell(f"{parameter_label(name)} is {wanted.kind.value} from the next identification on")

@@ -196,4 +196,4 @@ def _blank(out: Output, before: FloatArray, time: FloatArray) -> Output:
     stride = max(1, round(period / float(time[1] - time[0])))
     place = np.arange(0, time.size, stride)
     fresh = Output(out.name, place, np.zeros(place.size), out.sigma)
-    return fresh if out.window == 0.0 else fresh.averaged(time)
+    return fresh if out.window == 0.0 else fresh.after_period(time).averaged(time)

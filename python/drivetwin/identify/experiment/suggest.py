@@ -37,22 +37,30 @@ REPEATS = (1, 2, 4)
 """How often the best experiment is repeated at most, in steps."""
 LEAST_KNOWN = 3
 """How many identified parameters are told how to narrow."""
+NARROWER = 0.9
+"""Share of the present interval to which an experiment must narrow it to be worth recording."""
+NONE_HELPS = "none of the known experiments narrows it by a tenth or more"
 NO_SCALE = "an output-shaft torque sensor alone gives torques their scale"
 
 
 @dataclass(frozen=True)
 class Prospect:
-    """What an experiment would make of a parameter: half width of its 95 % interval, SI."""
+    """What an experiment would make of a parameter: half width of its 95 % interval, SI.
+
+    `shift` says by its gears on which shift of the log the experiment is built; empty where the log
+    has shifts between the same gears only.
+    """
 
     experiment: Experiment
     repeats: int
     half_width: float
     verdict: Verdict
+    shift: str = ""
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """What would tell a parameter: experiments in order of worth.
+    """What would tell a parameter: all experiments in order of worth, helpful or not.
 
     `half_width` is that of the present 95 % interval (noise and sensors), infinite without one.
     `limit` names what no experiment mends; empty where there is no such thing.
@@ -65,13 +73,23 @@ class Suggestion:
     limit: str = ""
 
     @property
+    def best(self) -> Prospect | None:
+        """The first experiment that narrows the interval by more than next to nothing."""
+        for one in self.prospects:
+            told = one.verdict is not Verdict.NOT_IDENTIFIABLE
+            if told and one.half_width <= NARROWER * self.half_width:
+                return one
+        return None
+
+    @property
     def text(self) -> str:
         """The suggestion in a sentence; without units, which are those of the parameter."""
-        if self.limit or not self.prospects:
-            return self.limit or "no experiment of the catalogue narrows it"
-        best = self.prospects[0]
+        best = self.best
+        if best is None:
+            return self.limit or NONE_HELPS
+        of = f" (shift {best.shift})" if best.shift else ""
         times = "" if best.repeats == 1 else f", {best.repeats} times"
-        return f"{best.experiment}{times}"
+        return f"{best.experiment}{of}{times}"
 
 
 def suggest(found: Identification) -> tuple[Suggestion, ...]:
@@ -84,9 +102,32 @@ def suggest(found: Identification) -> tuple[Suggestion, ...]:
     open_ = [one for one in found.estimates.values() if one.verdict in _OPEN]
     known = [one for one in found.estimates.values() if one.verdict is Verdict.IDENTIFIED]
     least = sorted(known, key=_relative_width, reverse=True)[:LEAST_KNOWN]
-    with part(0.0, 0.9, "experiments"):
-        gains = _gains(fit, signals)
-    return tuple(_suggestion(one, fit, signals, gains) for one in (*open_, *least))
+    asked = (*open_, *least)
+    places = {one.id: _places(one.id, fit) for one in asked}
+    wanted = list(dict.fromkeys(k for every in places.values() for k in every))
+    gains = {}
+    for number, k in enumerate(wanted):
+        with part(0.9 * number / len(wanted), 0.9 * (number + 1) / len(wanted), "experiments"):
+            gains[k] = _gains(fit, signals, k)
+    return tuple(
+        _suggestion(one, fit, signals, [gain for k in places[one.id] for gain in gains[k]])
+        for one in asked
+    )
+
+
+def _places(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
+    """Numbers of the shifts whose experiments may tell a parameter: the last one, and of what
+    belongs to an element the last ones of the same log that bring it in and let it go."""
+    parts = fit.problem.parts
+    last, element = len(parts) - 1, name.partition(".")[2]
+    with_it: dict[bool, int] = {}
+    for k, one in enumerate(parts):
+        structure = one.structure
+        if structure.log == parts[last].structure.log:
+            for role in structure.elements:
+                if role.name == element:
+                    with_it[role is structure.driveline.oncoming] = k
+    return tuple(dict.fromkeys((last, *with_it.values())))
 
 
 def examined(found: Identification) -> Identification:
@@ -114,21 +155,24 @@ _OPEN = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
 
 @dataclass(frozen=True, eq=False)
 class _Gain:
-    """Information (r, r) that an experiment adds, over `names` (r,)."""
+    """Information (r, r) that an experiment on a `shift` adds, over `names` (r,)."""
 
     experiment: Experiment
+    shift: str
     names: tuple[str, ...]
     information: FloatArray
 
 
-def _gains(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> list[_Gain]:
-    """What each experiment adds; one whose simulation fails is left out."""
+def _gains(fit: LikelihoodFit, signals: Sequence[ShiftSignals], k: int) -> list[_Gain]:
+    """What each experiment on shift number k adds; one whose simulation fails is left out."""
     point = _with_age(fit)
-    base = Base(fit.problem.parts[-1], point, signals[-1].shift.lockup_time)
+    base = Base(fit.problem.parts[k], point, signals[k].shift.lockup_time)
+    names = [f"{one.shift.start_gear}→{one.shift.end_gear}" for one in signals]
+    label = names[k] if len(set(names)) > 1 else ""
     found = []
     for number, experiment in enumerate(Experiment):
         tell(number / len(Experiment))
-        gain = _gain(planned(experiment, base))
+        gain = _gain(planned(experiment, base), label)
         if gain is not None:
             found.append(gain)
     return found
@@ -148,15 +192,14 @@ def _with_age(fit: LikelihoodFit) -> Point:
     return Point((*point.names, name), np.append(point.values, age))
 
 
-def _gain(plan: Planned) -> _Gain | None:
+def _gain(plan: Planned, shift: str) -> _Gain | None:
     weighted = plan.part.weighted_by(plan.point)
     found = weighted.linearised(plan.point)
     if found is None:
         return None
     _, columns = found
-    return _Gain(
-        plan.experiment, plan.point.names, columns.T @ weighted.weighting.weighted(columns)
-    )
+    information = columns.T @ weighted.weighting.weighted(columns)
+    return _Gain(plan.experiment, shift, plan.point.names, information)
 
 
 def _covariance(
@@ -200,18 +243,23 @@ def _suggestion(
     if not row.any():  # what another log has of its own
         return Suggestion(one.id, one.verdict, half, ())
     loud = np.sqrt(_noise_power(fit, row))
-    prospects = []
+    best: dict[Experiment, Prospect] = {}
     for gain in gains:
         for repeats in REPEATS:
             std = loud * float(np.sqrt(row @ _covariance(fit, names, gain, repeats) @ row))
             verdict = judge(one.id, told[one.id], std, "", systematic).verdict
             prospect = Prospect(
-                gain.experiment, repeats, Z95 * float(np.hypot(std, systematic)), verdict
+                gain.experiment,
+                repeats,
+                Z95 * float(np.hypot(std, systematic)),
+                verdict,
+                gain.shift,
             )
             if verdict is Verdict.IDENTIFIED or one.verdict is Verdict.IDENTIFIED:
                 break
-        prospects.append(prospect)
-    order = sorted(prospects, key=_worth)
+        other = best.get(gain.experiment, prospect)
+        best[gain.experiment] = min(other, prospect, key=_worth)
+    order = sorted(best.values(), key=_worth)
     return Suggestion(one.id, one.verdict, half, tuple(order))
 
 

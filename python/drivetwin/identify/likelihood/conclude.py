@@ -13,6 +13,7 @@ from drivetwin.identify.design import contradictions, design_of, held_against
 from drivetwin.identify.likelihood.curves import METHOD, curves_of
 from drivetwin.identify.likelihood.derived import absolute_ids, of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
+from drivetwin.identify.likelihood.hills import loads_of
 from drivetwin.identify.likelihood.left_out import left_out
 from drivetwin.identify.likelihood.limits import at_limits
 from drivetwin.identify.likelihood.null_space import null_directions
@@ -21,6 +22,7 @@ from drivetwin.identify.likelihood.priors import over_eta
 from drivetwin.identify.likelihood.residuals import against, residual_tests, unweighted
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
 from drivetwin.identify.likelihood.unknowns import AERO
+from drivetwin.identify.load import different_loads
 from drivetwin.identify.result import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import (
@@ -74,20 +76,19 @@ def conclude(
         )
         for name, value, variance in zip(values, values.values(), np.diag(covariance), strict=True)
     }
-    contradicted = contradictions(
-        tuple(values), np.array(list(values.values())), covariance, designs, spread
-    )
+    ids, every = tuple(values), np.array([*values.values()])
+    contradicted = contradictions(ids, every, covariance, designs, spread)
     estimates = held_against(estimates, contradicted, WITH_PRIOR)
     limits = {
         name: text
-        for name, text in at_limits(fit, tuple(values), matrix).items()
+        for name, text in at_limits(fit, ids, matrix).items()
         if estimates[name].verdict is not Verdict.DESIGN
     }
     estimates |= {name: doubted(estimates[name], text) for name, text in limits.items()}
     curves = curves_of(fit, linear, systematic)
     effects = tuple(left_out(fit))
     for effect in effects:
-        estimates = effect.held_against(estimates, tuple(values), matrix)
+        estimates = effect.held_against(estimates, ids, matrix)
         curves = {name: effect.widened(fit, name, curve) for name, curve in curves.items()}
     for why in (against(fit), unweighted(fit, labels_of(signals))):
         if why:
@@ -96,7 +97,7 @@ def conclude(
     return Conclusions(
         estimates,
         curves,
-        tuple(values),
+        ids,
         correlation(covariance),
         (
             *dict.fromkeys(notes.values()),
@@ -107,6 +108,7 @@ def conclude(
             *other_law_in_words(fit, values, matrix, np.sqrt(np.diag(covariance))),
         ),
         _load_law(fit, systematic),
+        loads_of(fit),
     )
 
 
@@ -200,4 +202,4 @@ def _warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str,
         texts += [f"{label}: {text}" for test in tests for text in test.warnings]
     if why := unweighted(fit, labels):
         texts.append(why)
-    return (*texts, *null_directions(fit))
+    return (*texts, *null_directions(fit), *different_loads(loads_of(fit)))

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Covariance of the residuals, R + G·Q·Gᵀ, without ever forming it.
+"""Covariance of the residuals, R + G·U·Gᵀ, without ever forming it.
 
-A residual is sensor noise R plus what the noise Q of the inputs, sent through the simulation (G),
-does to its outputs. The driveline has four states, so G·Q·Gᵀ is that of a Markov process z driven
+A residual is sensor noise R plus what the noise U of the inputs, sent through the simulation (G),
+does to its outputs. The driveline has four states, so G·U·Gᵀ is that of a Markov process z driven
 by the input noise, and by Woodbury's identity
 
     Σ⁻¹ = R⁻¹ - R⁻¹H·(P⁻¹ + Hᵀ R⁻¹ H)⁻¹·Hᵀ R⁻¹,   P⁻¹ = Lᵀ W L
 
 where L holds the transitions, W the inverse process noise and H what the sensors see of z. The
 matrix in brackets is banded, so its Cholesky factor costs as much as one run of the simulation
-(the information form of a fixed-interval smoother: Rauch, Tung and Striebel 1965).
+(the information form of a fixed-interval smoother: Rauch, Tung and Striebel 1965). It gives the
+determinant too, as L has a unit diagonal:
+
+    log|Σ| = log|R| + log|P⁻¹ + Hᵀ R⁻¹ H| - log|W|
+
+A torque that is computed from the compared speed ω_e has noise in common with it: with e the noise
+of the samples and S its share in the torque, the residual is (1 - G·S)·e less what the other noise
+does, and (1 - G·S)⁻¹ times the residual has the covariance above, with G that of a driveline whose
+torque follows its own speed (a Kalman filter with correlated noise: Anderson and Moore 1979).
 An input's noise acts on the driveline through its power per frequency only, since the driveline
 passes less than half the sampling rate: a sample's variance times the sampling time.
 """
@@ -37,7 +45,8 @@ class NoisePath:
     """How input noise reaches the outputs.
 
     `seen` is H, `factor` the banded Cholesky factor, `inverse` (N, 4, 4) the inverse process noise
-    of each step, `power` (N-1,) the variance of an input's noise over a step, by name.
+    of each step, `power` (N-1,) the variance of an input's noise over a step, by name; `share` is
+    S (N-1, n), None where no input has the noise of an output.
     """
 
     response: Response
@@ -45,6 +54,24 @@ class NoisePath:
     inverse: FloatArray
     seen: csr_array
     factor: FloatArray
+    share: csr_array | None = None
+
+    def freed(self, columns: FloatArray) -> FloatArray:
+        """Residual columns (n, q) without what the outputs' noise does through an input."""
+        if self.share is None:
+            return columns
+        push = self.response.drive[TORQUE][:, :, None] * (self.share @ columns)[:, None, :]
+        z = self.response.pushed_each(push)
+        return np.asarray(columns + self.seen @ z.reshape(-1, columns.shape[1]))
+
+    def bound(self, columns: FloatArray) -> FloatArray:
+        """The transpose of `freed` on columns (n, q)."""
+        if self.share is None:
+            return columns
+        pull = self.seen.T @ columns
+        back = self.response.pulled_each(pull.reshape(-1, STATES, columns.shape[1]))
+        torque = np.einsum("ki,kiq->kq", self.response.drive[TORQUE], back)
+        return np.asarray(columns + self.share.T @ torque)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,16 +84,31 @@ class Whiteness:
     variance: FloatArray
     path: NoisePath | None = None
 
+    @property
+    def log_determinant(self) -> float:
+        """log|Σ|, with the variances in squares of the residuals' units."""
+        total = float(np.sum(np.log(self.variance)))
+        if self.path is None:
+            return total
+        of_steps = np.linalg.slogdet(self.path.inverse).logabsdet
+        return total + 2.0 * float(np.sum(np.log(self.path.factor[0]))) - float(np.sum(of_steps))
+
     def weighted(self, columns: FloatArray) -> FloatArray:
         """Σ⁻¹·columns, (n,) or (n, q)."""
-        variance = self.variance if columns.ndim == 1 else self.variance[:, None]
-        return (columns - self.driven(columns)) / variance
+        each = columns.reshape(len(columns), -1)
+        weighted = (each - self.driven(each)) / self.variance[:, None]
+        if self.path is not None:
+            weighted = self.path.bound(weighted)
+        return weighted.reshape(columns.shape)
 
     def driven(self, columns: FloatArray) -> FloatArray:
         """The part of residual columns (n,) or (n, q) that input noise explains best."""
         if self.path is None:
             return np.zeros_like(columns)
-        return np.asarray(self.path.seen @ self._state(self.path, columns))
+        each = columns.reshape(len(columns), -1)
+        free = self.path.freed(each)
+        driven = (each - free) + self.path.seen @ self._state(self.path, free)
+        return np.asarray(driven.reshape(columns.shape))
 
     def input_noise(self, residual: FloatArray) -> dict[str, FloatArray]:
         """Expected noise (N-1,) of every input per step, by name, given the residual (n,).
@@ -75,13 +117,18 @@ class Whiteness:
         """
         if self.path is None:
             return {}
-        z = self._state(self.path, residual).reshape(-1, STATES)
+        free = self.path.freed(residual[:, None])[:, 0]
+        state = self._state(self.path, free)
+        z = state.reshape(-1, STATES)
         w = z[1:] - np.einsum("kij,kj->ki", self.path.response.transition, z[:-1])
         pull = np.einsum("kij,kj->ki", self.path.inverse[1:], w)
-        return {
+        noise = {
             name: -self.path.power[name] * np.einsum("ki,ki->k", drive, pull)
             for name, drive in self.path.response.drive.items()
         }
+        if self.path.share is not None:
+            noise[TORQUE] += self.path.share @ (free - self.path.seen @ state)
+        return noise
 
     def _state(self, path: NoisePath, columns: FloatArray) -> FloatArray:
         """Expected disturbance of the state (4N,) or (4N, q), given residual columns."""
@@ -97,6 +144,9 @@ def sensor_noise(record: Record) -> Whiteness:
 
 def with_input_noise(model: DualClutch, record: Record, response: Response) -> Whiteness:
     """Weighting with the noise of engine torque and pressures in it."""
+    share = record.torque_share()
+    if share is not None:
+        response = response.fed_back(np.asarray(share.sum(axis=1)))
     power = _power(record, response)
     inverse = _inverse(_process(model, record, response, power))
     factor = cholesky_banded(
@@ -105,7 +155,7 @@ def with_input_noise(model: DualClutch, record: Record, response: Response) -> W
         lower=True,
         check_finite=False,
     )
-    path = NoisePath(response, power, inverse, _seen(model, record), factor)
+    path = NoisePath(response, power, inverse, _seen(model, record), factor, share)
     return Whiteness(record.sigma**2, path)
 
 
@@ -115,7 +165,11 @@ def _power(record: Record, response: Response) -> dict[str, FloatArray]:
     for name in response.drive:
         signal = record.engine_torque if name == TORQUE else record.pressures[name]
         between = float(np.median(np.diff(signal.time)))
-        found[name] = record.input_sigma[name] ** 2 * between / response.step
+        variance = np.full(response.step.size, record.input_sigma[name] ** 2)
+        if name == TORQUE:
+            middle = 0.5 * (record.time[1:] + record.time[:-1])
+            variance = np.interp(middle, signal.time, record.torque_power)
+        found[name] = variance * between / response.step
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from drivetwin.identify.likelihood.output_error import staged
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.slow import beyond_white
 from drivetwin.identify.likelihood.unknowns import Point
-from drivetwin.identify.likelihood.work import OutOfWork
+from drivetwin.identify.likelihood.work import REMEDY, OutOfWork, at_most
 from drivetwin.identify.signals import FloatArray
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
@@ -46,7 +47,7 @@ ROUNDS = 5
 """Most minima one after the other: the fall halves from each to the next."""
 _FAILED = (
     "the simulation could not be brought onto the measurement",
-    "check ratios, clutch gains and P0 on the card against the log, or use the integral method",
+    REMEDY,
 )
 
 
@@ -70,6 +71,18 @@ class LikelihoodFit:
     normal: Normal
     chi2: float
     iterations: int
+
+    @cached_property
+    def deviance(self) -> float:
+        """Q + log|Σ|: -2 log of likelihood times prior, but for a constant of the samples.
+
+        Σ is formed anew at the minimum: that of the search is of the point before, where noise
+        about P0 opened an element at other instants, and log|Σ| was another by up to a thousand.
+        It is no part of a search and counts as no work.
+        """
+        with at_most(np.inf):
+            anew = self.problem.weighted_by(self.point)
+            return anew.cost(self.point) + sum(p.weighting.log_determinant for p in anew.parts)
 
 
 def fit(

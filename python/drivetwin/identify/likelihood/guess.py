@@ -10,7 +10,8 @@ import numpy as np
 from drivetwin.driveline import in_series
 from drivetwin.identify.friction import LOG_V, MU_C, MU_DROP, MU_V
 from drivetwin.identify.integral import IntegralShift
-from drivetwin.identify.likelihood.unknowns import LAW
+from drivetwin.identify.likelihood.hills import departures_of
+from drivetwin.identify.likelihood.unknowns import AERO, LAW
 from drivetwin.identify.signals import Driveline
 
 TYPICAL_LAW = {"mu_c": 0.11, "mu_drop": 0.02, "mu_v": 1e-4, "ln_v_s": float(np.log(12.0))}
@@ -20,20 +21,25 @@ TYPICAL_MODE = (2.0 * np.pi * 10.0, 0.06)
 
 
 def guess_of(shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]) -> dict[str, float]:
-    """A value for every unknown of the driveline and every law, from the linear fits."""
-    first = shifts[0]
-    told = dict(zip(first.ids, first.values, strict=True))
-    for shift in shifts[1:]:
-        told |= {k: v for k, v in zip(shift.ids, shift.values, strict=True) if k not in told}
-    J_e = first.momentum.value("J_e")
+    """A value for every unknown of the driveline and every law, from the linear fits.
+
+    The median of the shifts: one alone may tell next to nothing, or something wrong.
+    """
+    told = {
+        name: float(np.median([dict(zip(s.ids, s.values, strict=True))[name] for s in having]))
+        for name in dict.fromkeys(name for shift in shifts for name in shift.ids)
+        for having in ([shift for shift in shifts if name in shift.ids],)
+    }
     found = {
         "eta": told["eta"],
-        "J_e": J_e,
+        "J_e": float(np.median([shift.momentum.value("J_e") for shift in shifts])),
         "J_out": told["J_out"],
         "J_vehicle": told["J_vehicle"],
-        "Tv_over_if": told["Tv_over_if"],
-        "te_delay": first.momentum.value("te_delay"),
+        **departures_of([shift.load.load for shift in shifts]),
+        "te_delay": told.get("te_delay", shifts[0].momentum.value("te_delay")),
     }
+    if AERO in told:
+        found[AERO] = told[AERO]
     if "k_o" in told:
         found |= {"k_o": told["k_o"], "c_o": told["c_o"]}
     else:

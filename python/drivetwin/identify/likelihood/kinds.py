@@ -4,8 +4,21 @@
 An output may be the mean over the time since the sample before, as encoders on a bus send it. That
 is half a sample late, and half a millisecond between torque and speed moves k_o and c_o by several
 standard deviations. Between its samples an engine torque may be straight or a curve (`bend_of`).
-Which kind fits better is told by the expansion of Q for one of them: what the others would show
+Which kind may fit better is told by the expansion of Q for one of them: what the others would show
 differs by a known column each. Where that hardly tells, what is told of the unknowns is averaged.
+
+Where all outputs are of the other kind, which is nearly an age of the inputs, fits compare by their
+deviance and not by Q: with θ the unknowns, y the samples and δ the noise of the inputs u, of
+covariance C, the likelihood is
+
+    L(θ) = ∫ p(y | θ, u - δ)·p(δ) dδ,   -2·log L = Q + log|Σ| + n·log 2π,   Σ = R + G·C·Gᵀ
+
+where Q is the least over δ (Laplace's approximation; exact where the outputs are linear in δ, by
+|R + G·C·Gᵀ| = |R|·|1 + C·GᵀR⁻¹G|). G is that of the run at the minimum, so Σ hangs on the kind
+through the unknowns that go with it: when elements slip, and at what pressures. An age of the
+inputs moves these so far that log|Σ| differs by up to 40, mostly against the difference of Q: what
+gives pressure noise more room leaves less. It is no sure judge either: noise about P0 moves both
+terms by several. Other kinds move P0 and friction so little that Q decides between them.
 """
 
 from __future__ import annotations
@@ -15,7 +28,7 @@ from itertools import product
 
 import numpy as np
 
-from drivetwin.identify.likelihood.fit import NEAR, LikelihoodFit, nearest
+from drivetwin.identify.likelihood.fit import FAR, LikelihoodFit, nearest
 from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.problem import Normal, Part, Problem
 from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
@@ -27,19 +40,20 @@ from drivetwin.identify.signals import FloatArray
 
 SIGNALS = (*OUTPUTS, TORQUE)
 SPEEDS = tuple(name for name in OUTPUTS if name.endswith("speed"))
-COMMON = 4.0
-"""Fall of Q from which on all speeds count as means, or the engine torque as a curve: encoders that
-send means are common, at odds of e² against them."""
-RARE = 8.0
+COMMON_PRICE = 4.0
+"""Fall of Q, or of the deviance, from which on all speeds count as means, or the engine torque as
+a curve: encoders that send means are common, at odds of e² against them."""
+RARE_PRICE = 8.0
 """The same for means of the output torque alone, and for each speed of another kind than the rest:
 rare, at odds of e⁴. Half a millisecond of the torque is six standard deviations of its age."""
 TIE = 6.0
-"""Rise of Q below which the 95 % interval reaches the minimum of the other kind, whatever its
-weight: odds of 20."""
-UNTOLD = 20.0
-"""Rise of Q below which, without an output torque, the speeds may be of the other kind. Half their
-period is then nearly an age of the engine torque, and how the values of that are joined, which no
-model has quite, has been seen to speak for the wrong kind by 13."""
+"""Rise of the same below which the 95 % interval reaches the minimum of the other kind,
+whatever its weight: odds of 20."""
+EITHER_SPEEDS = 20.0
+"""Rise of the deviance below which, without an output torque, the speeds may be of the other kind.
+Half their period is then nearly an age of the engine torque; noise about P0, and how the values of
+a torque are joined, which no model has quite, have been seen to speak for the wrong kind by 10, and
+Q alone by 17."""
 UNLIKELY = 0.01
 """Weight of a kind below which it is not fitted."""
 MATTERS = 0.5
@@ -56,18 +70,22 @@ ROUNDS = 3
 
 def likely_kinds(problem: Problem, start: Point) -> tuple[Problem, Problem]:
     """The problem, which has signals as read, with the kinds that promise least from `start`, and
-    with the speeds of the other kind. From far off nothing is promised."""
+    with the speeds of the other kind.
+
+    From far off an expansion promises anything: at ten times the noise, where logs without an
+    output torque start, a mixture of kinds by a thousand of Q. There they are taken as read.
+    """
     weighted = problem.weighted_by(start)
     normal = weighted.normal(start)
-    if normal is None or normal.cost > NEAR * problem.size:
+    if normal is None or normal.cost > FAR * problem.size:
         kinds = frozenset[str]()
     else:
         kinds = _promising(weighted, start, normal)
     return problem.of_kinds(kinds), problem.of_kinds(kinds ^ frozenset(SPEEDS))
 
 
-def with_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
-    """The fit with every signal of the kind that leaves less.
+def with_best_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
+    """The fit with every signal of the likeliest kind.
 
     `problem` has signals as read, `best` is its fit with some kinds. Without an output torque half
     a period of all speeds is an age of the engine torque, too far away for an expansion to tell
@@ -76,26 +94,24 @@ def with_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
 
     tried = {best.problem.kinds}
 
-    def better_of(one: LikelihoodFit, kinds: frozenset[str]) -> LikelihoodFit:
+    def better_of(one: LikelihoodFit, kinds: frozenset[str], start: Point) -> LikelihoodFit:
         if kinds in tried:
             return one
         tried.add(kinds)
-        other = _nearby(problem.of_kinds(kinds), one)
-        return one if other is None or left(other) >= left(one) else other
-
-    def left(one: LikelihoodFit) -> float:
-        return one.chi2 * problem.size + _price(problem, one.problem.kinds)
+        other = _nearby(problem.of_kinds(kinds), one, start)
+        return one if other is None or _rise(problem, one, other) >= 0.0 else other
 
     for _ in range(ROUNDS):
-        known, best = best, better_of(best, _promising(best.problem, best.point, best.normal))
+        promising = _promising(best.problem, best.point, best.normal)
+        known, best = best, better_of(best, promising, best.point)
         if best is known:
             break
     if problem.parts[0].scale_known:
         return best
-    return better_of(best, best.problem.kinds ^ frozenset(SPEEDS))
+    return better_of(best, best.problem.kinds ^ frozenset(SPEEDS), _start_of_other_speeds(best))
 
 
-def averaged(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
+def averaged_over_kinds(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
     """The fit with mean and covariance over all kinds, weighted by their likelihood, and which
     kinds the log hardly tells, in words.
 
@@ -117,19 +133,17 @@ def averaged(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list
 
 def with_either_speeds(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
     """In a log without an output torque, the fit with its covariance widened up to the minimum that
-    has the speeds of the other kind, and that in words; as it is where Q rises much to there."""
+    has the speeds of the other kind, and that in words; as it is where the deviance rises much to
+    there."""
     if problem.parts[0].scale_known:
         return best, []
-    kinds, start = best.problem.kinds ^ frozenset(SPEEDS), _as_old(best)
+    kinds, start = best.problem.kinds ^ frozenset(SPEEDS), _start_of_other_speeds(best)
     try:
         other = nearest(problem.of_kinds(kinds), start, WORSE * best.normal.cost / problem.size)
     except OutOfWork:  # nobody knows: what shows the same may be as good
         far = start.values - best.point.values
     else:
-        if other is None:
-            return best, []
-        prices = _price(problem, kinds) - _price(problem, best.problem.kinds)
-        if (other.chi2 - best.chi2) * problem.size + prices > UNTOLD:
+        if other is None or _rise(problem, best, other) > EITHER_SPEEDS:
             return best, []
         far = other.point.values - best.point.values
     names = ", ".join(name.replace("_", " ") for name in SPEEDS if name in _shown(problem))
@@ -137,8 +151,9 @@ def with_either_speeds(problem: Problem, best: LikelihoodFit) -> tuple[Likelihoo
     return widened, [UNSURE.format(names)]
 
 
-def _as_old(best: LikelihoodFit) -> Point:
-    """The minimum, with ages of the torque by which speeds of the other kind show the same."""
+def _start_of_other_speeds(best: LikelihoodFit) -> Point:
+    """Where to look for the minimum with the speeds of the other kind: at that of `best`, with ages
+    of the torque by which they show nearly the same."""
     values = best.point.values.copy()
     ages = {part.structure.unknown("te_delay"): part.record for part in best.problem.parts}
     for name, record in ages.items():
@@ -168,25 +183,35 @@ def _fitted(problem: Problem, best: LikelihoodFit, choices: _Choices) -> _Choice
     far = np.max(np.abs(steps) / np.sqrt(np.diag(best.covariance)), axis=1) > MATTERS
     for k in np.flatnonzero(far & (_weights(seen, best) > UNLIKELY)):
         kinds = _flipped(best.problem.kinds, choices.flips[k])
-        other = _nearby(problem.of_kinds(kinds), best)
+        other = _nearby(problem.of_kinds(kinds), best, best.point)
         if other is None:
             left[k] = np.inf
             continue
-        prices = _price(problem, kinds) - _price(problem, best.problem.kinds)
-        left[k] = (other.chi2 - best.chi2) * problem.size + prices
+        left[k] = _rise(problem, best, other)
         steps[k] = other.point.values - best.point.values
-        if left[k] < TIE and (back := _nearby(problem.of_kinds(best.problem.kinds), other)):
-            left[0] = min(left[0], (back.chi2 - best.chi2) * problem.size)
+        first = problem.of_kinds(best.problem.kinds)
+        if left[k] < TIE and (back := _nearby(first, other, other.point)):
+            left[0] = min(left[0], _rise(problem, best, back))
     return seen
 
 
-def _nearby(problem: Problem, best: LikelihoodFit) -> LikelihoodFit | None:
-    """The minimum of other kinds next to that of `best`; None where it is surely no better, or not
-    found with the work that is left."""
+def _nearby(problem: Problem, best: LikelihoodFit, start: Point) -> LikelihoodFit | None:
+    """The minimum from `start`; None where it is surely no better than `best`, of other kinds, or
+    not found with the work that is left."""
     try:
-        return nearest(problem, best.point, WORSE * best.normal.cost / problem.size)
+        return nearest(problem, start, WORSE * best.normal.cost / problem.size)
     except OutOfWork:
         return None
+
+
+def _rise(problem: Problem, one: LikelihoodFit, other: LikelihoodFit) -> float:
+    """Rise from `one` to the `other` of what kinds compare by, with their prices: the deviance
+    where all outputs are of the other kind, Q where not."""
+    kinds, others = one.problem.kinds, other.problem.kinds
+    prices = _price(problem, others) - _price(problem, kinds)
+    if _shown(problem) <= kinds ^ others:
+        return other.deviance - one.deviance + prices
+    return other.normal.cost - one.normal.cost + prices
 
 
 def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[str]:
@@ -218,12 +243,12 @@ def _flipped(kinds: frozenset[str], flips: FloatArray) -> frozenset[str]:
 
 
 def _price(problem: Problem, kinds: frozenset[str]) -> float:
-    """What kinds other than read cost Q: twice the logarithm of the odds against them."""
+    """What kinds other than read cost: twice the logarithm of the odds against them."""
     speeds = _shown(problem).intersection(SPEEDS)
     means = len(kinds & speeds)
     common = int(means > 0) + int(TORQUE in kinds)
     rare = min(means, len(speeds) - means) + int("output_torque" in kinds)
-    return COMMON * common + RARE * rare
+    return COMMON_PRICE * common + RARE_PRICE * rare
 
 
 def _shown(problem: Problem) -> frozenset[str]:
@@ -234,8 +259,8 @@ def _shown(problem: Problem) -> frozenset[str]:
 @dataclass(frozen=True, eq=False)
 class _Choices:
     """Every way to take the signals, the one at hand first: `flips` (q, m) of `SIGNALS` are 1 where
-    one is of the other kind than now, `left` (q,) is Q with the price of kinds, less a constant,
-    and `steps` (q, p) is how the unknowns follow."""
+    one is of the other kind than now, `left` (q,) is what kinds compare by with their price,
+    less a constant, and `steps` (q, p) is how the unknowns follow."""
 
     flips: FloatArray
     left: FloatArray
@@ -243,7 +268,7 @@ class _Choices:
 
 
 def _choices(problem: Problem, point: Point, normal: Normal) -> _Choices:
-    """All choices by the expansion `normal` at `point`."""
+    """All choices by the expansion `normal` at `point`: with the weighting there, so by Q alone."""
     score = score_of(problem, normal, [_changes(part, point) for part in problem.parts])
     shown = {*_shown(problem), TORQUE}
     flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))

@@ -22,6 +22,7 @@ from drivetwin.identify.likelihood.smooth import ABOUT
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import OutOfWork
 from drivetwin.identify.result import Z95
+from drivetwin.progress import part as share_of
 
 LINGERS = 0.05
 """Time [s] that an element must slip about P0: one that just lets go passes in half of it."""
@@ -48,17 +49,21 @@ def _others(problem: Problem, best: LikelihoodFit) -> Iterator[LikelihoodFit]:
     """Minima found from either side of the P0 of each element that lingers about it."""
     problem = problem.of_kinds(best.problem.kinds)
     most = WORSE * best.normal.cost / problem.size
+    starts = []
     for name, away in _lingering(best).items():
         k = best.point.names.index(name)
         for side in (-away, away):
             values = best.point.values.copy()
             values[k] += side
-            try:
-                other = nearest(problem, best.point.moved(values), most)
-            except OutOfWork:
-                return
-            if other is not None:
-                yield other
+            starts.append(best.point.moved(values))
+    for done, start in enumerate(starts):
+        try:
+            with share_of(done / len(starts), (done + 1) / len(starts)):
+                other = nearest(problem, start, most)
+        except OutOfWork:
+            return
+        if other is not None:
+            yield other
 
 
 def _lingering(best: LikelihoodFit) -> dict[str, float]:

@@ -27,6 +27,7 @@ from drivetwin.identify.likelihood.smooth import local_mean
 from drivetwin.identify.likelihood.unknowns import (
     AERO,
     COMMON,
+    DEPARTURE,
     LAW,
     START,
     TE_OFFSET,
@@ -34,6 +35,7 @@ from drivetwin.identify.likelihood.unknowns import (
     Structure,
     own_of,
 )
+from drivetwin.identify.load import AERO_SPREAD, mean_speed_of
 from drivetwin.identify.momentum import DELAY_STD_MAX, MomentumSettings, rounding_error
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
@@ -57,8 +59,6 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
 """Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
 PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
 """Efficiency of a gearbox where no output torque shows it."""
-AERO_SPREAD = 10.0
-"""Plausible air drag at the wheel [N m s^2/rad^2]: of a lorry 1 to 3, of a car 0.1."""
 OFF_DESIGN = 10.0
 """Factor beside the card's Jo′ within which it is sought. Of all inertias it alone may be so small
 that with the shaft's damping one run takes as long as a whole fit."""
@@ -72,13 +72,15 @@ def problem_of(
     drivelines: Sequence[Driveline],
     loss_law: LossLaw,
     guess: Mapping[str, float],
+    hilly: bool = False,
 ) -> tuple[Problem, Point]:
     """The fit of all shifts of one log or of several, and where its search starts.
 
     `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
     start of each shift's run is read from the first samples. The age of the engine torque is held
-    where no torque step shows it. Shifts of one log stand together. Raises IdentificationError
-    where a shift holds too little.
+    where no torque step shows it. Shifts of one log stand together; on a `hilly` road each has a
+    load of its own, unless the load is known beforehand. Raises IdentificationError where a shift
+    holds too little.
     """
     logs = tuple(dict.fromkeys(s.log for s in signals))
     guess = _with_own(guess, logs)
@@ -93,6 +95,7 @@ def problem_of(
     names = [n for n in names if not untold.get(n, n in ages)]
     names += [n for n in _of_each((TE_OFFSET, AERO), logs) if n in priors]
     fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_known(p)}
+    departures = _departures(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
         label = f"start{k}"
@@ -100,13 +103,15 @@ def problem_of(
         same = [one for one in signals if one.log == s.log]
         own = {name: fixed[n] for name, n in own_of(s.log).items() if n in fixed}
         speed = mean_speed_of(same, d.i_f)
-        structure = Structure(d, loss_law, label, fixed | own, speed, tie, s.log)
+        departure = departures.get(k, {})
+        structure = Structure(d, loss_law, label, fixed | own, speed, tie, s.log, departure)
         parts.append(Part.unweighted(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
         torque = first.get("output_torque", guess["Tv_over_if"])
         values = (first["output_speed"], wheel, torque / guess["k_o"])
         start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
+    start |= {n: guess.get(n, 0.0) for each in departures.values() for n in each}
     lower, upper = _about_design(bounds_of(tuple(start)), tuple(start), priors)
     point = Point(tuple(start), np.clip(list(start.values()), lower, upper))
     entries = {
@@ -128,23 +133,27 @@ def _with_own(guess: Mapping[str, float], logs: Sequence[int]) -> dict[str, floa
     return own | dict(guess)
 
 
+def _departures(signals: Sequence[ShiftSignals]) -> dict[int, dict[str, float]]:
+    """By number of the shift how its load departs from the mean of its log: factors of unknowns.
+
+    Nothing of a shift that is the only one of its log.
+    """
+    found: dict[int, dict[str, float]] = {}
+    for log in dict.fromkeys(s.log for s in signals):
+        first, *others = [k for k, s in enumerate(signals) if s.log == log]
+        own = {k: f"start{k}.{DEPARTURE}" for k in others}
+        if others:
+            found[first] = dict.fromkeys(own.values(), -1.0)
+            found |= {k: {name: 1.0} for k, name in own.items()}
+    return found
+
+
 def over_eta(quantity: PriorValue, driveline: Driveline) -> PriorValue:
     """Design value of a torque-like quantity over the efficiency, as known from design or usual."""
     eta = driveline.known.get("eta", PLAUSIBLE_ETA)
     value = quantity.value / eta.value
     spread = value * eta.std / eta.value
     return PriorValue(value, float(np.hypot(quantity.std / eta.value, spread)))
-
-
-def mean_speed_of(signals: Sequence[ShiftSignals], i_f: float) -> float:
-    """Mean wheel speed over the log [rad/s]."""
-    means = [
-        float(np.mean(s.output_speed.values)) / i_f
-        if s.wheel_speed is None
-        else float(np.mean(s.wheel_speed.values))
-        for s in signals
-    ]
-    return float(np.mean(means))
 
 
 def shows_age(torque: Sampled) -> bool:

@@ -100,7 +100,9 @@ class Part:
         if not self._whole(found.run):
             return None
         columns = np.column_stack([self.record.stacked(found.derivatives[n]) for n in names])
-        slopes = columns @ matrix
+        acting = np.any(matrix != 0.0, axis=0)  # of many shifts a part knows few unknowns
+        slopes = np.zeros((len(columns), acting.size))
+        slopes[:, acting] = columns @ matrix[:, acting]
         response = self.response(point, found.run)
         for name, disturbance in self._torque_changes(point).items():
             answer = self.seen(point, response.to({TORQUE: disturbance}))
@@ -282,16 +284,20 @@ class Problem:
             if found is None:
                 return None
             residual, slopes = found
+            acting = np.flatnonzero(np.any(slopes != 0.0, axis=0))
+            own = slopes[:, acting]
+            regressor = np.zeros_like(slopes)
             with np.errstate(over="ignore", invalid="ignore"):
-                weighted = part.weighting.weighted(np.column_stack([residual, slopes]))
+                weighted = part.weighting.weighted(np.column_stack([residual, own]))
+                regressor[:, acting] = weighted[:, 1:]
                 square = float(residual @ weighted[:, 0])
-                gradient = gradient - slopes.T @ weighted[:, 0]
-                data += slopes.T @ weighted[:, 1:]
+                gradient[acting] -= own.T @ weighted[:, 0]
+                data[np.ix_(acting, acting)] += own.T @ weighted[:, 1:]
             if not _is_square(square):
                 return None
             cost += square
             residuals.append(residual)
-            regressors.append(weighted[:, 1:])
+            regressors.append(regressor)
         data = 0.5 * (data + data.T)
         if not (np.all(np.isfinite(data)) and _are_products(data)):
             return None

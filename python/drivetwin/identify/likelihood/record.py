@@ -8,16 +8,24 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from drivetwin.driveline import ENGINE_TORQUE, Signal, Trajectory
 from drivetwin.errors import IdentificationError
+from drivetwin.identify.likelihood.rounding import Rounding, rounding_of
 from drivetwin.identify.likelihood.smooth import (
     bend_of,
     local_cubic,
     local_mean,
     smooth_pressure,
 )
-from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals, Span
+from drivetwin.identify.signals import (
+    FloatArray,
+    Sampled,
+    ShiftSignals,
+    Span,
+    TorqueOfSpeeds,
+)
 from drivetwin.vehicle.spec import PriorValue
 
 IndexArray = NDArray[np.intp]
@@ -72,13 +80,19 @@ class Output:
         """Time from sample to sample [s]."""
         return float(np.median(np.diff(time[self.place])))
 
+    def after_period(self, time: FloatArray) -> Output:
+        """The samples stamped a period or more after the grid `time` (N,) starts: what they show
+        is on it, whether they are samples or means."""
+        first = int(np.searchsorted(time[self.place], time[0] + self.period(time)))
+        return replace(
+            self, place=self.place[first:], values=self.values[first:], centre=self.centre[first:]
+        )
+
     def averaged(self, time: FloatArray) -> Output:
         """The same samples taken as means over the time since the one before."""
         window = self.period(time)
-        first = int(np.searchsorted(time[self.place], time[0] + window))
-        place = self.place[first:]
-        centre = np.searchsorted(time, time[place] - 0.5 * window)
-        return replace(self, place=place, values=self.values[first:], window=window, centre=centre)
+        centre = np.searchsorted(time, time[self.place] - 0.5 * window)
+        return replace(self, window=window, centre=centre)
 
     def seen(self, time: FloatArray, column: FloatArray) -> FloatArray:
         """What a sensor of this kind shows (n,) of a quantity (N,) over the grid `time` (N,)."""
@@ -90,9 +104,7 @@ class Output:
         """What it would show (n,) if its samples were means where they are none, or the reverse."""
         if self.window > 0.0:
             return column[self.place]
-        window = self.period(time)
-        means = self._mean(time, column, window)
-        return np.where(time[self.place] - window < time[0], column[self.place], means)
+        return self._mean(time, column, self.period(time))
 
     def _mean(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
         """Means (n,) over the `window` [s] before each stamp."""
@@ -119,13 +131,18 @@ class Record:
     bend: FloatArray
     """What to add to the samples of the engine torque where it is a curve between them."""
     input_sigma: Mapping[str, float]
-    """White noise of an input sample by name; the engine torque is `engine torque`."""
+    """White noise of an input sample by name; the engine torque is `engine torque`, of one that is
+    computed from speeds the part that is not from the compared one, in the mean."""
     held_back: Mapping[str, FloatArray] = field(default_factory=dict)
     """What was taken off the samples of an input before it drives a run, by name: read less
     driving. An input without an entry drives as it was read."""
     fills: Mapping[str, PriorValue] = field(default_factory=dict)
     """P0 [Pa] of the elements as the card has it: about it more noise is taken off a pressure."""
     curved: bool = False
+    of_speeds: TorqueOfSpeeds | None = None
+    """Where the engine torque is computed from speeds: the noise of the compared one is in both."""
+    rounding: Rounding | None = None
+    """What rounding leaves of the samples of the engine torque; None where noise dithers it."""
 
     @property
     def size(self) -> int:
@@ -192,6 +209,53 @@ class Record:
         stamps[TORQUE] = self.engine_torque.time - age
         return {name: np.interp(middle, stamps[name], v) for name, v in self.held_back.items()}
 
+    @property
+    def torque_sigma(self) -> FloatArray:
+        """Noise (m,) of the samples of the engine torque that is no compared signal's and comes and
+        goes from sample to sample."""
+        time, sigma = self.engine_torque.time, self.input_sigma[TORQUE]
+        if self.of_speeds is None:
+            return np.full(time.size, sigma)
+        least = FLOOR * float(np.max(np.abs(self.engine_torque.values)))
+        return np.maximum(np.interp(time, self.of_speeds.time, self.of_speeds.rest), least)
+
+    @property
+    def torque_power(self) -> FloatArray:
+        """Variance (m,) of white samples that have the power of that noise and of the rounding."""
+        if self.rounding is None:
+            return self.torque_sigma**2
+        return np.asarray(self.torque_sigma**2 + self.rounding.sigma**2)
+
+    def torque_share(self) -> csr_array | None:
+        """Noise of the engine torque over each step per that of a compared sample (N-1, size).
+
+        None where the torque has a sensor of its own. One that is computed from speeds has no age.
+        """
+        if self.of_speeds is None:
+            return None
+        middle = 0.5 * (self.time[1:] + self.time[:-1])
+        torque = self.engine_torque.time
+        by_step = _interpolation(torque, middle, (0, torque.size))
+        return csr_array(by_step @ self._torque_by_sample(self.of_speeds))
+
+    def torque_noise(self, noise: FloatArray) -> FloatArray:
+        """What `noise` (size,) of the compared samples does to those of the engine torque (m,)."""
+        if self.of_speeds is None:
+            return np.zeros(self.engine_torque.time.size)
+        return np.asarray(self._torque_by_sample(self.of_speeds) @ noise)
+
+    def _torque_by_sample(self, of_speeds: TorqueOfSpeeds) -> csr_array:
+        """Noise of samples of the engine torque per that of a compared sample (m, size)."""
+        torque = self.engine_torque.time
+        slope = np.interp(torque, of_speeds.time, of_speeds.slope)
+        first = 0
+        for out in self.outputs:
+            if out.name == "engine_speed":
+                break
+            first += out.values.size
+        of_speed = _interpolation(self.time[out.place], torque, (first, self.size))
+        return csr_array(of_speed * slope[:, None])
+
     def torque_rate(self, age: float) -> FloatArray:
         """Rate of the engine torque [N m/s] as it acts over each step of the grid (N-1,)."""
         signal = self.steady_torque
@@ -220,8 +284,10 @@ def record_of(
 ) -> Record:
     """The record of one shift over `span` [s]; `fills` is P0 [Pa] by element as the card has it.
 
-    An output that stopped before it, or starts at its end, is not compared in it. Raises
-    IdentificationError where the span holds too little to compare.
+    An output that stopped before it, or starts at its end, is not compared in it. The first sample
+    of each is left out, as a mean it would show what was before: kinds of signals are compared by
+    what they leave of the same samples. Raises IdentificationError where the span holds too little
+    to compare.
     """
     channels = {
         "output_torque": signals.output_torque,
@@ -252,10 +318,15 @@ def record_of(
             np.searchsorted(time, part.time),
             part.values,
             max(part.sigma, FLOOR * float(np.ptp(part.values))),
-        )
+        ).after_period(time)
         for name, part in parts.items()
     )
-    torque = signals.engine_torque
+    torque, of_speeds = signals.engine_torque, signals.torque_of_speeds
+    sigma = torque.sigma if of_speeds is None else float(np.sqrt(np.mean(of_speeds.rest**2)))
+    noise = replace(torque, sigma=sigma)
+    rounding = rounding_of(torque, signals.torque_resolution)
+    if rounding is not None:
+        rounding = replace(rounding, stay=np.pad(rounding.stay, 1, mode="edge"))
     fills = fills or {}
     smooth = {n: smooth_pressure(p, fills.get(n)) for n, p in signals.pressures.items()}
     return Record(
@@ -265,9 +336,11 @@ def record_of(
         outputs,
         _held(replace(torque, values=local_mean(torque))),
         np.pad(bend_of(torque.time, torque.values), 1),
-        {TORQUE: _noise(torque)} | {n: _noise(p) for n, p in signals.pressures.items()},
+        {TORQUE: _noise(noise)} | {n: _noise(p) for n, p in signals.pressures.items()},
         {name: p.values - smooth[name] for name, p in signals.pressures.items()},
         fills,
+        of_speeds=of_speeds,
+        rounding=rounding,
     )
 
 
@@ -290,12 +363,22 @@ def _at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> Floa
     with the same weights, the transpose of interpolation.
     """
     middle, width = 0.5 * (grid[1:] + grid[:-1]), np.diff(grid)
-    after = np.clip(np.searchsorted(stamps, middle), 1, stamps.size - 1)
-    share = (middle - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
-    share = np.clip(share, 0.0, 1.0)
-    total = np.bincount(after - 1, (1.0 - share) * width * steps, stamps.size)
-    total += np.bincount(after, share * width * steps, stamps.size)
+    total = _interpolation(stamps, middle, (0, stamps.size)).T @ (width * steps)
     return np.asarray(total / float(np.median(np.diff(stamps))))
+
+
+def _interpolation(stamps: FloatArray, at: FloatArray, columns: tuple[int, int]) -> csr_array:
+    """The matrix (m, count) that interpolates linearly from `stamps` (n,) to `at` (m,).
+
+    Held beyond both ends. `columns` are the first of the stamps' columns and the count of all.
+    """
+    first, count = columns
+    after = np.clip(np.searchsorted(stamps, at), 1, stamps.size - 1)
+    share = (at - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
+    share = np.clip(share, 0.0, 1.0)
+    data = np.column_stack([1.0 - share, share]).ravel()
+    index = first + np.column_stack([after - 1, after]).ravel()
+    return csr_array((data, index, 2 * np.arange(at.size + 1)), shape=(at.size, count))
 
 
 def _held(signal: Sampled) -> Signal:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Tests of what the fit leaves over: whiteness, and correlation with the inputs.
 
-Q per sample hardly notices a wrong model (ESTIMATION: 1.10 where intervals covered 15 %), since
-the error is slow and the noise is not. Averages over blocks show it: white noise leaves 1/m of
+Q per sample hardly notices a wrong model (docs/accuracy.md, faults that nobody states), since the
+error is slow and the noise is not. Averages over blocks show it: white noise leaves 1/m of
 its power in means over m samples.
 """
 

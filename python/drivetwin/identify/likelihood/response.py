@@ -15,7 +15,7 @@ core's.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -63,16 +63,41 @@ class Response:
 
     def pushed(self, push: FloatArray) -> FloatArray:
         """z (N, 4) with changes `push` (N-1, 4) over the steps, from z = 0."""
-        start = np.zeros((1, STATES))
-        pushed = np.vstack([start, push])
+        return self.pushed_each(push[:, :, None])[:, :, 0]
+
+    def pushed_each(self, push: FloatArray) -> FloatArray:
+        """z (N, 4, q) with each of q changes `push` (N-1, 4, q) over the steps, from z = 0."""
+        start = np.zeros((1, *push.shape[1:]))
+        pushed = np.concatenate([start, push])
+        columns = pushed.reshape(-1, push.shape[-1])
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                z = solve_banded(
-                    (2 * STATES - 1, 0), self._banded, pushed.ravel(), check_finite=False
-                )
+                z = solve_banded((2 * STATES - 1, 0), self._banded, columns, check_finite=False)
         except np.linalg.LinAlgError:
             return np.full_like(pushed, np.inf)
-        return np.asarray(z.reshape(-1, STATES))
+        return np.asarray(z.reshape(pushed.shape))
+
+    def pulled_each(self, pull: FloatArray) -> FloatArray:
+        """The transpose of `pushed_each`: (N-1, 4, q) from weights `pull` (N, 4, q) on z."""
+        lower, count = self._banded, len(pull) * STATES
+        upper = np.zeros_like(lower)
+        for below, diagonal in enumerate(lower):
+            upper[-1 - below, below:] = diagonal[: count - below]
+        columns = pull.reshape(count, -1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            back = solve_banded((0, 2 * STATES - 1), upper, columns, check_finite=False)
+        return np.asarray(back.reshape(pull.shape)[1:])
+
+    def fed_back(self, slope: FloatArray) -> Response:
+        """The response where the engine torque follows the engine speed by `slope` (N-1,)
+        [N m s/rad], over each step by the mean of the speed at both its ends."""
+        half = 0.5 * slope[:, None] * self.drive[TORQUE]
+        transition = self.transition.copy()
+        transition[:, :, 0] += half
+        ahead = np.zeros_like(transition) + np.eye(STATES)
+        ahead[:, :, 0] += half / (1.0 - half[:, :1])  # the inverse of 1 less the half at the end
+        drive = {name: np.einsum("kij,kj->ki", ahead, one) for name, one in self.drive.items()}
+        return replace(self, transition=ahead @ transition, drive=drive, effect=ahead @ self.effect)
 
     @cached_property
     def _banded(self) -> FloatArray:

@@ -14,6 +14,7 @@ from drivetwin.identify.integral import IntegralShift
 from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.guess import guess_of
+from drivetwin.identify.likelihood.hills import departures_of
 from drivetwin.identify.likelihood.scale_free import guess_without_torque
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.signals import Driveline, ShiftSignals
@@ -23,7 +24,7 @@ DISAGREE = 5.0
 """Difference of the two methods in its standard deviations from which a warning is due."""
 
 OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
-"""What the linear method reads off a load that it takes as constant."""
+"""What a method reads off a load that it takes as constant."""
 
 
 def likelihood_alone(
@@ -34,8 +35,12 @@ def likelihood_alone(
     Raises IdentificationError where the fit does not reach a plausible minimum.
     """
     guess: dict[str, float] = {}
+    loads = []
     for s, d in zip(signals, drivelines, strict=True):
-        guess = guess_without_torque(s, d, card) | guess
+        found = guess_without_torque(s, d, card)
+        loads.append(found["Tv_over_if"])
+        guess = found | guess
+    guess |= departures_of(loads)
     best, notes = choose(signals, drivelines, card.loss_law, guess)
     told = conclude(best, signals, drivelines, {}, card.sensors)
     return replace(told, warnings=(*told.warnings, *notes)), best
@@ -61,10 +66,11 @@ def likelihood(
 def _disagreements(told: Conclusions, linear: Conclusions) -> list[str]:
     """Parameters on which the two methods differ by more than their noise explains.
 
-    Where the load grows with speed, which is told, the linear method must differ on what it reads
-    off a constant one.
+    Where one of them alone has a load that grows with speed, which is told, the other must differ
+    on what it reads off a constant one.
     """
-    explained = OF_A_CONSTANT_LOAD if told.load is not None else frozenset()
+    alike = (told.load is None) == (linear.load is None)
+    explained = frozenset() if alike else OF_A_CONSTANT_LOAD
     texts = []
     for name, estimate in told.estimates.items():
         other = linear.estimates.get(name)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Start values without an output torque: everything torque-like is divided by η.
 
-Speeds and engine torque tell ratios only (THEORY section 5). With η = 1 in the model, its
+Speeds and engine torque tell ratios only (THEORY section 6). With η = 1 in the model, its
 parameters are those ratios; these are their start values:
 
     T_e = (Je/η)·ω_e' + (J5/η)·ω_e'/i_g² + (T_v/i_f/η)/i_g     in gear, both gears together

@@ -2,8 +2,10 @@
 """The unknowns of the fit and how the simulated model follows from them.
 
     J1 = Je/η, J2e = 0 (THEORY section 3: only Je = J1·η + J2e can be told)
-    load.constant = i_f·(T_v/i_f) - aero·mean speed², mu_s = mu_c + mu_drop, v_s = exp(ln_v_s)
+    load.constant = i_f·(T_v/i_f + d) - aero·mean speed², mu_s = mu_c + mu_drop, v_s = exp(ln_v_s)
 
+On a hilly road the load of each shift departs from T_v/i_f by a d of its own. They add up to zero
+over the shifts of a log, so T_v/i_f is the mean: the d of the first is minus the sum of the others.
 An element that comes on in one of the shifts has its own Stribeck law; of one that only lets go
 no more than the level of its law shows, through the instant at which it breaks away.
 """
@@ -11,19 +13,18 @@ no more than the level of its law shows, through the instant at which it breaks 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from drivetwin.driveline import DualClutch, LossLaw, RoadLoad, ShiftElement, State, Stribeck
+from drivetwin.identify.load import AERO as AERO
 from drivetwin.identify.signals import Coupling, Driveline, FloatArray
 
 COMMON = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
 """Unknowns of the driveline, the same in all shifts."""
 TE_OFFSET = "te_offset"
 """Mean rounding error of the engine torque [N m]: what is read is the truth plus this."""
-AERO = "aero"
-"""Part of the load that grows with the square of the wheel speed [N m s^2/rad^2]."""
 OWN = ("Tv_over_if", "te_delay", TE_OFFSET)
 """Unknowns that each of several logs has of its own: road, logger and rounding differ."""
 LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
@@ -31,6 +32,11 @@ NO_LAW = (0.1, 0.1, 1.0, 0.0)
 """Any friction law, for an element without pressure."""
 START = ("speed", "wheel_speed", "twist")
 """Unknowns of the start of each shift's run: ω_out and ω_w [rad/s], shaft twist [rad]."""
+DEPARTURE = "load"
+"""Unknown of each shift but the first of a log on a hilly road: d, its load at the output shaft
+less the mean over the shifts of the log [N m]."""
+OF_RUN = (*START, DEPARTURE)
+"""All unknowns that belong to the run of one shift, by what follows its label and the dot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +77,9 @@ class Structure:
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
     start unknowns of this shift. `mean_speed` is that of the wheel over the log [rad/s], at which
     T_v/i_f holds where the load grows with the speed. A `tie` takes the place of the unknown J_e.
-    `log` is the number of the log among several, 0 where it is the only one.
+    `log` is the number of the log among several, 0 where it is the only one. `departure` is how
+    the load of this shift departs from that of its log: a factor by unknown; empty where it does
+    not.
     """
 
     driveline: Driveline
@@ -81,6 +89,7 @@ class Structure:
     mean_speed: float
     tie: Tie | None = None
     log: int = 0
+    departure: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def elements(self) -> tuple[Coupling, Coupling]:
@@ -127,8 +136,13 @@ class Structure:
 
     def _load(self, point: Point) -> RoadLoad:
         aero = self.value(point, AERO)
-        mean = self.value(point, "Tv_over_if") * self.driveline.i_f
+        mean = self.load(point) * self.driveline.i_f
         return RoadLoad(constant=mean - aero * self.mean_speed**2, aero=aero)
+
+    def load(self, point: Point) -> float:
+        """Load of this shift at the output shaft [N m], at the mean speed of its log."""
+        departure = sum(factor * point[name] for name, factor in self.departure.items())
+        return self.value(point, "Tv_over_if") + departure
 
     def _element(self, point: Point, one: Coupling) -> ShiftElement:
         c, drop, v, ln_v_s = (self.value(point, f"{one.name}.{key}") for key in LAW)
@@ -160,8 +174,8 @@ class Structure:
         entries = [entry for name in point.names for entry in self._entries(point, name)]
         core = tuple(dict.fromkeys(entry[0] for entry in entries))
         matrix = np.zeros((len(core), len(point.names)))
-        for field, name, slope in entries:
-            matrix[core.index(field), point.names.index(name)] = slope
+        for known, name, slope in entries:
+            matrix[core.index(known), point.names.index(name)] = slope
         return core, matrix
 
     def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
@@ -184,6 +198,8 @@ class Structure:
             f"{self.label}.wheel_speed": (("start.wheel_speed", 1.0),),
             f"{self.label}.twist": (("start.twist", 1.0),),
         }
+        for own, factor in self.departure.items():
+            table[own] = (("load.constant", factor * i_f),)
         for one in self.elements:
             v_s = float(np.exp(self.value(point, f"{one.name}.ln_v_s")))
             fields = {
@@ -198,5 +214,5 @@ class Structure:
                 table[f"{one.name}.{key}"] = [(f"{one.name}.{f}", d) for f, d in slopes]
         for one in self.spinning:
             table[f"{one.name}.drum"] = [(f"{one.name}.drum_inertia", 1.0)]
-        for field, slope in table.get(name, ()):
-            yield field, name, slope
+        for known, slope in table.get(name, ()):
+            yield known, name, slope

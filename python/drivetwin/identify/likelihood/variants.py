@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""What the log itself decides about the model: how the load grows, what outputs show.
+"""What the log itself decides about the model: how the load grows and differs, what outputs show.
 
 A part of the model that is wrongly left out biases everything (a load that grows with speed moves
 J3 by several per cent), and one that is wrongly left in widens intervals. The growing part is
-kept where it is significant; outputs are samples or means, whichever leaves less.
+kept where it is significant, a load for each shift unless all may be one (hills.py); outputs are
+samples or means, whichever leaves less.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.display import in_units
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
+from drivetwin.identify.conclude import growth_told
 from drivetwin.identify.likelihood.fit import (
     GOOD,
     RESTARTS,
@@ -26,25 +26,24 @@ from drivetwin.identify.likelihood.fit import (
     fit,
     spread_of,
 )
+from drivetwin.identify.likelihood.hills import with_one_load
 from drivetwin.identify.likelihood.kinds import (
-    averaged,
+    averaged_over_kinds,
     in_words,
     likely_kinds,
+    with_best_kinds,
     with_either_speeds,
-    with_kinds,
 )
 from drivetwin.identify.likelihood.lingering import lowest
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
 from drivetwin.identify.likelihood.work import OutOfWork, at_most
-from drivetwin.identify.result import Z95
+from drivetwin.identify.load import SIGNIFICANT
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
-SIGNIFICANT = 3.0
-"""Size of the growing part of the load, in its standard deviations, from which it is kept."""
 WORK = 700.0
 """Passes over the log that the search may take: from a bad start and to the end it takes 450."""
 LESS_WORK = 200.0
@@ -70,42 +69,60 @@ def choose(
     Raises IdentificationError where no variant converges.
     """
     shifts = [s.shift for s in signals]
-    problem, start = problem_of(signals, drivelines, loss_law, {**guess, AERO: SMALL})
-    notes = []
-    with part(0.0, 0.6), at_most(WORK) as search:
+    growing = {**guess, AERO: max(guess.get(AERO, 0.0), SMALL)}
+    constant = {name: value for name, value in guess.items() if name != AERO}
+    problem, start = problem_of(signals, drivelines, loss_law, growing, hilly=True)
+    with part(0.0, 0.5), at_most(WORK) as search:
         best = _fit_either(problem, start, shifts)
-    with part(0.6, 1.0), at_most(LESS_WORK):
-        narrower, start = problem_of(signals, drivelines, loss_law, guess)
-        if _grows(best):
-            notes.append(_growth(best))
-        elif best.point[AERO] == 0.0:
-            best, problem = _without_growth(best, narrower), narrower
-        else:
-            of_kinds = narrower.of_kinds(best.problem.kinds)
-            with suppress(OutOfWork):  # the wider model is right all the same
-                best = fit(of_kinds, _taken(start, best.point), shifts, thorough=False)
-                problem = narrower
-    with at_most(min(LINGER_WORK, search.left)):
+    with part(0.5, 0.65), at_most(LESS_WORK):
+        level = with_one_load(best)
+        point, covariance = level or (best.point, best.covariance)
+        guess = growing if _grows(point, covariance) else constant
+        narrower = problem_of(signals, drivelines, loss_law, guess, hilly=level is None)
+        best, problem = _narrowed(best, point, narrower, shifts) or (best, problem)
+    notes = _growth(best)
+    with part(0.65, 0.85, "other minima"), at_most(min(LINGER_WORK, search.left)):
         best = lowest(problem, best)
-    with at_most(min(DOUBT_WORK, search.left)):
-        best, doubts = averaged(problem, best)
+    with part(0.85, 1.0, "kinds of signals"), at_most(min(DOUBT_WORK, search.left)):
+        best, doubts = averaged_over_kinds(problem, best)
     with at_most(DOUBT_WORK):
         best, either = with_either_speeds(problem, best)
     return best, (*notes, *in_words(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
 
 
+def _narrowed(
+    wider: LikelihoodFit, point: Point, narrower: tuple[Problem, Point], shifts: Sequence[Shift]
+) -> tuple[LikelihoodFit, Problem] | None:
+    """The fit of a model without what the log does not show, and its problem; None where it shows
+    all, and where the work runs out: the wider model is right all the same.
+
+    `narrower` is its problem and start, `point` what the wider fit says of it.
+    """
+    problem, start = narrower
+    left_out = [name for name in wider.point.names if name not in start.names]
+    if not left_out:
+        return None
+    if left_out == [AERO] and wider.point[AERO] == 0.0:
+        return _without_growth(wider, problem), problem
+    try:
+        of_kinds = problem.of_kinds(wider.problem.kinds)
+        return fit(of_kinds, _taken(start, point), shifts, thorough=False), problem
+    except OutOfWork:
+        return None
+
+
 def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:
-    """The fit with every signal of the kind that leaves less.
+    """The fit with every signal of the likeliest kind.
 
     Raises IdentificationError where it does not converge with the likeliest kinds.
     """
     likely, other = likely_kinds(problem, start)
     best = _tried(likely, start, shifts) or fit(other, start, shifts, restarts=RESTARTS[:1])
-    best = with_kinds(problem, best)
+    best = with_best_kinds(problem, best)
     if best.chi2 < GOOD:
         return best
     second = checked(best, problem.of_kinds(best.problem.kinds), start, shifts)
-    return best if second is best else with_kinds(problem, second)
+    return best if second is best else with_best_kinds(problem, second)
 
 
 def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit | None:
@@ -121,10 +138,10 @@ def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Likelihoo
         return None
 
 
-def _grows(best: LikelihoodFit) -> bool:
+def _grows(point: Point, covariance: FloatArray) -> bool:
     """Whether the growing part of the load differs from none by more than its noise."""
-    k = best.point.names.index(AERO)
-    return bool(best.point[AERO] > SIGNIFICANT * np.sqrt(best.covariance[k, k]))
+    k = point.names.index(AERO)
+    return bool(point[AERO] > SIGNIFICANT * np.sqrt(covariance[k, k]))
 
 
 def _without_growth(best: LikelihoodFit, narrower: Problem) -> LikelihoodFit:
@@ -167,16 +184,13 @@ def _without(matrix: FloatArray, k: int) -> FloatArray:
     return np.delete(np.delete(matrix, k, axis=0), k, axis=1)
 
 
-def _growth(best: LikelihoodFit) -> str:
-    """What is said of a load that grows with speed."""
+def _growth(best: LikelihoodFit) -> list[str]:
+    """What is said of a load that grows with speed; nothing where it does not."""
+    if AERO not in best.point.names:
+        return []
     k = best.point.names.index(AERO)
-    half = Z95 * float(np.sqrt(best.covariance[k, k]))
-    speed = best.problem.parts[0].structure.mean_speed
-    return (
-        f"the load grows with the square of the speed "
-        f"({in_units(best.point[AERO], 'N*m*s^2/rad^2', half)} at the wheel); "
-        f"T_v/i_f holds at {speed:.3g} rad/s of the wheel"
-    )
+    std = float(np.sqrt(best.covariance[k, k]))
+    return [growth_told(best.point[AERO], std, best.problem.parts[0].structure.mean_speed)]
 
 
 def _taken(start: Point, found: Point) -> Point:

@@ -19,6 +19,11 @@ EXPANSION = 8.0
 """Passes that one expansion of Q counts: as long as so many evaluations, whatever the log."""
 WEIGHTING = 4.0
 """Passes that forming the covariance of Q anew counts."""
+REMEDY = (
+    "check ratios, clutch gains and P0 on the card against the log; where it has an output torque, "
+    "the integral method gives values without a model of the shift"
+)
+"""What to do where no search ends at a plausible minimum."""
 
 
 class OutOfWork(IdentificationError):
@@ -59,6 +64,5 @@ def spend(passes: float) -> None:
         raise OutOfWork(
             "the search was given up without a plausible minimum: the model hardly holds on "
             "this log",
-            "check ratios, clutch gains and P0 on the card against the log, or use the integral "
-            "method",
+            REMEDY,
         )

@@ -27,7 +27,7 @@ from drivetwin.identify.likelihood.derived import parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.noise_power import noise_power
 from drivetwin.identify.likelihood.null_space import reduced
-from drivetwin.identify.likelihood.unknowns import LAW, START, own_of
+from drivetwin.identify.likelihood.unknowns import LAW, OF_RUN, own_of
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.result import FrictionCurve
 from drivetwin.identify.signals import FloatArray, ShiftSignals
@@ -114,10 +114,10 @@ def consistency(
 
 
 def shared_of(fit: LikelihoodFit) -> list[int]:
-    """Places of the unknowns that all logs share: neither a log's own nor a start of a run."""
+    """Places of the unknowns that all logs share: neither a log's own nor a run's."""
     structures = [part.structure for part in fit.problem.parts]
     own = {name for one in structures for name in own_of(one.log).values()}
-    starts = {f"{one.label}.{key}" for one in structures for key in START}
+    starts = {f"{one.label}.{key}" for one in structures for key in OF_RUN}
     return [k for k, name in enumerate(fit.point.names) if name not in own | starts]
 
 

@@ -21,12 +21,12 @@ import numpy as np
 from drivetwin.display import in_units
 from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.identify.conclude import Conclusions
-from drivetwin.identify.design import outside_ranges
+from drivetwin.identify.design import outside_ranges, without_gain
 from drivetwin.identify.evidence import Evidence
-from drivetwin.identify.inputs import driveline_of
+from drivetwin.identify.inputs import driveline_behind, tolerances_of
 from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import PLAUSIBLE, LikelihoodFit, covariance_of
-from drivetwin.identify.likelihood.unknowns import AERO, OWN, START, own_of
+from drivetwin.identify.likelihood.unknowns import AERO, OF_RUN, OWN, own_of
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import Shifts, identify
@@ -89,7 +89,7 @@ def identify_several(
         with part(ALONE * k / len(logs), ALONE * (k + 1) / len(logs), f"log {k + 1} alone"):
             alone.append(_by_itself(log, card, found))
     signals = [replace(s, log=k) for k, one in enumerate(alone, 1) for s in one.evidence.signals]
-    drivelines = [driveline_of(card, s.shift) for s in signals]
+    drivelines = [driveline_behind(card, s) for s in signals]
     with part(ALONE, 0.95, "all logs together"):
         try:
             _refuse_apart(alone)
@@ -100,20 +100,25 @@ def identify_several(
                 f"alone they tell {'; '.join(farthest(alone)) or fault.what}",
                 "leave out the log of another vehicle, payload or temperature",
             ) from fault
-    told = conclude(fit, signals, drivelines, pooled_curves(alone), card.sensors)
+    tolerances = tolerances_of(logs[0], card, signals[0].shift)
+    told = conclude(fit, signals, drivelines, pooled_curves(alone), tolerances)
     tested = consistency(fit, signals, told.friction)
     shares = tuple(
         _share(k, log, one, fit) for k, (log, one) in enumerate(zip(logs, alone, strict=True), 1)
     )
     read = [f"{Path(log.source).name}: {text}" for log in logs for text in log.warnings]
-    ranges = outside_ranges(told.estimates, card)
-    told = replace(told, warnings=(*read, *told.warnings, *notes, *ranges))
+    is_open = any(s.torque_of_speeds is not None for s in signals)
+    ranges = () if is_open else outside_ranges(told.estimates, card)
+    estimates, gains = without_gain(told.estimates, card.loss_law)
+    warnings = (*read, *told.warnings, *notes, *gains, *ranges)
+    told = replace(told, estimates=estimates, warnings=warnings)
     several = Several(shares, tested)
     evidence = Evidence(
         signals=tuple(signals),
         paper=tuple(one for each in alone for one in each.evidence.paper),
         integral=tuple(one for each in alone for one in each.evidence.integral),
         likelihood=fit,
+        loads=told.loads,
         several=several,
     )
     return replace(_joined(alone, told, several), evidence=evidence)
@@ -178,7 +183,7 @@ def start_of(alone: Sequence[Identification]) -> dict[str, float]:
         values |= {own_of(k)[name]: value for name, value in own.items()}
         values = own | told | values
     values |= _mean([_shared(fit) for fit in fits])
-    starts = {f"start{k}.{key}" for k in range(len(values)) for key in START}
+    starts = {f"start{k}.{key}" for k in range(len(values)) for key in OF_RUN}
     return {name: value for name, value in values.items() if name not in starts | {AERO}}
 
 
@@ -202,7 +207,7 @@ _Told = tuple[list[str], FloatArray, FloatArray]
 
 def _shared(fit: LikelihoodFit) -> _Told:
     """Names, values (s,) and information (s, s) of what a log shares with others."""
-    starts = {f"{part.structure.label}.{key}" for part in fit.problem.parts for key in START}
+    starts = {f"{part.structure.label}.{key}" for part in fit.problem.parts for key in OF_RUN}
     keep = [k for k, name in enumerate(fit.point.names) if name not in {*starts, *OWN, AERO}]
     names = [fit.point.names[k] for k in keep]
     return names, fit.mean.values[keep], covariance_of(fit.covariance[np.ix_(keep, keep)])
@@ -291,6 +296,9 @@ def of_one_log(found: Identification, share: LogShare) -> Identification:
         if log in (0, share.number)
     }
     place = [k for k, name in enumerate(found.correlation_ids) if name in mine]
+    logs = () if found.evidence.several is None else found.evidence.several.logs
+    first = sum(len(one.shifts) for one in logs if one.number < share.number)
+    loads = found.evidence.loads[first : first + len(share.shifts)]
     correlation = None if found.correlation is None else found.correlation[np.ix_(place, place)]
     return replace(
         found,
@@ -303,4 +311,5 @@ def of_one_log(found: Identification, share: LogShare) -> Identification:
         correlation_ids=tuple(mine[found.correlation_ids[k]] for k in place),
         correlation=correlation,
         load=None if found.load is None else replace(found.load, mean_speed=share.mean_speed),
+        evidence=replace(found.evidence, loads=loads),
     )

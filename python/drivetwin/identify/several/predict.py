@@ -21,7 +21,7 @@ import numpy as np
 
 from drivetwin.driveline import State
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.inputs import driveline_of
+from drivetwin.identify.inputs import driveline_behind
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.guess import TYPICAL_LAW
 from drivetwin.identify.likelihood.newton import minimise
@@ -77,7 +77,7 @@ def expected(
     The signals' `log` is their number in the fit, or one that it does not have. Raises
     IdentificationError where the stretch before the shift cannot be simulated.
     """
-    drivelines = [driveline_of(card, s.shift) for s in held]
+    drivelines = [driveline_behind(card, s) for s in held]
     problem, point = problem_of(held, drivelines, card.loss_law, _known(fit, drivelines))
     problem = problem.of_kinds(fit.problem.kinds)
     unseen = _unseen(fit, problem, point)

@@ -147,9 +147,7 @@ def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
     laws = {f"{e.name}.{key}" for e in old.elements for key in LAW}
     fixed = {**old.fixed, **{name: old.value(base.point, name) for name in laws}}
     mine = {one.name: tables[one.name] for one in old.elements if one.name in tables}
-    structure = Shaped(
-        old.driveline, old.loss_law, old.label, fixed, old.mean_speed, old.tie, old.log, mine
-    )
+    structure = Shaped(**{**vars(old), "fixed": fixed, "tables": mine})
     return Part.unweighted(structure, part.record)
 
 

@@ -7,7 +7,10 @@ from drivetwin.display import NM
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.observed import Band, FloatArray, Observation
 from drivetwin.report.figures.stack import Curve, Panel
-from drivetwin.report.style import MEASURED, MUTED, SIMULATED
+from drivetwin.report.style import MEASURED, SIMULATED
+
+BAND_FILL, BAND_EDGE = "rgba(213,94,0,0.28)", "rgba(213,94,0,0.6)"
+"""Area and edges of a band, in the colour of the curve within."""
 
 
 def observer_panels(one: Observation, log: ShiftLog) -> list[Panel]:
@@ -25,8 +28,9 @@ def observer_panels(one: Observation, log: ShiftLog) -> list[Panel]:
 
 
 def _curves(time: FloatArray, band: Band) -> list[Curve]:
+    name, edge = "95 % band", BAND_EDGE
     return [
-        Curve("95 % low", time, band.lower, MUTED, width=0.8),
-        Curve("95 % high", time, band.upper, MUTED, width=0.8),
+        Curve(name, time, band.lower, edge, width=0.7, listed=False, says="from"),
+        Curve(name, time, band.upper, edge, width=0.7, fill=BAND_FILL, says="to"),
         Curve("observed", time, band.value, SIMULATED, width=1.6),
     ]

@@ -46,6 +46,10 @@ class Curve:
     """Drawn as a staircase: a value that is held until the next."""
     listed: bool = True
     """Named in the legend."""
+    fill: str = ""
+    """Colour of the area between it and the curve before it; empty: none."""
+    says: str = ""
+    """Word before its value where the mouse asks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +168,10 @@ def _trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -
         xaxis="x",
         yaxis=f"y{suffix}",
         legend=f"legend{suffix}",
+        fill="tonexty" if curve.fill else None,
+        fillcolor=curve.fill or None,
         showlegend=curve.listed and len(panel.curves) > 1,
-        hovertemplate=f"%{{y:.5~g}} {panel.display.label}",
+        hovertemplate=f"{curve.says} %{{y:.5~g}} {panel.display.label}".lstrip(),
     )
 
 

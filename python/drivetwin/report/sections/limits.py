@@ -88,7 +88,7 @@ def _suggested(suggestions: Sequence[Suggestion], found: Identification) -> Iter
     rows = []
     for one in suggestions:
         display = display_of(found.estimates[one.parameter].unit)
-        then = one.prospects[0].half_width if one.prospects and not one.limit else None
+        then = None if one.best is None else one.best.half_width
         rows.append(
             (
                 Cell(parameter_label(one.parameter)),

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: MIT
+"""What rounding leaves of an engine torque that its own noise does not dither.
+
+While the torque stays at a level the error stays too: its mean over that time is as far off as one
+sample, and noise of the same size that comes and goes from sample to sample would be far less. Each
+stay has an error of its own, so what it does is that of white noise of the same power there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.identify.likelihood.smooth import local_mean
+from drivetwin.identify.momentum import rounding_error
+from drivetwin.identify.signals import FloatArray, Sampled
+
+
+@dataclass(frozen=True, eq=False)
+class Rounding:
+    """Errors of the samples of a rounded signal that do not average out.
+
+    `error` is the standard deviation of the mean error of one stay at a level, in the signal's
+    unit; `stay` (m,) the number of the stay that each sample belongs to, from 0.
+    """
+
+    error: float
+    stay: NDArray[np.intp]
+
+    @property
+    def sigma(self) -> FloatArray:
+        """White noise (m,) of the samples with the same power: its mean over a stay is `error`."""
+        return np.asarray(self.error * np.sqrt(np.bincount(self.stay)[self.stay]))
+
+    def drawn(self, rng: np.random.Generator) -> FloatArray:
+        """Errors (m,) as they might have been."""
+        return np.asarray(self.error * rng.standard_normal(int(self.stay[-1]) + 1)[self.stay])
+
+
+def rounding_of(torque: Sampled, step: float) -> Rounding | None:
+    """Errors that rounding to `step` [N m] leaves; None where they are lost in the noise."""
+    error = rounding_error(torque, step)
+    if error == 0.0:
+        return None
+    level = np.round(local_mean(torque) / step)
+    return Rounding(error, np.cumsum(np.diff(level, prepend=level[0]) != 0.0))

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+"""The shift behind an open converter identified: values, and what its samples show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli.synth import write_run
+from drivetwin.dyno.converter_scenario import open_converter
+from drivetwin.dyno.dyno import run
+from drivetwin.identify.inputs import driveline_behind
+from drivetwin.identify.pipeline import MAP_EXACT, identify
+from drivetwin.logs.read import read_log
+from drivetwin.shifts.find import find_shifts
+from drivetwin.vehicle.card import load_card
+
+KINDS = "samples are means"
+
+
+def test_noise_that_turbine_and_its_torque_share_is_no_sign_of_means(tmp_path: Path) -> None:
+    made = run(open_converter(), seed=0)
+    path, card_path, _ = write_run(tmp_path / "open.csv", made)
+    card = load_card(card_path)
+    log = read_log(path, card)
+    found = identify(log, card, find_shifts(log, card))
+    # Taken for noise of its own, Q fell by 32 for means of all outputs, and J_prime_2 was 3 σ off.
+    assert not [text for text in found.warnings if KINDS in text]
+    assert MAP_EXACT in found.warnings
+    for name in ("eta", "J_prime_2", "J_prime_3", "J_vehicle", "Tv_over_if", "k_o"):
+        one, truth = found.estimates[name], made.truth.parameters[name]
+        assert one.value is not None
+        assert one.std_noise is not None
+        assert one.value == pytest.approx(truth, abs=2.0 * one.std_noise), name
+    (signals,) = found.evidence.signals
+    assert driveline_behind(card, signals).known["te_delay"].std == 0.0

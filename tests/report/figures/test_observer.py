@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: MIT
+"""Observed torques: the band is an area about the curve that can be seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.display import NM
+from drivetwin.identify.result import Z95
+from drivetwin.observer.observed import Band
+from drivetwin.report.figures.observer import _curves
+from drivetwin.report.figures.stack import Panel, over_time
+
+
+def test_the_band_is_filled_between_its_bounds_and_named_once() -> None:
+    time = np.linspace(0.0, 1.0, 50)
+    band = Band(np.sin(time), np.full(50, 0.1))
+    figure = over_time([Panel("torque", NM, _curves(time, band))], (0.0, 1.0), 300)
+    low, high, curve = figure.data
+    assert (low.fill, high.fill, curve.fill) == (None, "tonexty", None)
+    assert np.allclose(np.subtract(high.y, low.y), 2.0 * Z95 * 0.1, rtol=1e-3)
+    assert high.fillcolor.startswith("rgba")
+    assert [trace.name for trace in figure.data if trace.showlegend] == ["95 % band", "observed"]
+    assert high.hovertemplate.startswith("to ")

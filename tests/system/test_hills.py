@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""One log over hills: every shift has a load of its own, and the inertias do not feel it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import drivetwin
+from drivetwin.identify.method import Method
+from drivetwin.identify.pipeline import identify
+from drivetwin.identify.result import Identification
+from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.shifts.usable import usable_shifts
+from drivetwin.twin import Twin
+from tests.identify.several.made import LOADS, card, pair, scenario
+
+LATER = 60.0
+"""Time between the starts of the two shifts [s]."""
+
+
+@cache
+def hilly() -> ShiftLog:
+    """Both logs of the pair as one drive: the second shift on another grade than the first."""
+    first, second = (one.log for one in pair())
+    channels = {
+        role: replace(
+            one,
+            time=np.concatenate([one.time, second[role].time + LATER]),
+            values=np.concatenate([one.values, second[role].values]),
+        )
+        for role, one in first.channels.items()
+    }
+    return replace(first, channels=channels)
+
+
+@cache
+def found(method: Method) -> Identification:
+    log = hilly()
+    return identify(log, card(), usable_shifts(log, card()), method)
+
+
+@pytest.mark.parametrize("method", [Method.INTEGRAL, Method.LIKELIHOOD])
+def test_each_shift_has_its_own_load_and_the_parameters_do_not_feel_it(method: Method) -> None:
+    one, model = found(method), scenario().model
+    assert one.method is method
+    truth = {"Tv_over_if": float(np.mean(LOADS)), "J_vehicle": model.J_v, "eta": model.eta}
+    for name, value in truth.items():
+        told = one.estimates[name]
+        assert told.value is not None
+        assert told.std_total is not None
+        assert abs(told.value - value) < 3.5 * told.std_total, name
+        assert told.std_total < 5e-3 * value, name
+    assert one.evidence.loads == pytest.approx(LOADS, rel=0.01)
+    assert any("load differs from shift to shift" in text for text in one.warnings)
+    assert any("constant over each shift" in text for text in one.assumptions)
+
+
+def test_each_shift_is_simulated_on_its_own_grade() -> None:
+    one, log = found(Method.LIKELIHOOD), hilly()
+    twin = Twin.from_identification(one, card())
+    own = drivetwin.validated(one, twin, log)
+    flat = replace(one, evidence=replace(one.evidence, loads=()))
+    shared = drivetwin.validated(flat, twin, log)
+    assert own.fit["output_speed"]["all"].rmse < 0.2 * shared.fit["output_speed"]["all"].rmse
