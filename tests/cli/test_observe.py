@@ -54,7 +54,7 @@ def test_json_and_figure(bench: Bench, tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["observe", twin, log, "--by", "simulation", "--figure", str(page), "--json"]) == 0
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
     assert shift["torques"]["output_torque"]["highest"] > 4000.0
-    assert "95 % low" in page.read_text(encoding="utf-8")
+    assert "95 % band" in page.read_text(encoding="utf-8")
 
 
 def test_a_shift_with_a_gap_is_left_out_and_told(

@@ -41,9 +41,41 @@ def test_a_parameter_that_follows_from_others_still_does() -> None:
     found = dict(zip(ids, values, strict=True))
     stds = dict(zip(ids, np.sqrt(np.diag(covariance)), strict=True))
     for gear in ("3", "4"):
-        assert found["k_o"] == pytest.approx(2.0 * found["J_vehicle"] + found[f"f_d_{gear}"])
+        made = 2.0 * found["J_vehicle"] + found[f"f_d_{gear}"]
+        assert found["k_o"] == pytest.approx(made, abs=0.01 * stds["k_o"])
     assert stds["J_vehicle"] < 0.2
     assert stds["k_o"] < np.hypot(2.0 * stds["J_vehicle"], 0.01) * 1.01
+
+
+def test_what_is_made_by_a_product_tells_no_more_than_its_factors() -> None:
+    """c = 2·δ·J and ζ = δ/ω of the same gear in nine shifts, each with slopes of its own."""
+    rng = np.random.default_rng(3)
+    omega, inertia, decay = 70.0, 5.0, 8.0
+    std_J, std_rate = 0.15, 1.6
+
+    def shift() -> IntegralShift:
+        J = inertia + std_J * rng.standard_normal()
+        rate = decay + std_rate * rng.standard_normal()
+        slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * J], [0.0, 1.0 / omega]])
+        covariance = slopes @ np.diag([std_J**2, std_rate**2]) @ slopes.T
+        return _shift(("J_vehicle", "c_o", "zeta_3"), [J, 2.0 * rate * J, rate / omega], covariance)
+
+    ids, values, covariance = combine([shift() for _ in range(9)])
+    std = np.sqrt(np.diag(covariance))
+    # As if exact the slopes contradict each other, and J seems to be told eighty times better.
+    assert std[0] == pytest.approx(std_J / 3.0, rel=0.15)
+    assert values[0] == pytest.approx(inertia, abs=3.0 * std[0])
+    assert values[ids.index("zeta_3")] == pytest.approx(decay / omega, abs=3.0 * std[2])
+
+
+def test_shifts_that_contradict_each_other_widen_the_interval() -> None:
+    spread = np.diag([3.0**2])
+    agreeing = [_shift(("c_o",), [c], spread) for c in (168.0, 170.0, 173.0)]
+    _, value, covariance = combine(agreeing)
+    assert covariance[0, 0] == pytest.approx(3.0**2 / 3.0, rel=1e-3)
+    _, value, covariance = combine([*agreeing, _shift(("c_o",), [60.0], spread)])
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(27.6, abs=0.5)
+    assert abs(value[0] - 170.0) < 1.96 * np.sqrt(covariance[0, 0])
 
 
 def test_equal_shifts_halve_the_variance_but_for_the_prior() -> None:

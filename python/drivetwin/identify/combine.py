@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from drivetwin.identify.integral import NUISANCES, IntegralShift
 from drivetwin.identify.load import are_one
@@ -19,8 +20,14 @@ LOAD = "Tv_over_if"
 """What is a shift's own on a hilly road; its number follows then, after `@`."""
 
 NUGGET = 1e-7
-"""Variance, as a share of a parameter's own, by which derived parameters may leave the equation
-that makes them: of k_o, J′ and ω_d one follows from the others, so their covariance is singular."""
+"""Variance, as a share of a parameter's own, by which parameters may leave the equation that makes
+one of the others: of J′ in two gears and Jo′ one follows, so their covariance is singular."""
+SHAFT = ("k_o", "c_o", "f_d_", "zeta_")
+"""How names begin of what is made of ring-down and inertias by equations that are not linear. Each
+shift has their slopes at its own values; those of two shifts contradict each other by second order,
+the square of a relative standard deviation, and by that a value may leave its equation."""
+AGREE = 1e-3
+"""Probability of the shifts' scatter about a value below which its interval is widened to it."""
 
 
 def combine(
@@ -33,7 +40,28 @@ def combine(
     """
     ids, values, covariance = _with_own_loads(shifts) or _joined(shifts)
     kept = [k for k, name in enumerate(ids) if name.split(".")[0] not in NUISANCES]
-    return tuple(ids[k] for k in kept), values[kept], covariance[np.ix_(kept, kept)]
+    ids, values = tuple(ids[k] for k in kept), values[kept]
+    wider = np.array(
+        [_scatter(name, value, shifts) for name, value in zip(ids, values, strict=True)]
+    )
+    return ids, values, covariance[np.ix_(kept, kept)] * np.outer(wider, wider)
+
+
+def _scatter(name: str, value: float, shifts: Sequence[IntegralShift]) -> float:
+    """Factor by which the shifts lie further about a value than their noise explains; 1 if it does.
+
+    What a shift alone has, and the load, which may be a shift's own, have none.
+    """
+    told = [
+        (shift.values[k] - value) / np.sqrt(shift.covariance[k, k])
+        for shift in shifts
+        if name in shift.ids and name != LOAD
+        for k in (shift.ids.index(name),)
+    ]
+    square, freedom = float(np.sum(np.square(told))), len(told) - 1
+    if freedom < 1 or square < chi2.isf(AGREE, freedom):
+        return 1.0
+    return float(np.sqrt(square / freedom))
 
 
 def loads_of(shifts: Sequence[IntegralShift]) -> tuple[float, ...]:
@@ -64,6 +92,13 @@ def _with_own_loads(
     return told, rows @ values, rows @ covariance @ rows.T
 
 
+def _loose(shift: IntegralShift) -> FloatArray:
+    """Variances (q,) by which its parameters may leave the equations between them, as shares."""
+    bent = [name.startswith(SHAFT) for name in shift.ids]
+    relative = np.diag(shift.covariance) / np.square(shift.values)
+    return np.where(bent, np.maximum(relative, NUGGET), NUGGET)
+
+
 def _joined(
     shifts: Sequence[IntegralShift],
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
@@ -79,7 +114,7 @@ def _joined(
     for shift in shifts:
         place = [ids.index(name) for name in shift.ids]
         unit = scale[place]
-        weight = np.linalg.inv(shift.covariance / np.outer(unit, unit) + NUGGET * np.eye(unit.size))
+        weight = np.linalg.inv(shift.covariance / np.outer(unit, unit) + np.diag(_loose(shift)))
         information[np.ix_(place, place)] += weight
         pull[place] += weight @ (shift.values / unit)
     for name, prior in {n: p for shift in shifts for n, p in shift.priors.items()}.items():

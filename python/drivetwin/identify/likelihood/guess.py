@@ -20,6 +20,16 @@ TYPICAL_MODE = (2.0 * np.pi * 10.0, 0.06)
 """Angular frequency [rad/s] and damping ratio of a driveline where no ring-down was clean."""
 
 
+def _load(shift: IntegralShift, growth: float | None, i_f: float) -> float:
+    """T_v/i_f [N m] of a shift if its load grows as that of all: it is well told at its own speed,
+    and at the mean speed of the log as badly as its own growth."""
+    found = shift.load
+    if growth is None or found.holds_at is None:
+        return found.load
+    away = (found.mean_speed**2 - found.holds_at**2) / i_f
+    return found.load + (float(found.fit.theta[2]) - growth) * away
+
+
 def guess_of(shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]) -> dict[str, float]:
     """A value for every unknown of the driveline and every law, from the linear fits.
 
@@ -35,7 +45,7 @@ def guess_of(shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]) -
         "J_e": float(np.median([shift.momentum.value("J_e") for shift in shifts])),
         "J_out": told["J_out"],
         "J_vehicle": told["J_vehicle"],
-        **departures_of([shift.load.load for shift in shifts]),
+        **departures_of([_load(shift, told.get(AERO), drivelines[0].i_f) for shift in shifts]),
         "te_delay": told.get("te_delay", shifts[0].momentum.value("te_delay")),
     }
     if AERO in told:
