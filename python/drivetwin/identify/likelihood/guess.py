@@ -66,21 +66,30 @@ def _typical_shaft(found: Mapping[str, float], driveline: Driveline) -> dict[str
 
 
 def _laws(shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]) -> dict[str, float]:
-    """Law, P0 and drum of every element; one without a curve takes its partner's."""
+    """Law, P0 and drum of every element; one without a curve takes its partner's.
+
+    Of several curves the one that reaches the largest slip: beyond its slips a law may be anything,
+    even below zero.
+    """
     found: dict[str, float] = {}
-    laws: dict[str, dict[str, float]] = {}
+    own: dict[str, dict[str, float]] = {}
+    reached: dict[str, float] = {}
     for shift, d in zip(shifts, drivelines, strict=True):
-        law = TYPICAL_LAW
-        if shift.friction is not None:
-            theta = shift.friction.fit.theta
-            order = (MU_C, MU_DROP, MU_V, LOG_V)
-            law = {key: float(theta[i]) for key, i in zip(LAW, order, strict=True)}
-        laws[d.oncoming.name] = law
-        laws.setdefault(d.offgoing.name, law)
-        found |= {f"{e.name}.P0": e.P0.value for e in (d.offgoing, d.oncoming)}
+        for e in (d.offgoing, d.oncoming):
+            found.setdefault(f"{e.name}.P0", e.P0.value)
         found |= {f"{e.name}.drum": e.drum.value for e in d.couplings.values()}
-        if shift.friction is not None:
-            found[f"{d.oncoming.name}.P0"] = shift.friction.P0
+        name = d.oncoming.name
+        if shift.friction is None or shift.friction.curve.slip[-1] <= reached.get(name, 0.0):
+            continue
+        reached[name] = float(shift.friction.curve.slip[-1])
+        theta = shift.friction.fit.theta
+        order = (MU_C, MU_DROP, MU_V, LOG_V)
+        own[name] = {key: float(theta[i]) for key, i in zip(LAW, order, strict=True)}
+        found[f"{name}.P0"] = shift.friction.P0
+    laws = dict(own)
+    for d in drivelines:
+        for e, partner in ((d.oncoming, d.offgoing), (d.offgoing, d.oncoming)):
+            laws.setdefault(e.name, own.get(partner.name, TYPICAL_LAW))
     for name, law in laws.items():
         found |= {f"{name}.{key}": value for key, value in law.items()}
     return found

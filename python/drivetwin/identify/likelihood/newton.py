@@ -47,6 +47,9 @@ FAR_STEPS = 8
 from far off have not only come near but ended."""
 REFRESHES = 3
 """Least number of points at which Q is formed anew: near the minimum it settles in two."""
+PATIENCE = 3
+"""Points in a row that are no likelier, by Q + log|Σ|, before Q stays as it was at the likeliest: a
+weighting that follows may lead away, for what gives the inputs' noise more room leaves less."""
 CLOSE = 10.0
 """Expected fall of Q from which on it is no longer formed anew: it may alternate about a kink.
 Further off, what Q looks like from the other side of a kink cannot be told from here."""
@@ -87,6 +90,34 @@ def unchanged(problem: Problem, _: Point) -> Problem:
     return problem
 
 
+@dataclass
+class _Weighting:
+    """Forms Q anew at every point until it is `settled`."""
+
+    refresh: Refresh
+    settled: bool
+    likeliest: tuple[Problem, Point, Normal] | None = None
+    deviance: float = np.inf
+    worse: int = 0
+    """Points since the likeliest."""
+
+    def formed(self, problem: Problem, point: Point) -> tuple[Problem, Point, Normal | None]:
+        """Q and its expansion for the point: at it, or at the likeliest where it has led away."""
+        if self.settled:
+            return problem, point, problem.normal(point)
+        problem = self.refresh(problem, point)
+        normal = problem.normal(point)
+        if normal is None:
+            return problem, point, None
+        deviance = normal.cost + problem.log_determinant
+        if self.likeliest is None or deviance < self.deviance:
+            self.likeliest, self.deviance, self.worse = (problem, point, normal), deviance, 0
+        else:
+            self.worse += 1
+        self.settled = self.worse == PATIENCE
+        return self.likeliest if self.settled else (problem, point, normal)
+
+
 def minimise(
     problem: Problem,
     start: Point,
@@ -101,18 +132,18 @@ def minimise(
     `FAR_STEPS` with Q above `limit`, says so; the values are then no estimate.
     """
     point = start.moved(np.clip(start.values, problem.lower, problem.upper))
-    damping, first, settled = DAMPING, None, refresh is unchanged
+    damping, first = DAMPING, None
+    weighting = _Weighting(refresh, settled=refresh is unchanged)
     most = ROUGH_STEPS if rough else MAX_STEPS
     for iteration in range(most):
-        if not settled:
-            problem = refresh(problem, point)
-        normal = problem.normal(point)
+        problem, point, normal = weighting.formed(problem, point)
         if normal is None:
             return None
         expected = _expected(problem, point, normal)
         first = first or expected
         tell(_done(first, expected))
-        settled = settled or (iteration + 1 >= REFRESHES and expected < CLOSE)
+        weighting.settled |= iteration + 1 >= REFRESHES and expected < CLOSE
+        settled = weighting.settled
         if expected < ENOUGH and settled:
             return Found(problem, point, normal, True, iteration)
         trial, fall, damping = _better(problem, point, normal, damping)

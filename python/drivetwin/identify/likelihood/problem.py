@@ -230,6 +230,11 @@ class Problem:
         return sum(part.record.size for part in self.parts)
 
     @property
+    def log_determinant(self) -> float:
+        """log|Σ| of the weighting of all parts."""
+        return sum(part.weighting.log_determinant for part in self.parts)
+
+    @property
     def kinds(self) -> frozenset[str]:
         """Names of the signals that are of another kind than read, as in `Record.kinds`."""
         return frozenset[str]().union(*(part.record.kinds for part in self.parts))
