@@ -90,7 +90,7 @@ def unchanged(problem: Problem, _: Point) -> Problem:
     return problem
 
 
-@dataclass
+@dataclass(eq=False)
 class _Weighting:
     """Forms Q anew at every point until it is `settled`."""
 
