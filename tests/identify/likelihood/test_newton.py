@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -70,3 +72,42 @@ def test_a_search_goes_along_kinks_to_their_crossing(start: list[float]) -> None
     best = Point(NAMES, np.array([0.0, 0.5, -0.5]))
     # What the expansion can still promise where a search ends is what it can be away by.
     assert problem.cost(found.point) == pytest.approx(problem.cost(best), abs=STALLED)
+
+
+@dataclass(frozen=True, eq=False)
+class LedOn(Problem):
+    """Q = 25·(a - formed - 1)²: formed anew at every point it leads on for ever. log|Σ| is least
+    where it was formed at 2."""
+
+    formed: float = 0.0
+
+    @property
+    def log_determinant(self) -> float:
+        """log|Σ|."""
+        return 10.0 * (self.formed - 2.0) ** 2
+
+    def cost(self, point: Point) -> float:
+        """Q at a point."""
+        return float(25.0 * (point["a"] - self.formed - 1.0) ** 2)
+
+    def normal(self, point: Point) -> Normal:
+        """The expansion of Q."""
+        curvature = np.array([[25.0]])
+        gradient = curvature[0] * (point["a"] - self.formed - 1.0)
+        return Normal(self.cost(point), gradient, curvature, curvature, (), ())
+
+
+def test_a_weighting_that_leads_away_stays_as_it_was_where_that_was_likeliest() -> None:
+    free = np.full(1, np.inf)
+
+    def formed_at(_: Problem, point: Point) -> Problem:
+        return LedOn((), Prior(np.zeros(1), np.zeros((1, 1))), -free, free, formed=point["a"])
+
+    start = Point(("a",), np.zeros(1))
+    found = minimise(
+        formed_at(Problem((), Prior.independent(1, {}), -free, free), start), start, formed_at
+    )
+    assert found is not None
+    assert found.converged
+    # By Q alone it went on to 40, one step after the other.
+    assert found.point["a"] == pytest.approx(3.0, abs=0.1)
