@@ -12,12 +12,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.stats import chi2
 
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.modulating import Quadrature, hann_kernels, join, windows_in
-from drivetwin.identify.regression import Fit, Prior, Term, solve
+from drivetwin.identify.balance import (
+    GROWTH,
+    INERTIA,
+    LOAD,
+    WIDTH,
+    VehicleBalance,
+    recorded_windows,
+)
+from drivetwin.identify.regression import Fit, Prior
 from drivetwin.identify.signals import FloatArray, ShiftSignals, Span
 from drivetwin.identify.wlse import (
     GridFit,
@@ -29,7 +35,6 @@ from drivetwin.identify.wlse import (
     window_edges,
     window_means,
 )
-from drivetwin.shifts.recorded import parts_between
 
 
 @dataclass(frozen=True)
@@ -80,8 +85,6 @@ def paper_load(
 ONE_LOAD = 0.05
 """Probability under one load below which the shifts of a log have a load each. High: a load too
 many costs a little width, one too few puts what hills do into J3 and η."""
-WIDTH = 0.4
-"""Width of a window [s]."""
 AERO = "aero"
 """The part of the load that grows with the square of the speed, at the wheel [N m s^2/rad^2]."""
 AERO_SPREAD = 10.0
@@ -113,12 +116,12 @@ class LoadFit:
     @property
     def load(self) -> float:
         """T_v/i_f [N m]."""
-        return float(self.fit.theta[0])
+        return float(self.fit.theta[LOAD])
 
     @property
     def J_vehicle(self) -> float:
         """J3 at the wheel [kg m^2]."""
-        return float(self.fit.theta[1])
+        return float(self.fit.theta[INERTIA])
 
 
 def are_one(differences: FloatArray, covariance: FloatArray) -> bool:
@@ -155,8 +158,8 @@ def growing_from(signals: Sequence[ShiftSignals], i_f: float) -> float | None:
     """
     speed = mean_speed_of(signals, i_f)
     fits = [momentum_load(s, i_f, load_spans(s), speed).fit for s in signals]
-    growth = np.array([fit.theta[2] for fit in fits])
-    weight = np.array([fit.std[2] ** -2 for fit in fits])
+    growth = np.array([fit.theta[GROWTH] for fit in fits])
+    weight = np.array([fit.std[GROWTH] ** -2 for fit in fits])
     return speed if growth @ weight > SIGNIFICANT * np.sqrt(np.sum(weight)) else None
 
 
@@ -178,61 +181,41 @@ def momentum_load(
     holds_at: float | None = None,
     width: float = WIDTH,
 ) -> LoadFit:
-    """Estimate (T_v/i_f, J3) from ∫ψ·T_o - (T_v/i_f)·∫ψ = (J3/i_f)·∫ψ·ω_w' over all windows.
+    """Estimate (T_v/i_f, J3) from the balance of the vehicle over all windows.
 
     Eq. 11 knows no gear, so `spans` may cover the whole log where the wheel speed is measured. With
     `holds_at` [rad/s] the load may grow with speed, and T_v/i_f is that at this speed.
     Raises IdentificationError where torque and speed do not determine both.
     """
     wheel = signals.wheel_speed
-    speed = signals.output_speed if wheel is None else wheel
-    gaps = (*speed.unrecorded, *signals.output_torque.unrecorded)
-    parts = [part for span in spans for part in parts_between(span, gaps)]
-    windows = join([windows_in(part, width, width / 16.0) for part in parts])
+    speed, ratio = (signals.output_speed, 1.0 / i_f) if wheel is None else (wheel, 1.0)
+    torque, step = signals.output_torque, width / 16.0
+    windows = recorded_windows(torque, speed, spans, step, width)
     if not windows.count:
         raise IdentificationError(
             f"no {width:g} s of held gear without a gap for the balance of the vehicle",
             "record at least a second before and after the shift",
         )
-    scale = i_f**-2 if wheel is None else 1.0 / i_f
-    torque = signals.output_torque
-    psi = hann_kernels(torque.time, windows).psi
-    kernels = hann_kernels(speed.time, windows)
-    area = 0.5 * windows.width
-    one = np.ones(windows.count)
-    constant = Quadrature(csr_array(area[:, None]))
-    ratio = 1.0 if wheel is not None else 1.0 / i_f
+    balance = VehicleBalance.over(torque, speed, (ratio, i_f), windows)
+    start = np.array([float(np.mean(torque.values)), 1.0])
+    if holds_at is None:
+        fit = balance.fit(None, start, Prior.independent(2, {}))
+        load = np.full(windows.count, fit.theta[LOAD])
+    else:
+        grown = (balance.square - holds_at**2) / i_f
+        prior = Prior.independent(3, {GROWTH: (0.0, AERO_SPREAD)})
+        fit = balance.fit(grown, np.append(start, 0.0), prior)
+        load = fit.theta[LOAD] + fit.theta[GROWTH] * grown
     local = speed.at(windows.centre) * ratio
-    # By T_v/i_f and AERO; of squares the mean over a window: noise amid it would outweigh all else.
-    shares = {0: one}
-    if holds_at is not None:
-        square = (kernels.psi.matrix @ speed.values**2) * ratio**2 / area
-        shares[2] = (square - holds_at**2) / i_f
-
-    def load(theta: FloatArray) -> FloatArray:
-        return np.asarray(sum(theta[k] * share for k, share in shares.items()))
-
-    def terms(theta: FloatArray) -> list[Term]:
-        inertia = {1: (-scale * one, kernels.slope)}
-        acting = {k: (-share, constant) for k, share in shares.items()}
-        return [
-            Term(torque.values, torque.sigma, psi, one, {}),
-            Term(np.ones(1), 0.0, constant, -load(theta), acting),
-            Term(speed.values, speed.sigma, kernels.slope, -theta[1] * scale * one, inertia),
-        ]
-
-    start = np.array([float(np.mean(torque.values)), 1.0, 0.0])[: 1 + len(shares)]
-    known = {2: (0.0, AERO_SPREAD)} if 2 in shares else {}
-    fit = solve(terms, start, Prior.independent(start.size, known))
     centred = local - local.mean()
     z = fit.residual / fit.residual_std
     spread = float(np.sqrt(np.sum(centred**2)))
-    overlap = np.sqrt(width / (width / 16.0) * 0.375)
+    overlap = np.sqrt(width / step * 0.375)
     return LoadFit(
         fit,
         windows.centre,
-        (psi.matrix @ torque.values) / area - load(fit.theta),
-        (kernels.slope.matrix @ speed.values) * ratio / area,
+        balance.mean_torque - load,
+        balance.acceleration,
         float(local.mean()),
         float(z @ centred) / (spread * overlap) if spread > 0.0 else 0.0,
         holds_at,

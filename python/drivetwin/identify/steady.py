@@ -7,14 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.load import WIDTH
-from drivetwin.identify.modulating import Quadrature, hann_kernels, join, windows_in
-from drivetwin.identify.regression import Prior, Term, solve
-from drivetwin.identify.signals import FloatArray, Sampled, Span
-from drivetwin.shifts.recorded import parts_between
+from drivetwin.identify.balance import GROWTH, INERTIA, WIDTH, VehicleBalance, recorded_windows
+from drivetwin.identify.regression import Prior
+from drivetwin.identify.signals import Sampled, Span
 
 UNKNOWNS = 3
 """Load, inertia and the part of the load that grows with speed."""
@@ -46,38 +43,24 @@ def own_load(
     where something else moves it, a brake or a change of grade. By itself a shift would take a
     part of that for inertia. None where the span holds nothing to tell it from.
     """
-    parts = parts_between(span, (*torque.unrecorded, *wheel.unrecorded))
-    windows = join([windows_in(part, WIDTH, WIDTH / 4.0) for part in parts])
+    windows = recorded_windows(torque, wheel, (span,), WIDTH / 4.0)
     if windows.count <= UNKNOWNS:
         return None
-    psi = hann_kernels(torque.time, windows).psi
-    kernels = hann_kernels(wheel.time, windows)
-    area, one = 0.5 * windows.width, np.ones(windows.count)
-    constant = Quadrature(csr_array(area[:, None]))
-    square = (kernels.psi.matrix @ wheel.values**2) / area
+    balance = VehicleBalance.over(torque, wheel, (1.0, i_f), windows)
+    square = balance.square
     width = max(float(np.ptp(square)), np.finfo(float).tiny)
     grown = (square - square.mean()) / width
-
-    def terms(theta: FloatArray) -> list[Term]:
-        load = -(theta[0] + theta[2] * grown)
-        inertia = {1: (-one / i_f, kernels.slope)}
-        return [
-            Term(torque.values, torque.sigma, psi, one, {}),
-            Term(np.ones(1), 0.0, constant, load, {0: (-one, constant), 2: (-grown, constant)}),
-            Term(wheel.values, wheel.sigma, kernels.slope, -theta[1] / i_f * one, inertia),
-        ]
-
     start, prior = np.zeros(UNKNOWNS), Prior.independent(UNKNOWNS, {})
     if vehicle is not None:
         start[1:] = vehicle[0], vehicle[1] * width
-        prior = prior.held(1, start[1]).held(2, start[2])
+        prior = prior.held(INERTIA, start[INERTIA]).held(GROWTH, start[GROWTH])
     try:
-        fit = solve(terms, start, prior)
+        fit = balance.fit(grown, start, prior)
     except IdentificationError:
         return None
     std = fit.std
-    growth = float(fit.theta[2]) / width, float(std[2]) / width
-    return OwnLoad(fit.chi2, (float(fit.theta[1]), float(std[1])), growth)
+    growth = float(fit.theta[GROWTH]) / width, float(std[GROWTH]) / width
+    return OwnLoad(fit.chi2, (float(fit.theta[INERTIA]), float(std[INERTIA])), growth)
 
 
 def vehicle_of(loads: Sequence[OwnLoad]) -> tuple[float, float] | None:
