@@ -44,7 +44,7 @@ fn inertia<T: Real>(node: &str, inertia: f64) -> Element<T> {
     Element::Inertia(Inertia { name, node: node.into(), inertia: T::of(inertia) })
 }
 
-/// The layout of THEORY section 2 with the inertias (kg·m²) of its members.
+/// The three-set six-speed layout of heavy trucks, with the inertias (kg·m²) of its members.
 fn three_sets(inertias: &[(&str, f64)]) -> Mechanism<f64> {
     let mut elements = vec![
         set("P1", ["input", "R1", "R2-C1"], Z[0]),
