@@ -18,6 +18,7 @@ from drivetwin.logs.damage import (
     runs,
     spikes,
     staircase,
+    stale,
     stuck,
 )
 from drivetwin.logs.shiftlog import FloatArray, Quantity
@@ -323,3 +324,32 @@ def test_a_signal_in_stairs_has_less_noise_than_its_rounding() -> None:
     assert staircase(np.round(rough)) == 0.0
     assert staircase(calm) == 0.0
     assert staircase(speed(noise=0.0)) == 0.0
+
+
+def shown_on(values: FloatArray, lost: list[int]) -> FloatArray:
+    """The values as a logger shows them where the messages numbered `lost` did not come."""
+    shown = values.copy()
+    for k in lost:
+        shown[k] = shown[k - 1]
+    return shown
+
+
+@given(noise=st.floats(0.01, 0.08), rounding=st.sampled_from([0.0, 0.1, 1.0]))
+def test_a_value_shown_on_while_the_signal_moves_is_left_out(noise: float, rounding: float) -> None:
+    time = 0.02 * np.arange(300)
+    moving = 120.0 + 41.3 * np.abs(time - 1.21) + np.random.default_rng(2).normal(0.0, noise, 300)
+    moving[200:] = moving[199]  # at rest nothing tells
+    values = np.round(moving / rounding) * rounding if rounding else moving
+    found = stale(time, shown_on(values, [40, 90, 91, 250]))
+    if rounding == 1.0:  # steps of 0.83 rounded to 1: repeats are true
+        assert found is None
+    else:
+        assert found is not None
+        assert np.flatnonzero(found.mask).tolist() == [40, 90, 91]
+        assert found.text.startswith("3 samples repeat the one before")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sound_signals_show_no_value_on(seed: int) -> None:
+    for values in (speed(seed), speed(seed, 0.0), torque(), np.round(speed(seed)), np.round(TIME)):
+        assert stale(TIME, values) is None

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from drivetwin.logs.held import find_raster, fresh_samples
+from drivetwin.logs.held import find_raster, fresh_samples, shown_late
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 
 STEP = 1e-3
@@ -67,6 +67,29 @@ def test_message_jitter_of_a_sample_does_not_hide_the_raster() -> None:
     at = np.arange(200) * 10 + np.concatenate(([0], rng.integers(0, 2, 199)))
     values = np.repeat(wave(200, 0.01), np.diff(np.append(at, 2000)))
     assert_within_a_sample(fresh_samples(channel(values)).time, at * STEP)
+
+
+@settings(deadline=None)
+@given(st.integers(0, 1000), st.integers(10, 50), st.sampled_from([0.01, 11.0]))
+def test_messages_that_jitter_by_several_samples_of_the_table_are_updates(
+    seed: int, period: int, rounding: float
+) -> None:
+    """A bus in a fast table: each update shows up to a fifth of its period late."""
+    rng = np.random.default_rng(seed)
+    updates = wave(200, rounding)
+    late = rng.integers(0, period // 5 + 1, 200)
+    shown = np.searchsorted(period * np.arange(200) + late, np.arange(200 * period), "right")
+    fresh = fresh_samples(channel(updates[np.maximum(shown - 1, 0)]))
+    assert abs(fresh.values.size - 200) <= 2
+    near = np.abs(fresh.time[:, None] - STEP * (period * np.arange(200) + late)).argmin(axis=1)
+    assert np.mean(fresh.values == updates[near]) > 0.97
+
+
+def test_stairs_of_a_rounded_ramp_are_no_updates() -> None:
+    rate = 1.0 + 0.1 * np.sin(np.linspace(0.0, 30.0, 6000))
+    ramp = np.cumsum(rate) / 20.0  # a stair about every 20 samples
+    stairs = channel(np.round(ramp), Quantity.SPEED)
+    assert fresh_samples(stairs).values.size == 6000
 
 
 def test_clock_drift_does_not_add_up() -> None:
@@ -152,3 +175,19 @@ def test_a_gap_makes_no_two_updates_of_one(first: int, length: int) -> None:
     part = replace(held, time=held.time[keep], values=held.values[keep])
     if part.time.size > 100:
         assert np.all(np.diff(fresh_samples(part).time) > 0.5 * 10e-3)
+
+
+@pytest.mark.parametrize(
+    ("step", "own", "told"), [(0.01, 0.0, 1), (0.001, 0.0, 0), (0.01, 1e-3, 0)]
+)
+def test_a_coarse_table_that_shows_messages_on_is_told(step: float, own: float, told: int) -> None:
+    """Not one of 1 ms, and not messages with stamps of their own."""
+    held = channel(hold(wave(100, 1.0), 2))
+    held = replace(held, time=step * np.arange(200))
+    speed = replace(held, role="output_speed", quantity=Quantity.SPEED, held=False)
+    speed = replace(speed, values=wave(200, 0.01), time=speed.time + own)
+    texts = shown_late({"engine_torque": held, "output_speed": speed})
+    assert len(texts) == told
+    for text in texts:
+        assert "10 ms apart and repeat values of 'EngTrq'" in text
+    assert shown_late({"output_speed": speed}) == []

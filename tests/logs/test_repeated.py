@@ -52,3 +52,18 @@ def test_a_coarse_signal_on_uneven_stamps_repeats_nothing() -> None:
     time = STEP * (np.arange(4000) + 0.4 * rng.uniform(size=4000))
     values = np.round(30.0 * np.sin(np.linspace(0.0, 9.0, 4000)) ** 2)
     assert find_raster(replace(channel(values), time=time)) is None
+
+
+@settings(deadline=None)
+@given(st.integers(0, 1000))
+def test_messages_whose_jitter_a_table_of_even_stamps_shows(seed: int) -> None:
+    """Every 10 ms in a table of 1 ms, up to 3 ms off: too far for a raster."""
+    rng = np.random.default_rng(seed)
+    updates = wave(300, 0.01)
+    at = 10 * np.arange(300) + np.clip(np.round(rng.normal(0.0, 1.0, 300)), -3, 3)
+    at[7], at[8], at[9] = 73, 77, 93
+    shown = np.searchsorted(at, np.arange(3000), "right") - 1
+    held = channel(updates[np.maximum(shown, 0)])
+    fresh = fresh_samples(held)
+    assert abs(fresh.values.size - 300) < 10
+    assert set(updates[1:].tolist()) <= set(fresh.values.tolist())

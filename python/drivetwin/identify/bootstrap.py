@@ -18,7 +18,7 @@ from drivetwin.errors import IdentificationError, InputError
 from drivetwin.identify.likelihood.derived import parameters
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.problem import Part, Problem
-from drivetwin.identify.likelihood.record import Record
+from drivetwin.identify.likelihood.record import TORQUE, Record
 from drivetwin.identify.likelihood.smooth import smooth_pressure
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.regression import Prior
@@ -124,12 +124,14 @@ def _noisy(
     torque = record.engine_torque
     jitter = record.torque_sigma * rng.standard_normal(torque.values.size)
     jitter += record.torque_noise(noise)
-    if record.rounding is not None:
-        jitter += record.rounding.drawn(rng)
+    if TORQUE in record.rounding:
+        jitter += record.rounding[TORQUE].drawn(rng)
     pressures, held_back = {}, {}
     for name, signal in record.pressures.items():
         sigma = record.input_sigma[name]
         read = signal.values + sigma * rng.standard_normal(signal.values.size)
+        if name in record.rounding:
+            read = read + record.rounding[name].drawn(rng)
         driving = smooth_pressure(Sampled(signal.time, read, sigma), record.fills.get(name))
         pressures[name] = Signal(signal.time, driving)
         held_back[name] = read - driving

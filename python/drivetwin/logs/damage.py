@@ -92,6 +92,16 @@ _LIFT = 3.0
 """A fill pulse leaves a pressure higher by so many times what it moved by before, in the same time,
 or by so many of its steps."""
 
+_LOST = 2
+"""Most messages in a row that are lost while the value before them is shown on, ..."""
+
+_MOVES = 4.0
+"""... told by steps before and after of so many times resolution and noise, which repeat no number
+there."""
+
+_THIRD_DIFFERENCE = 3.02
+"""Median size of the third difference of unit white noise, 0.6745·sqrt(20)."""
+
 _CLIPPED_SAMPLES = 3
 _CLIPPED_RUNS = 3
 """A limit is reached in so many runs of so many equal samples."""
@@ -223,6 +233,34 @@ def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | 
     if not mask.any():
         return None
     return Damage(mask, f"stuck at one number {_spans(time, runs(mask))}, left out")
+
+
+def stale(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Updates (n,) that repeat the one before while the signal moves on and then catches up.
+
+    So a logger shows messages that were lost. Where the signal turns or rests a repeat may be true.
+    """
+    steps = np.diff(values)
+    mask = np.zeros(values.size, np.bool_)
+    if values.size < 4 * _SURROUNDINGS:
+        return None
+    noise = float(np.median(np.abs(np.diff(values, 3)))) / _THIRD_DIFFERENCE
+    size, least = np.abs(steps), _MOVES * max(resolution(np.unique(values)), noise)
+    for start, end in runs(steps == 0.0):
+        if start == 0 or end == steps.size or end - start > _LOST:
+            continue
+        before, after = float(steps[start - 1]), float(steps[end])
+        if before * after > 0.0 and least <= size[start - 1] < size[end]:
+            mask[start + 1 : end + 1] = True
+    if not mask.any():
+        return None
+    count = int(mask.sum())
+    what = "sample repeats" if count == 1 else "samples repeat"
+    return Damage(
+        mask,
+        f"{count} {what} the one before while the signal moves on, as where a message is lost: "
+        f"left out, {_spans(time, runs(mask))}",
+    )
 
 
 def _restless(steps: FloatArray, usual: float) -> bool:

@@ -9,12 +9,14 @@ regular raster of which the changes show a part. A logger whose step does not di
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.logs.repeated import repeat_period, updates_by_count
+from drivetwin.logs.roles import AUXILIARY
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
 
 MIN_CHANGES = 10
@@ -30,7 +32,7 @@ _JITTER = 0.2
 """How far a change may lie from the raster, as part of the period ..."""
 
 _JITTER_SAMPLES = 1.5
-"""... and in samples of the logger."""
+"""... and in samples of the logger, unless chance would not put so many so near."""
 
 _LEAST_STEPS = 2.1
 """Steps of the logger in a period that it does not divide: in fewer the updates cannot be counted
@@ -52,6 +54,10 @@ _IN_TIME = 0.05
 
 _CHANCE = 1e-6
 """Probability from which on chance may have put all changes near such a raster."""
+
+_COARSE = 2e-3
+"""Step of a table [s] above which it may matter how much later than its message a value is shown:
+elsewhere the time of a sample is known to a millisecond and better."""
 
 _PAUSE = 1.5
 """After more than so many steps without a sample nobody knows when the value arrived."""
@@ -124,8 +130,9 @@ def _fit(changes: FloatArray, period: float, step: float) -> Raster | None:
     if found is None:
         return None
     start, slope, late = found
-    on_raster = np.abs(late).max() <= min(_JITTER * slope, _JITTER_SAMPLES * step)
-    if not on_raster or slope <= 1.5 * step:
+    most = float(np.abs(late).max())
+    surely = most <= _JITTER_SAMPLES * step or _no_chance(_JITTER * slope, slope, changes.size)
+    if most > _JITTER * slope or not surely or slope <= 1.5 * step:
         return None
     return Raster(start, slope, _early(slope, step, late))
 
@@ -137,11 +144,15 @@ def _fit_between(changes: FloatArray, period: float, step: float) -> Raster | No
         return None
     start, slope, late = found
     most = 0.5 * step + _BETWEEN_JITTER * period
-    by_chance = (2.0 * most / period) ** (changes.size - 2)
     as_usual = abs(slope - period) < 0.01 * period
-    if np.abs(late).max() > most or by_chance > _CHANCE or not as_usual:
+    if np.abs(late).max() > most or not _no_chance(most, period, changes.size) or not as_usual:
         return None
     return Raster(start, slope, _early(slope, step, late))
+
+
+def _no_chance(most: float, period: float, changes: int) -> bool:
+    """Whether chance would hardly put all of so many changes within `most` [s] of a raster."""
+    return (2.0 * most / period) ** (changes - 2) < _CHANCE
 
 
 def _early(period: float, step: float, late: FloatArray) -> float:
@@ -216,3 +227,25 @@ def fresh_samples(channel: Channel) -> Channel:
         return channel
     fresh = updates_by_count(channel, period)
     return replace(channel, time=channel.time[fresh], values=channel.values[fresh], held=False)
+
+
+def shown_late(channels: Mapping[str, Channel]) -> list[str]:
+    """Words for a coarse table that shows messages on: nobody knows when within a row they came.
+
+    `channels` by role. Where each has stamps of its own, they are those of the messages.
+    """
+    measured = [one for one in channels.values() if one.quantity not in AUXILIARY]
+    held = [one for one in measured if one.held]
+    if not held:
+        return []
+    rows = max(measured, key=lambda one: one.time.size)
+    in_table = all(np.isin(one.time, rows.time).all() for one in measured)
+    if not in_table or rows.step <= _COARSE:
+        return []
+    names = ", ".join(repr(one.source_name) for one in held)
+    return [
+        f"the rows of the table are {1e3 * rows.step:.3g} ms apart and repeat values of {names}: a "
+        "value stands there up to a row later than its message came, of each channel by another "
+        "time, and intervals do not count that; the age of the engine torque, c_o, P0 and μ hang "
+        "on it: export each channel with its own stamps, or rows of 1 ms"
+    ]

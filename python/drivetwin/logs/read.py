@@ -25,7 +25,7 @@ from drivetwin.logs.agreement import (
 )
 from drivetwin.logs.align import clock_warnings
 from drivetwin.logs.formats import open_recording
-from drivetwin.logs.held import find_raster
+from drivetwin.logs.held import find_raster, shown_late
 from drivetwin.logs.mapping import ChannelSpec, Mapped, resolve
 from drivetwin.logs.profile import read_mapping
 from drivetwin.logs.raw import RawChannel, RawLog, ReadOptions, Recording, Window
@@ -106,6 +106,7 @@ def read_recording(
         warnings += [*torque_balance(channels, card), *final_drive_held(channels, card)]
         warnings += clock_warnings(channels, card)
     warnings += torque_warnings(channels)
+    warnings += shown_late(channels)
     return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
 
 

@@ -22,6 +22,7 @@ from drivetwin.logs.damage import (
     resolution,
     runs,
     spikes,
+    stale,
     stuck,
 )
 from drivetwin.logs.held import find_raster, fresh_samples
@@ -119,7 +120,7 @@ def check_channel(channel: Channel, file: str) -> Checked:
     channel = _without(channel, found, warnings)
     _check_count(channel, total, where)
     _check_variation(channel, where)
-    for look in (_dropouts, _spikes, _stuck, _beyond, _pulses, _clipped):
+    for look in (_dropouts, _spikes, _stuck, _beyond, _pulses, _clipped, _stale):
         channel = _without(channel, look(channel), warnings)
         _check_count(channel, total, where)
     _check_magnitude(channel, where)
@@ -236,6 +237,13 @@ def _of_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> D
         return found
     update = np.searchsorted(fresh.time, channel.time, side="right") - 1
     return Damage(found.mask[np.clip(update, 0, None)], found.text)
+
+
+def _stale(channel: Channel) -> Damage | None:
+    """Values that a logger shows on while their messages are lost."""
+    if channel.quantity in AUXILIARY:
+        return None
+    return _of_updates(channel, lambda fresh: stale(fresh.time, fresh.values))
 
 
 def _clipped(channel: Channel) -> Damage | None:

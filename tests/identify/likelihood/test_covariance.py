@@ -57,7 +57,7 @@ def _of_speeds(part: Part, slope: float, rest: float) -> Part:
     size = np.linspace(0.5, 1.5, record.time.size)
     share = TorqueOfSpeeds(record.time, size * slope, size * rest)
     sigma = {**record.input_sigma, TORQUE: rest}
-    made = replace(record, engine_torque=torque, of_speeds=share, input_sigma=sigma, rounding=None)
+    made = replace(record, engine_torque=torque, of_speeds=share, input_sigma=sigma, rounding={})
     return replace(part, record=made)
 
 

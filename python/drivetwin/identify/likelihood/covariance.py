@@ -162,13 +162,11 @@ def with_input_noise(model: DualClutch, record: Record, response: Response) -> W
 def _power(record: Record, response: Response) -> dict[str, FloatArray]:
     """Variance (N-1,) of an input's noise as constant over each step, by name."""
     found = {}
+    middle = 0.5 * (record.time[1:] + record.time[:-1])
     for name in response.drive:
         signal = record.engine_torque if name == TORQUE else record.pressures[name]
         between = float(np.median(np.diff(signal.time)))
-        variance = np.full(response.step.size, record.input_sigma[name] ** 2)
-        if name == TORQUE:
-            middle = 0.5 * (record.time[1:] + record.time[:-1])
-            variance = np.interp(middle, signal.time, record.torque_power)
+        variance = np.interp(middle, signal.time, record.variance_of(name))
         found[name] = variance * between / response.step
     return found
 

@@ -19,6 +19,7 @@ from drivetwin.identify.likelihood.smooth import (
     local_mean,
     smooth_pressure,
 )
+from drivetwin.identify.noise import resolution
 from drivetwin.identify.signals import (
     FloatArray,
     Sampled,
@@ -141,8 +142,8 @@ class Record:
     curved: bool = False
     of_speeds: TorqueOfSpeeds | None = None
     """Where the engine torque is computed from speeds: the noise of the compared one is in both."""
-    rounding: Rounding | None = None
-    """What rounding leaves of the samples of the engine torque; None where noise dithers it."""
+    rounding: Mapping[str, Rounding] = field(default_factory=dict)
+    """What rounding leaves of the samples of an input, by name; no entry where noise dithers it."""
 
     @property
     def size(self) -> int:
@@ -219,12 +220,15 @@ class Record:
         least = FLOOR * float(np.max(np.abs(self.engine_torque.values)))
         return np.maximum(np.interp(time, self.of_speeds.time, self.of_speeds.rest), least)
 
-    @property
-    def torque_power(self) -> FloatArray:
-        """Variance (m,) of white samples that have the power of that noise and of the rounding."""
-        if self.rounding is None:
-            return self.torque_sigma**2
-        return np.asarray(self.torque_sigma**2 + self.rounding.sigma**2)
+    def variance_of(self, name: str) -> FloatArray:
+        """Variance (m,) of white samples with the power of an input's own noise and rounding."""
+        if name == TORQUE:
+            noise = self.torque_sigma**2
+        else:
+            noise = np.full(self.pressures[name].time.size, self.input_sigma[name] ** 2)
+        if name in self.rounding:
+            noise = noise + self.rounding[name].sigma ** 2
+        return noise
 
     def torque_share(self) -> csr_array | None:
         """Noise of the engine torque over each step per that of a compared sample (N-1, size).
@@ -324,9 +328,6 @@ def record_of(
     torque, of_speeds = signals.engine_torque, signals.torque_of_speeds
     sigma = torque.sigma if of_speeds is None else float(np.sqrt(np.mean(of_speeds.rest**2)))
     noise = replace(torque, sigma=sigma)
-    rounding = rounding_of(torque, signals.torque_resolution)
-    if rounding is not None:
-        rounding = replace(rounding, stay=np.pad(rounding.stay, 1, mode="edge"))
     fills = fills or {}
     smooth = {n: smooth_pressure(p, fills.get(n)) for n, p in signals.pressures.items()}
     return Record(
@@ -340,8 +341,18 @@ def record_of(
         {name: p.values - smooth[name] for name, p in signals.pressures.items()},
         fills,
         of_speeds=of_speeds,
-        rounding=rounding,
+        rounding=_rounding(signals),
     )
+
+
+def _rounding(signals: ShiftSignals) -> dict[str, Rounding]:
+    """What rounding leaves of the inputs' samples, by name; those of the torque as `_held` has
+    them."""
+    found = {n: rounding_of(p, resolution(p.values)) for n, p in signals.pressures.items()}
+    torque = rounding_of(signals.engine_torque, signals.torque_resolution)
+    if torque is not None:
+        found[TORQUE] = replace(torque, stay=np.pad(torque.stay, 1, mode="edge"))
+    return {name: one for name, one in found.items() if one is not None}
 
 
 def _noise(of_input: Sampled) -> float:

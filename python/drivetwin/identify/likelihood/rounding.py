@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What rounding leaves of an engine torque that its own noise does not dither.
+"""What rounding leaves of an input that its own noise does not dither.
 
-While the torque stays at a level the error stays too: its mean over that time is as far off as one
-sample, and noise of the same size that comes and goes from sample to sample would be far less. Each
-stay has an error of its own, so what it does is that of white noise of the same power there.
+While a torque or pressure stays at a level the error stays too: its mean over that time is as far
+off as one sample, and noise of the same size that comes and goes from sample to sample would be far
+less. Each stay has an error of its own, so what it does is that of white noise of the same power
+there.
 """
 
 from __future__ import annotations
@@ -39,10 +40,11 @@ class Rounding:
         return np.asarray(self.error * rng.standard_normal(int(self.stay[-1]) + 1)[self.stay])
 
 
-def rounding_of(torque: Sampled, step: float) -> Rounding | None:
-    """Errors that rounding to `step` [N m] leaves; None where they are lost in the noise."""
-    error = rounding_error(torque, step)
+def rounding_of(signal: Sampled, step: float) -> Rounding | None:
+    """Errors that rounding to `step` leaves, in the signal's unit; None where they are lost in the
+    noise."""
+    error = rounding_error(signal, step)
     if error == 0.0:
         return None
-    level = np.round(local_mean(torque) / step)
+    level = np.round(local_mean(signal) / step)
     return Rounding(error, np.cumsum(np.diff(level, prepend=level[0]) != 0.0))
