@@ -56,6 +56,13 @@ def test_noise_free_log_returns_every_parameter(stepped: Run) -> None:
     compare(found, Truth(), 5e-4, 5e-4)
 
 
+def test_the_ring_is_fitted_from_where_lockup_is_sure(stepped: Run) -> None:
+    signals = stepped.signals()
+    ring = identify_shift(signals, Truth().driveline(), 12.0).ring
+    assert ring is not None
+    assert 0.01 <= ring.time[0] - signals.shift.lockup_time < 0.02
+
+
 def test_the_shift_alone_carries_eta_and_inertia(constant: Run) -> None:
     found = identify_shift(constant.signals(), Truth().driveline(), 12.0)
     compare(found, Truth(), 5e-4, 5e-4)

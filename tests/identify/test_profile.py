@@ -66,3 +66,10 @@ def test_refuses_what_does_not_move(name: str, match: str) -> None:
 def test_refuses_other_methods() -> None:
     with pytest.raises(IdentificationError, match="paper method"):
         profile(by_the_paper(), "eta")
+
+
+def test_of_a_search_that_was_given_up_it_is_told_why() -> None:
+    evidence = replace(by_the_paper().evidence, gave_up="the work ran out")
+    with pytest.raises(IdentificationError, match=r"gave up on this log.+ the work ran") as told:
+        likelihood_of(replace(by_the_paper(), evidence=evidence))
+    assert "--method likelihood" not in told.value.remedy

@@ -34,6 +34,41 @@ def test_fit_is_unbiased_and_its_intervals_cover() -> None:
     assert inside >= 53
 
 
+HIGH_RATE, HIGH_OMEGA = 28.9, 190.5
+"""A ring in a high gear: 30 Hz, 3.3 samples of 10 ms a period, and a damping ratio of 0.15."""
+
+
+def high_gear(amplitude: float, seed: int) -> Sampled:
+    time = np.arange(0.0, 1.6, 0.01)
+    wave = amplitude * np.exp(-HIGH_RATE * time) * np.cos(HIGH_OMEGA * time + 0.4 + seed)
+    noise = 20.0 * np.random.default_rng(seed).standard_normal(time.size)
+    return Sampled(time, 1000.0 + 40.0 * time + wave + noise, 20.0)
+
+
+def test_a_ring_of_three_samples_a_period_is_told_with_intervals_that_cover() -> None:
+    found = [fit_ringdown(high_gear(400.0, k), 0.0, 1.6, None, after=0.015) for k in range(40)]
+    rates = np.array([ring.decay_rate for ring in found])
+    std = np.sqrt([ring.covariance[0, 0] for ring in found])
+    omegas = np.array([ring.omega_d for ring in found])
+    assert np.mean(rates) == pytest.approx(HIGH_RATE, rel=0.08)
+    assert np.mean(omegas) == pytest.approx(HIGH_OMEGA, rel=0.01)
+    assert np.count_nonzero(np.abs(rates - HIGH_RATE) < 1.96 * std) >= 34
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 160.0])
+def test_a_ring_lost_in_the_noise_is_refused(amplitude: float) -> None:
+    for seed in range(40):
+        with pytest.raises(IdentificationError, match="no clean lock-up oscillation"):
+            fit_ringdown(high_gear(amplitude, seed), 0.0, 1.6, None)
+
+
+def test_a_ring_that_the_samples_do_not_resolve_is_refused() -> None:
+    time = np.arange(0.0, 1.6, 0.01)
+    wave = 900.0 * np.exp(-6.0 * time) * np.cos(2.0 * np.pi * 47.0 * time)
+    with pytest.raises(IdentificationError, match="no clean lock-up oscillation"):
+        fit_ringdown(Sampled(time, 1000.0 + wave, 20.0), 0.0, 1.6, None)
+
+
 def test_a_moving_engine_torque_is_accounted_for() -> None:
     push = 800.0 * np.clip((TIME - 0.3) / 0.08, 0.0, 1.0)
     torque = ring() + forced_response(RATE, OMEGA, TIME, push)

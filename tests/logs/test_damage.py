@@ -336,10 +336,10 @@ def shown_on(values: FloatArray, lost: list[int]) -> FloatArray:
 
 @given(noise=st.floats(0.01, 0.08), rounding=st.sampled_from([0.0, 0.1, 1.0]))
 def test_a_value_shown_on_while_the_signal_moves_is_left_out(noise: float, rounding: float) -> None:
-    time = 0.02 * np.arange(300)
+    time = np.linspace(0.0, 5.98, 300)
     moving = 120.0 + 41.3 * np.abs(time - 1.21) + np.random.default_rng(2).normal(0.0, noise, 300)
     moving[200:] = moving[199]  # at rest nothing tells
-    values = np.round(moving / rounding) * rounding if rounding else moving
+    values = np.asarray(np.round(moving / rounding) * rounding if rounding else moving, np.float64)
     found = stale(time, shown_on(values, [40, 90, 91, 250]))
     if rounding == 1.0:  # steps of 0.83 rounded to 1: repeats are true
         assert found is None

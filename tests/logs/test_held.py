@@ -183,7 +183,7 @@ def test_a_gap_makes_no_two_updates_of_one(first: int, length: int) -> None:
 def test_a_coarse_table_that_shows_messages_on_is_told(step: float, own: float, told: int) -> None:
     """Not one of 1 ms, and not messages with stamps of their own."""
     held = channel(hold(wave(100, 1.0), 2))
-    held = replace(held, time=step * np.arange(200))
+    held = replace(held, time=np.linspace(0.0, 199 * step, 200))
     speed = replace(held, role="output_speed", quantity=Quantity.SPEED, held=False)
     speed = replace(speed, values=wave(200, 0.01), time=speed.time + own)
     texts = shown_late({"engine_torque": held, "output_speed": speed})

@@ -39,6 +39,8 @@ class Evidence:
     paper's method and without an output torque."""
     likelihood: LikelihoodFit | None = None
     """The fit of all shifts together; None by another method, and where it did not converge."""
+    gave_up: str = ""
+    """Why the likelihood method gave up, in words; empty where it did not or was not asked for."""
     loads: tuple[float, ...] = ()
     """Load of each shift at the output shaft [N m] where they differ, as on hills, T_v/i_f is then
     their mean; empty where the shifts of a log share one."""

@@ -17,7 +17,13 @@ from drivetwin.identify.momentum import (
     momentum_inertia,
     off_going_free,
 )
-from drivetwin.identify.ringdown import Drive, RingDown, fit_ringdown, quiet
+from drivetwin.identify.ringdown import (
+    START_AFTER_LOCKUP,
+    Drive,
+    RingDown,
+    fit_ringdown,
+    quiet,
+)
 from drivetwin.identify.shaft import stiffness_and_damping
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals
 from drivetwin.identify.uncertainty import independent, propagate
@@ -69,6 +75,7 @@ def _ring(
     J5 = load.J_vehicle / driveline.i_f**2
     gain = momentum.value("eta") * ratio * J5 / (J4 + J5)
     shift, measured, age = signals.shift, signals.engine_torque, momentum.value("te_delay")
+    after = min(START_AFTER_LOCKUP, MomentumSettings().guard("lockup", shift))
     # Jitter of the engine torque is either the engine's own, then it drives the oscillation, or
     # its sensor's: the fit that leaves less of T_o decides.
     fits = [
@@ -77,6 +84,7 @@ def _ring(
             shift.lockup_time,
             shift.after[1],
             Drive(Sampled(acting.time - age, acting.values, acting.sigma), gain),
+            after,
         )
         for acting in (quiet(measured), measured)
     ]

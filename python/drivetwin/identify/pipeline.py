@@ -181,6 +181,7 @@ def _with_torque(
             evidence = replace(evidence, likelihood=fit)
         except IdentificationError as error:
             method, gave_up = Method.INTEGRAL, error.what
+            evidence = replace(evidence, gave_up=gave_up)
     if method is Method.INTEGRAL:
         with part(0.9 if likely else 0.5, 0.95, "tolerances of the sensors"):
             found = with_tolerances(integral, signals, drivelines, card)

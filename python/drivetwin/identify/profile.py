@@ -22,6 +22,7 @@ from drivetwin.identify.likelihood.newton import minimise
 from drivetwin.identify.likelihood.noise_power import noise_power
 from drivetwin.identify.likelihood.problem import Normal, Problem
 from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.likelihood.work import REMEDY
 from drivetwin.identify.result import Z95, Identification
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.progress import tell
@@ -91,9 +92,14 @@ def profile(found: Identification, parameter: str) -> Profile:
 def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftSignals]]:
     """The fit behind an identification and the signals it used.
 
-    Raises IdentificationError where it is by another method.
+    Raises IdentificationError where it is by another method, or the likelihood method gave up.
     """
-    fit = found.evidence.likelihood
+    fit, gave_up = found.evidence.likelihood, found.evidence.gave_up
+    if fit is None and gave_up:
+        raise IdentificationError(
+            f"the likelihood method gave up on this log, so there is no fit to work on: {gave_up}",
+            REMEDY,
+        )
     if fit is None:
         raise IdentificationError(
             f"the {found.method} method has no likelihood to work on",

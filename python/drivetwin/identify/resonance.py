@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import sampled
-from drivetwin.identify.ringdown import BAND
+from drivetwin.identify.ringdown import BAND, FASTEST
 from drivetwin.identify.signals import FloatArray, Sampled, Span
 from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.shifts.recorded import parts_between
@@ -31,8 +31,6 @@ TRIED = 150
 """Frequencies whose power decides where a fit starts."""
 EXPLAINED = 0.93
 """Least share of the variance about the trend that a decaying sine must explain."""
-FASTEST = 0.8
-"""Highest frequency told, as a share of half the sampling rate."""
 FINEST = 5e-3
 """Samples closer than this [s] are averaged first."""
 CYCLES = 2.5

@@ -20,13 +20,20 @@ from drivetwin.identify.wlse import window_edges, window_means
 from drivetwin.shifts.recorded import parts_between
 
 START_AFTER_LOCKUP = 0.05
-"""Start of the fit after lock-up [s]."""
+"""Latest start of the fit after lock-up [s]; a ring at 30 Hz has lost most of its power by then."""
 SHORTEST = 0.15
 """Shortest stretch fitted [s]."""
+FEWEST = 20
+"""Fewest samples fitted."""
 LONGEST = 1.6
 """Longest stretch fitted [s]: by then a drivetrain oscillation has died away."""
 BAND = (2.0, 60.0)
 """Frequencies [Hz] in which a driveline's first torsional mode is looked for."""
+FASTEST = 0.8
+"""Highest frequency told, as a share of half the sampling rate."""
+CHANCE = 1e-6
+"""Probability with which noise alone may pass for an oscillation. So small, for one that just
+passes owes much of its size to noise, and what noise and ring make together decays too slowly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +91,11 @@ def _refuse(what: str) -> IdentificationError:
     )
 
 
-def _stretch(torque: Sampled, lockup: float, end: float) -> Sampled:
-    span = (lockup + START_AFTER_LOCKUP, min(end, lockup + LONGEST))
+def _stretch(torque: Sampled, lockup: float, end: float, after: float) -> Sampled:
+    span = (lockup + after, min(end, lockup + LONGEST))
     for whole in parts_between(span, torque.gaps):
         part = torque.within(whole)
-        if part.time.size >= 20 and part.time[-1] - part.time[0] >= SHORTEST:
+        if part.time.size >= FEWEST and part.time[-1] - part.time[0] >= SHORTEST:
             return part
     raise _refuse(f"less than {SHORTEST:g} s of the new gear are left after lock-up")
 
@@ -104,7 +111,7 @@ def paper_ringdown(torque: Sampled, lockup: float, end: float) -> RingDown:
     T_o is averaged over 10 ms windows; half the difference of neighbouring extremes falls by
     exp(-σ·T/2). Extremes count while they exceed four times the noise of an average.
     """
-    part = _stretch(torque, lockup, end)
+    part = _stretch(torque, lockup, end, START_AFTER_LOCKUP)
     edges = window_edges((part.time[0], part.time[-1]))
     mean, centre = window_means(part, edges), 0.5 * (edges[1:] + edges[:-1])
     count = max(part.time.size / mean.size, 1.0)
@@ -157,6 +164,26 @@ def pencil_start(time: FloatArray, values: FloatArray, order: int = 6) -> tuple[
     return float(-rates[best].real), float(rates[best].imag)
 
 
+def _starts(time: FloatArray, values: FloatArray) -> list[tuple[float, float]]:
+    """Decay rates [1/s] and frequencies [rad/s] that a matrix pencil finds in the whole stretch and
+    in its first parts: of a ring that dies away soon the rest is noise.
+
+    Raises IdentificationError where it finds none in any of them.
+    """
+    found: list[tuple[float, float]] = []
+    for share in (1, 2, 4, 8):
+        count = values.size // share
+        if count < FEWEST:
+            break
+        try:
+            found.append(pencil_start(time[:count], values[:count]))
+        except IdentificationError:
+            continue
+    if not found:
+        raise _refuse(f"no decaying mode between {BAND[0]:g} and {BAND[1]:g} Hz")
+    return found
+
+
 def forced_response(rate: float, omega: float, time: FloatArray, drive: FloatArray) -> FloatArray:
     """Response (n,) of the shaft torque, static gain 1, to `drive` (n,) over equidistant time.
 
@@ -193,14 +220,21 @@ def quiet(torque: Sampled, block: int = 4, still: int = 12) -> Sampled:
     return Sampled(torque.time, smooth, torque.sigma)
 
 
-def fit_ringdown(torque: Sampled, lockup: float, end: float, drive: Drive | None) -> RingDown:
-    """Fit one decaying sine on a quadratic to T_o from 50 ms after lock-up.
+def fit_ringdown(
+    torque: Sampled,
+    lockup: float,
+    end: float,
+    drive: Drive | None,
+    after: float = START_AFTER_LOCKUP,
+) -> RingDown:
+    """Fit one decaying sine on a quadratic to T_o from `after` [s] past lock-up.
 
     `drive` adds the response to a moving engine torque. Amplitudes are eliminated (variable
     projection); the covariance uses the residual's power around the frequency fitted, so that
-    coloured residuals widen it. Raises IdentificationError where no clean decay shows.
+    coloured residuals widen it. Raises IdentificationError where no clean decay shows, or none that
+    stands out of the noise: the best fit to noise alone has an interval too, as narrow as any.
     """
-    part = _stretch(torque, lockup, end)
+    part = _stretch(torque, lockup, end, after)
     time = np.linspace(part.time[0], part.time[-1], part.time.size)
     values = part.at(time)
     local, trend = time - time[0], _quadratic(time)
@@ -213,25 +247,49 @@ def fit_ringdown(torque: Sampled, lockup: float, end: float, drive: Drive | None
         decay = np.exp(-p[0] * local)
         return np.column_stack([decay * np.cos(p[1] * local), decay * np.sin(p[1] * local), trend])
 
+    def unforced(p: FloatArray) -> FloatArray:
+        return values - (forced_response(p[0], p[1], time, push) if np.any(push) else 0.0)
+
     def projected(p: FloatArray) -> FloatArray:
-        target = values - (forced_response(p[0], p[1], time, push) if np.any(push) else 0.0)
-        q, _ = np.linalg.qr(basis(p))
-        return np.asarray(target - q @ (q.T @ target), dtype=float)
+        return _without(basis(p), unforced(p))
 
     detrended = values - push
     detrended = detrended - trend @ np.linalg.lstsq(trend, detrended, rcond=None)[0]
-    start = pencil_start(time, detrended)
+    starts = _starts(time, detrended)
+    start = min(starts, key=lambda p: float(np.sum(projected(np.array(p)) ** 2)))
     found = least_squares(projected, start, x_scale=(5.0, 5.0), method="lm")
     rate, omega = (float(v) for v in found.x)
+    if not 0.0 < rate < omega < FASTEST * np.pi / (time[1] - time[0]):
+        raise _refuse(f"the fit ends at decay rate {rate:.3g} 1/s, {omega / (2 * np.pi):.3g} Hz")
     residual = projected(found.x)
     noise = _power_near(residual, omega, time[1] - time[0], torque.sigma)
     slopes = np.asarray(found.jac, dtype=float)
     covariance = noise * np.linalg.inv(slopes.T @ slopes)
-    if not (0.0 < rate < omega) or np.sqrt(covariance[1, 1]) > 0.05 * omega:
-        raise _refuse(f"the fit ends at decay rate {rate:.3g} 1/s, {omega / (2 * np.pi):.3g} Hz")
+    still = _without(trend, unforced(found.x))
+    _require_more_than_chance(float(still @ still - residual @ residual) / noise, time.size)
     return RingDown(
         rate, omega, covariance, time, values, values - residual, np.empty(0), np.empty(0)
     )
+
+
+def _without(basis: FloatArray, values: FloatArray) -> FloatArray:
+    """What the columns of `basis` (n, m) cannot explain of `values` (n,)."""
+    q, _ = np.linalg.qr(basis)
+    return np.asarray(values - q @ (q.T @ values), dtype=float)
+
+
+def _require_more_than_chance(explained: float, count: int) -> None:
+    """Refuse a sine that explains so few noise variances of `count` samples that noise may do so.
+
+    Of noise one sine with its phase explains χ² of two degrees of freedom, more than x with the
+    probability exp(-x/2); about as many sines as there are samples are independent.
+    """
+    chance = 2.0 * float(np.log(count / CHANCE))
+    if explained < chance:
+        raise _refuse(
+            f"the best decaying sine explains {explained:.3g} times the noise power of a sample, "
+            f"and of noise alone it may be {chance:.2g}"
+        )
 
 
 def _power_near(residual: FloatArray, omega: float, step: float, sigma: float) -> float:

@@ -14,7 +14,8 @@ from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood import fit as fitting
-from drivetwin.identify.likelihood.fit import NEAR, Hopeless, fit, nearest
+from drivetwin.identify.likelihood.fit import DOUBTFUL, NEAR, Hopeless, fit, nearest
+from drivetwin.identify.likelihood.newton import Found
 from tests.identify.likelihood.made import ROUGH, bench, fitted, problem, truth_of
 
 DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -97,3 +98,16 @@ def test_two_starts_that_lead_nowhere_are_enough(monkeypatch: pytest.MonkeyPatch
     with pytest.raises(IdentificationError) as one:
         fit(posed, far, [made.signals.shift], restarts=fitting.RESTARTS[:1])
     assert not isinstance(one.value, Hopeless)
+
+
+def test_input_noise_that_stages_leave_out_is_no_doubt() -> None:
+    """Outputs so quiet that at the truth all that is left is the noise of the inputs."""
+    posed, start = problem(bench(noise=0.02))
+    normal = posed.normal(start)
+    assert normal is not None
+    assert normal.cost > DOUBTFUL * posed.size
+    assert not fitting._is_doubtful(posed, Found(posed, start, normal, True, 0))
+    posed, start = problem(bench(noise=0.02), off=0.05)
+    normal = posed.normal(start)
+    assert normal is not None
+    assert fitting._is_doubtful(posed, Found(posed, start, normal, True, 0))

@@ -25,6 +25,7 @@ from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import Sampled
+from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import ROUGH, problem, truth_of
 
 MEANS = frozenset({"output_torque"})
@@ -166,9 +167,23 @@ def test_from_far_off_signals_are_taken_as_read() -> None:
     assert normal is not None
     assert FAR < normal.cost / posed.size < NEAR
     assert of_signals._promising(weighted, far, normal)  # wrong: there are samples alone
-    likely, other = likely_kinds(posed, far)
+    likely, other = likely_kinds(posed, far, [realise(throttle_steps(), 0, ROUGH).signals.shift])
     assert likely.kinds == frozenset()
     assert other.kinds == frozenset(SPEEDS)
+
+
+def test_from_far_off_the_lower_gear_tells_kinds() -> None:
+    """Speeds that a bus sends as means over 10 ms, with pedal steps, from a poor start."""
+    base = throttle_steps()
+    sensors = [
+        replace(one, rate=100.0, window=0.01) if one.quantity is Quantity.SPEED else one
+        for one in base.sensors
+    ]
+    made = realise(replace(base, sensors=tuple(sensors)), 0, ROUGH)
+    posed, start = problem(made, off=0.1)
+    assert posed.weighted_by(start).cost(start) > FAR * posed.size
+    likely, _ = likely_kinds(posed, start, [made.signals.shift])
+    assert frozenset(SPEEDS) <= likely.kinds
 
 
 def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(

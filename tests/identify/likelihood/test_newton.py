@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -40,31 +41,37 @@ def test_correlated_unknowns_at_their_bounds(
     assert problem.cost(found.point) == pytest.approx(least, abs=0.02 * (1.0 + least))
 
 
+@dataclass(frozen=True, eq=False)
 class Kinked(Problem):
-    """Q = (x² + y² + z²)/2 + |x + 2y - 1| + |y - z - 1|, with the slopes of the side it is on."""
+    """Q = h·((x² + y² + z²)/2 + |x + 2y - 1| + |y - z - 1|), with the slopes of the side it is on:
+    h is its `height`."""
 
-    _BENDS = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, -1.0]])
+    height: float = 1.0
+
+    _BENDS: ClassVar[FloatArray] = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, -1.0]])
 
     def _sides(self, point: Point) -> FloatArray:
         return self._BENDS @ point.values - 1.0
 
     def cost(self, point: Point) -> float:
         """Q at a point."""
-        return float(0.5 * point.values @ point.values + np.abs(self._sides(point)).sum())
+        smooth = 0.5 * point.values @ point.values
+        return self.height * float(smooth + np.abs(self._sides(point)).sum())
 
     def normal(self, point: Point) -> Normal:
         """Half the gradient of the side that the point is on, and the smooth part's curvature."""
         signs = np.where(self._sides(point) >= 0.0, 1.0, -1.0)
-        gradient = 0.5 * point.values + 0.5 * signs @ self._BENDS
-        curvature = 0.5 * np.eye(3)
+        gradient = self.height * (0.5 * point.values + 0.5 * signs @ self._BENDS)
+        curvature = self.height * 0.5 * np.eye(3)
         return Normal(self.cost(point), gradient, curvature, curvature, (), ())
 
 
 @settings(deadline=None)
-@given(st.lists(st.floats(-1.5, 1.5), min_size=3, max_size=3))
-def test_a_search_goes_along_kinks_to_their_crossing(start: list[float]) -> None:
+@given(st.lists(st.floats(-1.5, 1.5), min_size=3, max_size=3), st.sampled_from([1.0, 300.0]))
+def test_a_search_goes_along_kinks_to_their_crossing(start: list[float], height: float) -> None:
+    """Also far off, where a step promises much more than `CLOSE`: there it crawls a while."""
     free = np.full(3, np.inf)
-    problem = Kinked((), Prior(np.zeros(3), np.zeros((3, 3))), -free, free)
+    problem = Kinked((), Prior(np.zeros(3), np.zeros((3, 3))), -free, free, height)
     found = minimise(problem, Point(NAMES, np.array(start)))
     assert found is not None
     assert found.converged

@@ -29,10 +29,11 @@ SAME = 1e-3
 RESTARTS = (1.0, 0.6, 1.6)
 """Factors on shaft stiffness: a wrong minimum hangs on it, and on the level of friction, which the
 stages look for."""
-DOUBTFUL = 3.0
+DOUBTFUL, DOUBTFUL_WITH_INPUTS = 3.0, 10.0
 """Q per sample after the stages above which every other start comes first, and only the best of
-these is fitted: where the stages end well, input noise that they leave out makes it a little more
-than one."""
+these is fitted. Where the stages end well, input noise that they leave out makes it a little more
+than one, and hundreds where the outputs are much quieter than the inputs: so it must be above the
+second too, which is with input noise."""
 ENOUGH = 2
 """First starts after which no other is tried where none of them is promising: this driveline has no
 such log."""
@@ -181,7 +182,7 @@ def _by_stages(
         near = staged(problem, start.moved(start.values * np.array(factor)), shifts)
         if near is None:
             yield None
-        elif near.normal.cost > DOUBTFUL * problem.size:
+        elif _is_doubtful(problem, near):
             doubtful.append(near)
         else:
             promising += 1
@@ -191,6 +192,14 @@ def _by_stages(
     if doubtful:
         yield nearest(problem, min(doubtful, key=lambda one: one.normal.cost).point)
     return promising > 0 or bool(doubtful)
+
+
+def _is_doubtful(problem: Problem, near: Found) -> bool:
+    """Whether stages that ended at `near` have hardly led to the right minimum."""
+    if near.normal.cost <= DOUBTFUL * problem.size:
+        return False
+    with_inputs = problem.weighted_by(near.point)
+    return with_inputs.cost(near.point) > DOUBTFUL_WITH_INPUTS * problem.size
 
 
 def nearest(problem: Problem, start: Point, most: float = FAR) -> LikelihoodFit | None:

@@ -23,6 +23,7 @@ terms by several. Other kinds move P0 and friction so little that Q decides betw
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -30,6 +31,7 @@ import numpy as np
 
 from drivetwin.identify.likelihood.fit import FAR, LikelihoodFit, nearest
 from drivetwin.identify.likelihood.newton import step_of
+from drivetwin.identify.likelihood.output_error import in_lower_gear
 from drivetwin.identify.likelihood.problem import Normal, Part, Problem
 from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
 from drivetwin.identify.likelihood.score import score_of
@@ -37,6 +39,7 @@ from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import OutOfWork
 from drivetwin.identify.result import Z95
 from drivetwin.identify.signals import FloatArray
+from drivetwin.shifts.shift import Shift
 
 SIGNALS = (*OUTPUTS, TORQUE)
 SPEEDS = tuple(name for name in OUTPUTS if name.endswith("speed"))
@@ -68,20 +71,32 @@ ROUNDS = 3
 """Most changes of kind: far off, the expansion promises the way, not the end of it."""
 
 
-def likely_kinds(problem: Problem, start: Point) -> tuple[Problem, Problem]:
+def likely_kinds(
+    problem: Problem, start: Point, shifts: Sequence[Shift]
+) -> tuple[Problem, Problem]:
     """The problem, which has signals as read, with the kinds that promise least from `start`, and
     with the speeds of the other kind.
 
     From far off an expansion promises anything: at ten times the noise, where logs without an
-    output torque start, a mixture of kinds by a thousand of Q. There they are taken as read.
+    output torque start, a mixture of kinds by a thousand of Q. From there the lower gear alone is
+    brought onto the measurement first: in a pedal step means that are taken for samples may leave
+    so much that no search with them ends at a plausible minimum. Where that fails too the signals
+    are taken as read.
     """
-    weighted = problem.weighted_by(start)
-    normal = weighted.normal(start)
-    if normal is None or normal.cost > FAR * problem.size:
-        kinds = frozenset[str]()
-    else:
-        kinds = _promising(weighted, start, normal)
+    kinds = _told_near(problem, start)
+    if kinds is None and (gear := in_lower_gear(problem, start, shifts)) is not None:
+        kinds = _told_near(gear.problem, gear.point)
+    kinds = kinds or frozenset()
     return problem.of_kinds(kinds), problem.of_kinds(kinds ^ frozenset(SPEEDS))
+
+
+def _told_near(problem: Problem, point: Point) -> frozenset[str] | None:
+    """The kinds that promise least from `point`; None where it is far from the measurement."""
+    weighted = problem.weighted_by(point)
+    normal = weighted.normal(point)
+    if normal is None or normal.cost > FAR * problem.size:
+        return None
+    return _promising(weighted, point, normal)
 
 
 def with_best_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:

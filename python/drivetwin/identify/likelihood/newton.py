@@ -52,7 +52,8 @@ PATIENCE = 3
 weighting that follows may lead away, for what gives the inputs' noise more room leaves less."""
 CLOSE = 10.0
 """Expected fall of Q from which on it is no longer formed anew: it may alternate about a kink.
-Further off, what Q looks like from the other side of a kink cannot be told from here."""
+Further off, what Q looks like from the other side of a kink cannot be told from here, so there no
+way along it is looked for, until `PATIENCE` steps in a row have crawled."""
 
 ROUGH = 1e-3
 """Fall of Q relative to Q at which a search ends that only prepares the next one."""
@@ -134,7 +135,7 @@ def minimise(
     point = start.moved(np.clip(start.values, problem.lower, problem.upper))
     damping, first = DAMPING, None
     weighting = _Weighting(refresh, settled=refresh is unchanged)
-    most = ROUGH_STEPS if rough else MAX_STEPS
+    most, crawled = ROUGH_STEPS if rough else MAX_STEPS, 0
     for iteration in range(most):
         problem, point, normal = weighting.formed(problem, point)
         if normal is None:
@@ -149,7 +150,11 @@ def minimise(
         trial, fall, damping = _better(problem, point, normal, damping)
         if rough and trial is not None and fall < ROUGH * normal.cost:
             return Found(problem, trial, normal, True, iteration)
-        if not rough and settled and fall < CRAWLING * expected < CRAWLING * CLOSE:
+        crawls = fall < CRAWLING * expected
+        crawled = crawled + 1 if crawls else 0
+        weighting.settled |= crawled >= PATIENCE
+        near = (settled and expected < CLOSE) or crawled >= PATIENCE
+        if not rough and crawls and near:
             along, lower, expected = _along_kink(problem, point, normal)
             if along is not None and lower > fall:
                 trial, fall = along, lower

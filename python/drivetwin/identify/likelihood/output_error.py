@@ -42,8 +42,7 @@ def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found | N
     None where a run fails, and where a stage ends far from the measurement.
     """
     problem = _about(problem, start)
-    gear = _without_friction(problem, start).until([s.before[1] - CLEAR for s in shifts])
-    found = minimise(gear, start, rough=True)
+    found = in_lower_gear(problem, start, shifts)
     if found is None or _hopeless(found):
         return None
     slipping = problem.until([s.lockup_time - CLEAR for s in shifts])
@@ -55,6 +54,12 @@ def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found | N
     )
     found = minimise(plain, found.point, rough=True)
     return None if found is None or _hopeless(found) else found
+
+
+def in_lower_gear(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found | None:
+    """Output error over the gear before each shift alone; None where a run fails."""
+    gear = _without_friction(_about(problem, start), start)
+    return minimise(gear.until([s.before[1] - CLEAR for s in shifts]), start, rough=True)
 
 
 def _hopeless(found: Found) -> bool:

@@ -116,7 +116,7 @@ def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Like
 
     Raises IdentificationError where it does not converge with the likeliest kinds.
     """
-    likely, other = likely_kinds(problem, start)
+    likely, other = likely_kinds(problem, start, shifts)
     best = _tried(likely, start, shifts) or fit(other, start, shifts, restarts=RESTARTS[:1])
     best = with_best_kinds(problem, best)
     if best.chi2 < GOOD:

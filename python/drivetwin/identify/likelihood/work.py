@@ -62,7 +62,7 @@ def spend(passes: float) -> None:
     meter.left -= passes
     if meter.left < 0.0:
         raise OutOfWork(
-            "the search was given up without a plausible minimum: the model hardly holds on "
-            "this log",
+            "the search was given up without a plausible minimum when it had done the work that it "
+            "may do: either its start was too far off, or the model hardly holds on this log",
             REMEDY,
         )
