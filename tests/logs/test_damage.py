@@ -353,3 +353,19 @@ def test_a_value_shown_on_while_the_signal_moves_is_left_out(noise: float, round
 def test_sound_signals_show_no_value_on(seed: int) -> None:
     for values in (speed(seed), speed(seed, 0.0), torque(), np.round(speed(seed)), np.round(TIME)):
         assert stale(TIME, values) is None
+
+
+def test_a_torque_that_sets_off_may_repeat_a_number_just_before() -> None:
+    """Noise gives a step, a repeat by chance, and then the pedal: nothing is made up for."""
+    noise = np.random.default_rng(3).normal(0.0, 2.0, 200)
+    values = np.round(250.0 + noise + 35.0 * np.clip(np.arange(200) - 100, 0, 20), 1)
+    values[98:102] = [251.5, 262.5, 262.5, 302.5]
+    assert stale(np.linspace(0.0, 1.99, 200), np.asarray(values, np.float64)) is None
+
+
+def test_a_repeat_by_chance_amid_noise_is_none() -> None:
+    """A wheel speed [rpm] that rises by 0.014 a sample under noise of 0.006."""
+    noise = np.random.default_rng(4).normal(0.0, 0.0057, 400)
+    values = np.round(160.0 + 0.0145 * np.arange(400) + noise, 6)
+    values[198:202] = values[199] + np.array([-0.026, 0.0, 0.0, 0.028])
+    assert stale(np.linspace(0.0, 0.399, 400), np.asarray(values, np.float64)) is None

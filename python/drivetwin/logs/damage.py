@@ -96,8 +96,12 @@ _LOST = 2
 """Most messages in a row that are lost while the value before them is shown on, ..."""
 
 _MOVES = 4.0
-"""... told by steps before and after of so many times resolution and noise, which repeat no number
-there."""
+"""... told by a slope about it of so many times resolution and noise of a step, which repeat no
+number there, ..."""
+
+_CATCHES_UP = 1.5
+"""... and by a step after it of at most so many times what is missing by the one before it: a
+signal that sets off from rest may repeat a number just before."""
 
 _THIRD_DIFFERENCE = 3.02
 """Median size of the third difference of unit white noise, 0.6745·sqrt(20)."""
@@ -249,8 +253,10 @@ def stale(time: FloatArray, values: FloatArray) -> Damage | None:
     for start, end in runs(steps == 0.0):
         if start == 0 or end == steps.size or end - start > _LOST:
             continue
-        before, after = float(steps[start - 1]), float(steps[end])
-        if before * after > 0.0 and least <= size[start - 1] < size[end]:
+        before, after, lost = size[start - 1], size[end], end - start
+        onwards = steps[start - 1] * steps[end] > 0.0
+        catches_up = before < after < _CATCHES_UP * (lost + 1) * before
+        if onwards and catches_up and before + after >= least * (lost + 2):
             mask[start + 1 : end + 1] = True
     if not mask.any():
         return None
