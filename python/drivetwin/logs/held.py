@@ -34,6 +34,9 @@ _JITTER = 0.2
 _JITTER_SAMPLES = 1.5
 """... and in samples of the logger, unless chance would not put so many so near."""
 
+_USUAL = 0.05
+"""Then the usual distance of changes is the period, but for this part of it."""
+
 _LEAST_STEPS = 2.1
 """Steps of the logger in a period that it does not divide: in fewer the updates cannot be counted
 from change to change."""
@@ -131,7 +134,10 @@ def _fit(changes: FloatArray, period: float, step: float) -> Raster | None:
         return None
     start, slope, late = found
     most = float(np.abs(late).max())
-    surely = most <= _JITTER_SAMPLES * step or _no_chance(_JITTER * slope, slope, changes.size)
+    # After a pause more jitter leaves it open how many updates have come: another period fits too.
+    as_usual = abs(slope - float(np.median(np.diff(changes)))) < _USUAL * slope
+    by_chance = not _no_chance(_JITTER * slope, slope, changes.size)
+    surely = most <= _JITTER_SAMPLES * step or (as_usual and not by_chance)
     if most > _JITTER * slope or not surely or slope <= 1.5 * step:
         return None
     return Raster(start, slope, _early(slope, step, late))
