@@ -68,6 +68,24 @@ def test_the_paper_like_log_returns_its_truth_within_the_intervals() -> None:
     assert np.max(np.abs(curve.mu / mu - 1.0)) < 0.015
 
 
+def test_a_likelihood_that_gives_up_leaves_its_reason_and_the_integral_values(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def gives_up(*_: object) -> None:
+        raise IdentificationError("the search crawls", "drive on")
+
+    monkeypatch.setattr("drivetwin.identify.pipeline.likelihood", gives_up)
+    found = identify(*recording("paper_like"), Method.LIKELIHOOD)
+    assert found.method is Method.INTEGRAL
+    assert found.evidence.gave_up == "the search crawls"
+    assert found.warnings[0].startswith("likelihood: the search crawls; the values are those of")
+    integral = identified("paper_like", Method.INTEGRAL)
+    assert found.estimates["J_vehicle"].value == integral.estimates["J_vehicle"].value
+    assert integral.evidence.gave_up == ""
+    with pytest.raises(IdentificationError, match="gave up on this log.*the search crawls"):
+        likelihood_of(found)
+
+
 def test_constant_engine_torque_is_said_in_words_not_hidden() -> None:
     found = identified("paper_like", Method.INTEGRAL)
     assert "cannot tell η from J′" in found.estimates["eta"].reason

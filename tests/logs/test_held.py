@@ -85,6 +85,22 @@ def test_messages_that_jitter_by_several_samples_of_the_table_are_updates(
     assert np.mean(fresh.values == updates[near]) > 0.97
 
 
+@pytest.mark.parametrize("length", [2, 3, 4, 6])
+@pytest.mark.parametrize("pause", range(20, 60, 5))
+def test_a_torque_that_changes_in_bursts_keeps_its_period_through_the_pauses(
+    length: int, pause: int
+) -> None:
+    """Throttle steps without noise: jittering by a sample, 37 periods of 10.8 ms fit 40 of 10."""
+    updates = np.full(51 + 7 * pause, 400.0)
+    for step in range(7):
+        start = 31 + pause * step
+        updates[start:] += 20.0
+        updates[start : start + length] -= 50.0 * np.exp(-np.arange(length))
+    raster = find_raster(channel(hold(updates, 10)))
+    assert raster is not None
+    assert raster.period == pytest.approx(0.01, rel=1e-6)
+
+
 def test_stairs_of_a_rounded_ramp_are_no_updates() -> None:
     rate = 1.0 + 0.1 * np.sin(np.linspace(0.0, 30.0, 6000))
     ramp = np.cumsum(rate) / 20.0  # a stair about every 20 samples

@@ -34,8 +34,8 @@ _JITTER = 0.2
 _JITTER_SAMPLES = 1.5
 """... and in samples of the logger, unless chance would not put so many so near."""
 
-_USUAL = 0.05
-"""Then the usual distance of changes is the period, but for this part of it."""
+_SAME_BEAT = 1.5
+"""Ratio of periods within which they rival for the same updates; half a period fits as well as all."""
 
 _LEAST_STEPS = 2.1
 """Steps of the logger in a period that it does not divide: in fewer the updates cannot be counted
@@ -70,20 +70,23 @@ _PAUSE = 1.5
 class Raster:
     """Instants `start` + k·`period` [s] at which a logger shows the updates.
 
-    Where the logger's step does not divide the period they come `early` [s] before that.
+    Where the logger's step does not divide the period they come `early` [s] before that. The changes
+    lie about it by `spread` [s], root of the mean square.
     """
 
     start: float
     period: float
     early: float = 0.0
+    spread: float = 0.0
 
 
 def find_raster(channel: Channel) -> Raster | None:
     """Return the update raster of a held channel; None where each sample may be an update.
 
     The period is the longest one, up to the shortest distance of two changes, on which all changes
-    lie; start and period are fitted by least squares so that clock drift does not add up. Where
-    stamps jitter or messages are lost, it is the distance that most changes have.
+    lie, of those near it the one to which they lie nearest; start and period are fitted by least
+    squares so that clock drift does not add up. Where stamps jitter or messages are lost, it is the
+    distance that most changes have.
     """
     raster = _raster_of(channel)
     if raster is None:
@@ -108,11 +111,15 @@ def _raster_of(channel: Channel) -> Raster | None:
         if _LEAST_STEPS * step < period < shortest + step + _BETWEEN_JITTER * period
         and _uneven(period, step)
     ]
+    best, least = None, 0.0
     for period, fit in sorted(whole + between, key=lambda one: -one[0]):
+        if period < least:
+            break
         raster = fit(changes, period, step)
-        if raster is not None:
-            return raster
-    return None
+        if raster is not None and (best is None or raster.spread < best.spread):
+            least = raster.period / _SAME_BEAT if best is None else least
+            best = raster
+    return best
 
 
 def _step(channel: Channel) -> float:
@@ -134,13 +141,10 @@ def _fit(changes: FloatArray, period: float, step: float) -> Raster | None:
         return None
     start, slope, late = found
     most = float(np.abs(late).max())
-    # After a pause more jitter leaves it open how many updates have come: another period fits too.
-    as_usual = abs(slope - float(np.median(np.diff(changes)))) < _USUAL * slope
-    by_chance = not _no_chance(_JITTER * slope, slope, changes.size)
-    surely = most <= _JITTER_SAMPLES * step or (as_usual and not by_chance)
+    surely = most <= _JITTER_SAMPLES * step or _no_chance(_JITTER * slope, slope, changes.size)
     if most > _JITTER * slope or not surely or slope <= 1.5 * step:
         return None
-    return Raster(start, slope, _early(slope, step, late))
+    return _raster(start, slope, step, late)
 
 
 def _fit_between(changes: FloatArray, period: float, step: float) -> Raster | None:
@@ -153,7 +157,13 @@ def _fit_between(changes: FloatArray, period: float, step: float) -> Raster | No
     as_usual = abs(slope - period) < 0.01 * period
     if np.abs(late).max() > most or not _no_chance(most, period, changes.size) or not as_usual:
         return None
-    return Raster(start, slope, _early(slope, step, late))
+    return _raster(start, slope, step, late)
+
+
+def _raster(start: float, period: float, step: float, late: FloatArray) -> Raster:
+    """The raster of which changes are `late` [s] (n,)."""
+    spread = float(np.sqrt(np.mean(late**2)))
+    return Raster(start, period, _early(period, step, late), spread)
 
 
 def _no_chance(most: float, period: float, changes: int) -> bool:
