@@ -20,20 +20,24 @@ from drivetwin.dyno.scenarios import gearbox, throttle_steps
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.integral import identify_shift
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
 SHOWN = ("eta", "J_prime_2", "J_out", "Tv_over_if", "J_vehicle", "k_o", "c_o", "mu at 30 rad/s")
 KNOW = Knowledge(J_out=0.1)
 
 
+UNDISTURBED = ("", SensorTolerance())
+"""No sensor reads wrongly."""
+
+
 @dataclass(frozen=True)
 class Fault:
-    """`faulty` and `sound` are scenarios; `disturb` is a sensor role with its gain and offset."""
+    """`faulty` and `sound` are scenarios; `disturb` is a sensor role and its error."""
 
     text: str
     sound: Callable[[], Scenario]
     faulty: Callable[[], Scenario]
-    disturb: tuple[str, float, float] = ("", 0.0, 0.0)
+    disturb: tuple[str, SensorTolerance] = UNDISTURBED
 
 
 @dataclass(frozen=True)
@@ -56,14 +60,17 @@ def late_torque() -> Scenario:
     return replace(base, sensors=tuple(sensors))
 
 
+PRESSURE = ("pressure.B3", SensorTolerance(offset=2e4))
+ENGINE_TORQUE = ("engine_torque", SensorTolerance(gain=0.03))
+OUTPUT_TORQUE = ("output_torque", SensorTolerance(gain=0.01))
 DRUMLESS = partial(gearbox, 0.0)
 FAULTS = (
     Fault("drums of 0.05 kg m²", DRUMLESS, partial(gearbox, 0.05)),
     Fault("drums of 0.2 kg m²", DRUMLESS, partial(gearbox, 0.2)),
-    Fault("pressure of B3 +20 kPa", throttle_steps, throttle_steps, ("pressure.B3", 0.0, 2e4)),
+    Fault("pressure of B3 +20 kPa", throttle_steps, throttle_steps, PRESSURE),
     Fault("engine torque 15 ms late", throttle_steps, late_torque),
-    Fault("engine torque +3 %", throttle_steps, throttle_steps, ("engine_torque", 0.03, 0.0)),
-    Fault("output torque +1 %", throttle_steps, throttle_steps, ("output_torque", 0.01, 0.0)),
+    Fault("engine torque +3 %", throttle_steps, throttle_steps, ENGINE_TORQUE),
+    Fault("output torque +1 %", throttle_steps, throttle_steps, OUTPUT_TORQUE),
 )
 
 
@@ -84,7 +91,7 @@ def shift_of(fault: Fault, count: int) -> Shift:
 
 @cache
 def _runs(
-    made: Callable[[], Scenario], count: int, disturb: tuple[str, float, float] = ("", 0.0, 0.0)
+    made: Callable[[], Scenario], count: int, disturb: tuple[str, SensorTolerance] = UNDISTURBED
 ) -> list[dict[str, float]]:
     """What is told of `count` realisations; several faults are compared with the same ones."""
     with ProcessPoolExecutor() as pool:
@@ -92,7 +99,7 @@ def _runs(
 
 
 def _one(
-    made: Callable[[], Scenario], disturb: tuple[str, float, float], seed: int
+    made: Callable[[], Scenario], disturb: tuple[str, SensorTolerance], seed: int
 ) -> dict[str, float]:
     bench = _drumless(realise(made(), seed, KNOW))
     return _told(replace(bench, signals=disturbed(bench.signals, *disturb)))

@@ -85,7 +85,9 @@ def test_the_tolerance_of_the_speed_sensor_that_is_read_is_one_of_the_engine_spe
     there = signals_of(
         replace(log, channels={**log.channels, "input_speed": wrong}), card, shift(100.0)
     )
-    here = disturbed(signals_of(log, card, shift(100.0)), "engine_speed", 1e-3, 0.6)
+    here = disturbed(
+        signals_of(log, card, shift(100.0)), "engine_speed", SensorTolerance(1e-3, 0.6)
+    )
     assert here.engine_speed.values == pytest.approx(there.engine_speed.values)
     engine = replace(
         log["input_speed"], role="engine_speed", values=1.2 * log["input_speed"].values
@@ -95,6 +97,25 @@ def test_the_tolerance_of_the_speed_sensor_that_is_read_is_one_of_the_engine_spe
         **other,
         "engine_speed": sensors["engine_speed"],
     }
+
+
+def test_rows_that_show_values_late_make_ages_uncertain() -> None:
+    log = drive()
+    late = {role: replace(one, late=0.01) for role, one in log.channels.items()}
+    card = replace(CARD, sensors={"output_torque": SensorTolerance(0.01, 30.0, 4e-3)})
+    found = tolerances_of(replace(log, channels=late), card, shift(100.0))
+    spread = 0.01 / float(np.sqrt(12.0))
+    assert found["output_torque"] == SensorTolerance(0.01, 30.0, float(np.hypot(4e-3, spread)))
+    assert found["engine_speed"] == found["pressure.B2"] == SensorTolerance(age=spread)
+    assert "input_speed" not in found
+    assert tolerances_of(log, card, shift(100.0)) == card.sensors
+
+
+def test_what_is_older_has_the_values_of_before() -> None:
+    signals = signals_of(drive(), CARD, shift(100.0))
+    older = disturbed(signals, "output_torque", SensorTolerance(age=2e-3)).output_torque
+    assert older.time == pytest.approx(signals.output_torque.time + 2e-3)
+    assert older.values == pytest.approx(signals.output_torque.values)
 
 
 class Fitted(Exception):

@@ -76,12 +76,13 @@ def test_sensors_and_channels_go_by_role_in_si(tmp_path: Path) -> None:
     card = load(
         tmp_path,
         CARD + "[sensors.output_torque]\ngain_tolerance = 0.01\noffset_tolerance_Nm = 20\n"
+        "age_tolerance_ms = 2\n"
         "[sensors.input_speed]\noffset_tolerance_rpm = 30\n"
         "[sensors.pressure.B2]\noffset_tolerance_bar = 0.02\n"
         '[channels.pressure.B3]\nsource = "p3"\nunit = "bar"\n'
         '[channels.throttle]\nsource = "pedal"\ntime_shift_s = 0.1\n',
     )
-    assert card.sensors["output_torque"] == SensorTolerance(0.01, 20.0)
+    assert card.sensors["output_torque"] == SensorTolerance(0.01, 20.0, 2e-3)
     assert card.sensors["pressure.B2"] == SensorTolerance(0.0, 2e3)
     assert card.sensors["input_speed"].offset == pytest.approx(3.14159265)
     assert card.channels["pressure.B3"] == ChannelSpec("p3", "bar")

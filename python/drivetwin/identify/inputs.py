@@ -158,20 +158,28 @@ def tolerances_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> dict[str, S
     """The card's sensor tolerances by role, of the speed sensors that ω_e is from as one of ω_e.
 
     An engine speed beside which the gearbox input's is not looked at, or the reverse, has none.
+    Where the log's table shows values up to a row late, each channel's age is uncertain by that.
     """
     read = "engine_speed" if "engine_speed" in behind_converter(log, card, shift) else "input_speed"
     found = {role: one for role, one in card.sensors.items() if role not in ENGINE_SPEEDS}
     if read in card.sensors:
         one, factor = card.sensors[read], card.i_in if read == "input_speed" else 1.0
         found["engine_speed"] = replace(one, offset=factor * one.offset)
+    for role, channel in log.channels.items():
+        if channel.late and (role not in ENGINE_SPEEDS or role == read):
+            role = "engine_speed" if role == read else role
+            one = found.get(role, SensorTolerance())
+            # Anywhere within the row, so that the spread is that of an even distribution.
+            found[role] = replace(one, age=float(np.hypot(one.age, channel.late / np.sqrt(12.0))))
     return found
 
 
-def disturbed(signals: ShiftSignals, role: str, gain: float, offset: float) -> ShiftSignals:
-    """The same signals with one sensor reading `gain` (relative) and `offset` (SI) too much."""
+def disturbed(signals: ShiftSignals, role: str, error: SensorTolerance) -> ShiftSignals:
+    """The same signals with one sensor reading too much, or values that are older, by `error`."""
 
     def changed(s: Sampled) -> Sampled:
-        return replace(s, values=s.values * (1.0 + gain) + offset)
+        values = s.values * (1.0 + error.gain) + error.offset
+        return replace(s, time=s.time + error.age, values=values)
 
     name = pressed_element(role)
     if name is not None:

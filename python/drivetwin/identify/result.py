@@ -39,9 +39,10 @@ class Verdict(StrEnum):
 class Estimate:
     """One parameter's value and uncertainty, SI.
 
-    `std_noise` comes from the sensors' noise; `std_systematic` from the gain and offset
-    tolerances on the card. `value` is None exactly when the verdict is `not identifiable`.
-    `reason` says why a verdict is not `identified` and which experiment would help.
+    `std_noise` comes from the sensors' noise; `std_systematic` from the tolerances on the card, of
+    gain, offset and age, and from rows of the log that show values late. `value` is None exactly
+    when the verdict is `not identifiable`. `reason` says why a verdict is not `identified` and which
+    experiment would help.
     """
 
     id: str

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -23,7 +23,8 @@ PRIOR_SHARE = 0.8
 SENSORS = 0.8
 """Share of the total standard deviation from which the sensors' tolerances decide an interval."""
 CALIBRATE = (
-    "the sensors' tolerances decide its interval: calibrate them, then state less on the card"
+    "the sensors' tolerances, or values shown late, decide its interval: calibrate them and state "
+    "less on the card, or record each message with its own stamp"
 )
 KNOWN = "known from design, as the card says"
 ADDS_LITTLE = "design value of the card, to which the log adds little"
@@ -205,14 +206,15 @@ def systematic_std(
     signals: ShiftSignals,
     tolerances: Mapping[str, SensorTolerance],
 ) -> FloatArray:
-    """Standard deviation (q,) of `values` from the sensors' stated gain and offset errors.
+    """Standard deviation (q,) of `values` from the sensors' errors of gain, offset and age.
 
     Each tolerance is applied alone; the shifts of the result add in quadrature.
     """
     base = values(signals)
     total = np.zeros_like(base)
     for role, tolerance in tolerances.items():
-        for gain, offset in ((tolerance.gain, 0.0), (0.0, tolerance.offset)):
-            if gain or offset:
-                total += (values(disturbed(signals, role, gain, offset)) - base) ** 2
+        for kind, size in asdict(tolerance).items():
+            if size:
+                error = SensorTolerance(**{kind: size})
+                total += (values(disturbed(signals, role, error)) - base) ** 2
     return np.asarray(np.sqrt(total), dtype=float)

@@ -35,7 +35,7 @@ _JITTER_SAMPLES = 1.5
 """... and in samples of the logger, unless chance would not put so many so near."""
 
 _SAME_BEAT = 1.5
-"""Ratio of periods within which they rival for the same updates; half a period fits as well as all."""
+"""Ratio of periods within which they rival for the same changes: half a period fits as well."""
 
 _LEAST_STEPS = 2.1
 """Steps of the logger in a period that it does not divide: in fewer the updates cannot be counted
@@ -70,7 +70,7 @@ _PAUSE = 1.5
 class Raster:
     """Instants `start` + k·`period` [s] at which a logger shows the updates.
 
-    Where the logger's step does not divide the period they come `early` [s] before that. The changes
+    Where the logger's step does not divide the period they come `early` [s] before that. Changes
     lie about it by `spread` [s], root of the mean square.
     """
 
@@ -245,23 +245,25 @@ def fresh_samples(channel: Channel) -> Channel:
     return replace(channel, time=channel.time[fresh], values=channel.values[fresh], held=False)
 
 
-def shown_late(channels: Mapping[str, Channel]) -> list[str]:
-    """Words for a coarse table that shows messages on: nobody knows when within a row they came.
+def shown_late(channels: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
+    """The channels by role, those `late` that a coarse table shows on, and what to say of it.
 
-    `channels` by role. Where each has stamps of its own, they are those of the messages.
+    Nobody knows when within a row their messages came. Where each has stamps of its own, they are
+    those of the messages.
     """
-    measured = [one for one in channels.values() if one.quantity not in AUXILIARY]
-    held = [one for one in measured if one.held]
+    measured = {role: one for role, one in channels.items() if one.quantity not in AUXILIARY}
+    held = [one for one in measured.values() if one.held]
     if not held:
-        return []
-    rows = max(measured, key=lambda one: one.time.size)
-    in_table = all(np.isin(one.time, rows.time).all() for one in measured)
+        return dict(channels), []
+    rows = max(measured.values(), key=lambda one: one.time.size)
+    in_table = all(np.isin(one.time, rows.time).all() for one in measured.values())
     if not in_table or rows.step <= _COARSE:
-        return []
+        return dict(channels), []
     names = ", ".join(repr(one.source_name) for one in held)
-    return [
+    aged = {role: replace(one, late=rows.step) for role, one in measured.items()}
+    return {**channels, **aged}, [
         f"the rows of the table are {1e3 * rows.step:.3g} ms apart and repeat values of {names}: a "
         "value stands there up to a row later than its message came, of each channel by another "
-        "time, and intervals do not count that; the age of the engine torque, c_o, P0 and μ hang "
-        "on it: export each channel with its own stamps, or rows of 1 ms"
+        "time; intervals count that, and the age of the engine torque, c_o, P0 and μ hang on it: "
+        "export each channel with its own stamps, or rows of 1 ms"
     ]

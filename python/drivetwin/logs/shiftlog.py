@@ -75,6 +75,7 @@ class Channel:
     `engine_speed`, `output_speed`, `wheel_speed`, `pressure.<element>`, `throttle`, `gear`, ...
     `time` (n,) in s strictly increasing; `values` (n,) in SI. `source_name` and `source_unit`
     are as in the file. `held` marks a slow signal that the logger repeated on a faster time base.
+    `late` [s] is how much older than its stamp a value may be, as a row of a coarse table.
     """
 
     role: str
@@ -84,6 +85,7 @@ class Channel:
     source_name: str
     source_unit: str
     held: bool = False
+    late: float = 0.0
 
     @property
     def step(self) -> float:

@@ -121,40 +121,60 @@ class SensorTable(StrictModel):
     gain_tolerance: float = Field(default=0.0, ge=0, lt=1)
 
 
-class TorqueSensor(SensorTable):
-    """Tolerances of a torque sensor or an engine torque message."""
+class EngineTorqueSensor(SensorTable):
+    """Tolerances of the engine torque message; how old it is, is a parameter (te_delay)."""
 
     offset_tolerance_Nm: float = Field(default=0.0, ge=0)
 
     def tolerance(self) -> SensorTolerance:
-        """Return both tolerances, the offset in SI."""
+        """Return the tolerances in SI."""
         return SensorTolerance(self.gain_tolerance, self.offset_tolerance_Nm)
 
 
-class SpeedSensor(SensorTable):
+class AgedSensor(SensorTable):
+    """A sensor of which a standard deviation of the age of its values may be stated too."""
+
+    age_tolerance_ms: float = Field(default=0.0, ge=0)
+
+    def _with_offset(self, offset: float) -> SensorTolerance:
+        """All tolerances in SI with that of the offset."""
+        return SensorTolerance(self.gain_tolerance, offset, 1e-3 * self.age_tolerance_ms)
+
+
+class TorqueSensor(AgedSensor):
+    """Tolerances of a torque sensor."""
+
+    offset_tolerance_Nm: float = Field(default=0.0, ge=0)
+
+    def tolerance(self) -> SensorTolerance:
+        """Return the tolerances in SI."""
+        return self._with_offset(self.offset_tolerance_Nm)
+
+
+class SpeedSensor(AgedSensor):
     """Tolerances of a speed sensor."""
 
     offset_tolerance_rpm: float = Field(default=0.0, ge=0)
 
     def tolerance(self) -> SensorTolerance:
-        """Return both tolerances, the offset in SI."""
-        return SensorTolerance(self.gain_tolerance, self.offset_tolerance_rpm * RPM)
+        """Return the tolerances in SI."""
+        return self._with_offset(self.offset_tolerance_rpm * RPM)
 
 
-class PressureSensor(SensorTable):
+class PressureSensor(AgedSensor):
     """Tolerances of a pressure sensor."""
 
     offset_tolerance_bar: float = Field(default=0.0, ge=0)
 
     def tolerance(self) -> SensorTolerance:
-        """Return both tolerances, the offset in SI."""
-        return SensorTolerance(self.gain_tolerance, self.offset_tolerance_bar * BAR)
+        """Return the tolerances in SI."""
+        return self._with_offset(self.offset_tolerance_bar * BAR)
 
 
 class SensorsTable(StrictModel):
     """`[sensors]`: tolerances by channel role; none stated means that only noise is counted."""
 
-    engine_torque: TorqueSensor | None = None
+    engine_torque: EngineTorqueSensor | None = None
     output_torque: TorqueSensor | None = None
     input_speed: SpeedSensor | None = None
     engine_speed: SpeedSensor | None = None

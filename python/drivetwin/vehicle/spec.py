@@ -27,10 +27,14 @@ class PriorValue:
 
 @dataclass(frozen=True)
 class SensorTolerance:
-    """One standard deviation of a sensor's constant errors: `gain` relative, `offset` in SI."""
+    """One standard deviation of a sensor's constant errors.
+
+    `gain` is relative, `offset` in SI; `age` [s] is how much older values are than their stamps.
+    """
 
     gain: float = 0.0
     offset: float = 0.0
+    age: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ OFFSET = 50.0
 
 def _inertia(offset: float) -> Estimate:
     made = bench(know=CLOSE)
-    signals = disturbed(made.signals, "output_torque", 0.0, offset)
+    signals = disturbed(made.signals, "output_torque", SensorTolerance(offset=offset))
     posed, start = problem(replace(made, signals=signals))
     fit = nearest(posed, start)
     assert fit is not None

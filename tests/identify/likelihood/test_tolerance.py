@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Ages of the sensors against what must hold of them, and against a fit of older signals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.identify.inputs import disturbed
+from drivetwin.identify.likelihood.fit import fit
+from drivetwin.identify.likelihood.tolerance import sensor_shifts
+from drivetwin.identify.signals import FloatArray
+from drivetwin.vehicle.spec import SensorTolerance
+from tests.identify.likelihood.made import bench, fitted, problem
+
+AGE = 1e-3
+OTHERS = (
+    "output_torque",
+    "engine_speed",
+    "output_speed",
+    "wheel_speed",
+    "pressure.B2",
+    "pressure.B3",
+)
+
+
+def shifts(*roles: str) -> FloatArray:
+    """Sum of the shifts of all unknowns by values of `roles` that are `AGE` older."""
+    found = sensor_shifts(fitted(), {role: SensorTolerance(age=AGE) for role in roles})
+    assert set(found) <= {f"{role} age" for role in roles}
+    return np.asarray(sum(found.values()))
+
+
+def in_deviations(shift: FloatArray) -> dict[str, float]:
+    std = np.sqrt(np.diag(fitted().covariance))
+    return dict(zip(fitted().point.names, shift / std, strict=True))
+
+
+def test_an_older_engine_torque_has_a_larger_age_and_changes_nothing_else() -> None:
+    shift = shifts("engine_torque")
+    names = fitted().point.names
+    assert shift[names.index("te_delay")] == pytest.approx(AGE, rel=0.02)
+    others = {name: one for name, one in in_deviations(shift).items() if name != "te_delay"}
+    assert max(map(abs, others.values())) < 0.3
+
+
+def test_where_all_else_is_older_the_engine_torque_is_younger() -> None:
+    """A time base that is moved moves no other parameter."""
+    shift = shifts(*OTHERS)
+    names = fitted().point.names
+    assert shift[names.index("te_delay")] == pytest.approx(-AGE, rel=0.05)
+    whole = {n: one for n, one in in_deviations(shift).items() if n in ("k_o", "c_o", "eta", "J_e")}
+    assert max(map(abs, whole.values())) < 0.5
+
+
+def test_the_shift_is_that_of_a_fit_of_older_values() -> None:
+    made = bench()
+    older = disturbed(made.signals, "output_torque", SensorTolerance(age=AGE))
+    posed, _ = problem(replace(made, signals=older))
+    again = fit(posed, fitted().point, [older.shift])
+    moved = in_deviations(again.point.values - fitted().point.values)
+    told = in_deviations(shifts("output_torque"))
+    assert abs(told["te_delay"]) > 10.0
+    assert told["te_delay"] == pytest.approx(moved["te_delay"], rel=0.02)
+    assert abs(told["B3.mu_c"]) > 0.5
+    assert max(abs(told[name] - moved[name]) for name in told) < 0.5
