@@ -41,8 +41,8 @@ class Estimate:
 
     `std_noise` comes from the sensors' noise; `std_systematic` from the tolerances on the card, of
     gain, offset and age, and from rows of the log that show values late. `value` is None exactly
-    when the verdict is `not identifiable`. `reason` says why a verdict is not `identified` and which
-    experiment would help.
+    when the verdict is `not identifiable`. `reason` says why a verdict is not `identified` and what
+    to record.
     """
 
     id: str

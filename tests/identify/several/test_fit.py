@@ -16,6 +16,7 @@ from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.several.consistency import shared_of
 from drivetwin.identify.several.fit import (
     Several,
+    common_tolerances,
     farthest,
     identify_several,
     of_one_log,
@@ -71,6 +72,17 @@ def test_the_truth_of_shared_and_of_own_values_is_within_the_intervals() -> None
         assert estimate.value is not None
         assert estimate.std_noise is not None
         assert abs(estimate.value - value) < 3.3 * estimate.std_noise, name
+
+
+@pytest.mark.parametrize("first", [0.0, 0.01])
+def test_the_log_that_shows_values_latest_tells_how_old_they_may_be(first: float) -> None:
+    found = together().found
+    logs = [
+        replace(one.log, channels={r: replace(c, late=late) for r, c in one.log.channels.items()})
+        for one, late in zip(pair(), (first, 0.01 - first), strict=True)
+    ]
+    tolerances = common_tolerances(logs, [found, found], card())
+    assert tolerances["output_torque"].age == pytest.approx(0.01 / np.sqrt(12.0))
 
 
 def test_a_design_prior_counts_once() -> None:

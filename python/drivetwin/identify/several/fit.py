@@ -39,7 +39,7 @@ from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.parameters import log_of
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.spec import VehicleCard
+from drivetwin.vehicle.spec import SensorTolerance, VehicleCard
 
 ALONE = 0.6
 """Share of the time that the fits of single logs take."""
@@ -100,7 +100,7 @@ def identify_several(
                 f"alone they tell {'; '.join(farthest(alone)) or fault.what}",
                 "leave out the log of another vehicle, payload or temperature",
             ) from fault
-    tolerances = tolerances_of(logs[0], card, signals[0].shift)
+    tolerances = common_tolerances(logs, alone, card)
     told = conclude(fit, signals, drivelines, pooled_curves(alone), tolerances)
     tested = consistency(fit, signals, told.friction)
     shares = tuple(
@@ -122,6 +122,18 @@ def identify_several(
         several=several,
     )
     return replace(_joined(alone, told, several), evidence=evidence)
+
+
+def common_tolerances(
+    logs: Sequence[ShiftLog], alone: Sequence[Identification], card: VehicleCard
+) -> dict[str, SensorTolerance]:
+    """Tolerances by role: of the sensors, which are the same in all logs, with the largest age."""
+    found: dict[str, SensorTolerance] = {}
+    for log, one in zip(logs, alone, strict=True):
+        for role, own in tolerances_of(log, card, one.evidence.signals[0].shift).items():
+            known = found.get(role, own)
+            found[role] = replace(known, age=max(known.age, own.age))
+    return found
 
 
 def _refuse_unlike(logs: Sequence[ShiftLog]) -> None:
