@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from drivetwin.cli import main
-from drivetwin.cli.output import show, step, table_of
+from drivetwin.cli.output import say, show, step, table_of
 from drivetwin.progress import tell
 from tests.cli.conftest import Files
 
@@ -47,6 +47,23 @@ def test_texts_are_folded_and_numbers_stay_whole(
     assert max(map(len, lines)) <= 24
     assert any("-1234567.25" in line for line in lines)
     assert "…" not in "".join(lines)
+
+
+def test_texts_in_brackets_and_between_colons_are_shown_as_they_are(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As markup a unit `[bar]` would vanish and `[/min]` be an error."""
+    monkeypatch.setenv("COLUMNS", "80")
+    table = table_of("of [bar].csv", "column", "unit")
+    table.add_row("PrsBrk2\\XCP:on:1", "[bar]")
+    table.add_row("SpdIn", "[/min]")
+    show(table)
+    say("[bar] :on:")
+    text = capsys.readouterr().out
+    assert "of [bar].csv" in text
+    assert "PrsBrk2\\XCP:on:1" in text
+    assert text.count("[bar]") == 3
+    assert "[/min]" in text
 
 
 def on_a_terminal(*arguments: str, **settings: str) -> str:

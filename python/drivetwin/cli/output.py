@@ -23,15 +23,18 @@ JsonFlag = Annotated[
 
 
 def console(*, stderr: bool = False) -> Console:
-    """Console of this moment; no colours and 80 columns where it is not a terminal."""
+    """Console of this moment; no colours and 80 columns where it is not a terminal.
+
+    Texts are shown as they are: a unit in brackets, `[/min]`, is no markup and `:on:` no picture.
+    """
     from rich.console import Console
 
-    return Console(stderr=stderr, highlight=False)
+    return Console(stderr=stderr, highlight=False, markup=False, emoji=False)
 
 
 def say(text: str) -> None:
     """Print a line of plain text on stdout; a long one is left to the terminal to wrap."""
-    console().print(text, markup=False, soft_wrap=True)
+    console().print(text, soft_wrap=True)
 
 
 def note(text: str) -> None:
