@@ -206,6 +206,33 @@ def test_there_is_no_response_at_an_eigenvalue() -> None:
         system.frequency_response(np.array([0.0, 5.0]))
 
 
+def test_a_driveline_that_is_held_has_a_static_response() -> None:
+    """Two springs side by side behind a gear; the wheel in the park lock, or loose."""
+    elements: list[Element] = [
+        {"type": "inertia", "name": "Ja", "node": "a", "inertia": 1e-3},
+        {"type": "torque", "name": "T", "node": "a", "input": "torque"},
+        {"type": "gear", "name": "g", "a": "a", "b": "b", "ratio": 3.0},
+        *(
+            {"type": "spring_damper", "name": name, "a": "b", "b": "wheel"}
+            | {"stiffness": stiffness, "damping": 2.0}
+            for name, stiffness in (("soft", 4e4), ("stiff", 6e4))
+        ),
+        {"type": "inertia", "name": "Jw", "node": "wheel", "inertia": 150.0},
+        {"type": "clutch", "name": "park", "a": "wheel", "b": "ground"}
+        | {"friction": {"slip": [0.0], "mu": [0.1]}, "gain": 1.0, "p0": 0.0, "peak": 1.0}
+        | {"pressure": "P", "drum_inertia": 0.0},
+    ]
+    outputs = [("shaft_torque", "soft"), ("twist", "stiff"), ("speed", "a")]
+    outputs.append(("friction_torque", "park"))
+    still, slow = linearise(elements, ["park"], outputs=outputs).frequency_response(
+        np.array([0.0, 1e-6])
+    )[:, :, 0]
+    assert still == pytest.approx([3.0 * 0.4, 3.0 / 1e5, 0.0, 3.0], rel=1e-12, abs=1e-15)
+    assert still == pytest.approx(slow, abs=1e-6)
+    with pytest.raises(InputError, match="is an eigenvalue"):
+        linearise(elements, [], outputs=outputs).frequency_response(np.array([0.0]))
+
+
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(InputError, match="B9"):
         linearise(MODEL, ["B9"])

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import null_space
 
 from drivetwin import _native
 from drivetwin.border import as_json
@@ -25,6 +26,9 @@ Output = tuple[str, str]
 """A quantity and the name of its node or element, such as ("shaft_torque", "output shaft")."""
 
 SHAFT_TORQUE: Output = ("shaft_torque", "output shaft")
+
+_ZERO = 1e-12
+"""Relative size of numbers that are zero but for round-off."""
 
 _HELD = {"prescribed_speed": "input", "engine_map": "throttle"}
 """Elements that take no part in a linear system, and their field that names the input."""
@@ -85,20 +89,48 @@ class LinearSystem:
     def frequency_response(self, frequency: FloatArray) -> NDArray[np.complex128]:
         """Exact response C (jω - A)⁻¹ B + D at `frequency` (n,) [Hz]: (n, outputs, inputs).
 
-        Raises InputError where a frequency is an eigenvalue, such as 0 of a driveline that turns
-        freely: a motion there grows without end.
+        States that no input moves, as the slip of a locked element, stay as they are.
+        Raises InputError where a frequency is an eigenvalue of what moves, such as 0 of a driveline
+        that turns freely: a motion there grows without end.
         """
         omega = 2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-        unit = np.eye(len(self.A))
-        moved = omega[:, None, None] * unit - self.A
+        moved = omega[:, None, None] * np.eye(len(self.A)) - self.A
         try:
             states = np.linalg.solve(moved, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
-        except np.linalg.LinAlgError as error:
-            raise InputError(
-                "one of the frequencies is an eigenvalue: there is no response to it",
-                "leave it out; 0 Hz is an eigenvalue of a driveline that turns freely",
-            ) from error
+        except np.linalg.LinAlgError:
+            states = np.stack([_forced(one, self.B) for one in moved])
         return np.asarray(self.C @ states + self.D)
+
+
+def _forced(moved: NDArray[np.complex128], by: FloatArray) -> NDArray[np.complex128]:
+    """States X (n, inputs) of `moved` X = `by`, zero in every combination that no input moves.
+
+    Such a combination w has w·`moved` = 0 and w·`by` = 0: the slip of a locked element, or the
+    difference of the twists of two shafts side by side. Rows and columns are brought to one size,
+    so that units do not tell what is zero. Raises InputError where X is not unique even so.
+    """
+    rows = 1.0 / _sizes(np.hstack([moved, by]), 1)
+    forces = rows * by
+    columns = 1.0 / _sizes(rows * moved, 0)
+    scaled = rows * moved * columns
+    every = np.hstack([scaled, forces / _sizes(forces, 0)])
+    still = null_space(every.conj().T, rcond=_ZERO).conj().T
+    held = still * rows.T * columns
+    whole = np.vstack([scaled, held / _sizes(held, 1)])
+    silent = np.zeros((len(held), by.shape[1]))
+    found, _, rank, _ = np.linalg.lstsq(whole, np.vstack([forces, silent]), rcond=_ZERO)
+    if rank < len(moved):
+        raise InputError(
+            "one of the frequencies is an eigenvalue: there is no response to it",
+            "leave it out; 0 Hz is an eigenvalue of a driveline that turns freely",
+        )
+    return np.asarray(columns.T * found)
+
+
+def _sizes(matrix: NDArray[np.complex128] | FloatArray, axis: int) -> FloatArray:
+    """Largest magnitude along an axis, which is kept; 1 where all are zero."""
+    largest = np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0)
+    return np.where(largest > 0.0, largest, 1.0)
 
 
 def linearise(
