@@ -59,6 +59,7 @@ PLAIN = "time,EngTrq,nAb\ns,Nm,1/min\n0.0,1000,700.5\n0.1,1001,701\n"
         PLAIN.replace(",", "   "),
         PLAIN.replace("0.0,", "seconds,double,double\n0.0,", 1),
         PLAIN.replace("s,Nm", "elapsed,crankshaft,tail\ns,Nm"),
+        PLAIN.replace("s,Nm", "-,-,-\ns,Nm").replace("0.0,", "f8,f8,f8\n0.0,", 1),
         "Zeit;EngTrq;nAb\ns;Nm;1/min\n0,0;1,000E3;7,005e2\n,1;1001,;701\n",
     ],
 )
@@ -147,6 +148,11 @@ def test_the_time_column_can_be_stated() -> None:
         ("time;x\ns;Nm\n0.5;1.000,5\n1.5;2,5\n", FileFormatError, "with point ('0.5')"),
         ('time,x\ns,Nm\n0,"1\n1,2\n', FileFormatError, "line 3: a quoted field does not end"),
         ("clock,x\ns,Nm\n0,1\n", MissingChannelError, "no time column among clock, x"),
+        (
+            "time,x\nNm,Nm\n0,1\n",
+            MissingChannelError,
+            "time, x; 'time' is in 'Nm', no unit of time",
+        ),
         ("time,t,x\ns,s,Nm\n0,0,1\n", MappingError, "several time columns: time, t"),
         ("time,x\n,Nm\n0,1\n", UnitError, "no unit for its time column"),
         ("time,x\nparsec,Nm\n0,1\n", UnitError, "unknown time unit 'parsec'"),
@@ -181,6 +187,12 @@ def test_reading_is_fast() -> None:
 def test_date_and_clock_in_columns_of_their_own() -> None:
     log = read("Date;Time;n_in [rpm]\n03.05.2024;23:59:59,9;1200\n04.05.2024;00:00:00,1;1201\n")
     assert [channel.name for channel in log.channels] == ["n_in"]
+    assert log.channels[0].time == pytest.approx([0.0, 0.2], abs=1e-9)
+
+
+def test_a_german_date_and_clock_in_columns_of_their_own() -> None:
+    log = read("Datum;Uhrzeit;n\n;;rpm\n03.05.2024;23:59:59,9;1200\n04.05.2024;00:00:00,1;1201\n")
+    assert [channel.name for channel in log.channels] == ["n"]
     assert log.channels[0].time == pytest.approx([0.0, 0.2], abs=1e-9)
 
 

@@ -252,6 +252,21 @@ def test_a_time_series_keeps_its_unit_in_its_data_info(tmp_path: Path) -> None:
     assert by_name(read(tmp_path, {"p": series}))["p"].unit == "bar"
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("milliseconds", 1e3), ("minutes", 1 / 60)])
+def test_a_time_series_keeps_its_unit_of_time_in_its_time_info(
+    tmp_path: Path, unit: str, factor: float
+) -> None:
+    series = {"Time": T * factor, "Data": T * 2, "DataInfo": {"Units": "bar"}}
+    series["TimeInfo"] = {"Units": unit, "Start": 0.0}
+    assert by_name(read(tmp_path, {"p": series}))["p"].time == pytest.approx(T, abs=1e-12)
+
+
+def test_an_unknown_unit_of_time_of_a_time_series_is_refused(tmp_path: Path) -> None:
+    series = {"Time": T, "Data": T * 2, "TimeInfo": {"Units": "fortnights"}}
+    with pytest.raises(UnitError, match="unknown time unit 'fortnights'"):
+        read(tmp_path, {"p": series})
+
+
 def test_stamps_from_1970_count_from_the_first_of_all(tmp_path: Path) -> None:
     late = {"te": T, "te_t": T + 1.7e9 + 0.25, "x": T[::2], "x_t": T[::2] + 1.7e9}
     raw = read(tmp_path, late)

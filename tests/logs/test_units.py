@@ -38,6 +38,7 @@ def test_torque_spellings(spelling: str, factor: float) -> None:
         *((text, RPM) for text in ("rpm", "RPM", "1/min", "U/min", "u/min", "min-1", "min⁻¹")),
         *((text, RPM) for text in ("r/min", "rev/min", "1 / min", "min^-1", "/min", "Upm")),
         *((text, 1.0) for text in ("rad/s", "rad·s⁻¹", "rad*s-1", "RAD/S")),
+        ("krpm", 1e3 * RPM),
         ("U/s", 2.0 * math.pi),
         ("°/s", math.pi / 180.0),
     ],

@@ -328,7 +328,7 @@ def _header(table: _Table, time: TimeColumn, file: str) -> _Header:
     names = [name for name, _ in split]
     units = [unit for _, unit in split]
     below = _rows_below(table, time_indices(names, units, time))
-    stated = max(below, key=lambda row: sum(map(is_unit, row)), default=[])
+    stated = max(below, key=_units_in, default=[])
     if any(map(is_unit, stated)) or (stated and not any(units)):
         units = [_unit(beside, under) for beside, under in zip(units, stated, strict=True)]
     return _Header(names, units, _time_columns(names, units, time, file), height=1 + len(below))
@@ -366,12 +366,25 @@ def _time_columns(
     return [time_index(names, units, time, file)] * len(names)
 
 
+def _units_in(row: Sequence[str]) -> tuple[int, int]:
+    """How many units a row below the names holds: first those that tell more than `-` does.
+
+    A tool fills a row of comments with `-` where there are none.
+    """
+    return sum(map(_tells, row)), sum(map(is_unit, row))
+
+
+def _tells(cell: str) -> bool:
+    """Whether a cell holds a unit that is not that of a plain number."""
+    return is_unit(cell) and lookup(cell) != lookup("-")
+
+
 def _unit(beside: str | None, under: str) -> str | None:
     """Unit of a column from its name and the row below, where a comment or a type may stand.
 
     What is no unit, or says that there is none, as `-`, leaves the name its unit.
     """
-    tells = is_unit(under) and lookup(under) != lookup("-")
+    tells = _tells(under)
     return under if tells or (beside is None and under) else beside
 
 

@@ -178,8 +178,13 @@ class _Search:
         return name == self._stated.source or (name in clocks and (owner or is_time_name(name)))
 
     def _seconds(self, name: str, tree: Mapping[str, Any]) -> float:
-        """Factor to seconds of a time vector; MATLAB's own unit is the second."""
-        unit = self._stated.unit or _unit(name, tree) or "s"
+        """Factor to seconds of a time vector; MATLAB's own unit is the second.
+
+        A time series keeps another one in `TimeInfo`.
+        """
+        info = tree.get("TimeInfo")
+        told = _own_unit(info) if isinstance(info, Mapping) else None
+        unit = self._stated.unit or _unit(name, tree) or told or "s"
         return time_factor(unit, Where(file=self._file, channel=name))
 
     def _add(
@@ -252,7 +257,9 @@ def _unit(name: str, tree: Mapping[str, Any]) -> str | None:
 def _field_unit(tree: Mapping[str, Any]) -> str | None:
     """Unit of a struct that is one signal; a time series keeps it in `DataInfo`."""
     info = tree.get("DataInfo")
-    tables = (tree, info) if isinstance(info, Mapping) else (tree,)
-    return next(
-        (text for table in tables for key in _UNIT_FIELDS if (text := _text(table.get(key)))), None
-    )
+    return _own_unit(tree) or (_own_unit(info) if isinstance(info, Mapping) else None)
+
+
+def _own_unit(tree: Mapping[str, Any]) -> str | None:
+    """What a struct itself names as unit."""
+    return next((text for key in _UNIT_FIELDS if (text := _text(tree.get(key)))), None)

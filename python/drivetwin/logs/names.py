@@ -12,7 +12,10 @@ from drivetwin.logs.units import is_time_unit, is_unit, lookup
 from drivetwin.tomlfile import did_you_mean
 
 _TIME_NAMES = frozenset(
-    ("t", "time", "times", "timestamp", "timestamps", "zeit", "zeitstempel", "messzeit", "tout")
+    (
+        *("t", "time", "times", "timestamp", "timestamps", "tout"),
+        *("zeit", "zeitstempel", "messzeit", "uhrzeit"),
+    )
 )
 
 
@@ -72,5 +75,15 @@ def time_index(
     if time.source is not None:
         what = f"no column {time.source!r} for time{did_you_mean(time.source, names)}"
     else:
-        what = f"no time column among {', '.join(names)}"
+        what = f"no time column among {', '.join(names)}{_in_another_unit(names, units)}"
     raise MissingChannelError(what, remedy, where)
+
+
+def _in_another_unit(names: Sequence[str], units: Sequence[str | None]) -> str:
+    """What to say of columns that have a name for time and a unit that is none of time."""
+    told = [
+        f"{name!r} is in {unit!r}"
+        for name, unit in zip(names, units, strict=True)
+        if is_time_name(name) and not may_be_time(unit)
+    ]
+    return f"; {', '.join(told)}, no unit of time" if told else ""
