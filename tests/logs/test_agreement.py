@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.errors import PlausibilityError
+from drivetwin.errors import PlausibilityError, TimeError
 from drivetwin.logs.agreement import (
+    check_common_span,
     check_gearing,
     check_torque_signs,
     final_drive_held,
@@ -68,6 +69,17 @@ def test_channels_that_start_late_or_end_early_are_told() -> None:
     ]
 
 
+def test_channels_without_a_common_time_are_refused() -> None:
+    channels = speeds(input_speed=180.0, output_speed=100.0, wheel_speed=20.0)
+    check_common_span(channels, "log.csv")
+    late = channels["wheel_speed"]
+    channels["wheel_speed"] = replace(late, time=late.time + 0.75)
+    with pytest.raises(TimeError) as caught:
+        check_common_span(channels, "log.csv")
+    assert "'n_wheel_speed' starts at 0.750 s" in caught.value.what
+    assert caught.value.what.endswith("_speed' ends at 0.500 s")
+
+
 def powered(ratio: float, share: float) -> dict[str, Channel]:
     """A gear of `ratio`, whose output torque is `share` of ratio times engine torque."""
     made = speeds(input_speed=100.0 * ratio, output_speed=100.0)
@@ -83,6 +95,13 @@ def test_opposite_torques_are_refused() -> None:
     assert "sign = -1" in caught.value.remedy
 
 
+def test_torques_that_act_against_each_other_for_a_while_are_no_wrong_sign() -> None:
+    made = powered(1.8, 0.9)
+    values = made["output_torque"].values.copy()
+    values[:30] *= -1.0
+    check_torque_signs(made | {"output_torque": replace(made["output_torque"], values=values)}, "")
+
+
 @pytest.mark.parametrize(
     ("share", "told"), [(0.9, False), (0.65, False), (0.45, True), (1.8, True)]
 )
@@ -91,6 +110,16 @@ def test_a_torque_of_the_wrong_scale_is_told(tmp_path: Path, share: float, told:
     assert bool(texts) == told
     if told:
         assert f"in gear 2 the output torque is {share:.2f} of ratio times" in texts[0]
+
+
+def test_overrun_and_little_torque_do_not_count_in_the_balance(tmp_path: Path) -> None:
+    made = powered(1.8, 0.9)
+    engine, output = (made[role].values.copy() for role in ("engine_torque", "output_torque"))
+    engine[25:40], output[25:40] = 120.0, -500.0
+    engine[40:], output[40:] = -60.0, -2000.0
+    for role, values in (("engine_torque", engine), ("output_torque", output)):
+        made[role] = replace(made[role], values=values)
+    assert torque_balance(made, card(tmp_path)) == []
 
 
 def test_without_a_gear_there_is_no_balance(tmp_path: Path) -> None:

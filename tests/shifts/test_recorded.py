@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
-from drivetwin.shifts.converter import LETS_GO
+from drivetwin.shifts.converter import LETS_GO, TURBINE_TORQUE
 from drivetwin.shifts.recorded import (
     AFTER,
     BEFORE,
@@ -46,6 +46,11 @@ gap_lists = st.lists(st.tuples(seconds, seconds).map(sorted).map(tuple), max_siz
 
 def log(gap: tuple[float, float] | None = None, role: str = "") -> ShiftLog:
     """5 s at 1 kHz: B2 lets go at 2.2 s and B3 takes hold at 2.0 s; `role` lacks the gap."""
+    return log_without([] if gap is None else [gap], role)
+
+
+def log_without(gaps: list[tuple[float, float]], role: str) -> ShiftLog:
+    """The same where `role` lacks several gaps."""
     time = np.linspace(0.0, 5.0, 5001)
     values = {
         "engine_torque": 1000.0 + 200.0 * np.sin(9.0 * time),
@@ -56,8 +61,8 @@ def log(gap: tuple[float, float] | None = None, role: str = "") -> ShiftLog:
     for name, column in values.items():
         quantity = Quantity.TORQUE if name == "engine_torque" else Quantity.PRESSURE
         keep = np.ones(time.size, np.bool_)
-        if gap is not None and name == role:
-            keep = (time < gap[0]) | (time > gap[1])
+        for low, high in gaps if name == role else []:
+            keep &= (time < low) | (time > high)
         channels[name] = Channel(name, quantity, time[keep], column[keep], name, "")
     return ShiftLog(channels, "made", "")
 
@@ -68,6 +73,7 @@ def test_parts_and_gaps_make_up_the_span(
     span: tuple[float, float], gaps: list[tuple[float, float]]
 ) -> None:
     parts = parts_between(span, tuple(gaps))
+    assert all(span[0] <= low < high <= span[1] for low, high in parts)
     for time in np.linspace(*span, 97):
         inside = sum(low < time < high for low, high in parts)
         blocked = any(low < time < high for low, high in gaps)
@@ -91,6 +97,13 @@ def test_gap_of_the_engine_torque_cuts_the_gear_after() -> None:
     cut = recorded(log((4.0, 4.5), "engine_torque"), SHIFT, FILLS)
     assert cut.after == pytest.approx((2.5, 4.0 - OLDEST), abs=2e-3)
     assert cut.before == SHIFT.before
+
+
+def test_of_several_gaps_the_nearest_to_the_shift_cuts() -> None:
+    gaps = [(0.3, 0.5), (1.0, 1.2), (3.2, 3.4), (4.0, 4.5)]
+    cut = recorded(log_without(gaps, "engine_torque"), SHIFT, FILLS)
+    assert cut.before == pytest.approx((1.2 + YOUNGEST, 2.0), abs=2e-3)
+    assert cut.after == pytest.approx((2.5, 3.2 - OLDEST), abs=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -117,6 +130,17 @@ def test_input_that_starts_or_ends_in_the_shift_refuses_it(gap: tuple[float, flo
 def test_gap_in_the_shift_refuses_it(role: str) -> None:
     with pytest.raises(DamagedChannelError, match="during the shift"):
         recorded(log((2.3, 2.4), role), SHIFT, FILLS)
+
+
+def test_refused_is_where_the_gap_begins_and_a_turbine_asks_for_its_clutch() -> None:
+    gapped = log((2.3, 2.4), "engine_torque")
+    with pytest.raises(DamagedChannelError, match="record the shift again") as refused:
+        recorded(gapped, SHIFT, FILLS)
+    assert refused.value.where.time == pytest.approx(2.299)
+    turbine = replace(gapped["engine_torque"], source_name=f"{TURBINE_TORQUE} from n_e")
+    driven = replace(gapped, channels={**gapped.channels, "engine_torque": turbine})
+    with pytest.raises(DamagedChannelError, match="keep the lock-up clutch open, or closed"):
+        recorded(driven, SHIFT, FILLS)
 
 
 @pytest.mark.parametrize("gap", [(2.0 - LEAST, 1.95), (2.51 + OLDEST, 2.7)])
