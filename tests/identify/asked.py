@@ -42,7 +42,9 @@ def _identified(
             for name, one in card.elements.items()
         }
         card = replace(card, elements=elements)
-        log = drivetwin.read_log(log_file, card)
+        mapping = Path(folder) / "rows.toml"
+        mapping.write_text("[time]\nsimultaneous = true\n", encoding="utf-8")
+        log = drivetwin.read_log(log_file, card, mapping)
         return identify(log, card, drivetwin.find_shifts(log, card), method)
 
 

@@ -88,6 +88,18 @@ def test_a_mapping_asserts_unit_sign_scale_offset_and_time(tmp_path: Path) -> No
     assert log.warnings == ()
 
 
+@pytest.mark.parametrize(("mapping", "late"), [("", 0.01), ("[time]\nsimultaneous = true\n", 0.0)])
+def test_rows_that_repeat_messages_are_late_unless_they_are_simultaneous(
+    tmp_path: Path, mapping: str, late: float
+) -> None:
+    table = {name: np.resize(column, 600) for name, column in columns().items()}
+    table["time"] = np.arange(600, dtype=np.float64) / 100.0
+    table["EngTrq"] = np.repeat(700.0 + 50.0 * np.sin(np.arange(300)), 2)
+    log = mapped(tmp_path, table, UNITS, mapping)
+    assert [one.late for one in log.channels.values()] == pytest.approx([late] * len(log.channels))
+    assert any("simultaneous = true" in text for text in log.warnings) == (late > 0.0)
+
+
 def test_a_unit_asserted_against_the_file_is_told(tmp_path: Path) -> None:
     table = columns()
     table["PrsBrk2"] = table["PrsBrk2"] * 1e5

@@ -17,7 +17,7 @@ from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import scenario_of
 
-RATE = 400.0
+RATE = 500.0
 """Hz of the logger: less than usual, so that seven identifications take less time."""
 KINDS = {
     ScenarioName.POWER_ON_DOWN: "power-on downshift",

@@ -58,9 +58,9 @@ _IN_TIME = 0.05
 _CHANCE = 1e-6
 """Probability from which on chance may have put all changes near such a raster."""
 
-_COARSE = 2e-3
-"""Step of a table [s] above which it may matter how much later than its message a value is shown:
-elsewhere the time of a sample is known to a millisecond and better."""
+_COARSE = 2.1e-3
+"""Step of a table [s] above which it matters how much later than its message a value is shown: with
+rows of 2 ms, however their stamps are rounded, its time is known to a millisecond and better."""
 
 _PAUSE = 1.5
 """After more than so many steps without a sample nobody knows when the value arrived."""
@@ -265,5 +265,6 @@ def shown_late(channels: Mapping[str, Channel]) -> tuple[dict[str, Channel], lis
         f"the rows of the table are {1e3 * rows.step:.3g} ms apart and repeat values of {names}: a "
         "value stands there up to a row later than its message came, of each channel by another "
         "time; intervals count that, and the age of the engine torque, c_o, P0 and μ hang on it: "
-        "export each channel with its own stamps, or rows of 1 ms"
+        "export each channel with its own stamps, or rows of 1 ms; where all values of a row are "
+        "of its stamp, say simultaneous = true under [time] of the channel mapping"
     ]

@@ -71,10 +71,11 @@ class ChannelTable(StrictModel):
 
 
 class TimeTable(StrictModel):
-    """`[time]`: name and unit of the time column, where they cannot be found in the file."""
+    """`[time]`: what cannot be found in the file about its time column and its rows."""
 
     source: str | None = None
     unit: str | None = None
+    simultaneous: bool = False
 
 
 class BusTable(StrictModel):
@@ -106,7 +107,8 @@ def read_mapping(path: Path) -> Mapped:
     bus = BusOptions(
         tuple(path.parent / name for name in file.bus.dbc), file.bus.reference_torque_Nm
     )
-    return Mapped(channels, ReadOptions(TimeColumn(file.time.source, file.time.unit), bus))
+    time = TimeColumn(file.time.source, file.time.unit, file.time.simultaneous)
+    return Mapped(channels, ReadOptions(time, bus))
 
 
 def mapping_text(
@@ -143,7 +145,11 @@ def mapping_text(
 
 def _options(options: ReadOptions) -> dict[str, dict[str, object]]:
     """The tables `[time]` and `[bus]`, without what is not stated."""
-    time = {"source": options.time.source, "unit": options.time.unit}
+    time = {
+        "source": options.time.source,
+        "unit": options.time.unit,
+        "simultaneous": options.time.simultaneous or None,
+    }
     bus = {
         "dbc": [str(path.resolve()) for path in options.bus.databases] or None,
         "reference_torque_Nm": options.bus.reference_torque,

@@ -176,10 +176,14 @@ class RawLog:
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """Which column holds time and in what unit, where the user states it (None: as found)."""
+    """Which column holds time and in what unit, where the user states it (None: as found).
+
+    `simultaneous` says that all values of a row are of its stamp, however coarse the rows.
+    """
 
     source: str | None = None
     unit: str | None = None
+    simultaneous: bool = False
 
 
 @dataclass(frozen=True)

@@ -106,8 +106,9 @@ def read_recording(
         warnings += [*torque_balance(channels, card), *final_drive_held(channels, card)]
         warnings += clock_warnings(channels, card)
     warnings += torque_warnings(channels)
-    channels, late = shown_late(channels)
-    warnings += late
+    if not stated.options.time.simultaneous:
+        channels, late = shown_late(channels)
+        warnings += late
     return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
 
 

@@ -41,10 +41,10 @@ def test_frequency_and_damping_ratio_do_not_hang_on_the_scale_of_torque() -> Non
         assert percent(name, "output_torque gain") == pytest.approx(0.0, abs=0.02)
 
 
-def test_every_sensor_has_a_gain_and_an_offset() -> None:
+def test_every_sensor_has_a_gain_an_offset_and_an_age() -> None:
     roles = {error.rsplit(" ", 1)[0] for error in found().errors}
     assert {"engine_torque", "output_torque", "input_speed", "pressure.B3"} <= roles
-    assert len(found().errors) == 2 * len(roles)
+    assert len(found().errors) == 3 * len(roles)
     assert found().change.shape == (len(found().ids), len(found().errors))
     assert np.isfinite(found().change).all()
 

@@ -18,7 +18,7 @@ from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.shifts.usable import usable_shifts
 from drivetwin.together import Source, Together, identify_together
 from drivetwin.vehicle.spec import VehicleCard
-from tests.identify.asked import DURATION, RATE
+from tests.identify.asked import DURATION
 
 LEVEL = 0.85
 """Engine torque of the second log over that of the first."""
@@ -33,8 +33,7 @@ def scenario(level: float = 1.0, load: float = LOADS[0], payload: float = 1.0) -
     model = replace(
         base.model, load=RoadLoad(constant=load * base.model.i_f), J_v=payload * base.model.J_v
     )
-    sensors = tuple(replace(one, rate=min(one.rate, RATE)) for one in base.sensors)
-    return replace(base, model=model, engine_torque=torque, duration=DURATION, sensors=sensors)
+    return replace(base, model=model, engine_torque=torque, duration=DURATION)
 
 
 def source(made: Scenario, seed: int, held: frozenset[int] = frozenset()) -> Source:

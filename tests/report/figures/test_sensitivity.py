@@ -28,14 +28,15 @@ def test_a_time_is_told_in_ms_and_a_value_of_zero_in_no_per_cent() -> None:
 @pytest.mark.parametrize(("element", "angle"), [("B2", 0), ("Kupplung_K1", -90)])
 def test_names_that_are_wider_than_their_column_are_turned(element: str, angle: int) -> None:
     roles = ("engine_torque", f"pressure.{element}")
-    errors = tuple(f"{role} {kind}" for role in roles for kind in ("gain", "offset"))
+    errors = tuple(f"{role} {kind}" for role in roles for kind in ("gain", "offset", "age"))
     found = Sensitivity(
         ids=("eta",),
         values=np.array([0.85]),
         errors=errors,
-        sizes=np.full(4, 0.01),
-        change=np.full((1, 4), 0.001),
+        sizes=np.full(6, 0.01),
+        change=np.full((1, 6), 0.001),
         slips={},
     )
     layout = sensitivity_figure(found).layout
-    assert (layout.xaxis.tickangle, layout.xaxis2.tickangle) == (angle, angle)
+    axes = (layout.xaxis, layout.xaxis2, layout.xaxis3)
+    assert [one.tickangle for one in axes] == [angle] * 3

@@ -55,9 +55,9 @@ def test_residuals_of_a_right_model_lie_in_the_band() -> None:
 def test_every_sensor_stands_over_the_columns() -> None:
     block = likelihood_sections(found())[1].blocks[0]
     assert isinstance(block, FigureBlock)
-    gain, offset = block.figure.data
+    gain, offset, age = block.figure.data
     assert {"T_e", "T_o", "n_in", "P B3"} <= set(gain.x)
-    assert len(gain.x) == len(offset.x)
+    assert len(gain.x) == len(offset.x) == len(age.x)
     row = list(gain.y).index("η [%]")
     assert gain.text[row][list(gain.x).index("T_e")] == "−1.0"
     assert gain.text[row][list(gain.x).index("T_o")] == "+1.0"

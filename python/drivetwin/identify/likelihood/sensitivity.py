@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What a gain or offset error of each sensor does to each result, whatever the card's tolerances.
+"""What an error of each sensor does to each result, whatever the card's tolerances.
 
-The errors are of one size for all sensors, one per cent of gain and an offset of one per cent of
-the largest reading, so that the columns can be compared and scaled to a sensor's data sheet.
+The errors are of one size for all sensors, one per cent of gain, an offset of one per cent of the
+largest reading and values that are a millisecond older, so that the columns can be compared and
+scaled to a sensor's data sheet.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from drivetwin.vehicle.spec import SensorTolerance
 
 SIZE = 0.01
 """Gain error, and offset in shares of a sensor's largest reading."""
+AGE = 1e-3
+"""How much older values are than their stamps [s]."""
 FRICTION = "mu."
 """Start of the id of μ of an element, at `slips` of the sensitivity."""
 
@@ -32,8 +35,8 @@ class Sensitivity:
     """Change of each result by each sensor error, SI.
 
     `ids` (q,) are parameter ids and `mu.<element>`, `values` (q,) their values; `errors` (e,) read
-    `<role> gain` or `<role> offset`, `sizes` (e,) say how large (SI for an offset); `change` is
-    (q, e). `slips` [rad/s] by element are those at which μ is told.
+    `<role> gain`, `<role> offset` or `<role> age`, `sizes` (e,) say how large (SI but for a gain);
+    `change` is (q, e). `slips` [rad/s] by element are those at which μ is told.
     """
 
     ids: tuple[str, ...]
@@ -52,7 +55,7 @@ def sensitivity(
     To first order in the fit's unknowns; costs one linear response of the run per input and kind.
     """
     largest = _largest_readings(fit)
-    sizes = {role: SensorTolerance(SIZE, SIZE * value) for role, value in largest.items()}
+    sizes = {role: SensorTolerance(SIZE, SIZE * value, AGE) for role, value in largest.items()}
     slips = {name: float(np.mean(curve.slip[[0, -1]])) for name, curve in friction.items()}
 
     def results(unknowns: FloatArray) -> dict[str, float]:
@@ -103,4 +106,4 @@ def _largest_readings(fit: LikelihoodFit) -> dict[str, float]:
 
 def _size(sizes: Mapping[str, SensorTolerance], error: str) -> float:
     role, kind = error.rsplit(" ", 1)
-    return sizes[role].gain if kind == "gain" else sizes[role].offset
+    return float(getattr(sizes[role], kind))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What one per cent of gain or offset error of each sensor does to each result."""
+"""What errors of gain, offset and age of each sensor do to each result."""
 
 from __future__ import annotations
 
@@ -8,12 +8,18 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from drivetwin.display import display_of, significant
-from drivetwin.identify.likelihood.sensitivity import FRICTION, SIZE, Sensitivity
+from drivetwin.identify.likelihood.sensitivity import AGE, FRICTION, SIZE, Sensitivity
 from drivetwin.identify.result import FloatArray
 from drivetwin.parameters import spec_of
 from drivetwin.report.labels import channel_symbol, channel_unit, parameter_label
 from drivetwin.report.style import DIVERGING, axis, layout
 
+_KINDS = {
+    "gain": f"gain + {100 * SIZE:g} %",
+    "offset": f"offset of {100 * SIZE:g} % of the largest",
+    "age": f"values {1e3 * AGE:g} ms older",
+}
+"""Kinds of errors with their titles, from left to right."""
 _FULL_COLOUR = 3.0
 """Change [% of the value] at which the colour is full; the number stands in the cell."""
 _DOT = 0.05
@@ -23,13 +29,13 @@ _UPRIGHT = 9
 
 
 def sensitivity_figure(found: Sensitivity) -> go.Figure:
-    """Change of each result [%] by sensor: gain errors on the left, offsets on the right."""
+    """Change of each result [%] by sensor: of gain errors, of offsets, of older values."""
     names = [_label(one, found) for one in found.ids]
     change = _shown(found)
     symbols = [channel_symbol(error.rsplit(" ", 1)[0]) for error in found.errors]
     angle = -90 if max(map(len, symbols)) > _UPRIGHT else 0
-    figure = make_subplots(cols=2, shared_yaxes=True, horizontal_spacing=0.02)
-    for column, kind in enumerate(("gain", "offset"), start=1):
+    figure = make_subplots(cols=len(_KINDS), shared_yaxes=True, horizontal_spacing=0.02)
+    for column, (kind, title) in enumerate(_KINDS.items(), start=1):
         chosen = [k for k, error in enumerate(found.errors) if error.endswith(kind)]
         figure.add_trace(
             go.Heatmap(
@@ -47,19 +53,10 @@ def sensitivity_figure(found: Sensitivity) -> go.Figure:
             row=1,
             col=column,
         )
+        figure.update_xaxes(axis(title, side="top", tickangle=angle, ticks=""), col=column)
     figure.update_layout(layout(170 + 27 * len(names)))
-    figure.update_layout(
-        xaxis=axis(f"gain + {100 * SIZE:g} %", side="top", tickangle=angle, ticks=""),
-        xaxis2=axis(
-            f"offset of {100 * SIZE:g} % of the largest reading",
-            side="top",
-            tickangle=angle,
-            ticks="",
-        ),
-        yaxis=axis("", autorange="reversed", ticks=""),
-        yaxis2={"autorange": "reversed", "ticks": ""},
-        margin={"t": 80, "b": 20},
-    )
+    figure.update_yaxes(autorange="reversed", ticks="")
+    figure.update_layout(yaxis=axis("", autorange="reversed", ticks=""), margin={"t": 80, "b": 20})
     return figure
 
 
@@ -96,7 +93,7 @@ def _label(result_id: str, found: Sensitivity) -> str:
 def _sensor(found: Sensitivity, k: int) -> str:
     """Name of the sensor, and the size of its offset below it."""
     role, kind = found.errors[k].rsplit(" ", 1)
-    if kind == "gain":
+    if kind != "offset":
         return channel_symbol(role)
     display = display_of(channel_unit(role))
     size = significant(found.sizes[k] * display.factor, 2)

@@ -124,8 +124,9 @@ def _judged(text: str, *, good: bool) -> Cell:
 def _sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
     change = sensitivity(fit, found.evidence.signals, found.friction)
     text = (
-        "Change of each result, in per cent of its value, by an error of one sensor: on the left "
-        "a gain error of 1 %, on the right an offset of 1 % of the sensor's largest reading. "
+        "Change of each result, in per cent of its value, by an error of one sensor: a gain error "
+        "of 1 %, an offset of 1 % of the sensor's largest reading, values 1 ms older than their "
+        "stamps. "
         "Engine torque T_e, pressures P, output torque T_o, speeds n of gearbox input, output and "
         "wheel; a dot is less than 0.05. Scale a column to the data sheet of your sensor; with the "
         "tolerances on the vehicle card all columns are part of the total intervals."
@@ -133,6 +134,6 @@ def _sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
     return Section(
         "sensors",
         "What a sensor error would do",
-        "Noise averages out over a log; a gain or offset error of a sensor does not.",
+        "Noise averages out over a log; an error of a sensor's gain, offset or age does not.",
         [FigureBlock(sensitivity_figure(change), text)],
     )

@@ -61,8 +61,8 @@ def trust_section(found: Identification) -> Section:
     blocks.append(
         FigureBlock(
             interval_figure(found.estimates),
-            "How narrowly each parameter is known. Dots: sensor noise together with the gain and "
-            "offset tolerances on the vehicle card; bars: noise alone.",
+            "How narrowly each parameter is known. Dots: sensor noise together with the sensors' "
+            "tolerances on the vehicle card and values shown late; bars: noise alone.",
         )
     )
     return Section("trust", "Can I trust this model?", _headline(found), blocks)
