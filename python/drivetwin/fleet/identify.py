@@ -186,7 +186,10 @@ def _estimate_row(one: Estimate) -> Row:
 
 
 def _mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
-    """μ at one slip of a curve, judged like any estimate by the width of its band."""
+    """μ at one slip of a curve, judged like any estimate by the width of its band.
+
+    The band holds all errors: what noise alone does to μ is no part of a curve.
+    """
     spec = spec_of(name)
     mu, low, high = (
         float(np.interp(slip, curve.slip, values))
@@ -200,7 +203,7 @@ def _mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
         )  # fmt: skip
     std = (high - low) / (2.0 * Z95)
     one = judge(name, mu, std, curve.method_text)
-    return replace(_estimate_row(one), at=slip)
+    return replace(_estimate_row(one), std_noise=None, at=slip)
 
 
 def _friction_rows(element: str, curve: FrictionCurve) -> Iterator[Row]:
