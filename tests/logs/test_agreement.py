@@ -122,6 +122,12 @@ def test_overrun_and_little_torque_do_not_count_in_the_balance(tmp_path: Path) -
     assert torque_balance(made, card(tmp_path)) == []
 
 
+def test_a_speed_next_to_zero_is_no_gear(tmp_path: Path) -> None:
+    made = powered(1.8, 0.3)
+    still = replace(made["output_speed"], values=np.full_like(made["output_speed"].values, 5e-324))
+    assert torque_balance(made | {"output_speed": still}, card(tmp_path)) == []
+
+
 def test_without_a_gear_there_is_no_balance(tmp_path: Path) -> None:
     assert torque_balance(powered(2.5, 0.3), card(tmp_path)) == []
     assert torque_balance(speeds(input_speed=180.0, output_speed=100.0), card(tmp_path)) == []

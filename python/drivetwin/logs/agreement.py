@@ -160,8 +160,8 @@ def torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[s
     texts = []
     loaded = (engine.values > LEAST_LOAD * engine.values.max()) & np.isfinite(output)
     for gear in card.gears:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            held = loaded & (np.abs(inlet / outlet / gear.ratio - 1.0) < IN_GEAR)
+        expected = gear.ratio * outlet
+        held = loaded & (np.abs(inlet - expected) < IN_GEAR * np.abs(expected))
         if np.count_nonzero(held) < LEAST_SAMPLES:
             continue
         driving = card.ratio(gear.name) * float(engine.values[held].sum())
