@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivetwin.errors import IdentificationError
 from drivetwin.identify.friction import stribeck_at
 from drivetwin.identify.integral import IntegralShift, identify_shift
 from drivetwin.identify.momentum import MomentumSettings, off_going_free, rounding_error
@@ -91,6 +92,17 @@ def test_an_off_going_element_that_lingers_about_its_fill_pressure_is_never_free
     lingering = replace(signals, pressures={**signals.pressures, "B2": held})
     free = off_going_free(lingering, driveline, MomentumSettings())
     assert free == pytest.approx(signals.shift.lockup_time, abs=2e-3)
+
+
+def test_torque_that_flows_back_throughout_has_no_equation_by_the_dissipative_law(
+    constant: Run,
+) -> None:
+    signals = constant.signals()
+    torque = signals.output_torque
+    dragged = replace(signals, output_torque=replace(torque, values=-np.abs(torque.values)))
+    driveline = replace(Truth().driveline(), loss_law="dissipative")
+    with pytest.raises(IdentificationError, match="nowhere does torque flow from the engine"):
+        identify_shift(dragged, driveline, 12.0)
 
 
 def test_truth_off_the_papers_grid_and_another_vehicle() -> None:

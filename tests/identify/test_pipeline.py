@@ -86,6 +86,45 @@ def test_a_likelihood_that_gives_up_leaves_its_reason_and_the_integral_values(
         likelihood_of(found)
 
 
+def _held_briefly(before: float, after: float) -> tuple[ShiftLog, VehicleCard, FoundShifts]:
+    """The paper-like log without a wheel speed, its gears held for so long [s]."""
+    log, card, shifts = recording("paper_like")
+    channels = {role: c for role, c in log.channels.items() if role != "wheel_speed"}
+    (shift,) = shifts.shifts
+    end, lockup = shift.before[1], shift.lockup_time
+    brief = replace(shift, before=(end - before, end), after=(lockup, lockup + after))
+    return replace(log, channels=channels), card, FoundShifts((brief,), ())
+
+
+def test_gears_held_too_briefly_for_the_linear_method_are_fitted_without_it() -> None:
+    log, card, shifts = _held_briefly(0.2, 0.2)
+    with pytest.raises(IdentificationError, match=r"no 0\.4 s of held gear"):
+        identify(log, card, shifts, Method.INTEGRAL)
+    found = identify(log, card, shifts, Method.LIKELIHOOD)
+    assert found.method is Method.LIKELIHOOD
+    (told,) = [text for text in found.warnings if text.startswith("linear method: no 0.4 s of")]
+    assert told.endswith("the likelihood started without it")
+    truth = {"eta": 0.85, "J_prime_2": 17.50, "J_vehicle": 6056.0, "k_o": 1.76e5, "c_o": 280.0}
+    for name, value in truth.items():
+        estimate = found.estimates[name]
+        assert estimate.value is not None
+        assert estimate.std_total is not None
+        assert abs(estimate.value - value) < 3.0 * estimate.std_total, name
+        assert estimate.std_total < 0.02 * value, name
+
+
+def test_where_neither_method_finds_anything_the_linear_one_says_what_to_record(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def gives_up(*_: object) -> None:
+        raise IdentificationError("the search crawls", "drive on")
+
+    monkeypatch.setattr("drivetwin.identify.pipeline.likelihood_alone", gives_up)
+    with pytest.raises(IdentificationError, match=r"no 0\.4 s of held gear") as caught:
+        identify(*_held_briefly(0.2, 0.2), Method.LIKELIHOOD)
+    assert "record at least a second" in caught.value.remedy
+
+
 def test_constant_engine_torque_is_said_in_words_not_hidden() -> None:
     found = identified("paper_like", Method.INTEGRAL)
     assert "cannot tell η from J′" in found.estimates["eta"].reason

@@ -215,6 +215,26 @@ def test_a_number_that_overflows_is_refused(role: str) -> None:
         check_channel(channel(role, np.mod(true, 0.7 * size)), "log.csv")
 
 
+def test_a_slowly_sampled_output_torque_may_fall_at_lock_up_and_swing_back() -> None:
+    time = np.linspace(0.0, 1.18, 60)
+    values = np.where(time < 0.6, 1000.0 + 1400.0 * time, 200.0 + 900.0 * (time - 0.6))
+    check_channel(channel("output_torque", values, time=time), "log.csv")
+    with pytest.raises(DamagedChannelError, match="as a number that overflows does"):
+        check_channel(channel("engine_torque", values, time=time), "log.csv")
+
+
+def test_an_electric_motor_turns_fast_and_changes_its_speed_fast() -> None:
+    turning = np.where(TIME < 0.5, 1500.0, np.maximum(1500.0 - 7000.0 * (TIME - 0.5), 900.0))
+    check_channel(channel("input_speed", turning, "rpm"), "log.csv")
+    with pytest.raises(DamagedChannelError, match="jumps from"):
+        check_channel(channel("output_speed", turning - 800.0, "rpm"), "log.csv")
+    with pytest.raises(PlausibilityError, match="largest speed is") as caught:
+        check_channel(channel("input_speed", turning, "rad/s"), "log.csv")
+    assert 'unit = "rpm"' in caught.value.remedy
+    with pytest.raises(PlausibilityError, match="largest speed is"):
+        check_channel(channel("input_speed", 2.0 * turning, "rpm"), "log.csv")
+
+
 def test_a_switched_pressure_does_not_overflow() -> None:
     values = np.where(np.arange(TIME.size) < TIME.size // 2, 14e5, 0.0)
     values = values + 4e3 * np.random.default_rng(1).normal(size=TIME.size)

@@ -212,17 +212,24 @@ def stretches(
         ("inertia", (free, shift.lockup_time - lockup), False),
         ("after", (shift.lockup_time + lockup, shift.after[1]), True),
     )
-    found = []
+    found, backwards = [], False
     for name, span, tied in spans:
         ratio = driveline.i_before if name == "before" else driveline.i_after
         for part in parts_between(span, signals.output_gaps):
             if tied and part != span and part[1] - part[0] < LEAST_BESIDE:
                 continue
             windows = _windows(part, settings)
-            if driveline.loss_law == "dissipative":
+            if driveline.loss_law == "dissipative" and windows.count:
                 windows = _driving(signals.output_torque, windows)
+                backwards = backwards or not windows.count
             if windows.count:
                 found.append(Stretch(name, part, ratio, tied, windows))
+    if backwards and not found:
+        raise IdentificationError(
+            "nowhere does torque flow from the engine to the wheels throughout, which the momentum "
+            "balance by the dissipative loss law needs",
+            "use the likelihood method, or record a second with the pedal down beside the shift",
+        )
     if not found:
         raise IdentificationError(
             "no stretch of the log is long enough for the momentum balance",

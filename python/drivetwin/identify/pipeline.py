@@ -79,8 +79,8 @@ def identify(
     """Identify the driveline from all usable shifts of a log.
 
     The paper's stages run beside the other methods for comparison. The likelihood method starts
-    from the integral one, and leaves the integral result with a warning where it does not
-    converge. What each stage found is in `evidence`.
+    from the integral one, or alone where that has no equation, and leaves the integral result with
+    a warning where it does not converge. What each stage found is in `evidence`.
     Raises NoShiftError without a shift, IdentificationError where the data cannot carry it,
     MissingChannelError for a missing channel, DamagedChannelError where the inputs of the only
     shift have gaps; of several such shifts are refused and the others used.
@@ -171,8 +171,13 @@ def _with_torque(
         paper = _paper_shifts(signals, drivelines, card)
         return paper_conclusions(paper, signals, drivelines), method, Evidence(paper=paper)
     likely, gave_up = method is Method.LIKELIHOOD, ""
-    with part(0.05, 0.2 if likely else 0.5, "linear method"):
-        found, integral = integral_method(signals, drivelines, card)
+    try:
+        with part(0.05, 0.2 if likely else 0.5, "linear method"):
+            found, integral = integral_method(signals, drivelines, card)
+    except IdentificationError as error:
+        if not likely:
+            raise
+        return _without_linear(signals, drivelines, card, error)
     evidence = Evidence(integral=integral)
     if likely:
         try:
@@ -194,6 +199,27 @@ def _with_torque(
     except IdentificationError as error:
         found = replace(found, warnings=(*found.warnings, f"paper's method: {error.what}"))
     return found, method, evidence
+
+
+def _without_linear(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    card: VehicleCard,
+    refusal: IdentificationError,
+) -> _Stage:
+    """The likelihood method from a start of its own where the linear one has no equation: gears
+    held too briefly, or by the dissipative law a drive whose torque flows back throughout.
+
+    Raises the linear method's `refusal` where it does not converge from there either.
+    """
+    try:
+        with part(0.2, 0.95, "likelihood"):
+            found, fit = likelihood_alone(signals, drivelines, card)
+    except IdentificationError:
+        raise refusal from None
+    text = f"linear method: {refusal.what}; the likelihood started without it"
+    found = replace(found, warnings=(text, *found.warnings))
+    return found, Method.LIKELIHOOD, Evidence(likelihood=fit)
 
 
 def _without_torque(

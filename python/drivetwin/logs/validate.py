@@ -28,7 +28,7 @@ from drivetwin.logs.damage import (
 from drivetwin.logs.held import find_raster, fresh_samples
 from drivetwin.logs.roles import AUXILIARY
 from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
-from drivetwin.logs.units import BAR, RPM, usual_units
+from drivetwin.logs.units import BAR, RPM, lookup, usual_units
 
 MIN_SAMPLES = 10
 """Fewer samples cannot show a shift."""
@@ -64,9 +64,16 @@ LEAST_SUCTION = BAR
 
 MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
 """Speed change [rad/s] and rate [rad/s2] that no shaft of a driveline shows between samples."""
+OF_A_MOTOR = 1e4
+"""The same rate of engine and gearbox input: 300 N m turn an electric motor of 0.04 kg m2 with 7500
+rad/s2."""
 
 WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
 """An overflow jumps by this share of the range, and by so many usual steps."""
+
+WRAP_STEP = 15e-3
+"""Interval of samples [s] from which an output torque may do the same: at lock-up it falls within a
+quarter of a period of the shaft, and swings back."""
 
 WRAP_BESIDE, WRAP_DRIFT = 5, 0.02
 """So many samples before and after an overflow move against the jump by this share at least."""
@@ -78,6 +85,13 @@ _PLAUSIBLE: dict[Quantity, tuple[float, float]] = {
     Quantity.FRACTION: (1e-3, 2.0),
 }
 """Limits of max|value| in SI over a recording that contains a shift."""
+
+_FASTEST = 2.7e3
+"""Limit of engine and gearbox input in rpm [rad/s], as of electric drives. In rad/s the limit of
+all speeds holds: larger numbers are those of an engine in rpm."""
+
+_DRIVING = ("input_speed", "engine_speed")
+"""Speeds of what drives: an engine, or an electric motor."""
 
 _IDLE = 30.0
 """Largest speed [rad/s] that engine and gearbox input exceed in any shift."""
@@ -355,7 +369,8 @@ def _check_jumps(channel: Channel, where: Where) -> None:
         return
     pause, change = np.diff(channel.time), np.abs(np.diff(channel.values))
     close = pause <= 2.5 * channel.step
-    jumps = np.flatnonzero(close & (change > MAX_JUMP) & (change > MAX_ACCELERATION * pause))
+    fastest = OF_A_MOTOR if channel.role in _DRIVING else MAX_ACCELERATION
+    jumps = np.flatnonzero(close & (change > MAX_JUMP) & (change > fastest * pause))
     if jumps.size:
         index = int(jumps[0]) + 1
         before, after = (
@@ -377,6 +392,8 @@ def _check_wraps(channel: Channel, where: Where) -> None:
     it came from.
     """
     if channel.quantity not in (Quantity.TORQUE, Quantity.PRESSURE):
+        return
+    if channel.role == "output_torque" and channel.step > WRAP_STEP:
         return
     values, span = channel.values, float(np.ptp(channel.values))
     near = WRAP_BESIDE
@@ -411,8 +428,10 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
     if channel.quantity not in _PLAUSIBLE:
         return
     lowest, highest = _PLAUSIBLE[channel.quantity]
-    if channel.role in ("input_speed", "engine_speed"):
+    if channel.role in _DRIVING:
+        unit = lookup(channel.source_unit)
         lowest = _IDLE
+        highest = _FASTEST if unit is not None and unit.factor == RPM else highest
     largest = float(np.abs(channel.values).max())
     if largest == 0.0 or lowest <= largest <= highest:
         return

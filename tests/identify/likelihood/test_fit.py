@@ -16,6 +16,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood import fit as fitting
 from drivetwin.identify.likelihood.fit import DOUBTFUL, NEAR, Hopeless, fit, nearest
 from drivetwin.identify.likelihood.newton import Found
+from drivetwin.identify.likelihood.output_error import in_lower_gear
 from tests.identify.likelihood.made import ROUGH, bench, fitted, problem, truth_of
 
 DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -111,3 +112,13 @@ def test_input_noise_that_stages_leave_out_is_no_doubt() -> None:
     normal = posed.normal(start)
     assert normal is not None
     assert fitting._is_doubtful(posed, Found(posed, start, normal, True, 0))
+
+
+def test_what_starts_at_zero_is_sought_too() -> None:
+    made = bench()
+    posed, start = problem(made)
+    values = start.values.copy()
+    values[start.names.index("J_out")] = 0.0
+    found = in_lower_gear(posed, start.moved(values), [made.signals.shift])
+    assert found is not None
+    assert found.point["J_out"] > 0.0

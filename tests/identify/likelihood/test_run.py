@@ -5,14 +5,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from benchmarks.estimation.bench import Knowledge, realise
+import pytest
+
+from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import RoadLoad
 from drivetwin.dyno.scenarios import throttle_steps
+from drivetwin.errors import IdentificationError
 from drivetwin.identify.conclude import conclude
-from drivetwin.identify.integral import identify_shift
+from drivetwin.identify.integral import IntegralShift, identify_shift
 from drivetwin.identify.likelihood.run import DISAGREE, likelihood
 from drivetwin.vehicle.spec import VehicleCard
 
+CARD = VehicleCard("truck", "paper", 1.0, 5.0, (), {}, (3.0, 9.0), (1000.0, 9000.0))
 GROWTH = 40.0
 """Enough, N·m·s²/rad², for the linear method to err beyond its noise."""
 
@@ -21,11 +25,10 @@ def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> N
     base = throttle_steps()
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
     made = realise(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
-    card = VehicleCard("truck", "paper", 1.0, 5.0, (), {}, (3.0, 9.0), (1000.0, 9000.0))
     signals, drivelines = [made.signals], [made.driveline]
     shifts = [identify_shift(made.signals, made.driveline, 5.0)]
     linear = conclude(shifts, signals, drivelines, {})
-    told, _ = likelihood(signals, drivelines, (linear, shifts), card)
+    told, _ = likelihood(signals, drivelines, (linear, shifts), CARD)
     assert told.load is not None
     assert sum("grows with the square of the speed" in text for text in told.warnings) == 1
     linear_J, J = linear.estimates["J_vehicle"], told.estimates["J_vehicle"]
@@ -34,3 +37,39 @@ def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> N
     assert J.value is not None
     assert abs(linear_J.value - J.value) > DISAGREE * linear_J.std_noise
     assert not any("the linear method" in text for text in told.warnings)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e3, -1.0])
+def test_a_vehicle_that_cannot_be_is_no_start(
+    factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = realise(throttle_steps(), 0, Knowledge())
+    found = identify_shift(made.signals, made.driveline, 5.0)
+    values = found.values.copy()
+    values[found.ids.index("J_vehicle")] *= factor
+    guess = _started_from(made, replace(found, values=values), monkeypatch)
+    told = dict(zip(found.ids, found.values, strict=True))
+    low, high = CARD.J_vehicle_range
+    assert guess["eta"] == told["eta"]
+    assert (guess["J_vehicle"] == told["J_vehicle"]) == (factor == 1.0)
+    assert low <= guess["J_vehicle"] <= high
+    assert 0.2 < guess["k_o"] / made.truth["k_o"] < 5.0
+
+
+def _started_from(
+    made: Bench, shift: IntegralShift, monkeypatch: pytest.MonkeyPatch
+) -> dict[str, float]:
+    """The start values of the likelihood after what the linear method told of a shift."""
+    seen: list[dict[str, float]] = []
+
+    def caught(*given: object) -> None:
+        assert isinstance(given[3], dict)
+        seen.append(given[3])
+        raise IdentificationError("seen", "")
+
+    monkeypatch.setattr("drivetwin.identify.likelihood.run.choose", caught)
+    signals, drivelines = [made.signals], [made.driveline]
+    linear = conclude([shift], signals, drivelines, {})
+    with pytest.raises(IdentificationError, match="seen"):
+        likelihood(signals, drivelines, (linear, [shift]), CARD)
+    return seen[0]

@@ -12,6 +12,7 @@ import pytest
 from benchmarks.estimation.bench import Knowledge, realise
 from drivetwin.dyno.files import card_text
 from drivetwin.dyno.scenarios import paper
+from drivetwin.identify.likelihood.priors import PLAUSIBLE_ETA
 from drivetwin.identify.likelihood.scale_free import guess_without_torque
 from drivetwin.identify.signals import Sampled
 from drivetwin.vehicle.card import load_card
@@ -34,3 +35,17 @@ def test_noise_of_the_speeds_does_not_make_the_vehicle_light(tmp_path: Path) -> 
     eta = scenario.model.eta
     assert guess["J_vehicle"] == pytest.approx(made.truth["J_vehicle"] / eta, rel=0.1)
     assert guess["Tv_over_if"] == pytest.approx(made.truth["Tv_over_if"] / eta, rel=0.1)
+
+
+def test_a_gear_held_too_briefly_leaves_the_start_to_the_other(tmp_path: Path) -> None:
+    scenario = paper()
+    made = realise(scenario, 0, Knowledge())
+    file = tmp_path / "card.toml"
+    file.write_text(card_text(scenario), encoding="utf-8")
+    shift = made.signals.shift
+    brief = replace(shift, before=(shift.before[1] - 0.08, shift.before[1]))
+    guess = guess_without_torque(
+        replace(made.signals, shift=brief), made.driveline, load_card(file)
+    )
+    assert guess["eta"] == PLAUSIBLE_ETA.value
+    assert guess["J_vehicle"] == pytest.approx(made.truth["J_vehicle"], rel=0.5)

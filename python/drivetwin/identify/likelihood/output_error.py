@@ -92,8 +92,8 @@ def _levelled(problem: Problem, point: Point) -> Point:
 
 
 def _about(problem: Problem, start: Point) -> Problem:
-    """The problem with bounds about the start."""
-    sought = np.array([name in SOUGHT for name in start.names])
+    """The problem with bounds about the start, of what starts above zero."""
+    sought = np.array([name in SOUGHT for name in start.names]) & (start.values > 0.0)
     lower = np.where(sought, np.maximum(problem.lower, start.values / ABOUT), problem.lower)
     upper = np.where(sought, np.minimum(problem.upper, start.values * ABOUT), problem.upper)
     return replace(problem, lower=lower, upper=upper)

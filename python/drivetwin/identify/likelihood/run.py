@@ -16,13 +16,19 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.guess import guess_of
 from drivetwin.identify.likelihood.hills import departures_of
 from drivetwin.identify.likelihood.scale_free import guess_without_torque
+from drivetwin.identify.likelihood.unknowns import DEPARTURE
 from drivetwin.identify.likelihood.variants import choose
+from drivetwin.identify.load import AERO
 from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.vehicle.spec import VehicleCard
 
 DISAGREE = 5.0
 """Difference of the two methods in its standard deviations from which a warning is due."""
 
+OUTSIDE = 10.0
+"""Factor beside the design range of J3 from which the linear method's value is no start."""
+BEHIND_GEARBOX = ("J_vehicle", "Tv_over_if", "k_o", "c_o")
+"""Unknowns whose start hangs on the linear method's J3."""
 OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
 """What a method reads off a load that it takes as constant."""
 
@@ -30,20 +36,48 @@ OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
 def likelihood_alone(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
 ) -> tuple[Conclusions, LikelihoodFit]:
-    """Fit a log without an output torque: ratios over η, and all absolute values refused.
+    """Fit without the linear method: of a log without an output torque, which tells ratios over η
+    and whose absolute values are all refused, or of one that has no equation for that method.
 
     Raises IdentificationError where the fit does not reach a plausible minimum.
     """
+    guess = _own_guess(signals, drivelines, card)
+    best, notes = choose(signals, drivelines, card.loss_law, guess)
+    told = conclude(best, signals, drivelines, {}, card.sensors)
+    return replace(told, warnings=(*told.warnings, *notes)), best
+
+
+def _own_guess(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
+) -> dict[str, float]:
+    """A value for every unknown without the linear method."""
     guess: dict[str, float] = {}
     loads = []
     for s, d in zip(signals, drivelines, strict=True):
         found = guess_without_torque(s, d, card)
         loads.append(found["Tv_over_if"])
         guess = found | guess
-    guess |= departures_of(loads)
-    best, notes = choose(signals, drivelines, card.loss_law, guess)
-    told = conclude(best, signals, drivelines, {}, card.sensors)
-    return replace(told, warnings=(*told.warnings, *notes)), best
+    return guess | departures_of(loads)
+
+
+def _guess(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    shifts: Sequence[IntegralShift],
+    card: VehicleCard,
+) -> dict[str, float]:
+    """A value for every unknown from the linear method, but for a vehicle that cannot be.
+
+    Without a wheel speed that method takes the output speed for it, and where the shaft is soft
+    its swing hides how little the vehicle's speed changes.
+    """
+    found = guess_of(shifts, drivelines)
+    low, high = card.J_vehicle_range
+    if low / OUTSIDE < found["J_vehicle"] < high * OUTSIDE:
+        return found
+    own = _own_guess(signals, drivelines, card)
+    behind = {n: own[n] for n in own if n in BEHIND_GEARBOX or n.endswith(f".{DEPARTURE}")}
+    return {name: value for name, value in found.items() if name != AERO} | behind
 
 
 def likelihood(
@@ -57,7 +91,8 @@ def likelihood(
     Raises IdentificationError where the fit does not reach a plausible minimum.
     """
     found, shifts = linear
-    best, notes = choose(signals, drivelines, card.loss_law, guess_of(shifts, drivelines))
+    guess = _guess(signals, drivelines, shifts, card)
+    best, notes = choose(signals, drivelines, card.loss_law, guess)
     told = conclude(best, signals, drivelines, found.friction, card.sensors)
     warnings = (*told.warnings, *notes, *_disagreements(told, found))
     return replace(told, warnings=warnings), best

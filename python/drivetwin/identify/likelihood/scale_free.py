@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Start values without an output torque: everything torque-like is divided by η.
+"""Start values from speeds and engine torque alone: everything torque-like is divided by η.
 
-Speeds and engine torque tell ratios only (THEORY section 6). With η = 1 in the model, its
-parameters are those ratios; these are their start values:
+They tell ratios only (THEORY section 6). With η = 1 in the model, its parameters are those ratios;
+these are their start values:
 
     T_e = (Je/η)·ω_e' + (J5/η)·ω_e'/i_g² + (T_v/i_f/η)/i_g     in gear, both gears together
     T_c/η = (T_e - (Je/η)·ω_e')/a                               in the inertia phase
@@ -15,6 +15,7 @@ import numpy as np
 from drivetwin.driveline import in_series
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.guess import TYPICAL_LAW, TYPICAL_MODE
+from drivetwin.identify.likelihood.priors import PLAUSIBLE_ETA
 from drivetwin.identify.momentum import MomentumSettings
 from drivetwin.identify.ringdown import pencil_start
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals, Span
@@ -32,7 +33,10 @@ RING = (0.05, 0.8)
 def guess_without_torque(
     signals: ShiftSignals, driveline: Driveline, card: VehicleCard
 ) -> dict[str, float]:
-    """A value for every unknown, from speeds and engine torque of one shift."""
+    """A value for every unknown, from speeds and engine torque of one shift.
+
+    With an output torque η is a plausible one, and the ratios stand for what they are ratios of.
+    """
     inertia = _inertias(signals, driveline, card)
     J_e, J_vehicle, load = inertia
     J_out = 0.0 if driveline.J_out is None else driveline.J_out.value
@@ -40,7 +44,7 @@ def guess_without_torque(
     J = in_series(J4, J5)
     rate, omega = _mode(signals, driveline)
     found = {
-        "eta": 1.0,
+        "eta": PLAUSIBLE_ETA.value if signals.scale_known else 1.0,
         "J_e": J_e,
         "J_out": max(J_out, 0.05 * J_e),
         "J_vehicle": J_vehicle,
@@ -75,7 +79,8 @@ def _inertias(
         slopes.append(in_gear)
         ratios.append(np.full(in_gear.size, gear))
         torques.append(np.array([_mean(signals, t - 0.5 * STEP + age) for t in time]))
-    ratio, slope, torque = (np.concatenate(each) for each in (ratios, slopes, torques))
+    every = (np.concatenate(each) for each in (ratios, slopes, torques))
+    ratio, slope, torque = whole(*every)
     target, seen = torque - J_e * slope, np.column_stack([slope / ratio**2, 1.0 / ratio])
     limits = np.array(card.J_vehicle_range) / driveline.i_f**2
     found = np.linalg.lstsq(seen, target, rcond=None)[0]
@@ -88,12 +93,13 @@ def _inertias(
 
 
 def _slopes(signals: ShiftSignals, span: Span) -> tuple[FloatArray, FloatArray]:
-    """Centres [s] and differences of the engine speed [rad/s^2] over windows of `STEP`."""
+    """Centres [s] and differences of the engine speed [rad/s^2] over windows of `STEP`.
+
+    NaN in gaps; a gear held for less than a window has none.
+    """
     edges = np.arange(span[0], span[1], STEP)
     speed = signals.engine_speed
-    means = speed.at(edges)
-    known, slope = whole(0.5 * (edges[1:] + edges[:-1]), np.diff(means) / STEP)
-    return known, slope
+    return 0.5 * (edges[1:] + edges[:-1]), np.diff(speed.at(edges)) / STEP
 
 
 def _mean(signals: ShiftSignals, start: float) -> float:
