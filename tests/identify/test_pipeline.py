@@ -177,8 +177,7 @@ def test_the_default_method_agrees_with_the_linear_one_and_knows_more() -> None:
         assert old.value is not None
         assert new.std_noise is not None
         assert old.std_noise is not None
-        # The ring-down takes an engine torque that stands still for one without noise.
-        assert new.std_noise < old.std_noise or name == "c_o"
+        assert new.std_noise < old.std_noise, name
         assert abs(new.value - old.value) < 4.0 * old.std_noise, name
     assert found.estimates["J_out"].method == "likelihood with design prior"
     assert likelihood_of(found)[0].chi2 == pytest.approx(1.0, abs=0.05)

@@ -227,7 +227,7 @@ def test_an_electric_motor_turns_fast_and_changes_its_speed_fast() -> None:
     turning = np.where(TIME < 0.5, 1500.0, np.maximum(1500.0 - 7000.0 * (TIME - 0.5), 900.0))
     check_channel(channel("input_speed", turning, "rpm"), "log.csv")
     with pytest.raises(DamagedChannelError, match="jumps from"):
-        check_channel(channel("output_speed", turning - 800.0, "rpm"), "log.csv")
+        check_channel(channel("wheel_speed", turning - 800.0, "rpm"), "log.csv")
     with pytest.raises(PlausibilityError, match="largest speed is") as caught:
         check_channel(channel("input_speed", turning, "rad/s"), "log.csv")
     assert 'unit = "rpm"' in caught.value.remedy

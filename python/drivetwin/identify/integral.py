@@ -22,7 +22,6 @@ from drivetwin.identify.ringdown import (
     Drive,
     RingDown,
     fit_ringdown,
-    quiet,
 )
 from drivetwin.identify.shaft import stiffness_and_damping
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals
@@ -76,19 +75,14 @@ def _ring(
     gain = momentum.value("eta") * ratio * J5 / (J4 + J5)
     shift, measured, age = signals.shift, signals.engine_torque, momentum.value("te_delay")
     after = min(START_AFTER_LOCKUP, MomentumSettings().guard("lockup", shift))
-    # Jitter of the engine torque is either the engine's own, then it drives the oscillation, or
-    # its sensor's: the fit that leaves less of T_o decides.
-    fits = [
-        fit_ringdown(
-            signals.output_torque,
-            shift.lockup_time,
-            shift.after[1],
-            Drive(Sampled(acting.time - age, acting.values, acting.sigma), gain),
-            after,
-        )
-        for acting in (quiet(measured), measured)
-    ]
-    return min(fits, key=lambda ring: float(np.mean((ring.torque - ring.fitted) ** 2)))
+    acting = Sampled(measured.time - age, measured.values, measured.sigma)
+    return fit_ringdown(
+        signals.output_torque,
+        shift.lockup_time,
+        shift.after[1],
+        Drive(acting, gain),
+        after,
+    )
 
 
 def _derived(

@@ -3,7 +3,8 @@
 
 The paper's way reads them from the extremes of the curve. The better way starts from a matrix
 pencil (Hua and Sarkar 1990) and fits one decaying sine on a quadratic; what a moving engine
-torque adds is the response of the same oscillator to it.
+torque adds is the response of the same oscillator to it. Jitter of that torque is its sensor's, or
+the engine's own, which drives the oscillation too: the share of it that does is fitted as well.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.signals import FloatArray, Sampled
+from drivetwin.identify.unseen_torque import Left, covariance, hats, knots_of
 from drivetwin.identify.wlse import window_edges, window_means
 from drivetwin.shifts.recorded import parts_between
 
@@ -34,6 +36,8 @@ FASTEST = 0.8
 CHANCE = 1e-6
 """Probability with which noise alone may pass for an oscillation. So small, for one that just
 passes owes much of its size to noise, and what noise and ring make together decays too slowly."""
+SURE = 5
+"""Columns of a ring-down's basis without jitter: the two of the sine, three of the trend."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +82,37 @@ class RingDown:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Engine torque [N m] as it acts on the oscillator, and its static gain on T_o."""
+    """Engine torque [N m] as measured, at the instants it acts, and its static gain on T_o."""
 
     torque: Sampled
     gain: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Push:
+    """What the engine torque does to a stiff shaft's T_o [N m], at the instants fitted (n,).
+
+    `sure` is that without jitter, less its first value; `jitter` (n, 1), or (n, 0) where there is
+    none. `density` [N²m²s] is the power density of the noise that is left in `sure`, should the
+    jitter be the sensor's.
+    """
+
+    sure: FloatArray
+    jitter: FloatArray
+    density: FloatArray
+
+
+def _push(drive: Drive | None, time: FloatArray) -> _Push:
+    if drive is None:
+        return _Push(np.zeros_like(time), np.empty((time.size, 0)), np.zeros_like(time))
+    measured, calm = drive.torque, quiet(drive.torque)
+    sure = drive.gain * calm.at(time)
+    jitter = drive.gain * measured.at(time) - sure
+    jumps = np.ptp(jitter) > 1e-3 * drive.gain * measured.sigma
+    as_measured = np.interp(time, calm.time, (calm.values == measured.values).astype(float))
+    period = float(np.median(np.diff(measured.time)))
+    density = (drive.gain * measured.sigma) ** 2 * period * as_measured
+    return _Push(sure - sure[0], jitter[:, None][:, : int(jumps)], density)
 
 
 def _refuse(what: str) -> IdentificationError:
@@ -185,15 +216,16 @@ def _starts(time: FloatArray, values: FloatArray) -> list[tuple[float, float]]:
 
 
 def forced_response(rate: float, omega: float, time: FloatArray, drive: FloatArray) -> FloatArray:
-    """Response (n,) of the shaft torque, static gain 1, to `drive` (n,) over equidistant time.
+    """Response of the shaft torque, static gain 1, to each column of `drive` (n,) or (n, m).
 
-    The two-mass shaft passes a torque on the one mass as (2σp + ω_n²)/(p² + 2σp + ω_n²).
+    `time` (n,) is equidistant. The two-mass shaft passes a torque on the one mass as
+    (2σp + ω_n²)/(p² + 2σp + ω_n²).
     """
     step, square = float(time[1] - time[0]), rate**2 + omega**2
     numerator = np.array([2.0 * rate, square])
     denominator = np.array([1.0, 2.0 * rate, square])
     top, bottom, _ = cont2discrete((numerator, denominator), step, method="foh")
-    return np.asarray(lfilter(np.ravel(top), bottom, drive), dtype=float)
+    return np.asarray(lfilter(np.ravel(top), bottom, drive, axis=0), dtype=float)
 
 
 def quiet(torque: Sampled, block: int = 4, still: int = 12) -> Sampled:
@@ -229,47 +261,72 @@ def fit_ringdown(
 ) -> RingDown:
     """Fit one decaying sine on a quadratic to T_o from `after` [s] past lock-up.
 
-    `drive` adds the response to a moving engine torque. Amplitudes are eliminated (variable
-    projection); the covariance uses the residual's power around the frequency fitted, so that
-    coloured residuals widen it. Raises IdentificationError where no clean decay shows, or none that
-    stands out of the noise: the best fit to noise alone has an interval too, as narrow as any.
+    `drive` adds the response to a moving engine torque, and to that share of its jitter which shows
+    in T_o. Amplitudes and share are eliminated (variable projection); the covariance counts noise
+    of T_o and unseen torques, as the residual shows them. Raises IdentificationError where no clean
+    decay shows, or none that stands out of the noise: the best fit to noise alone has an interval
+    too, as narrow as any.
     """
     part = _stretch(torque, lockup, end, after)
     time = np.linspace(part.time[0], part.time[-1], part.time.size)
     values = part.at(time)
     local, trend = time - time[0], _quadratic(time)
-    push = np.zeros_like(time)
-    if drive is not None:
-        acting = drive.gain * drive.torque.at(time)
-        push = acting - acting[0]
+    push = _push(drive, time)
+
+    def beside(p: FloatArray) -> FloatArray:
+        return np.column_stack([trend, forced_response(p[0], p[1], time, push.jitter)])
 
     def basis(p: FloatArray) -> FloatArray:
         decay = np.exp(-p[0] * local)
-        return np.column_stack([decay * np.cos(p[1] * local), decay * np.sin(p[1] * local), trend])
+        swing = [decay * np.cos(p[1] * local), decay * np.sin(p[1] * local)]
+        return np.column_stack([*swing, beside(p)])
 
     def unforced(p: FloatArray) -> FloatArray:
-        return values - (forced_response(p[0], p[1], time, push) if np.any(push) else 0.0)
+        return values - forced_response(p[0], p[1], time, push.sure)
 
     def projected(p: FloatArray) -> FloatArray:
         return _without(basis(p), unforced(p))
 
-    detrended = values - push
-    detrended = detrended - trend @ np.linalg.lstsq(trend, detrended, rcond=None)[0]
-    starts = _starts(time, detrended)
+    starts = _starts(time, _without(trend, values - push.sure))
     start = min(starts, key=lambda p: float(np.sum(projected(np.array(p)) ** 2)))
     found = least_squares(projected, start, x_scale=(5.0, 5.0), method="lm")
     rate, omega = (float(v) for v in found.x)
     if not 0.0 < rate < omega < FASTEST * np.pi / (time[1] - time[0]):
         raise _refuse(f"the fit ends at decay rate {rate:.3g} 1/s, {omega / (2 * np.pi):.3g} Hz")
     residual = projected(found.x)
+    still = _without(beside(found.x), unforced(found.x))
     noise = _power_near(residual, omega, time[1] - time[0], torque.sigma)
-    slopes = np.asarray(found.jac, dtype=float)
-    covariance = noise * np.linalg.inv(slopes.T @ slopes)
-    still = _without(trend, unforced(found.x))
     _require_more_than_chance(float(still @ still - residual @ residual) / noise, time.size)
-    return RingDown(
-        rate, omega, covariance, time, values, values - residual, np.empty(0), np.empty(0)
+    slopes, span = np.asarray(found.jac, dtype=float), basis(found.x)
+    knots = knots_of(time, omega)
+    density = (1.0 - _share(span, unforced(found.x))) * np.interp(knots, time, push.density)
+    left = Left(
+        residual,
+        np.column_stack([span, slopes]),
+        torque.sigma,
+        forced_response(rate, omega, time, hats(time, knots)),
+        density / (knots[1] - knots[0]),
     )
+    return RingDown(
+        rate,
+        omega,
+        covariance(left, slopes),
+        time,
+        values,
+        values - residual,
+        np.empty(0),
+        np.empty(0),
+    )
+
+
+def _share(basis: FloatArray, values: FloatArray) -> float:
+    """Share of the jitter, the last column of `basis` where there is any, that shows in `values`.
+
+    Between 0, also without jitter, and 1.
+    """
+    if basis.shape[1] == SURE:
+        return 0.0
+    return float(np.clip(np.linalg.lstsq(basis, values, rcond=None)[0][-1], 0.0, 1.0))
 
 
 def _without(basis: FloatArray, values: FloatArray) -> FloatArray:
@@ -293,7 +350,7 @@ def _require_more_than_chance(explained: float, count: int) -> None:
 
 
 def _power_near(residual: FloatArray, omega: float, step: float, sigma: float) -> float:
-    """Noise variance per sample that acts on a fit at ω: the residual's power from ω/2 to 2ω.
+    """Noise variance per sample beside a ring at ω: the residual's power from ω/2 to 2ω.
 
     Never less than the power over all frequencies or the sensor's own noise; these alone where a
     fit has gone to an ω that the samples do not resolve.

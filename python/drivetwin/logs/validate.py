@@ -63,10 +63,10 @@ LEAST_SUCTION = BAR
 """A gauge pressure below -1 bar [Pa] does not exist."""
 
 MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
-"""Speed change [rad/s] and rate [rad/s2] that no shaft of a driveline shows between samples."""
+"""Speed change [rad/s] and rate [rad/s2] that no wheel shows between samples."""
 OF_A_MOTOR = 1e4
-"""The same rate of engine and gearbox input: 300 N m turn an electric motor of 0.04 kg m2 with 7500
-rad/s2."""
+"""The same rate of the other shafts: 300 N m turn an electric motor of 0.04 kg m2 with 7500 rad/s2,
+and what little turns between it and a soft shaft follows at lock-up."""
 
 WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
 """An overflow jumps by this share of the range, and by so many usual steps."""
@@ -369,7 +369,7 @@ def _check_jumps(channel: Channel, where: Where) -> None:
         return
     pause, change = np.diff(channel.time), np.abs(np.diff(channel.values))
     close = pause <= 2.5 * channel.step
-    fastest = OF_A_MOTOR if channel.role in _DRIVING else MAX_ACCELERATION
+    fastest = MAX_ACCELERATION if channel.role == "wheel_speed" else OF_A_MOTOR
     jumps = np.flatnonzero(close & (change > MAX_JUMP) & (change > fastest * pause))
     if jumps.size:
         index = int(jumps[0]) + 1
