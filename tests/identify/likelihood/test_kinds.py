@@ -19,7 +19,8 @@ from drivetwin.identify.likelihood.kinds import (
     averaged_over_kinds,
     likely_kinds,
     with_best_kinds,
-    with_either_speeds,
+    with_either_kind,
+    with_slow_outputs,
 )
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
@@ -32,6 +33,8 @@ MEANS = frozenset({"output_torque"})
 UNDECIDED = 78
 """Seed of a noise whose Q is lower by 4.7 of 26,847 with means of the output torque, which are
 none."""
+AS_READ = 2
+"""Seed of a noise with which an expansion takes means over 20 ms for samples."""
 
 
 @cache
@@ -191,7 +194,7 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
 ) -> None:
     posed, _, best = _without_torque()
     monkeypatch.setattr(of_signals, "EITHER_SPEEDS", np.inf)
-    wide, doubts = with_either_speeds(posed, best)
+    wide, doubts = with_either_kind(posed, best)
     other = nearest(posed.of_kinds(frozenset(SPEEDS)), best.point)
     assert other is not None
     far = abs(other.point["te_delay"] - best.point["te_delay"])
@@ -199,9 +202,45 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
     assert far < 1.96 * _age(wide)[1]
     assert "engine speed" in doubts[0]
     monkeypatch.setattr(of_signals, "EITHER_SPEEDS", -np.inf)
-    assert with_either_speeds(posed, best) == (best, [])
+    assert with_either_kind(posed, best) == (best, [])
 
 
 def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
     fit = _fit(MEANS)
-    assert with_either_speeds(_posed(), fit) == (fit, [])
+    assert with_either_kind(_posed(), fit) == (fit, [])
+
+
+@cache
+def _at_50_hertz(window: float) -> tuple[Problem, LikelihoodFit]:
+    """A problem of outputs every 20 ms that are means over the `window` [s], and its minimum with
+    the kinds that an expansion tells."""
+    base = throttle_steps()
+    sensors = [
+        replace(one, rate=50.0, window=window)
+        if one.quantity is Quantity.SPEED or one.role == "output_torque"
+        else one
+        for one in base.sensors
+    ]
+    posed, start = problem(realise(replace(base, sensors=tuple(sensors)), AS_READ, ROUGH))
+    fit = nearest(posed, start)
+    assert fit is not None
+    return posed, with_best_kinds(posed, fit)
+
+
+def test_slow_outputs_are_tried_as_the_other_kind_for_no_expansion_reaches_so_far() -> None:
+    posed, known = _at_50_hertz(0.02)
+    assert known.problem.kinds == frozenset()
+    assert abs(_age(known)[0]) > 20.0 * _age(known)[1]  # half a period of the outputs
+    told = with_slow_outputs(posed, known)
+    assert told.problem.kinds == {*SPEEDS, "output_torque"}
+    assert abs(_age(told)[0]) < 2.0 * _age(told)[1]
+
+
+def test_slow_samples_stay_samples() -> None:
+    posed, known = _at_50_hertz(0.0)
+    assert known.problem.kinds == frozenset()
+    assert with_slow_outputs(posed, known) is known
+
+
+def test_fast_outputs_of_the_other_kind_are_within_reach_of_the_expansion() -> None:
+    assert with_slow_outputs(_posed(), _fit(frozenset())) is _fit(frozenset())

@@ -53,8 +53,8 @@ TIE = 6.0
 """Rise of the same below which the 95 % interval reaches the minimum of the other kind,
 whatever its weight: odds of 20."""
 EITHER_SPEEDS = 20.0
-"""Rise of the deviance below which, without an output torque, the speeds may be of the other kind.
-Half their period is then nearly an age of the engine torque; noise about P0, and how the values of
+"""Rise of the deviance below which outputs that lie `_far_apart` may be of the other kind. Half
+their period is nearly an age of the engine torque; noise about P0, and how the values of
 a torque are joined, which no model has quite, have been seen to speak for the wrong kind by 10, and
 Q alone by 17."""
 UNLIKELY = 0.01
@@ -67,6 +67,8 @@ UNSURE = (
 )
 WORSE = 1.1
 """Q per sample, as a factor, from which on other kinds are surely no better."""
+SLOW = 4e-3
+"""Period of outputs [s] from which on half of it is too far away for an expansion."""
 ROUNDS = 3
 """Most changes of kind: far off, the expansion promises the way, not the end of it."""
 
@@ -75,7 +77,7 @@ def likely_kinds(
     problem: Problem, start: Point, shifts: Sequence[Shift]
 ) -> tuple[Problem, Problem]:
     """The problem, which has signals as read, with the kinds that promise least from `start`, and
-    with the speeds of the other kind.
+    with the speeds, or all slow outputs, of the other kind.
 
     From far off an expansion promises anything: at ten times the noise, where logs without an
     output torque start, a mixture of kinds by a thousand of Q. From there the lower gear alone is
@@ -87,7 +89,20 @@ def likely_kinds(
     if kinds is None and (gear := in_lower_gear(problem, start, shifts)) is not None:
         kinds = _told_near(gear.problem, gear.point)
     kinds = kinds or frozenset()
-    return problem.of_kinds(kinds), problem.of_kinds(kinds ^ frozenset(SPEEDS))
+    other = kinds ^ (_far_apart(problem) or frozenset(SPEEDS))
+    return problem.of_kinds(kinds), problem.of_kinds(other)
+
+
+def _far_apart(problem: Problem) -> frozenset[str]:
+    """The outputs of which half a period is nearly an age of the inputs and too far away for an
+    expansion: the speeds of a log without an output torque, and all outputs where they are slow.
+
+    That moves P0 and the age of the engine torque by many standard deviations.
+    """
+    if not problem.parts[0].scale_known:
+        return frozenset(SPEEDS)
+    periods = [out.period(one.record.time) for one in problem.parts for out in one.record.outputs]
+    return _shown(problem) if min(periods) > SLOW else frozenset()
 
 
 def _told_near(problem: Problem, point: Point) -> frozenset[str] | None:
@@ -123,7 +138,23 @@ def with_best_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
             break
     if problem.parts[0].scale_known:
         return best
-    return better_of(best, best.problem.kinds ^ frozenset(SPEEDS), _start_of_other_speeds(best))
+    return better_of(best, best.problem.kinds ^ frozenset(SPEEDS), _start_of_other_outputs(best))
+
+
+def with_slow_outputs(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
+    """The fit, or where the outputs of a log with an output torque are slow that with all of them
+    of the other kind, if it is likelier. `problem` has signals as read."""
+    outputs = _far_apart(problem)
+    if not outputs or not problem.parts[0].scale_known:
+        return best
+    kinds = best.problem.kinds ^ outputs
+    other = _nearby(problem.of_kinds(kinds), best, _start_of_other_outputs(best))
+    if other is None or _rise(problem, best, other) >= 0.0:
+        return best
+    try:
+        return with_best_kinds(problem, other)
+    except OutOfWork:
+        return other
 
 
 def averaged_over_kinds(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
@@ -146,13 +177,14 @@ def averaged_over_kinds(problem: Problem, best: LikelihoodFit) -> tuple[Likeliho
     return told, _doubts(choices, weight, np.sqrt(np.diag(best.covariance)))
 
 
-def with_either_speeds(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
-    """In a log without an output torque, the fit with its covariance widened up to the minimum that
-    has the speeds of the other kind, and that in words; as it is where the deviance rises much to
+def with_either_kind(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
+    """The fit with its covariance widened up to the minimum that has the outputs which lie
+    `_far_apart` of the other kind, and that in words; as it is where the deviance rises much to
     there."""
-    if problem.parts[0].scale_known:
+    outputs = _far_apart(problem) & _shown(problem)
+    if not outputs:
         return best, []
-    kinds, start = best.problem.kinds ^ frozenset(SPEEDS), _start_of_other_speeds(best)
+    kinds, start = best.problem.kinds ^ outputs, _start_of_other_outputs(best)
     try:
         other = nearest(problem.of_kinds(kinds), start, WORSE * best.normal.cost / problem.size)
     except OutOfWork:  # nobody knows: what shows the same may be as good
@@ -161,14 +193,14 @@ def with_either_speeds(problem: Problem, best: LikelihoodFit) -> tuple[Likelihoo
         if other is None or _rise(problem, best, other) > EITHER_SPEEDS:
             return best, []
         far = other.point.values - best.point.values
-    names = ", ".join(name.replace("_", " ") for name in SPEEDS if name in _shown(problem))
+    names = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in outputs)
     widened = replace(best, covariance=best.covariance + np.outer(far, far) / Z95**2)
     return widened, [UNSURE.format(names)]
 
 
-def _start_of_other_speeds(best: LikelihoodFit) -> Point:
-    """Where to look for the minimum with the speeds of the other kind: at that of `best`, with ages
-    of the torque by which they show nearly the same."""
+def _start_of_other_outputs(best: LikelihoodFit) -> Point:
+    """Where to look for the minimum with the outputs of the other kind: at that of `best`, with
+    ages of the torque by which they show nearly the same."""
     values = best.point.values.copy()
     ages = {part.structure.unknown("te_delay"): part.record for part in best.problem.parts}
     for name, record in ages.items():

@@ -32,7 +32,8 @@ from drivetwin.identify.likelihood.kinds import (
     in_words,
     likely_kinds,
     with_best_kinds,
-    with_either_speeds,
+    with_either_kind,
+    with_slow_outputs,
 )
 from drivetwin.identify.likelihood.lingering import lowest
 from drivetwin.identify.likelihood.priors import problem_of
@@ -74,6 +75,8 @@ def choose(
     problem, start = problem_of(signals, drivelines, loss_law, growing, hilly=True)
     with part(0.0, 0.5), at_most(WORK) as search:
         best = _fit_either(problem, start, shifts)
+    with at_most(DOUBT_WORK):
+        best = with_slow_outputs(problem, best)
     with part(0.5, 0.65), at_most(LESS_WORK):
         level = with_one_load(best)
         point, covariance = level or (best.point, best.covariance)
@@ -86,7 +89,7 @@ def choose(
     with part(0.85, 1.0, "kinds of signals"), at_most(min(DOUBT_WORK, search.left)):
         best, doubts = averaged_over_kinds(problem, best)
     with at_most(DOUBT_WORK):
-        best, either = with_either_speeds(problem, best)
+        best, either = with_either_kind(problem, best)
     return best, (*notes, *in_words(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
 
 
