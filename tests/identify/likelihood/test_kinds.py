@@ -193,7 +193,7 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     posed, _, best = _without_torque()
-    monkeypatch.setattr(of_signals, "EITHER_SPEEDS", np.inf)
+    monkeypatch.setattr(of_signals, "EITHER_KIND", np.inf)
     wide, doubts = with_either_kind(posed, best)
     other = nearest(posed.of_kinds(frozenset(SPEEDS)), best.point)
     assert other is not None
@@ -201,7 +201,7 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
     assert far == pytest.approx(0.5e-3, rel=0.3)  # half a period of the speeds
     assert far < 1.96 * _age(wide)[1]
     assert "engine speed" in doubts[0]
-    monkeypatch.setattr(of_signals, "EITHER_SPEEDS", -np.inf)
+    monkeypatch.setattr(of_signals, "EITHER_KIND", -np.inf)
     assert with_either_kind(posed, best) == (best, [])
 
 

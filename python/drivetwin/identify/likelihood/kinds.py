@@ -52,7 +52,7 @@ rare, at odds of e⁴. Half a millisecond of the torque is six standard deviatio
 TIE = 6.0
 """Rise of the same below which the 95 % interval reaches the minimum of the other kind,
 whatever its weight: odds of 20."""
-EITHER_SPEEDS = 20.0
+EITHER_KIND = 20.0
 """Rise of the deviance below which outputs that lie `_far_apart` may be of the other kind. Half
 their period is nearly an age of the engine torque; noise about P0, and how the values of
 a torque are joined, which no model has quite, have been seen to speak for the wrong kind by 10, and
@@ -190,7 +190,7 @@ def with_either_kind(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodF
     except OutOfWork:  # nobody knows: what shows the same may be as good
         far = start.values - best.point.values
     else:
-        if other is None or _rise(problem, best, other) > EITHER_SPEEDS:
+        if other is None or _rise(problem, best, other) > EITHER_KIND:
             return best, []
         far = other.point.values - best.point.values
     names = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in outputs)
