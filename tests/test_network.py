@@ -107,7 +107,12 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], Start, str]] = {
     "nothing can move": (
         [inertia("a"), gear("g", "a", "ground", 2.0)],
         AT_REST,
-        "the mechanism cannot move",
+        "the mechanism cannot move: the rigid couplings of g leave no independent speed",
+    ),
+    "contradictory ratios": (
+        [inertia("a"), inertia("b"), gear("g", "a", "b", 2.0), gear("h", "a", "b", 3.0)],
+        AT_REST,
+        "the mechanism cannot move: the rigid couplings of g, h leave no independent speed",
     ),
     "missing input": ([*PAIR[:2], torque("a")], AT_REST, 'input "torque" has no signal'),
     "undetermined start": (PAIR, Start({"a": 0.0}), "the start leaves speeds undetermined: .* b"),
@@ -125,7 +130,7 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], Start, str]] = {
     "unknown shaft": (
         PAIR,
         Start({"a": 0.0, "b": 0.0}, {"axle": 0.0}),
-        'shaft "axle" is unknown',
+        'shaft "axle" is unknown; known are none',
     ),
 }
 
@@ -148,6 +153,16 @@ def test_numbers_and_arrays_of_numpy_describe_as_plain_ones_do() -> None:
     other = run([inertia("a", 2.0), plain], start, ("speed", "a"), pressure=ONE)
     assert one.status == "completed"
     assert np.array_equal(one.columns["speed", "a"], other.columns["speed", "a"])
+
+
+def test_a_set_of_dual_pinions_may_state_that_its_planets_have_no_inertia() -> None:
+    members: Element = {"type": "planetary", "name": "set", "sun": "s", "ring": "r", "carrier": "c"}
+    bodies = [inertia("s", 0.2), inertia("c", 0.5), inertia("r", 1.0), torque("s")]
+    start = Start({"s": 10.0, "c": 0.0})
+    sets = [members | {"z": -1.9}, members | {"z": -1.9, "planet_inertia": 0.0}]
+    one, other = (run([*bodies, each], start, ("speed", "r"), torque=ONE) for each in sets)
+    assert one.status == "completed"
+    assert np.array_equal(one.columns["speed", "r"], other.columns["speed", "r"])
 
 
 def test_an_input_that_is_no_signal_is_named() -> None:

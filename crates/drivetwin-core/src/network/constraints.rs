@@ -34,7 +34,8 @@ pub fn coordinates<T: Number>(m: &Mechanism<T>) -> Result<Coordinates<T>, Compil
     let dependent = || CompileError::DependentConstraints { elements: dependent_elements(m) };
     let found = found.ok_or_else(dependent)?;
     if found.independent.is_empty() {
-        return Err(CompileError::Immobile);
+        let elements = m.constraints.iter().map(|one| one.element.to_string()).collect();
+        return Err(CompileError::Immobile { elements });
     }
     Ok(found)
 }

@@ -39,9 +39,15 @@ pub enum CompileError {
         /// The elements.
         elements: Vec<String>,
     },
-    /// Everything is rigidly connected to the ground.
-    #[error("the mechanism cannot move: its rigid couplings leave no independent speed")]
-    Immobile,
+    /// Everything is rigidly connected to the ground, or ratios between the same nodes contradict each other.
+    #[error(
+        "the mechanism cannot move: the rigid couplings of {} leave no independent speed",
+        elements.join(", ")
+    )]
+    Immobile {
+        /// The rigid couplings.
+        elements: Vec<String>,
+    },
     /// More friction elements and lossy gears than a mode key can hold.
     #[error("{count} friction elements and lossy gears; at most {limit} are supported")]
     TooManyRows {

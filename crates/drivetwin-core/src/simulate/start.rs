@@ -160,9 +160,9 @@ pub(super) fn find<'n>(
     name: &str,
     known: impl Iterator<Item = &'n Name> + Clone,
 ) -> Result<usize, StartError> {
-    known.clone().position(|k| k == name).ok_or_else(|| StartError::Unknown {
-        kind,
-        name: name.to_owned(),
-        known: known.map(Name::as_str).collect::<Vec<_>>().join(", "),
+    known.clone().position(|k| k == name).ok_or_else(|| {
+        let names: Vec<&str> = known.map(Name::as_str).collect();
+        let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        StartError::Unknown { kind, name: name.to_owned(), known }
     })
 }

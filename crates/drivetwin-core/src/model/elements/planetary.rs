@@ -4,7 +4,7 @@
 use crate::model::Name;
 use crate::model::error::{ModelError, require};
 use crate::model::mechanism::{Constraint, Inertia, Mechanism};
-use crate::number::Number;
+use crate::number::{Number, Values};
 use serde::{Deserialize, Serialize};
 
 /// `ω_sun + z ω_ring = (1 + z) ω_carrier` with z = teeth of ring over teeth of sun, negative for a
@@ -23,7 +23,7 @@ pub struct Planetary<T> {
     /// Ring over sun teeth. Must not be 0 or -1.
     pub z: T,
     /// Spin inertia of all planets together about their own axes, kg·m²; none if absent. For single
-    /// pinions (z > 1). Their orbiting mass belongs to the carrier. Must be >= 0.
+    /// pinions (z > 1), 0 for others. Their orbiting mass belongs to the carrier. Must be >= 0.
     #[serde(default = "Option::default")]
     pub planet_inertia: Option<T>,
 }
@@ -33,6 +33,9 @@ impl<T: Number> Planetary<T> {
         require(&self.name, "z", self.z.re(), |z| z != 0.0 && z != -1.0, "neither 0 nor -1")?;
         let Some(spin) = self.planet_inertia else { return Ok(()) };
         require(&self.name, "planet_inertia", spin.re(), |v| v >= 0.0, ">= 0 kg m^2")?;
+        if spin.re().decide(|v| v == 0.0) {
+            return Ok(());
+        }
         require(&self.name, "z", self.z.re(), |z| z > 1.0, "> 1 for a set with planet inertia")
     }
 
@@ -40,7 +43,7 @@ impl<T: Number> Planetary<T> {
         let one = T::of(1.0);
         let row =
             m.row(&[(&self.sun, one), (&self.ring, self.z), (&self.carrier, -(self.z + 1.0))]);
-        if let Some(inertia) = self.planet_inertia {
+        if let Some(inertia) = self.planet_inertia.filter(|_| self.z.re().decide(|z| z > 1.0)) {
             // ω_planet = ω_carrier - (ω_sun - ω_carrier) N_sun / N_planet, N_planet = (N_ring - N_sun)/2
             let pinion = (self.z - 1.0).recip() * 2.0;
             let spin = m.row(&[(&self.carrier, pinion + 1.0), (&self.sun, -pinion)]);
