@@ -14,8 +14,8 @@ from drivetwin.driveline import RoadLoad
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import paper_steps, throttle_steps
-from drivetwin.identify.likelihood import variants
-from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
+from drivetwin.identify.likelihood import growth, variants
+from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest, spread_of
 from drivetwin.identify.likelihood.kinds import SPEEDS
 from drivetwin.identify.likelihood.record import TORQUE
 from drivetwin.identify.likelihood.unknowns import AERO
@@ -43,7 +43,7 @@ def _chosen(made: Bench) -> tuple[LikelihoodFit, tuple[str, ...]]:
 
 def _deviation(fit: LikelihoodFit, name: str, truth: float) -> float:
     k = fit.point.names.index(name)
-    return abs(fit.point[name] - truth) / float(np.sqrt(fit.covariance[k, k]))
+    return abs(fit.mean[name] - truth) / float(np.sqrt(fit.covariance[k, k]))
 
 
 def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
@@ -56,6 +56,20 @@ def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
     assert _deviation(fit, AERO, GROWTH) < 3.5
     assert _deviation(fit, "Tv_over_if", load.at(speed) / base.model.i_f) < 3.5
     assert _deviation(fit, "J_vehicle", base.model.J_v) < 3.5
+
+
+def test_a_growing_load_that_is_left_out_is_allowed_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = throttle_steps()
+    load = RoadLoad(base.model.load.constant, aero=GROWTH)
+    made = realise(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
+    monkeypatch.setattr(growth, "grows", lambda *_: False)
+    fit, notes = _chosen(made)
+    assert AERO not in fit.point.names
+    assert not any("grows" in note for note in notes)
+    k = fit.point.names.index("J_vehicle")
+    far = abs(fit.point["J_vehicle"] - base.model.J_v)
+    assert far > 5.0 * np.sqrt(spread_of(fit.problem, fit.normal, fit.chi2)[k, k])
+    assert _deviation(fit, "J_vehicle", base.model.J_v) < 2.0
 
 
 def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search(

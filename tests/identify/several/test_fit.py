@@ -114,7 +114,7 @@ def test_the_start_is_the_mean_by_information() -> None:
     found = still()
     fit, _ = likelihood_of(found)
     start = start_of([found, found])
-    for name, value in zip(fit.point.names, fit.point.values, strict=True):
+    for name, value in zip(fit.mean.names, fit.mean.values, strict=True):
         if not name.startswith("start") and name not in OWN:
             assert start[name] == pytest.approx(value, rel=1e-4, abs=1e-7), name
 

@@ -20,8 +20,8 @@ from drivetwin.identify.signals import FloatArray
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
-NEAR = 50.0
-"""Q per sample at the start below which the direct way is tried first."""
+NEAR = 120.0
+"""Q per sample with input noise at the start below which the direct way is tried first."""
 GOOD = 1.03
 """Q per sample from which on no other start is tried."""
 SAME = 1e-3
@@ -154,7 +154,7 @@ def _attempts(
 
     Raises Hopeless where the first of these show that none will do.
     """
-    if problem.cost(start) < NEAR * problem.size:
+    if _is_near(problem, start):
         direct = nearest(problem, start)
         yield direct
         restarts = restarts if direct is None else restarts[:1]
@@ -167,8 +167,13 @@ def _other_attempts(
     problem: Problem, start: Point, shifts: Sequence[Shift]
 ) -> Iterator[LikelihoodFit | None]:
     """Fits by stages; not the first where that is what `_attempts` began with."""
-    near = problem.cost(start) < NEAR * problem.size
-    yield from _by_stages(problem, start, shifts, RESTARTS[:1] if near else RESTARTS[1:])
+    restarts = RESTARTS[:1] if _is_near(problem, start) else RESTARTS[1:]
+    yield from _by_stages(problem, start, shifts, restarts)
+
+
+def _is_near(problem: Problem, start: Point) -> bool:
+    """Whether the direct way is tried first."""
+    return problem.weighted_by(start).cost(start) < NEAR * problem.size
 
 
 def _by_stages(

@@ -10,13 +10,12 @@ samples or means, whichever leaves less.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.conclude import growth_told
+from drivetwin.identify.likelihood import growth
 from drivetwin.identify.likelihood.fit import (
     GOOD,
     RESTARTS,
@@ -24,7 +23,6 @@ from drivetwin.identify.likelihood.fit import (
     LikelihoodFit,
     checked,
     fit,
-    spread_of,
 )
 from drivetwin.identify.likelihood.hills import with_one_load
 from drivetwin.identify.likelihood.kinds import (
@@ -40,8 +38,7 @@ from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import AERO, Point
 from drivetwin.identify.likelihood.work import OutOfWork, at_most
-from drivetwin.identify.load import SIGNIFICANT
-from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
+from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
@@ -80,16 +77,19 @@ def choose(
     with part(0.5, 0.65), at_most(LESS_WORK):
         level = with_one_load(best)
         point, covariance = level or (best.point, best.covariance)
-        guess = growing if _grows(point, covariance) else constant
+        guess = growing if growth.grows(point, covariance) else constant
         narrower = problem_of(signals, drivelines, loss_law, guess, hilly=level is None)
+        wider = best
         best, problem = _narrowed(best, point, narrower, shifts) or (best, problem)
-    notes = _growth(best)
+    notes = growth.told(best)
     with part(0.65, 0.85, "other minima"), at_most(min(LINGER_WORK, search.left)):
         best = lowest(problem, best)
     with part(0.85, 1.0, "kinds of signals"), at_most(min(DOUBT_WORK, search.left)):
         best, doubts = averaged_over_kinds(problem, best)
     with at_most(DOUBT_WORK):
         best, either = with_either_kind(problem, best)
+    if AERO not in best.point.names:
+        best = growth.allowed_for(best, wider)
     return best, (*notes, *in_words(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
 
 
@@ -106,7 +106,7 @@ def _narrowed(
     if not left_out:
         return None
     if left_out == [AERO] and wider.point[AERO] == 0.0:
-        return _without_growth(wider, problem), problem
+        return growth.without(wider, problem), problem
     try:
         of_kinds = problem.of_kinds(wider.problem.kinds)
         return fit(of_kinds, _taken(start, point), shifts, thorough=False), problem
@@ -139,61 +139,6 @@ def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Likelihoo
         raise
     except IdentificationError:
         return None
-
-
-def _grows(point: Point, covariance: FloatArray) -> bool:
-    """Whether the growing part of the load differs from none by more than its noise."""
-    k = point.names.index(AERO)
-    return bool(point[AERO] > SIGNIFICANT * np.sqrt(covariance[k, k]))
-
-
-def _without_growth(best: LikelihoodFit, narrower: Problem) -> LikelihoodFit:
-    """The fit of the model without the growing part, where that of the wider one ends without any.
-
-    It is the same minimum. What lies on its bound has no place in the covariance: it would widen
-    the interval of T_v/i_f, with which it nearly goes, by what it cannot be.
-    """
-    k = best.point.names.index(AERO)
-    point, normal = _taken_out(best.point, k), best.normal
-    parts = [
-        replace(part, structure=other.structure)
-        for part, other in zip(best.problem.parts, narrower.parts, strict=True)
-    ]
-    normal = replace(
-        normal,
-        gradient=np.delete(normal.gradient, k),
-        information=_without(normal.information, k),
-        data=_without(normal.data, k),
-        regressors=tuple(np.delete(one, k, axis=1) for one in normal.regressors),
-    )
-    problem = replace(narrower, parts=tuple(parts))
-    return replace(
-        best,
-        problem=problem,
-        point=point,
-        mean=_taken_out(best.mean, k),
-        covariance=spread_of(problem, normal, best.chi2),
-        normal=normal,
-    )
-
-
-def _taken_out(point: Point, k: int) -> Point:
-    """The point without its unknown number k."""
-    return Point((*point.names[:k], *point.names[k + 1 :]), np.delete(point.values, k))
-
-
-def _without(matrix: FloatArray, k: int) -> FloatArray:
-    """A matrix (p, p) without row and column k."""
-    return np.delete(np.delete(matrix, k, axis=0), k, axis=1)
-
-
-def _growth(best: LikelihoodFit) -> list[str]:
-    """What is said of a load that grows with speed; nothing where it does not."""
-    if AERO not in best.point.names:
-        return []
-    k = best.point.names.index(AERO)
-    std = float(np.sqrt(best.covariance[k, k]))
-    return [growth_told(best.point[AERO], std, best.problem.parts[0].structure.mean_speed)]
 
 
 def _taken(start: Point, found: Point) -> Point:
