@@ -159,7 +159,7 @@ def test_a_set_of_dual_pinions_may_state_that_its_planets_have_no_inertia() -> N
     members: Element = {"type": "planetary", "name": "set", "sun": "s", "ring": "r", "carrier": "c"}
     bodies = [inertia("s", 0.2), inertia("c", 0.5), inertia("r", 1.0), torque("s")]
     start = Start({"s": 10.0, "c": 0.0})
-    sets = [members | {"z": -1.9}, members | {"z": -1.9, "planet_inertia": 0.0}]
+    sets = [{**members, "z": -1.9}, {**members, "z": -1.9, "planet_inertia": 0.0}]
     one, other = (run([*bodies, each], start, ("speed", "r"), torque=ONE) for each in sets)
     assert one.status == "completed"
     assert np.array_equal(one.columns["speed", "r"], other.columns["speed", "r"])

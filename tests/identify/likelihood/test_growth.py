@@ -89,7 +89,7 @@ def _at_bound(wide: LikelihoodFit, size: float) -> LikelihoodFit:
     k = wide.point.names.index(AERO)
     inside, away = wide.point.values.copy(), np.zeros(wide.point.values.size)
     inside[k], away[k] = 0.0, size
-    information = np.linalg.inv(wide.covariance)
+    information = np.asarray(np.linalg.inv(wide.covariance), dtype=float)
     normal = replace(wide.normal, information=information, gradient=-information @ away)
     return replace(wide, point=Point(wide.point.names, inside), normal=normal)
 
