@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Whether the load grows with the square of the speed; what is allowed for where it hardly shows.
 
-Every vehicle meets air drag, a load on a dynamometer none. Left out where it does not show, as a
-test of significance does, it still moves J3 and T_v/i_f: one that is twice its own noise by up to
-seven standard deviations of the model without it. So there the model without is told as the average
-of both, weighted by their likelihood (Burnham and Anderson 2002), to first order.
+Every vehicle meets air drag, a load on a dynamometer none. Left out where it is not significant it
+still moves J3 and T_v/i_f, in a short log by several of the standard deviations that the model
+without it tells. So there the values are the average over both models, weighted by their likelihood
+(Burnham and Anderson 2002), to first order.
 """
 
 from __future__ import annotations

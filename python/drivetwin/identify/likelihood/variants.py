@@ -3,8 +3,8 @@
 
 A part of the model that is wrongly left out biases everything (a load that grows with speed moves
 J3 by several per cent), and one that is wrongly left in widens intervals. The growing part is
-kept where it is significant, a load for each shift unless all may be one (hills.py); outputs are
-samples or means, whichever leaves less.
+kept where it is significant and allowed for where it is not (growth.py), a load for each shift
+unless all may be one (hills.py); outputs are samples or means, whichever leaves less.
 """
 
 from __future__ import annotations
@@ -70,9 +70,9 @@ def choose(
     growing = {**guess, AERO: max(guess.get(AERO, 0.0), SMALL)}
     constant = {name: value for name, value in guess.items() if name != AERO}
     problem, start = problem_of(signals, drivelines, loss_law, growing, hilly=True)
-    with part(0.0, 0.5), at_most(WORK) as search:
+    with part(0.0, 0.45), at_most(WORK) as search:
         best = _fit_either(problem, start, shifts)
-    with at_most(DOUBT_WORK):
+    with part(0.45, 0.5, "kinds of signals"), at_most(DOUBT_WORK):
         best = with_slow_outputs(problem, best)
     with part(0.5, 0.65), at_most(LESS_WORK):
         level = with_one_load(best)
