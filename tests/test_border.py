@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivetwin.border import as_array, as_json
-from drivetwin.driveline import FrictionTable
+from drivetwin.border import as_array, as_json, as_names
+from drivetwin.driveline import FrictionTable, State, plain_start
 from drivetwin.errors import InputError
 
 
@@ -41,3 +41,10 @@ def test_what_is_no_description_is_refused_by_name(description: Any, message: st
 def test_what_is_no_column_of_numbers_is_refused(values: Any) -> None:
     with pytest.raises(InputError, match="an array"):
         as_array(values)
+
+
+def test_names_are_a_list_and_a_text_is_none() -> None:
+    assert as_names(("B2", "B3")) == ["B2", "B3"]
+    start = State(100.0, 50.0, 10.0, 0.0, locked="B2")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="'B2' where a list"):
+        plain_start(start)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin import _native
-from drivetwin.border import as_array, as_json
+from drivetwin.border import as_array, as_json, as_names
 from drivetwin.driveline import (
     DualClutch,
     FloatArray,
@@ -141,6 +141,7 @@ def batch_sensitivities(
     cores.
     Raises InputError as `simulate_batch`.
     """
+    by = as_names(by)
     if not by:
         raise InputError("nothing to differentiate by", "name a parameter, or use simulate_batch")
     for scenario in scenarios:
@@ -151,7 +152,7 @@ def batch_sensitivities(
             as_json(model),
             asked.scenarios,
             asked.sets,
-            (asked.time, list(by)),
+            (asked.time, by),
             asked.wanted,
             (asked.outputs, 0),
         )
@@ -194,6 +195,7 @@ class _Asked:
         if isinstance(keep, str) and keep not in tuple(Keep):
             raise InputError(f"{keep!r} cannot be kept", f"choose from {', '.join(Keep)}")
         keep = Keep(keep) if isinstance(keep, str) else keep
+        outputs = as_names(outputs)
         sets = {name: as_array(values) for name, values in parameters.items()}
         shape = (_runs(sets, scenarios), len(outputs), len(time))
         table = np.stack(list(sets.values()), axis=1) if sets else np.empty((0, 0))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 
 import numpy as np
@@ -66,3 +66,12 @@ def as_array(values: FloatArray) -> FloatArray:
     if column.ndim != 1:
         raise InputError(f"an array of shape {column.shape}", "give one with a single axis")
     return column
+
+
+def as_names(names: Sequence[str]) -> list[str]:
+    """Names as the core takes them. Raises InputError for a text, which is no list of names."""
+    if isinstance(names, str):
+        raise InputError(
+            f"the text {names!r} where a list of names is needed", f"write ({names!r},)"
+        )
+    return list(names)

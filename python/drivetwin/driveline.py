@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin import _native
-from drivetwin.border import as_array, as_json
+from drivetwin.border import as_array, as_json, as_names
 from drivetwin.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -345,9 +345,9 @@ def sensitivities(
     Raises InputError for an unknown name, the delay of an input that jumps, or an inconsistent
     description.
     """
-    inputs = inputs_of(engine_torque, pressures)
+    inputs, parameters = inputs_of(engine_torque, pressures), as_names(parameters)
     require_delays(inputs, parameters)
-    options = (Accuracy().tolerance, list(parameters))
+    options = (Accuracy().tolerance, parameters)
     try:
         columns, events, status, derivatives, event_derivatives = _native.sensitivities(
             as_json(model), delayed_samples(inputs), plain_start(start), run_time(time), options
@@ -427,9 +427,9 @@ def require_delays(inputs: Mapping[str, Signal], by: Sequence[str]) -> None:
 
 
 def plain_start(start: State) -> tuple[float, float, float, float, list[str]]:
-    """A start as the core takes it."""
+    """A start as the core takes it. Raises InputError."""
     speeds = (start.engine_speed, start.output_speed, start.wheel_speed)
-    return (*speeds, start.twist, list(start.locked))
+    return (*speeds, start.twist, as_names(start.locked))
 
 
 def _trajectory(

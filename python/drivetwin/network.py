@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from drivetwin import _native
-from drivetwin.border import as_json
+from drivetwin.border import as_json, as_names
 from drivetwin.driveline import (
     Accuracy,
     EnergyAudit,
@@ -101,7 +101,7 @@ def simulate(
             as_json(list(elements)),
             json.dumps([{kind: name} for kind, name in outputs]),
             (samples(sampled), sines),
-            (list(start.speeds.items()), list(start.twists.items()), list(start.locked)),
+            (list(start.speeds.items()), list(start.twists.items()), as_names(start.locked)),
             run_time(time),
             (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit),
         )
