@@ -207,26 +207,30 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
     #[inline(always)]
     fn correct<const F: bool>(&mut self, channels: &[Carried<L, N>; A], carry: &mut [Carry<L>; A]) {
         let mut missing = [[L::all(0.0); END]; A];
+        let mut raised = [L::all(0.0); A];
         for a in 0..A {
             let (v, [a0, a1, a2]) = (&carry[a].value, self.cubics[a]);
             let known = self.rate[a] + self.direct[a];
             let rate = over_channels::<L, F, N, A>(&channels[a].rate, carry, known);
             let drift = v.by_normal * self.normal[a][1];
+            raised[a] = a0 + a1 + a2;
             missing[a] =
-                [v.value - (a0 + a1 + a2), v.by_argument.fma::<F>(rate, drift - (a1 + a2 + a2))];
+                [v.value - raised[a], v.by_argument.fma::<F>(rate, drift - (a1 + a2 + a2))];
         }
         let size = self.size + L::Values::all(1.0);
-        let (predicted, mut reached) = (missing, self.argument);
+        let mut reached = self.argument;
         for a in 0..A {
             let (form, none) = (&channels[a].argument_end.cubics, L::all(0.0));
-            missing[a][0] = over_raised::<L, F, A>(form, carry[a].value.by_argument, a, &predicted);
-            let ds = over_cubics::<L, F, A, START, END>(form, &predicted, none);
+            let ds = over_cubics::<L, F, A, START, END>(form, &missing, none);
             reached[a] = reached[a] + ds;
             let corrected = carry[a].value.moved::<F>(ds);
             let correction = (corrected.value - carry[a].value.value).values().magnitude();
             let close = size.times(MAX_CORRECTION) - correction;
             self.guard = self.guard.negative_with(close);
             carry[a].value = corrected;
+        }
+        for a in 0..A {
+            missing[a][0] = carry[a].value.value - raised[a];
         }
         add_moments::<L, F, N, A, START, END>(channels, &missing, &mut self.end);
         let mut early = [L::Values::all(0.0); A];
@@ -343,25 +347,6 @@ fn over_cubics<L: Lane, const F: bool, const A: usize, const FROM: usize, const 
     for k in 0..COUNT {
         for a in 0..A {
             sum = form[a][FROM + k].fma::<F>(cubics[a][k], sum);
-        }
-    }
-    sum
-}
-
-/// What a channel misses of its value at the end, once its law has followed the argument to where what is
-/// missing moves it. The slope of the law is multiplied into the form beforehand and what is missing of slopes,
-/// known last, is added last: the state at the end waits for two products less.
-#[inline(always)]
-fn over_raised<L: Lane, const F: bool, const A: usize>(
-    form: &[[L; SHAPES]; MAX_ACTIVE],
-    slope: L,
-    channel: usize,
-    missing: &[[L; END]; A],
-) -> L {
-    let mut sum = missing[channel][0];
-    for k in 0..END {
-        for a in 0..A {
-            sum = (slope * form[a][START + k]).fma::<F>(missing[a][k], sum);
         }
     }
     sum
