@@ -259,6 +259,8 @@ def test_lengths_and_names_must_fit() -> None:
         simulate_batch(MODEL, [scenario()], TIME, sets(2), keep=[TIME[1:]])
     with pytest.raises(InputError, match="shaft_torque"):
         simulate_batch(MODEL, [scenario()], TIME, sets(2), outputs=["angle"])
+    with pytest.raises(InputError, match="the text 'shaft_torque'"):
+        simulate_batch(MODEL, [scenario()], TIME, sets(2), outputs="shaft_torque")
     uneven = {"eta": np.array([0.8, 0.9]), "k_o": np.array([1.8e5])}
     with pytest.raises(InputError, match=r"parameters of \[1, 2\] values make no batch"):
         simulate_batch(MODEL, [scenario()], TIME, uneven)
@@ -334,9 +336,16 @@ def test_a_run_that_fails_has_no_derivatives() -> None:
     assert np.isnan(found.derivatives[1]).all()
 
 
-@pytest.mark.parametrize("by", [[], ["nothing"]])
-def test_derivatives_by_nothing_known_are_refused(by: list[str]) -> None:
-    with pytest.raises(InputError):
+@pytest.mark.parametrize(
+    ("by", "message"),
+    [
+        ([], "nothing to differentiate"),
+        (["nothing"], "'nothing'|\"nothing\""),
+        ("eta", "text 'eta'"),
+    ],
+)
+def test_derivatives_by_nothing_known_are_refused(by: list[str] | str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         batch_sensitivities(MODEL, [scenario()], TIME, by=by)
 
 

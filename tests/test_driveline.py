@@ -395,6 +395,8 @@ def test_an_unknown_parameter_of_a_derivative_is_refused() -> None:
     torque, pressures, start, time = upshift()
     with pytest.raises(InputError, match=r"parameter \"B3\.nu\" is unknown"):
         sensitivities(paper_model(), torque, pressures, start, time, ["B3.nu"])
+    with pytest.raises(InputError, match="the text 'eta'"):
+        sensitivities(paper_model(), torque, pressures, start, time, "eta")
 
 
 def test_times_too_far_from_zero_are_refused() -> None:

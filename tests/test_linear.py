@@ -236,6 +236,8 @@ def test_a_driveline_that_is_held_has_a_static_response() -> None:
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(InputError, match="B9"):
         linearise(MODEL, ["B9"])
+    with pytest.raises(InputError, match="the text 'B2'"):
+        linearise(MODEL, "B2")
 
 
 def test_what_no_linear_system_tells_is_refused() -> None:

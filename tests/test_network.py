@@ -127,6 +127,11 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], Start, str]] = {
         Start({"a": 0.0, "b": 0.0}, locked=("lock-up",)),
         'friction element "lock-up" is unknown; known are c',
     ),
+    "a text for names": (
+        PAIR,
+        Start({"a": 0.0, "b": 0.0}, locked="c1"),  # type: ignore[arg-type]
+        "the text 'c1' where a list of names is needed",
+    ),
     "unknown shaft": (
         PAIR,
         Start({"a": 0.0, "b": 0.0}, {"axle": 0.0}),

@@ -427,7 +427,7 @@ def require_delays(inputs: Mapping[str, Signal], by: Sequence[str]) -> None:
 
 
 def plain_start(start: State) -> tuple[float, float, float, float, list[str]]:
-    """A start as the core takes it. Raises InputError."""
+    """A start as the core takes it. Raises InputError where `locked` is a text."""
     speeds = (start.engine_speed, start.output_speed, start.wheel_speed)
     return (*speeds, start.twist, as_names(start.locked))
 

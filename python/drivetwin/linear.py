@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from drivetwin import _native
-from drivetwin.border import as_json
+from drivetwin.border import as_json, as_names
 from drivetwin.driveline import DualClutch, FloatArray
 from drivetwin.errors import InputError
 from drivetwin.network import Element
@@ -150,12 +150,12 @@ def linearise(
     elements = None if isinstance(driveline, DualClutch) else list(driveline)
     if outputs is None:
         outputs = (SHAFT_TORQUE,) if elements is None else ()
-    points = dict(slipping or {})
+    locked, points = as_names(locked), dict(slipping or {})
     _check(locked, points, outputs)
     try:
         matrices, states, inputs = _native.linearise(
             as_json(driveline if elements is None else elements),
-            list(locked),
+            locked,
             [(name, p.slip, p.pressure) for name, p in points.items()],
             json.dumps([{kind: name} for kind, name in outputs]),
         )
