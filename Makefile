@@ -38,7 +38,8 @@ lint-python: $(venv)/.native ## ruff, mypy --strict, and the native module again
 	$(bin)/stubtest --concise --mypy-config-file pyproject.toml drivetwin._native
 
 .PHONY: tidy
-tidy: $(venv)/.dev ## the project's own rules (sizes, layers, paths named in the documents)
+tidy: $(venv)/.dev ## directions of imports, and the project's own rules (circles, names, sizes, paths)
+	PYTHONPATH=python $(bin)/lint-imports --no-cache --no-logo
 	$(bin)/python -m tools.tidy
 
 .PHONY: test-rust

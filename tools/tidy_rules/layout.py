@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where tests stand: beside what they test, by name."""
+"""Rule on the place of tests: the path of a test names the module that it tests."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ GIVEN_LOGS = "given_logs"
 _SOURCE_ROOTS = ("python/drivetwin", ".")
 
 
-def tests_mirror_sources(tree: Tree) -> Iterator[Fault]:
-    """`tests/logs/test_units.py` tests the module `python/drivetwin/logs/units.py`.
+def check_tests(tree: Tree) -> Iterator[Fault]:
+    """Require a module for every test: `tests/a/test_b.py` tests `python/drivetwin/a/b.py`.
 
     A second file on one module adds a word (`test_units_property.py`); `test_given_logs.py` runs
-    its whole folder on recordings from outside; tests of several folders stand in `tests/system`,
-    those that need a browser in `tests/browser`.
+    its folder on recordings from outside; tests of several folders stand in `tests/system`, tests
+    that need a browser in `tests/browser`.
     """
     modules = {source.path.with_suffix("") for source in tree.below("", ".py", ".sh")}
     packages = {path.parent for path in modules}

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""Circles of imports in the Python package; lazy and type-only imports count.
+
+The direction of imports between packages is checked by import-linter (`pyproject.toml`).
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator
+from pathlib import PurePosixPath
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from tools.tidy_rules.base import PACKAGE, Fault, Tree
+
+MAX_CIRCLE = 7
+"""Largest set of modules that may import each other; all of them stand in one folder."""
+
+Edges = set[tuple[str, str]]
+
+
+def _is_facade(module: ast.Module) -> bool:
+    """Return whether an `__init__` file only re-exports names, as to its statements."""
+    return not any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in module.body)
+
+
+def _find_imports(module: ast.Module) -> Iterator[str]:
+    """Yield the full name of every module or symbol imported from the package, at any depth."""
+    for node in ast.walk(module):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("drivetwin"):
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.startswith("drivetwin."))
+
+
+def read_edges(tree: Tree) -> Edges:
+    """Return pairs (importing module, imported module), without `__init__` files as facades."""
+    modules = {}
+    for source in tree.below(PACKAGE, ".py"):
+        parsed = ast.parse(source.data)
+        parts = source.path.relative_to("python").with_suffix("").parts
+        if parts[-1] != "__init__":
+            modules[".".join(parts)] = parsed
+        elif not _is_facade(parsed):
+            modules[".".join(parts[:-1])] = parsed
+    edges = set()
+    for importer, parsed in modules.items():
+        for name in _find_imports(parsed):
+            imported = name if name in modules else name.rpartition(".")[0]
+            if imported in modules and imported != importer:
+                edges.add((importer, imported))
+    return edges
+
+
+def find_circles(edges: Edges) -> list[list[str]]:
+    """Return the strongly connected sets of more than one node, the largest first."""
+    names = sorted({name for edge in edges for name in edge})
+    if not names:
+        return []
+    index = {name: number for number, name in enumerate(names)}
+    rows, columns = np.array([(index[a], index[b]) for a, b in edges]).T
+    graph = coo_array((np.ones(rows.size), (rows, columns)), shape=(len(names), len(names)))
+    _, labels = connected_components(graph, connection="strong")
+    sets: dict[int, list[str]] = {}
+    for name, label in zip(names, labels.tolist(), strict=True):
+        sets.setdefault(label, []).append(name)
+    return sorted((one for one in sets.values() if len(one) > 1), key=len, reverse=True)
+
+
+def _folders(edges: Edges) -> Edges:
+    """Return the imports between the folders in which modules stand, and between their parents.
+
+    Folders are compared where their paths divide: `a.b.c` -> `a.d.e` makes `a.b` import `a.d`.
+    """
+    pairs = set()
+    for importer, imported in edges:
+        above, below = importer.split("."), imported.split(".")
+        depth = next(
+            (k for k, (a, b) in enumerate(zip(above, below, strict=False)) if a != b), None
+        )
+        if depth is not None and len(above) > depth + 1 and len(below) > depth + 1:
+            pairs.add((".".join(above[: depth + 1]), ".".join(below[: depth + 1])))
+    return pairs
+
+
+def check_circles(tree: Tree) -> Iterator[Fault]:
+    """Reject circles of packages, and of modules that are many or stand in several folders."""
+    edges = read_edges(tree)
+    for packages in find_circles(_folders(edges)):
+        yield _report(packages, "packages import each other")
+    for modules in find_circles(edges):
+        folders = {name.rpartition(".")[0] for name in modules}
+        if len(modules) > MAX_CIRCLE or len(folders) > 1:
+            text = f"{len(modules)} modules of {len(folders)} folders import each other"
+            yield _report(modules, text)
+
+
+def _report(circle: Iterable[str], text: str) -> Fault:
+    names = sorted(circle)
+    place = PurePosixPath("python", *names[0].split("."))
+    return Fault("import-circle", place, 1, f"{text}: {', '.join(names)}")
+
+
+def describe_circles(tree: Tree) -> str:
+    """Return the size of the largest circle of modules and the number of circles of packages."""
+    edges = read_edges(tree)
+    largest = max((len(one) for one in find_circles(edges)), default=1)
+    packages = len(find_circles(_folders(edges)))
+    return f"largest circle of modules {largest}, circles of packages {packages}"
