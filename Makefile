@@ -79,7 +79,8 @@ reference: $(venv)/.native ## solve the reference problems anew with SciPy
 
 .PHONY: bench
 bench: $(venv)/.native ## measure what has a stated limit
-	for program in benchmarks/*.py; do $(bin)/python "$$program"; done
+	$(bin)/python -m benchmarks.limits
+	$(bin)/python -m benchmarks.export_step # writes docs/export-cost.md
 	$(bin)/python -m benchmarks.speed # writes docs/benchmarks.md
 
 .PHONY: fuzz

@@ -11,8 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.speed import c_peer, cvode_peer, general, numba_peer, reference, scipy_peer, shift
-from benchmarks.speed.batch import batches, threads_curve
+from benchmarks.speed import c_peer, general, reference, scipy_peer, shift
+from benchmarks.speed.batch import measure_batches, measure_threads
 from benchmarks.speed.core import ROOT, Example, Scenario
 from benchmarks.speed.growth import curves
 from benchmarks.speed.instructions import instruction_table
@@ -39,7 +39,7 @@ def main() -> int:
         measured = measure(entries, options.rounds, _tell)
         extra = {
             "What was set out to be reached": limit_table(measured),
-            "Many runs": batches(of, given, folder),
+            "Many runs": measure_batches(of, given, folder),
             "Instructions": instruction_table(of, given, example, stated, folder),
             "Growth": "Time of one run inside Rust, network ready, over the number of samples of "
             "inputs and outputs, of states, and of clutches that slip; and time per run in a "
@@ -47,7 +47,7 @@ def main() -> int:
             f"![Growth of the time of a run](img/{PICTURE.name})\n",
         }
         text = page(measured, skipped, _base(measured), extra)
-        picture = svg([*curves(stated, example), threads_curve(of, given)])
+        picture = svg([*curves(stated, example), measure_threads(of, given)])
     _tell("")
     print(text)
     if options.write:
@@ -63,9 +63,7 @@ def _entries(
     found = [
         c_peer.entries(of, given, judge, example.folder),
         shift.entries(of, given, judge, example),
-        cvode_peer.entries(of, given, judge),
         scipy_peer.entries(of, given, judge),
-        numba_peer.entries(of, given, judge),
         general.entries(stated, example),
     ]
     skipped = [one for one in found if isinstance(one, Skipped)]
