@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Run the comparison, print it and write docs/benchmarks.md with its picture.
+"""Run the comparison, print it and write docs/benchmarks.md.
 
 `python -m benchmarks.speed [--rounds N] [--no-build] [--no-write]`
 """
@@ -12,18 +12,16 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.speed import c_peer, general, reference, scipy_peer, shift
-from benchmarks.speed.batch import measure_batches, measure_threads
+from benchmarks.speed.batch import measure_batches
 from benchmarks.speed.core import ROOT, Example, Scenario
-from benchmarks.speed.growth import curves
+from benchmarks.speed.growth import format_growth
 from benchmarks.speed.instructions import instruction_table
 from benchmarks.speed.limits import limit_table
 from benchmarks.speed.measure import Entry, Measured, Skipped, measure
 from benchmarks.speed.page import page
-from benchmarks.speed.picture import svg
 from benchmarks.speed.statement import Inputs, Problem, inputs, problem
 
 PAGE = ROOT / "docs" / "benchmarks.md"
-PICTURE = ROOT / "docs" / "img" / "benchmark-growth.svg"
 
 
 def main() -> int:
@@ -41,18 +39,13 @@ def main() -> int:
             "What was set out to be reached": limit_table(measured),
             "Many runs": measure_batches(of, given, folder),
             "Instructions": instruction_table(of, given, example, stated, folder),
-            "Growth": "Time of one run inside Rust, network ready, over the number of samples of "
-            "inputs and outputs, of states, and of clutches that slip; and time per run in a "
-            "batch, called from Python, over threads.\n\n"
-            f"![Growth of the time of a run](img/{PICTURE.name})\n",
+            "Growth": format_growth(stated, example),
         }
         text = page(measured, skipped, _base(measured), extra)
-        picture = svg([*curves(stated, example), measure_threads(of, given)])
     _tell("")
     print(text)
     if options.write:
         PAGE.write_text(text, encoding="utf-8")
-        PICTURE.write_text(picture, encoding="utf-8")
     return 0
 
 

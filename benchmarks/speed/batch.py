@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
@@ -19,7 +18,6 @@ from typing import cast
 import numpy as np
 
 from benchmarks.speed import c_peer, shift
-from benchmarks.speed.growth import Curve
 from benchmarks.speed.statement import BAR, Inputs, Problem, inputs, problem, start
 from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
 from drivetwin.driveline import (
@@ -117,20 +115,6 @@ def measure_batches(of: Problem, given: Inputs, folder: Path) -> str:
     return "\n".join([_format_table([theirs, ours], theirs), *lines, _measure_memory()])
 
 
-def measure_threads(of: Problem, given: Inputs) -> Curve:
-    """Measure the time per run in a batch over the number of threads."""
-    sets = parameter_sets(of)
-    points = []
-    for threads in range(1, (os.cpu_count() or 1) + 1):
-        seconds = []
-        for _ in range(_ROUNDS):
-            begin = time.perf_counter()
-            simulate_sets(of, given, sets, (Keep.LAST, threads))
-            seconds.append((time.perf_counter() - begin) / RUNS)
-        points.append((float(threads), float(np.median(seconds))))
-    return Curve("threads, per run in a batch", tuple(points))
-
-
 def _count_chattering(of: Problem, given: Inputs, sets: FloatArray, found: Batch) -> int:
     """Count runs with more events than the same run at round-off accuracy has."""
     suspects = np.flatnonzero(found.events > _USUAL_EVENTS)
@@ -180,7 +164,7 @@ def _load_library(folder: Path) -> c_peer.Library | None:
 
 
 def _name_columns(of: Problem, given: Inputs, sets: FloatArray) -> dict[str, FloatArray]:
-    """Map the names of drivetwin to columns; all sets start with one torque of the shaft's spring."""
+    """Map names of drivetwin to columns; all sets start with the same torque of the shaft."""
     column = dict(enumerate(sets.T))
     laws = {
         f"{clutch}.{field}": column[place]

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How the time of a run grows with samples, states and clutches."""
+"""Growth of the time of a run with samples, states and clutches."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,39 +12,37 @@ from benchmarks.speed.general import with_brakes, with_shafts
 from drivetwin.driveline import Signal
 
 _REPEATS = 15
+_HEAD = """\
+Time of one run inside Rust, network ready, over the number of samples of inputs and outputs, of
+states, and of clutches that slip; each new clutch brings two states.
+
+| what grows | size: time of a run [µs] |
+|---|---|
+"""
 
 
-@dataclass(frozen=True)
-class Curve:
-    """Median times [s] over what grows; `decades` where they span several."""
-
-    over: str
-    points: tuple[tuple[float, float], ...]
-    decades: bool = False
-
-
-def curves(shift: Scenario, example: Example) -> list[Curve]:
-    """Measured one after the other, inside Rust, network ready."""
-    samples: dict[float, Scenario] = {
-        rate * 1.5 + 1: resampled(shift, rate) for rate in (250, 500, 1000, 2000, 4000)
+def format_growth(shift: Scenario, example: Example) -> str:
+    """Measure one size after the other, inside Rust, network ready; return the table."""
+    cases = {
+        "samples": {
+            round(1.5 * rate) + 1: resample(shift, rate) for rate in (250, 500, 1000, 2000, 4000)
+        },
+        "states": {4 + 2 * count: with_shafts(shift, count) for count in range(6)},
+        "clutches": {2 + count: with_brakes(shift, count) for count in range(5)},
     }
-    states: dict[float, Scenario] = {
-        4.0 + 2 * count: with_shafts(shift, count) for count in range(6)
-    }
-    clutches: dict[float, Scenario] = {2.0 + count: with_brakes(shift, count) for count in range(5)}
-    return [
-        Curve("samples", _times("samples", samples, example)),
-        Curve("states", _times("states", states, example), decades=True),
-        Curve(
-            "clutches, each new one with two states",
-            _times("clutches", clutches, example),
-            decades=True,
-        ),
-    ]
+    rows = []
+    for name, scenarios in cases.items():
+        texts = []
+        for size, scenario in scenarios.items():
+            path = example.store(f"{name}{size}", scenario)
+            seconds = example.run(path, _REPEATS, "again").seconds
+            texts.append(f"{size}: {1e6 * float(np.median(seconds)):.3g}")
+        rows.append(f"| {name} | {', '.join(texts)} |\n")
+    return _HEAD + "".join(rows)
 
 
-def resampled(shift: Scenario, rate: float) -> Scenario:
-    """The shift with inputs and outputs at another rate [Hz]; its inputs keep their shape."""
+def resample(shift: Scenario, rate: float) -> Scenario:
+    """Return the shift with inputs and outputs at another rate [Hz]; inputs keep their shape."""
     time = np.arange(round(shift.time[-1] * rate) + 1) / rate
     inputs = {
         name: Signal(time, np.interp(time, one.time, one.values))
@@ -53,14 +50,3 @@ def resampled(shift: Scenario, rate: float) -> Scenario:
         if isinstance(one, Signal)
     }
     return replace(shift, time=time, inputs=inputs)
-
-
-def _times(
-    name: str, scenarios: Mapping[float, Scenario], example: Example
-) -> tuple[tuple[float, float], ...]:
-    points = []
-    for size, scenario in scenarios.items():
-        path = example.store(f"{name}{size:g}", scenario)
-        seconds = example.run(path, _REPEATS, "again").seconds
-        points.append((float(size), float(np.median(seconds))))
-    return tuple(points)

@@ -10,9 +10,7 @@ from benchmarks.speed import reference
 from benchmarks.speed.core import Scenario
 from benchmarks.speed.equations import Equations
 from benchmarks.speed.general import with_brakes, with_shafts
-from benchmarks.speed.growth import Curve
 from benchmarks.speed.measure import Quality
-from benchmarks.speed.picture import svg
 from benchmarks.speed.scipy_peer import solve
 from benchmarks.speed.shift import judge, scenario_of
 from benchmarks.speed.statement import Solution, inputs, problem
@@ -61,9 +59,3 @@ def test_larger_drivelines_start_as_the_shift(stated: Scenario) -> None:
         found = _solution(wide)
         assert found.columns[:, 0] == pytest.approx(plain.columns[:, 0])
         assert np.abs(found.columns[3] - plain.columns[3]).max() > 1.0
-
-
-def test_the_picture_holds_every_point() -> None:
-    text = svg([Curve("samples", ((1.0, 1e-6), (2.0, 2e-6))), Curve("states", ((4.0, 5e-6),))])
-    assert text.count("<circle") == 3
-    assert text.count("<polyline") == 2
