@@ -47,7 +47,7 @@ class Figure:
         return f"{self.text}: {self.value:.3g} {self.unit}, limit {self.limit:g} {self.unit}"
 
 
-def measure_help(_: str) -> Iterator[Figure]:
+def measure_help(_argument: str) -> Iterator[Figure]:
     """Measure the median wall time of `drivetwin --help`, import included."""
     command = [sys.executable, "-m", "drivetwin", "--help"]
 
@@ -67,7 +67,7 @@ def _time_median(call: Callable[[], object], count: int) -> float:
     return statistics.median(times)
 
 
-def measure_identify(_: str) -> Iterator[Figure]:
+def measure_identify(_argument: str) -> Iterator[Figure]:
     """Measure identifications of a synthetic 6.6 s log at 1 kHz, by method.
 
     The least of several times is taken: other work on the machine only adds to them.
@@ -95,7 +95,7 @@ def measure_identify(_: str) -> Iterator[Figure]:
         yield Figure(f"CPU time of an identification, {method}", min(times), limit, "s")
 
 
-def measure_slider(_: str) -> Iterator[Figure]:
+def measure_slider(_argument: str) -> Iterator[Figure]:
     """Measure the median of several moves over the paper's synthetic shift."""
     from dash import Patch
     from plotly.io.json import to_json_plotly

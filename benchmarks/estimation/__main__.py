@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from benchmarks.estimation.bench import Knowledge
-from benchmarks.estimation.mismatch import FAULTS, shift_of
+from benchmarks.estimation.mismatch import FAULTS, measure_shift
 from benchmarks.estimation.report import (
     faults_section,
     starts_section,
@@ -68,7 +68,7 @@ def main() -> int:
     if UNSEEN in asked.only:
         _write(unseen_section(identify_unseen(range(asked.vehicles))))
     if FAULTS_TOO in asked.only:
-        shifts = [shift_of(fault, asked.faulty) for fault in FAULTS]
+        shifts = [measure_shift(fault, asked.faulty) for fault in FAULTS]
         _write(faults_section(shifts, asked.faulty))
     return 0
 

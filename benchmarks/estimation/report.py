@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.estimation.mismatch import SHOWN, Shift
 from benchmarks.estimation.starts import OFF, Outcome
 from benchmarks.estimation.study import Sample, Study
-from benchmarks.estimation.unseen import HALF, Told, by_parameter
+from benchmarks.estimation.unseen import HALF, Log, collect
 from drivetwin.identify.signals import FloatArray
 
 HEAD = """# Accuracy of the estimators
@@ -85,12 +85,12 @@ def starts_section(outcomes: Counter[Outcome]) -> str:
     )
 
 
-def unseen_section(logs: Sequence[Told]) -> str:
+def unseen_section(logs: Sequence[Log]) -> str:
     """What became of vehicles drawn at random."""
     lines = [UNSEEN.format(count=len(logs)).rstrip("\n")]
-    told = _with_all(by_parameter([log.deviates for log in logs]))
-    misread = _with_all(by_parameter([log.misread for log in logs]))
-    widths = _with_all(by_parameter([log.widths for log in logs]))
+    told = _with_all(collect([log.deviates for log in logs]))
+    misread = _with_all(collect([log.misread for log in logs]))
+    widths = _with_all(collect([log.widths for log in logs]))
     for name, deviates in told.items():
         median, most = np.quantile(widths[name], [0.5, 0.9])
         cells = (
