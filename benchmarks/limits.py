@@ -54,10 +54,10 @@ def measure_help(_argument: str) -> Iterator[Figure]:
     def call() -> None:
         subprocess.run(command, check=True, capture_output=True)
 
-    yield Figure("drivetwin --help", _time_median(call, 11), 0.3, "s")
+    yield Figure("drivetwin --help", _measure_median(call, 11), 0.3, "s")
 
 
-def _time_median(call: Callable[[], object], count: int) -> float:
+def _measure_median(call: Callable[[], object], count: int) -> float:
     """Return the median wall time of several calls [s]."""
     times = []
     for _ in range(count):
@@ -119,13 +119,13 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
             time.sleep(0.05)
         stiffness = iter(range(140_000, 200_000, 1000))
 
-        def move() -> None:
+        def slide_once() -> None:
             patch = Patch()
             for place, change in session.slide({"k_o": float(next(stiffness))}).items():
                 patch["data"][place]["x"], patch["data"][place]["y"] = change["x"], change["y"]
             to_json_plotly(patch)
 
-        yield Figure("move of a slider", 1e3 * _time_median(move, 30), 100.0, "ms")
+        yield Figure("move of a slider", 1e3 * _measure_median(slide_once, 30), 100.0, "ms")
         session.close()
 
 

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.estimation.bench import Bench, Knowledge, realise
-from benchmarks.estimation.bound import bound
+from benchmarks.estimation.bound import compute_bound
 from drivetwin.driveline import Stribeck
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import IdentificationError
@@ -123,7 +123,7 @@ def compute_bounds(scenario: Scenario, know: Knowledge) -> dict[str, float]:
     law = scenario.model.loss_law
     problem, start = problem_of([bench.signals], [driveline], law, build_guess(bench))
     truth = build_point(problem, start, bench)
-    covariance = bound(bench, problem.parts[0], truth, problem.prior)
+    covariance = compute_bound(bench, problem.parts[0], truth, problem.prior)
     found = propagate(problem, truth, covariance, bench.signals)
     return {name: std for name, (_, std) in found.items()}
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.estimation.unseen_bound import compute_widths, find_slips
-from benchmarks.estimation.vehicles import sensor_errors, vehicle, with_tolerances
+from benchmarks.estimation.vehicles import add_tolerances, draw_errors, draw_vehicle
 from drivetwin.cli.synth import write_run
 from drivetwin.driveline import Stribeck
 from drivetwin.dyno.dyno import DynoRun, run
@@ -59,11 +59,11 @@ def identify_unseen(seeds: Sequence[int]) -> list[Log]:
 
 def identify_vehicle(seed: int) -> Log:
     """Record, write, read and identify one vehicle by the default method."""
-    made = vehicle(seed)
+    made = draw_vehicle(seed)
     recorded = run(made.scenario, seed)
     try:
         found = _identify(recorded, made.card)
-        card = with_tolerances(made.card, made.scenario)
+        card = add_tolerances(made.card, made.scenario)
         misread = _identify(_misread(recorded, seed), card)
     except DrivetwinError as fault:
         return Log({}, {}, {}, (), (), fault.what)
@@ -96,7 +96,7 @@ def _identify(recorded: DynoRun, card_text: str) -> Identification:
 
 def _misread(recorded: DynoRun, seed: int) -> DynoRun:
     """Return the run as sensors with errors of gain and offset read it."""
-    errors = sensor_errors(seed, recorded.scenario)
+    errors = draw_errors(seed, recorded.scenario)
     channels = []
     for channel in recorded.channels:
         gain, offset = errors.get(channel.role, (0.0, 0.0))

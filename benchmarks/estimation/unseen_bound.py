@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.estimation.bench import Bench
-from benchmarks.estimation.bound import bound
+from benchmarks.estimation.bound import compute_bound
 from benchmarks.estimation.study import build_guess, build_point, propagate
 from drivetwin.driveline import DualClutch
 from drivetwin.dyno.dyno import DynoRun, run
@@ -52,7 +52,7 @@ def compute_widths(found: Identification, recorded: DynoRun) -> dict[str, tuple[
     part = Part.unweighted(old.structure, record)
     start = fit.point.moved(_build_values(fit.point, part, bench))
     truth = build_point(replace(fit.problem, parts=(part,)), start, bench)
-    least = bound(bench, part, truth, fit.problem.prior)
+    least = compute_bound(bench, part, truth, fit.problem.prior)
     here = propagate(fit.problem, fit.mean, fit.covariance, exact, slips)
     there = propagate(fit.problem, truth, least, exact, slips)
     return {name: (here[name][1], there[name][1]) for name in here}

@@ -15,10 +15,10 @@ from benchmarks.speed import c_peer, general, reference, scipy_peer, shift
 from benchmarks.speed.batch import measure_batches
 from benchmarks.speed.core import ROOT, Example, Scenario
 from benchmarks.speed.growth import format_growth
-from benchmarks.speed.instructions import instruction_table
-from benchmarks.speed.limits import limit_table
+from benchmarks.speed.instructions import format_instructions
+from benchmarks.speed.limits import format_limits
 from benchmarks.speed.measure import Entry, Measured, Skipped, measure
-from benchmarks.speed.page import page
+from benchmarks.speed.page import format_page
 from benchmarks.speed.statement import Inputs, Problem, inputs, problem
 
 PAGE = ROOT / "docs" / "benchmarks.md"
@@ -26,30 +26,30 @@ PAGE = ROOT / "docs" / "benchmarks.md"
 
 def main() -> int:
     """Measure and write."""
-    options = _options()
+    options = _parse_options()
     of, given = problem(), inputs()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _tell("building the example of the core")
+        _show_progress("building the example of the core")
         example = Example(folder, build=options.build)
         stated = shift.scenario_of(of, given)
-        entries, skipped = _entries(of, given, example, stated)
-        measured = measure(entries, options.rounds, _tell)
+        entries, skipped = _collect_entries(of, given, example, stated)
+        measured = measure(entries, options.rounds, _show_progress)
         extra = {
-            "What was set out to be reached": limit_table(measured),
+            "What was set out to be reached": format_limits(measured),
             "Many runs": measure_batches(of, given, folder),
-            "Instructions": instruction_table(of, given, example, stated, folder),
+            "Instructions": format_instructions(of, given, example, stated, folder),
             "Growth": format_growth(stated, example),
         }
-        text = page(measured, skipped, _base(measured), extra)
-    _tell("")
+        text = format_page(measured, skipped, _find_base(measured), extra)
+    _show_progress("")
     print(text)
     if options.write:
         PAGE.write_text(text, encoding="utf-8")
     return 0
 
 
-def _entries(
+def _collect_entries(
     of: Problem, given: Inputs, example: Example, stated: Scenario
 ) -> tuple[list[Entry], list[Skipped]]:
     judge = shift.judge(reference.read())
@@ -63,11 +63,11 @@ def _entries(
     return [entry for one in found if not isinstance(one, Skipped) for entry in one], skipped
 
 
-def _base(measured: list[Measured]) -> Measured | None:
+def _find_base(measured: list[Measured]) -> Measured | None:
     return next((one for one in measured if one.entry.program == c_peer.PROGRAM), None)
 
 
-def _options() -> argparse.Namespace:
+def _parse_options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=25, help="how often to go round all entries")
     parser.add_argument(
@@ -79,7 +79,7 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _tell(text: str) -> None:
+def _show_progress(text: str) -> None:
     if sys.stderr.isatty():
         sys.stderr.write(f"\r\x1b[K{text}")
         sys.stderr.flush()

@@ -11,24 +11,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
 from benchmarks.speed import c_peer, shift
 from benchmarks.speed.statement import BAR, Inputs, Problem, inputs, problem, start
 from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
-from drivetwin.driveline import (
-    ENGINE_TORQUE,
-    Accuracy,
-    FloatArray,
-    ShiftElement,
-    Stribeck,
-    Trajectory,
-    simulate,
-)
+from drivetwin.driveline import ENGINE_TORQUE, FloatArray
 
 RUNS = 1000
 _SPREAD = 0.05
@@ -43,8 +34,6 @@ _KEPT: dict[Keep, str] = {
     Keep.COLUMNS: "T_o at every sample",
     Keep.LAST: "T_o at the end; a misfit takes as much",
 }
-_USUAL_EVENTS = 4
-"""Runs with more are simulated once more at round-off: what that does not have is chatter."""
 
 
 @dataclass
@@ -59,7 +48,7 @@ class Rates:
         return RUNS / float(np.median(self.seconds[threads]))
 
 
-def parameter_sets(of: Problem, runs: int = RUNS) -> FloatArray:
+def draw_sets(of: Problem, runs: int = RUNS) -> FloatArray:
     """Return parameters (runs, 21) of a fixed seed, in the order of the C program."""
     noise = np.random.default_rng(1)
     numbers = np.tile(c_peer.parameters(of), (runs, 1))
@@ -85,7 +74,7 @@ def simulate_sets(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep,
 
 def measure_batches(of: Problem, given: Inputs, folder: Path) -> str:
     """Measure runs per second, errors and memory, the programs in turns."""
-    sets, library = parameter_sets(of), _load_library(folder)
+    sets, library = draw_sets(of), _load_library(folder)
     ours = Rates(shift.PROGRAM, {threads: [] for threads in _THREADS})
     theirs = Rates(c_peer.PROGRAM, {threads: [] for threads in _THREADS})
     # Once beforehand: the first calls of a process wait for its memory.
@@ -104,54 +93,13 @@ def measure_batches(of: Problem, given: Inputs, folder: Path) -> str:
     exact = library.batch(sets, of, given, (max(_THREADS), _FINE_STEPS))
     lines = [
         f"Errors of T_o over {RUNS} runs [N·m], against C at {_FINE_STEPS} steps per sample:\n",
-        "| program | median | 99 % | worst | failed | chattering |",
-        "|---|---|---|---|---|---|",
-        _format_errors(theirs.program, rough, exact, ""),
-        _format_errors(
-            ours.program, found.values[:, 0], exact, str(_count_chattering(of, given, sets, found))
-        ),
+        "| program | median | 99 % | worst | failed |",
+        "|---|---|---|---|---|",
+        _format_errors(theirs.program, rough, exact),
+        _format_errors(ours.program, found.values[:, 0], exact),
         "",
     ]
     return "\n".join([_format_table([theirs, ours], theirs), *lines, _measure_memory()])
-
-
-def _count_chattering(of: Problem, given: Inputs, sets: FloatArray, found: Batch) -> int:
-    """Count runs with more events than the same run at round-off accuracy has."""
-    suspects = np.flatnonzero(found.events > _USUAL_EVENTS)
-    exact = [len(_simulate_exactly(of, given, sets[run]).events) for run in suspects]
-    return int(np.count_nonzero(found.events[suspects] > np.array(exact)))
-
-
-def _simulate_exactly(of: Problem, given: Inputs, numbers: FloatArray) -> Trajectory:
-    model, signals = shift.model_of(of), shift.signals_of(given)
-    torque, begin = signals.pop(ENGINE_TORQUE), shift.state_of(of, given)
-    value = {
-        name: float(values[0]) for name, values in _name_columns(of, given, numbers[None]).items()
-    }
-
-    def element(nominal: ShiftElement) -> ShiftElement:
-        own = {
-            key.partition(".")[2]: number
-            for key, number in value.items()
-            if key.startswith(f"{nominal.name}.")
-        }
-        gain = own.pop("gain")
-        friction = replace(cast("Stribeck", nominal.friction), **own)
-        return replace(nominal, gain=gain, friction=friction)
-
-    model = replace(
-        model,
-        J1=value["J1"],
-        J_v=value["J_v"],
-        eta=value["eta"],
-        k_o=value["k_o"],
-        c_o=value["c_o"],
-        load=replace(model.load, constant=value["load.constant"]),
-        elements=tuple(element(one) for one in model.elements),
-    )
-    begin = replace(begin, twist=value["start.twist"])
-    accuracy = Accuracy(exact=True)
-    return simulate(model, torque, signals, begin, given.time, accuracy=accuracy)
 
 
 def _load_library(folder: Path) -> c_peer.Library | None:
@@ -206,12 +154,12 @@ def _format_ratios(one: Rates, base: Rates, threads: int) -> list[str]:
     return [f"{medians:.3g}", f"{shortest:.3g}"]
 
 
-def _format_errors(program: str, torques: FloatArray, exact: FloatArray, chattering: str) -> str:
+def _format_errors(program: str, torques: FloatArray, exact: FloatArray) -> str:
     worst = np.abs(torques - exact).max(axis=1)
     known = worst[np.isfinite(worst)]
     levels = (np.median(known), np.quantile(known, 0.99), known.max())
     shown = " | ".join(f"{level:.2g}" for level in levels)
-    return f"| {program} | {shown} | {worst.size - known.size} | {chattering} |"
+    return f"| {program} | {shown} | {worst.size - known.size} |"
 
 
 def _measure_memory() -> str:
@@ -235,7 +183,7 @@ def main() -> None:
     """Run one batch and print the largest memory of this process [byte]."""
     of = problem()
     keep, runs = Keep(sys.argv[1]), int(sys.argv[2])
-    simulate_sets(of, inputs(), parameter_sets(of, runs), (keep, 2))
+    simulate_sets(of, inputs(), draw_sets(of, runs), (keep, 2))
     # The largest memory in the resource usage of a child includes that of its parent.
     (kilobytes,) = re.findall(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text("utf-8"))
     print(1024 * int(kilobytes))

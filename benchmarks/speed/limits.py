@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What was set out to be reached, beside what was measured."""
+"""Measured ratios with their limits."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ Times = Mapping[tuple[str, str], float]
 """Seconds of a run by program and setting."""
 
 
-def limit_table(measured: Sequence[Measured]) -> str:
-    """Ratios with their limits; none where the C program is missing."""
+def format_limits(measured: Sequence[Measured]) -> str:
+    """Return ratios with their limits; none without the C program."""
     medians = {(one.entry.program, one.entry.setting): one.median for one in measured}
     shortest = {(one.entry.program, one.entry.setting): one.least for one in measured}
     if _BASE not in medians:
         return f"No ratios: {c_peer.SOURCE.name} is not beside the repository.\n"
     lines = ["| ratio | of medians | of shortest | limit |", "|---|---|---|---|"]
-    for (name, value, limit), (_, least, _) in zip(_rows(medians), _rows(shortest), strict=True):
+    for (name, value, limit), (_, least, _) in zip(
+        _compute_ratios(medians), _compute_ratios(shortest), strict=True
+    ):
         lines.append(f"| {name} | {value:.3g} | {least:.3g} | {limit:g} |")
     called, whole = (medians[shift.PROGRAM, name] for name in (shift.PYTHON, shift.WHOLE))
     lines.append(
@@ -34,8 +36,8 @@ def limit_table(measured: Sequence[Measured]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _rows(time: Times) -> list[tuple[str, float, float]]:
-    """Name, ratio and limit."""
+def _compute_ratios(time: Times) -> list[tuple[str, float, float]]:
+    """Return name, ratio and limit of every row."""
     base = time[_BASE]
     ours = {setting: value for (program, setting), value in time.items() if program != _BASE[0]}
     span = float(general.gearbox_shift()[general.WHOLE].time[-1])

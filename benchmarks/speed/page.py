@@ -43,18 +43,18 @@ _LEGEND = {
 }
 
 
-def page(
+def format_page(
     measured: Sequence[Measured],
     skipped: Sequence[Skipped],
     base: Measured | None,
     extra: Mapping[str, str],
 ) -> str:
-    """The whole page; `extra` are further sections by title."""
-    parts = [_HEAD, _machine()]
+    """Return the whole page; `extra` are further sections by title."""
+    parts = [_HEAD, _describe_machine()]
     for group in Group:
         rows = [one for one in measured if one.entry.group is group]
         if rows:
-            parts += [f"## {group.value}\n", _LEGEND[group] + "\n", table(rows, base)]
+            parts += [f"## {group.value}\n", _LEGEND[group] + "\n", format_table(rows, base)]
     parts += [f"## {title}\n\n{text}" for title, text in extra.items()]
     if skipped:
         listed = "\n".join(f"- {one.program}: {one.reason}" for one in skipped)
@@ -62,8 +62,8 @@ def page(
     return "\n".join(parts)
 
 
-def table(rows: Sequence[Measured], base: Measured | None) -> str:
-    """Markdown table of entries."""
+def format_table(rows: Sequence[Measured], base: Measured | None) -> str:
+    """Return a Markdown table of entries."""
     lines = [
         "| program | setting | median ms | shortest ms | ratio to C | max error | events, s |",
         "|---|---|---|---|---|---|---|",
@@ -81,8 +81,8 @@ def table(rows: Sequence[Measured], base: Measured | None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _machine() -> str:
-    found = _processor()
+def _describe_machine() -> str:
+    found = _describe_processor()
     versions = (
         f"Python {platform.python_version()}, NumPy {np.__version__}, SciPy {scipy.__version__}"
     )
@@ -90,8 +90,8 @@ def _machine() -> str:
     return f"Measured on: {found}, {platform.system()}, {load}; {versions}.\n"
 
 
-def _processor() -> str:
-    """Model name where the system tells it."""
+def _describe_processor() -> str:
+    """Return the model of the processor if the system states it."""
     try:
         text = Path("/proc/cpuinfo").read_text("utf-8")
     except OSError:

@@ -70,7 +70,7 @@ def find_circles(edges: Edges) -> list[list[str]]:
     return sorted((one for one in sets.values() if len(one) > 1), key=len, reverse=True)
 
 
-def _folders(edges: Edges) -> Edges:
+def _find_folder_imports(edges: Edges) -> Edges:
     """Return the imports between the folders in which modules stand, and between their parents.
 
     Folders are compared where their paths divide: `a.b.c` -> `a.d.e` makes `a.b` import `a.d`.
@@ -89,16 +89,16 @@ def _folders(edges: Edges) -> Edges:
 def check_circles(tree: Tree) -> Iterator[Fault]:
     """Reject circles of packages, and of modules that are many or stand in several folders."""
     edges = read_edges(tree)
-    for packages in find_circles(_folders(edges)):
-        yield _report(packages, "packages import each other")
+    for packages in find_circles(_find_folder_imports(edges)):
+        yield _make_fault(packages, "packages import each other")
     for modules in find_circles(edges):
         folders = {name.rpartition(".")[0] for name in modules}
         if len(modules) > MAX_CIRCLE or len(folders) > 1:
             text = f"{len(modules)} modules of {len(folders)} folders import each other"
-            yield _report(modules, text)
+            yield _make_fault(modules, text)
 
 
-def _report(circle: Iterable[str], text: str) -> Fault:
+def _make_fault(circle: Iterable[str], text: str) -> Fault:
     names = sorted(circle)
     place = PurePosixPath("python", *names[0].split("."))
     return Fault("import-circle", place, 1, f"{text}: {', '.join(names)}")
@@ -108,5 +108,5 @@ def describe_circles(tree: Tree) -> str:
     """Return the size of the largest circle of modules and the number of circles of packages."""
     edges = read_edges(tree)
     largest = max((len(one) for one in find_circles(edges)), default=1)
-    packages = len(find_circles(_folders(edges)))
+    packages = len(find_circles(_find_folder_imports(edges)))
     return f"largest circle of modules {largest}, circles of packages {packages}"
