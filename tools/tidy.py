@@ -16,6 +16,7 @@ from tools.tidy_rules.base import Fault, Rule, Tree, read_tree
 RULES: tuple[Rule, ...] = (
     core.check_purity,
     core.check_layers,
+    core.check_circles,
     imports.check_circles,
     layout.check_tests,
     prose.check_names,

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Acceptance of a synthetic fleet: `python -m benchmarks.fleet.acceptance COUNT [FOLDER]`.
 
-Every healthy log must be done and every damaged one reported; level, drift and spread over units of μ
-and P0 must lie in their 95 % intervals, and the one unit that was changed be found. The folder is
-kept where it is named, and a run in it goes on; else it is a temporary one.
+Every healthy log must be done and every damaged one reported; level, drift and spread over units of
+μ and P0 must lie in their 95 % intervals, and the one unit that was changed must be found. A run in
+the named folder is resumed; without a name it is a temporary one.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from tools.tidy_rules.base import Fault, Rule, Source, Tree, read_tree
+from tools.tidy_rules.core import check_circles as check_core_circles
 from tools.tidy_rules.core import check_layers, check_purity
 from tools.tidy_rules.imports import MAX_CIRCLE, check_circles, describe_circles
 from tools.tidy_rules.layout import check_tests
@@ -172,6 +173,19 @@ def test_type_only_imports_count_and_facades_do_not() -> None:
     assert len(faults(check_circles, files)) == 2
     facade = {f"{PACKAGE}/a/__init__.py": "from drivetwin.b.c import X\n"}
     assert faults(check_circles, facade | module("drivetwin.b.c", "drivetwin.a")) == []
+
+
+def test_circles_of_the_core_are_followed_through_groups_and_re_exports() -> None:
+    files = {
+        f"{CORE}/solver/mod.rs": "mod a;\nmod b;\nmod c;\npub use b::Step;\n",
+        f"{CORE}/solver/a.rs": "use super::Step;\n",
+        f"{CORE}/solver/b.rs": "use crate::{model::Clutch, solver::{c::{self, Run}}};\n",
+        f"{CORE}/solver/c.rs": "fn f() { super::a::g() }\n",
+        f"{CORE}/model/mod.rs": "pub struct Clutch;\n",
+    }
+    assert faults(check_core_circles, files) == [(CORE, 1)]
+    files[f"{CORE}/solver/c.rs"] = "// super::a\n#[cfg(test)]\nmod tests {\n use super::a;\n}\n"
+    assert faults(check_core_circles, files) == []
 
 
 def test_private_words_are_found_as_files_folders_and_definitions() -> None:

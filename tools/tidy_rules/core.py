@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import PurePosixPath
 
-from tools.tidy_rules.base import Fault, Source, Tree
+from tools.tidy_rules.base import Edges, Fault, Source, Tree, find_circles
+from tools.tidy_rules.sizes import RUST_TESTS
 
 CORE = "crates/drivetwin-core"
 
@@ -29,6 +31,10 @@ _FORBIDDEN = {
     "solver": ("model", "simulate"),
 }
 """Folders of the core and those they must not import; the solver is independent of elements."""
+_USE = re.compile(r"^[ \t]*(pub(?:\([^)]*\))?\s+)?use\s+([^;]+);", re.MULTILINE)
+_PATH = re.compile(r"(?<![\w:])((?:crate|super|self)(?:::\w+)+)")
+MAX_CIRCLE = 2
+"""Largest set of files of the core that may import each other."""
 
 
 def mask(code: str) -> str:
@@ -62,3 +68,69 @@ def check_layers(tree: Tree) -> Iterator[Fault]:
             for line, match in _find(source, use):
                 text = f"{folder}/ may not use {match.group(1)}/"
                 yield Fault("core-layers", source.path, line, text)
+
+
+def _split_tree(text: str) -> Iterator[str]:
+    """Yield the paths of a `use` tree: `a::{b, c::{d}}` gives `a::b` and `a::c::d`."""
+    depth, start = 0, 0
+    for index, character in enumerate(text + ","):
+        depth += (character == "{") - (character == "}")
+        if character == "," and depth == 0:
+            part = text[start:index].strip()
+            start = index + 1
+            head, brace, inner = part.partition("{")
+            if brace:
+                yield from (f"{head}{path}" for path in _split_tree(inner.rstrip("}")))
+            elif part:
+                yield part.partition(" as ")[0].strip().removesuffix("::self")
+
+
+def _resolve(path: str, module: tuple[str, ...]) -> tuple[str, ...]:
+    """Return a path from the root of the crate, for a use in `module`."""
+    parts = path.split("::")
+    if parts[0] == "crate":
+        return tuple(parts[1:])
+    base = module
+    while parts and parts[0] in ("super", "self"):
+        base = base[:-1] if parts.pop(0) == "super" else base
+    return (*base, *parts)
+
+
+def read_edges(tree: Tree) -> Edges:
+    """Return pairs of files (importing, imported); `mod.rs` files that re-export are followed."""
+    root = PurePosixPath(CORE, "src")
+    codes, exports = {}, {}
+    for source in tree.below(str(root), ".rs"):
+        parts = source.path.relative_to(root).with_suffix("").parts
+        module = parts[:-1] if parts[-1] in ("mod", "lib") else parts
+        code = RUST_TESTS.split(mask(source.text or ""))[0]
+        codes[module] = code
+        for is_public, uses in _USE.findall(code):
+            for path in _split_tree(" ".join(uses.split())) if is_public else ():
+                anchored = path if path.startswith(("crate::", "super::")) else f"self::{path}"
+                exports[*module, path.rpartition("::")[2]] = _resolve(anchored, module)
+    edges = set()
+    facades = {key[:-1] for key in exports} | {()}
+    for module, code in codes.items():
+        paths = [
+            path for _, uses in _USE.findall(code) for path in _split_tree(" ".join(uses.split()))
+        ]
+        for path in (*paths, *_PATH.findall(code)):
+            if not path.startswith(("crate::", "super::", "self::")):
+                continue
+            target = _resolve(path, module)
+            for _ in range(3):
+                target = exports.get(target, target)
+            while target and target not in codes:
+                target = target[:-1]
+            if target != module and target not in facades and module not in facades:
+                edges.add(("::".join(module), "::".join(target)))
+    return edges
+
+
+def check_circles(tree: Tree) -> Iterator[Fault]:
+    """Reject circles of many files of the core."""
+    for circle in find_circles(read_edges(tree)):
+        if len(circle) > MAX_CIRCLE:
+            text = f"{len(circle)} files import each other: {', '.join(circle)}"
+            yield Fault("core-circle", PurePosixPath(CORE, "src"), 1, text)

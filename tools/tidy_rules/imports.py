@@ -10,16 +10,11 @@ import ast
 from collections.abc import Iterable, Iterator
 from pathlib import PurePosixPath
 
-import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-
-from tools.tidy_rules.base import PACKAGE, Fault, Tree
+from tools.tidy_rules import core
+from tools.tidy_rules.base import PACKAGE, Edges, Fault, Tree, find_circles
 
 MAX_CIRCLE = 7
 """Largest set of modules that may import each other; all of them stand in one folder."""
-
-Edges = set[tuple[str, str]]
 
 
 def _is_facade(module: ast.Module) -> bool:
@@ -53,21 +48,6 @@ def read_edges(tree: Tree) -> Edges:
             if imported in modules and imported != importer:
                 edges.add((importer, imported))
     return edges
-
-
-def find_circles(edges: Edges) -> list[list[str]]:
-    """Return the strongly connected sets of more than one node, the largest first."""
-    names = sorted({name for edge in edges for name in edge})
-    if not names:
-        return []
-    index = {name: number for number, name in enumerate(names)}
-    rows, columns = np.array([(index[a], index[b]) for a, b in edges]).T
-    graph = coo_array((np.ones(rows.size), (rows, columns)), shape=(len(names), len(names)))
-    _, labels = connected_components(graph, connection="strong")
-    sets: dict[int, list[str]] = {}
-    for name, label in zip(names, labels.tolist(), strict=True):
-        sets.setdefault(label, []).append(name)
-    return sorted((one for one in sets.values() if len(one) > 1), key=len, reverse=True)
 
 
 def _find_folder_imports(edges: Edges) -> Edges:
@@ -105,8 +85,14 @@ def _make_fault(circle: Iterable[str], text: str) -> Fault:
 
 
 def describe_circles(tree: Tree) -> str:
-    """Return the size of the largest circle of modules and the number of circles of packages."""
+    """Return the sizes of the largest circles of modules, and the number of those of packages."""
     edges = read_edges(tree)
-    largest = max((len(one) for one in find_circles(edges)), default=1)
+    python, rust = (
+        max((len(one) for one in find_circles(each)), default=1)
+        for each in (edges, core.read_edges(tree))
+    )
     packages = len(find_circles(_find_folder_imports(edges)))
-    return f"largest circle of modules {largest}, circles of packages {packages}"
+    return (
+        f"largest circle of modules {python}, circles of packages {packages}, "
+        f"largest circle of files in the core {rust}"
+    )

@@ -10,7 +10,7 @@ from tools.tidy_rules.base import Fault, Tree
 
 MAX_FILE_LINES = 500
 MAX_FILE_BYTES = 1_000_000
-_RUST_TESTS = re.compile(r"^#\[cfg\(test\)\]\s*\n\s*mod\s+\w+\s*\{", re.MULTILINE)
+RUST_TESTS = re.compile(r"^#\[cfg\(test\)\]\s*\n\s*mod\s+\w+\s*\{", re.MULTILINE)
 
 
 def check_lines(tree: Tree) -> Iterator[Fault]:
@@ -18,7 +18,7 @@ def check_lines(tree: Tree) -> Iterator[Fault]:
     for source in tree.below("", ".py", ".pyi", ".rs"):
         text = source.text or ""
         if source.path.suffix == ".rs":
-            text = _RUST_TESTS.split(text)[0]
+            text = RUST_TESTS.split(text)[0]
         count = len(text.splitlines())
         if count > MAX_FILE_LINES:
             yield Fault("file-lines", source.path, 1, f"{count} lines, at most {MAX_FILE_LINES}")
