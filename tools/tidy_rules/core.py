@@ -80,7 +80,7 @@ def _split_tree(text: str) -> Iterator[str]:
             start = index + 1
             head, brace, inner = part.partition("{")
             if brace:
-                yield from (f"{head}{path}" for path in _split_tree(inner.rstrip("}")))
+                yield from (f"{head}{path}" for path in _split_tree(inner[:-1]))
             elif part:
                 yield part.partition(" as ")[0].strip().removesuffix("::self")
 
