@@ -17,7 +17,7 @@ from benchmarks.speed.core import ROOT, Example, Scenario
 from benchmarks.speed.growth import format_growth
 from benchmarks.speed.instructions import format_instructions
 from benchmarks.speed.limits import format_limits
-from benchmarks.speed.measure import Entry, Measured, Skipped, measure
+from benchmarks.speed.measure import Entry, Measured, measure
 from benchmarks.speed.page import format_page
 from benchmarks.speed.statement import Inputs, Problem, inputs, problem
 
@@ -33,7 +33,7 @@ def main() -> int:
         _show_progress("building the example of the core")
         example = Example(folder, build=options.build)
         stated = shift.scenario_of(of, given)
-        entries, skipped = _collect_entries(of, given, example, stated)
+        entries = _collect_entries(of, given, example, stated)
         measured = measure(entries, options.rounds, _show_progress)
         extra = {
             "What was set out to be reached": format_limits(measured),
@@ -41,7 +41,7 @@ def main() -> int:
             "Instructions": format_instructions(of, given, example, stated, folder),
             "Growth": format_growth(stated, example),
         }
-        text = format_page(measured, skipped, _find_base(measured), extra)
+        text = format_page(measured, _find_base(measured), extra)
     _show_progress("")
     print(text)
     if options.write:
@@ -49,18 +49,15 @@ def main() -> int:
     return 0
 
 
-def _collect_entries(
-    of: Problem, given: Inputs, example: Example, stated: Scenario
-) -> tuple[list[Entry], list[Skipped]]:
+def _collect_entries(of: Problem, given: Inputs, example: Example, stated: Scenario) -> list[Entry]:
     judge = shift.judge(reference.read())
-    found = [
-        c_peer.entries(of, given, judge, example.folder),
-        shift.entries(of, given, judge, example),
-        scipy_peer.entries(of, given, judge),
-        general.entries(stated, example),
+    library = c_peer.load_library(example.folder)
+    return [
+        *(c_peer.make_entries(of, given, judge, library) if library is not None else ()),
+        *shift.entries(of, given, judge, example),
+        *scipy_peer.entries(of, given, judge),
+        *general.entries(stated, example),
     ]
-    skipped = [one for one in found if isinstance(one, Skipped)]
-    return [entry for one in found if not isinstance(one, Skipped) for entry in one], skipped
 
 
 def _find_base(measured: list[Measured]) -> Measured | None:

@@ -51,7 +51,7 @@ class Rates:
 def draw_sets(of: Problem, runs: int = RUNS) -> FloatArray:
     """Return parameters (runs, 21) of a fixed seed, in the order of the C program."""
     noise = np.random.default_rng(1)
-    numbers = np.tile(c_peer.parameters(of), (runs, 1))
+    numbers = np.tile(c_peer.list_parameters(of), (runs, 1))
     for column in _VARIED:
         numbers[:, column] *= 1.0 + _SPREAD * noise.standard_normal(runs)
     return numbers
@@ -74,7 +74,7 @@ def simulate_sets(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep,
 
 def measure_batches(of: Problem, given: Inputs, folder: Path) -> str:
     """Measure runs per second, errors and memory, the programs in turns."""
-    sets, library = draw_sets(of), _load_library(folder)
+    sets, library = draw_sets(of), c_peer.load_library(folder)
     ours = Rates(shift.PROGRAM, {threads: [] for threads in _THREADS})
     theirs = Rates(c_peer.PROGRAM, {threads: [] for threads in _THREADS})
     # Once beforehand: the first calls of a process wait for its memory.
@@ -86,11 +86,11 @@ def measure_batches(of: Problem, given: Inputs, folder: Path) -> str:
             ours.seconds[threads].append(time.perf_counter() - begin)
             if library is not None:
                 begin = time.perf_counter()
-                rough = library.batch(sets, of, given, (threads, 1))
+                rough = library.run_batch(sets, of, given, (threads, 1))
                 theirs.seconds[threads].append(time.perf_counter() - begin)
     if library is None:
         return "\n".join([_format_table([ours], None), _measure_memory()])
-    exact = library.batch(sets, of, given, (max(_THREADS), _FINE_STEPS))
+    exact = library.run_batch(sets, of, given, (max(_THREADS), _FINE_STEPS))
     lines = [
         f"Errors of T_o over {RUNS} runs [N·m], against C at {_FINE_STEPS} steps per sample:\n",
         "| program | median | 99 % | worst | failed |",
@@ -100,15 +100,6 @@ def measure_batches(of: Problem, given: Inputs, folder: Path) -> str:
         "",
     ]
     return "\n".join([_format_table([theirs, ours], theirs), *lines, _measure_memory()])
-
-
-def _load_library(folder: Path) -> c_peer.Library | None:
-    if not c_peer.SOURCE.exists():
-        return None
-    try:
-        return c_peer.Library(folder)
-    except (subprocess.CalledProcessError, FileNotFoundError):
-        return None
 
 
 def _name_columns(of: Problem, given: Inputs, sets: FloatArray) -> dict[str, FloatArray]:

@@ -67,7 +67,11 @@ def count_instructions(command: list[str], function: str, folder: Path) -> int:
 
 def _build_driver(of: Problem, given: Inputs, folder: Path) -> list[str]:
     """Build a program that runs the C peer once; return its command."""
-    parts = [c_peer.parameters(of), np.array(start(of, given)), c_peer.samples_of(given).ravel()]
+    parts = [
+        c_peer.list_parameters(of),
+        np.array(start(of, given)),
+        c_peer.stack_samples(given).ravel(),
+    ]
     numbers = np.concatenate(parts)
     data, source, program = (folder / name for name in ("numbers", "driver.c", "driver"))
     data.write_bytes(numbers.tobytes())

@@ -55,14 +55,6 @@ class Entry:
     rounds: int = 1000
 
 
-@dataclass(frozen=True)
-class Skipped:
-    """A program that is not there, and why."""
-
-    program: str
-    reason: str
-
-
 @dataclass
 class Measured:
     """All seconds of an entry."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from benchmarks.speed.measure import Group, Measured, Skipped
+from benchmarks.speed.measure import Group, Measured
 
 _HEAD = """# Benchmarks
 
@@ -45,7 +45,6 @@ _LEGEND = {
 
 def format_page(
     measured: Sequence[Measured],
-    skipped: Sequence[Skipped],
     base: Measured | None,
     extra: Mapping[str, str],
 ) -> str:
@@ -56,9 +55,6 @@ def format_page(
         if rows:
             parts += [f"## {group.value}\n", _LEGEND[group] + "\n", format_table(rows, base)]
     parts += [f"## {title}\n\n{text}" for title, text in extra.items()]
-    if skipped:
-        listed = "\n".join(f"- {one.program}: {one.reason}" for one in skipped)
-        parts.append(f"## Not measured\n\n{listed}\n")
     return "\n".join(parts)
 
 
