@@ -8,7 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-from benchmarks.estimation.bench import Knowledge
 from benchmarks.estimation.mismatch import FAULTS, measure_shift
 from benchmarks.estimation.report import (
     format_faults,
@@ -23,6 +22,7 @@ from benchmarks.estimation.unseen import identify_unseen
 from drivetwin.atomic import write_text
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
+from tests.support.bench import Knowledge
 
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
 COUNT, TRIES, FAULTY, VEHICLES = 200, 200, 20, 100

@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench
 from drivetwin.driveline import Signal
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import IndexArray
 from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import FloatArray
+from tests.support.bench import Bench
 
 STEPS = {"engine torque": 1.0}
 """Disturbance of one engine torque sample [N m]."""

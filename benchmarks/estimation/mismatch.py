@@ -13,7 +13,6 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from benchmarks.estimation.study import START_INERTIA, fit_likelihood, read_fit
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import gearbox, throttle_steps
@@ -21,6 +20,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.integral import identify_shift
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
+from tests.support.bench import Bench, Knowledge, realise
 
 SHOWN = ("eta", "J_prime_2", "J_out", "Tv_over_if", "J_vehicle", "k_o", "c_o", "mu at 30 rad/s")
 KNOW = Knowledge(J_out=0.1)

@@ -10,13 +10,13 @@ from enum import StrEnum
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from benchmarks.estimation.study import build_guess, read_fit
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.variants import choose
+from tests.support.bench import Bench, Knowledge, realise
 
 OFF = 0.4
 """Start values lie so far beside the truth, at most, drawn evenly."""

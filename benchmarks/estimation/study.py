@@ -10,7 +10,6 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from benchmarks.estimation.bound import compute_bound
 from drivetwin.driveline import Stribeck
 from drivetwin.dyno.scenario import Scenario
@@ -26,6 +25,7 @@ from drivetwin.identify.likelihood.unknowns import LAW, Point
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.vehicle.spec import PriorValue
+from tests.support.bench import Bench, Knowledge, realise
 
 SLIPS = {f"mu at {slip:g} rad/s": slip for slip in (10.0, 30.0, 50.0)}
 """Slips [rad/s] at which the friction coefficient is compared, by the name in the tables."""

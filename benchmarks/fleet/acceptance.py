@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
-from benchmarks.fleet.made import ELEMENT, ODOMETER, UNITS, Ageing, Made, Truth, make_fleet, plan
 from drivetwin.cli.fleet_view import watching
 from drivetwin.fleet.events import Event, Settled
 from drivetwin.fleet.joint.estimate import joint_estimates
@@ -27,6 +26,16 @@ from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import State
 from drivetwin.identify.method import Method
+from tests.support.synthetic_fleet import (
+    ELEMENT,
+    ODOMETER,
+    UNITS,
+    Ageing,
+    Made,
+    Truth,
+    make_fleet,
+    plan,
+)
 
 LOGS_TO_SEE_A_CHANGE = 20
 """Logs of a unit from which its change must be found."""

@@ -10,10 +10,10 @@ from functools import cache
 from pathlib import Path
 from time import process_time
 
-from benchmarks.fleet.made import make_fleet
 from drivetwin.fleet.identify import identify_log
 from drivetwin.fleet.rows import Found, Row, RowKind
 from drivetwin.fleet.task import Recipe, Task
+from tests.support.synthetic_fleet import make_fleet
 
 CLOCK = "processor_time"
 """Name of the row with the processor time [s] that identifying a log took."""

@@ -11,15 +11,16 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.speed import c_peer, general, reference, scipy_peer, shift
+from benchmarks.speed import c_peer, general, shift
 from benchmarks.speed.batch import measure_batches
-from benchmarks.speed.core import ROOT, Example, Scenario
+from benchmarks.speed.core import ROOT, Example
 from benchmarks.speed.growth import format_growth
 from benchmarks.speed.instructions import format_instructions
-from benchmarks.speed.limits import format_limits
 from benchmarks.speed.measure import Entry, Measured, measure
-from benchmarks.speed.page import format_page
-from benchmarks.speed.statement import Inputs, Problem, inputs, problem
+from benchmarks.speed.page import format_limits, format_page
+from tests.support.upshift import reference
+from tests.support.upshift.scenario import Scenario, build_scenario
+from tests.support.upshift.statement import Inputs, Problem, inputs, problem
 
 PAGE = ROOT / "docs" / "benchmarks.md"
 
@@ -32,7 +33,7 @@ def main() -> int:
         folder = Path(name)
         _show_progress("building the example of the core")
         example = Example(folder, build=options.build)
-        stated = shift.scenario_of(of, given)
+        stated = build_scenario(of, given)
         entries = _collect_entries(of, given, example, stated)
         measured = measure(entries, options.rounds, _show_progress)
         extra = {
@@ -55,7 +56,7 @@ def _collect_entries(of: Problem, given: Inputs, example: Example, stated: Scena
     return [
         *(c_peer.make_entries(of, given, judge, library) if library is not None else ()),
         *shift.entries(of, given, judge, example),
-        *scipy_peer.entries(of, given, judge),
+        *shift.make_scipy_entries(of, given, judge),
         *general.entries(stated, example),
     ]
 

@@ -17,9 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.speed import c_peer, shift
-from benchmarks.speed.statement import BAR, Inputs, Problem, inputs, problem, start
 from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
 from drivetwin.driveline import ENGINE_TORQUE, FloatArray
+from tests.support.upshift.scenario import build_model, build_signals, build_state
+from tests.support.upshift.statement import BAR, Inputs, Problem, inputs, problem, start
 
 RUNS = 1000
 _SPREAD = 0.05
@@ -60,7 +61,7 @@ def draw_sets(of: Problem, runs: int = RUNS) -> FloatArray:
 def simulate_sets(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep, int]) -> Batch:
     """Simulate all sets in drivetwin; `how` is what is kept and the number of threads."""
     keep, threads = how
-    model, signals, begin = shift.model_of(of), shift.signals_of(given), shift.state_of(of, given)
+    model, signals, begin = build_model(of), build_signals(given), build_state(of, given)
     torque = signals.pop(ENGINE_TORQUE)
     return simulate_batch(
         model,

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.speed.measure import Entry, Judge, Sample
-from benchmarks.speed.statement import BAR, SAMPLES, STEP, Inputs, Problem, Solution, start
 from drivetwin.driveline import FloatArray
+from tests.support.upshift.statement import BAR, SAMPLES, STEP, Inputs, Problem, Solution, start
 
 SOURCE = Path(__file__).resolve().parents[3] / "shared" / "peers" / "shift.c"
 PROGRAM = "hand-written C"

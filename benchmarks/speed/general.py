@@ -8,10 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.speed.core import Example, Scenario
+from benchmarks.speed.core import Example
 from benchmarks.speed.measure import Entry, Group, Judge, Quality
-from benchmarks.speed.shift import OUTPUTS, PROGRAM
-from benchmarks.speed.statement import STEP, Solution
+from benchmarks.speed.shift import PROGRAM
 from drivetwin.driveline import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.export.modelica.dual_clutch import network_of, network_start
 from drivetwin.gearbox import load_gearbox
@@ -21,6 +20,8 @@ from drivetwin.gearbox.maneuver import plan, signals, time_grid
 from drivetwin.network import Element, Output, Start, simulate
 from reference import tables
 from reference.problem import ROOT, load
+from tests.support.upshift.scenario import OUTPUTS, Scenario
+from tests.support.upshift.statement import STEP, Solution
 
 EIGHT, TWELVE = "the shift with 8 states", "the shift with 12 states"
 COUPLED = "CoupledClutches, 1.5 s"

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.speed.core import Example, Scenario
+from benchmarks.speed.core import Example
 from benchmarks.speed.general import with_brakes, with_shafts
 from drivetwin.driveline import Signal
+from tests.support.upshift.scenario import Scenario
 
 _REPEATS = 15
 _HEAD = """\

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.speed import c_peer
-from benchmarks.speed.core import Example, Scenario
-from benchmarks.speed.statement import SAMPLES, STEP, Inputs, Problem, start
+from benchmarks.speed.core import Example
+from tests.support.upshift.scenario import Scenario
+from tests.support.upshift.statement import SAMPLES, STEP, Inputs, Problem, start
 
 _TARGET = "haswell"
 """What both are counted for: valgrind knows instructions up to AVX2."""

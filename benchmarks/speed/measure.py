@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from benchmarks.speed.statement import Solution
+from tests.support.upshift.statement import Solution
 
 
 @dataclass(frozen=True)

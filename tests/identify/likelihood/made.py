@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.identify.likelihood.fit import LikelihoodFit, fit
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import Point
+from tests.support.bench import Bench, Knowledge, realise
 
 ROUGH = Knowledge(J_out=0.1, P0=5e3)
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Knowledge, realise
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
@@ -18,6 +17,7 @@ from drivetwin.identify.likelihood.fit import DOUBTFUL, NEAR, Hopeless, fit, nea
 from drivetwin.identify.likelihood.newton import Found
 from drivetwin.identify.likelihood.output_error import in_lower_gear
 from tests.identify.likelihood.made import ROUGH, bench, fitted, problem, truth_of
+from tests.support.bench import Knowledge, realise
 
 DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 

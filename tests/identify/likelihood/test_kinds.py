@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import realise
 from drivetwin.dyno.scenarios import paper_steps, throttle_steps
 from drivetwin.identify.likelihood import kinds as of_signals
 from drivetwin.identify.likelihood.covariance import Whiteness
@@ -28,6 +27,7 @@ from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import ROUGH, problem, truth_of
+from tests.support.bench import realise
 
 MEANS = frozenset({"output_torque"})
 UNDECIDED = 78

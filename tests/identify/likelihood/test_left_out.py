@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.identify.likelihood.conclude import conclude
@@ -18,6 +17,7 @@ from drivetwin.identify.likelihood.left_out import late_torque, left_out
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.result import Verdict
 from tests.identify.likelihood.made import fitted, problem, truth_of
+from tests.support.bench import Bench, Knowledge, realise
 
 
 @cache

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import paper_steps
@@ -16,6 +15,7 @@ from drivetwin.identify.likelihood.lingering import lowest
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.variants import choose
 from tests.identify.likelihood.made import truth_of
+from tests.support.bench import Bench, Knowledge, realise
 
 ROUGH = Knowledge(J_out=0.1, P0=5e3)
 PRESSURE = "B2.P0"

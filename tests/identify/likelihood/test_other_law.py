@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import LossLaw
 from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.identify.likelihood import other_law
@@ -17,6 +16,7 @@ from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.priors import problem_of
 from tests.identify.likelihood.made import bench, fitted, truth_of
+from tests.support.bench import Bench, Knowledge, realise
 
 LAWS: tuple[LossLaw, ...] = ("paper", "dissipative")
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import realise
 from drivetwin.driveline import LossLaw, Signal
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import scenario_of
 from tests.identify.likelihood.made import ROUGH, bench, problem
+from tests.support.bench import realise
 
 
 @pytest.mark.parametrize("name", ["engine torque", "B3"])

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import RoadLoad
 from drivetwin.dyno.scenarios import throttle_steps
 from drivetwin.errors import IdentificationError
@@ -15,6 +14,7 @@ from drivetwin.identify.conclude import conclude
 from drivetwin.identify.integral import IntegralShift, identify_shift
 from drivetwin.identify.likelihood.run import DISAGREE, likelihood
 from drivetwin.vehicle.spec import VehicleCard
+from tests.support.bench import Bench, Knowledge, realise
 
 CARD = VehicleCard("truck", "paper", 1.0, 5.0, (), {}, (3.0, 9.0), (1000.0, 9000.0))
 GROWTH = 40.0

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Knowledge, realise
 from drivetwin.dyno.files import card_text
 from drivetwin.dyno.scenarios import paper
 from drivetwin.identify.likelihood.priors import PLAUSIBLE_ETA
 from drivetwin.identify.likelihood.scale_free import guess_without_torque
 from drivetwin.identify.signals import Sampled
 from drivetwin.vehicle.card import load_card
+from tests.support.bench import Knowledge, realise
 
 NOISY = 4.0
 """Noise of the speeds, a multiple of the scenario's."""

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import RoadLoad
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
@@ -23,6 +22,7 @@ from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import truth_of
+from tests.support.bench import Bench, Knowledge, realise
 
 GROWTH = 4.0
 

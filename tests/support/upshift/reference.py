@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.speed.statement import Inputs, Problem, Solution, inputs, problem, start
 from reference.dual_clutch_upshift.solve import Line
 from reference.march import Array
 from reference.mechanism import Mechanism, solve, speed
+from tests.support.upshift.statement import Inputs, Problem, Solution, inputs, problem, start
 
 FILE = Path(__file__).with_name("reference.csv")
 _DIGITS = ".12g"

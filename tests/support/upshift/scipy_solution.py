@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""SciPy: `solve_ivp` from event to event."""
+"""Solution of the stated upshift by `solve_ivp` of SciPy, from event to event."""
 
 from __future__ import annotations
 
@@ -9,38 +9,18 @@ from typing import Literal
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from benchmarks.speed.equations import FIRST_MODE, Equations, Guard, Mode
-from benchmarks.speed.measure import Entry, Judge, timed
-from benchmarks.speed.statement import SAMPLES, STEP, Inputs, Problem, Solution
 from drivetwin.driveline import FloatArray
+from tests.support.upshift.equations import FIRST_MODE, Equations, Guard, Mode
+from tests.support.upshift.statement import SAMPLES, STEP, Solution
 
 _MOST_EVENTS = 100
-_Method = Literal["RK45", "LSODA"]
-
-
-def entries(of: Problem, given: Inputs, judge: Judge) -> list[Entry]:
-    """RK45 and LSODA at a loose and a usual tolerance."""
-    equations = Equations(of, given)
-
-    def entry(method: _Method, rtol: float, atol: float, max_step: float) -> Entry:
-        def run() -> Solution:
-            return solve(equations, given.time, method, (rtol, atol, max_step))
-
-        setting = f"{method}, rtol {rtol:g}, restart at events"
-        return Entry("SciPy", setting, lambda: timed(run, 1), judge, rounds=3)
-
-    return [
-        entry("RK45", 1e-3, 1e-6, np.inf),
-        entry("RK45", 1e-6, 1e-8, 1e-2),
-        entry("LSODA", 1e-3, 1e-6, np.inf),
-        entry("LSODA", 1e-6, 1e-8, 1e-2),
-    ]
+Method = Literal["RK45", "LSODA"]
 
 
 def solve(
     equations: Equations,
     instants: FloatArray,
-    method: _Method,
+    method: Method,
     accuracy: tuple[float, float, float],
 ) -> Solution:
     """Integrate piece by piece; `accuracy` is rtol, atol and the longest step [s]."""
@@ -53,12 +33,12 @@ def solve(
         guards = equations.guards(mode)
         ahead = int(np.searchsorted(instants, t))
         piece = solve_ivp(
-            _rate(equations, mode),
+            _make_rate(equations, mode),
             (t, end),
             np.array(x),
             method=method,
             t_eval=instants[ahead:],
-            events=[_terminal(guard) for _, guard in guards],
+            events=[_make_event(guard) for _, guard in guards],
             rtol=rtol,
             atol=atol,
             max_step=max_step,
@@ -75,11 +55,11 @@ def solve(
     return Solution(columns, np.array(events))
 
 
-def _rate(equations: Equations, mode: Mode) -> Callable[[float, FloatArray], list[float]]:
+def _make_rate(equations: Equations, mode: Mode) -> Callable[[float, FloatArray], list[float]]:
     return lambda t, x: equations.evaluate(t, x.tolist(), mode)[0]
 
 
-def _terminal(guard: Guard) -> Callable[[float, FloatArray], float]:
+def _make_event(guard: Guard) -> Callable[[float, FloatArray], float]:
     def event(t: float, x: FloatArray) -> float:
         return guard(t, x.tolist())
 

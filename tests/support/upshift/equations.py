@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from benchmarks.speed.statement import STEP, Inputs, Problem, start
+from tests.support.upshift.statement import STEP, Inputs, Problem, start
 
 Guard = Callable[[float, Sequence[float]], float]
 
