@@ -10,8 +10,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-import time
-from collections.abc import Callable
+import timeit
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -109,17 +108,7 @@ def measure_core(case: Case, step: int, accuracy: Accuracy) -> float:
         pressures = {"B2": off, "B3": on}
         simulate(subject.model, torque, pressures, subject.start, time_grid, accuracy=accuracy)
 
-    return 1e9 * find_fastest(run) / (len(time_grid) - 1)
-
-
-def find_fastest(run: Callable[[], None]) -> float:
-    """Return the smallest wall time of several runs [s]."""
-    times = []
-    for _ in range(5 * REPEATS):
-        start = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - start)
-    return min(times)
+    return 1e9 * min(timeit.repeat(run, number=1, repeat=5 * REPEATS)) / (len(time_grid) - 1)
 
 
 def format_page(case: Case) -> str:

@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import timeit
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,17 +55,8 @@ def measure_help(_argument: str) -> Iterator[Figure]:
     def call() -> None:
         subprocess.run(command, check=True, capture_output=True)
 
-    yield Figure("drivetwin --help", _measure_median(call, 11), 0.3, "s")
-
-
-def _measure_median(call: Callable[[], object], count: int) -> float:
-    """Return the median wall time of several calls [s]."""
-    times = []
-    for _ in range(count):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
+    median = statistics.median(timeit.repeat(call, number=1, repeat=11))
+    yield Figure("drivetwin --help", median, 0.3, "s")
 
 
 def measure_identify(_argument: str) -> Iterator[Figure]:
@@ -125,7 +117,8 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
                 patch["data"][place]["x"], patch["data"][place]["y"] = change["x"], change["y"]
             to_json_plotly(patch)
 
-        yield Figure("move of a slider", 1e3 * _measure_median(slide_once, 30), 100.0, "ms")
+        median = statistics.median(timeit.repeat(slide_once, number=1, repeat=30))
+        yield Figure("move of a slider", 1e3 * median, 100.0, "ms")
         session.close()
 
 

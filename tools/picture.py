@@ -27,13 +27,8 @@ PICTURES = Path(__file__).resolve().parents[1] / "docs" / "img"
 WIDTH, HEIGHT = 1000, 960
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 OPTIONS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--hide-scrollbars",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--virtual-time-budget=20000",
+    *("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run"),
+    *("--disable-background-networking", "--virtual-time-budget=20000"),
     f"--window-size={WIDTH},{HEIGHT}",
 )
 

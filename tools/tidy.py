@@ -10,19 +10,19 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from tools.tidy_rules import core, imports, layout, prose, sizes, texts, units, words
+from tools.tidy_rules import core, files, imports, prose, texts, units, words
 from tools.tidy_rules.base import Fault, Rule, Tree, read_tree
 
 RULES: tuple[Rule, ...] = (
     core.check_purity,
     core.check_layers,
     core.check_circles,
+    files.check_lines,
+    files.check_bytes,
+    files.check_tests,
     imports.check_circles,
-    layout.check_tests,
     prose.check_names,
     prose.check_openers,
-    sizes.check_lines,
-    sizes.check_bytes,
     texts.check_licence,
     texts.check_machine_paths,
     texts.check_named_paths,

@@ -16,7 +16,6 @@ import numpy as np
 from benchmarks.estimation.study import START_INERTIA, fit_likelihood, read_fit
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import gearbox, throttle_steps
-from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.integral import identify_shift
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
@@ -42,13 +41,10 @@ class Fault:
 
 @dataclass(frozen=True)
 class Shift:
-    """Mean shift by parameter [%], of the delay [ms], and chi2 without and with the fault.
-
-    `percent` is None where the fit with the fault finds no plausible minimum and says so.
-    """
+    """Mean shift by parameter [%], of the delay [ms], and chi2 without and with the fault."""
 
     fault: Fault
-    percent: dict[str, float] | None
+    percent: dict[str, float]
     delay: float
     chi2: tuple[float, float]
 
@@ -76,11 +72,7 @@ FAULTS = (
 
 def measure_shift(fault: Fault, count: int) -> Shift:
     """Compute the shift over `count` noise realisations."""
-    sound = _fit_all(fault.sound, count)
-    try:
-        faulty = _fit_all(fault.faulty, count, fault.disturb)
-    except IdentificationError:
-        return Shift(fault, None, 0.0, (sound[0]["chi2"], 0.0))
+    sound, faulty = _fit_all(fault.sound, count), _fit_all(fault.faulty, count, fault.disturb)
     means = [
         {n: float(np.mean([one[n] for one in runs])) for n in runs[0]} for runs in (sound, faulty)
     ]

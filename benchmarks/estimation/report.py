@@ -139,10 +139,6 @@ def format_faults(shifts: Sequence[Shift], count: int) -> str:
     """Return the section on faults, from `count` realisations of each."""
     lines = [MISMATCH.format(count=count), *_format_header("fault", *SHOWN, "te_delay", "chi2")]
     for one in shifts:
-        if one.percent is None:
-            empty = [""] * (len(SHOWN) + 1)
-            lines.append(_format_row(one.fault.text, "refused: no plausible minimum", *empty))
-            continue
         cells = [f"{one.percent[name]:+.2f}" for name in SHOWN]
         chi2 = f"{one.chi2[0]:.3f} → {one.chi2[1]:.3f}"
         lines.append(_format_row(one.fault.text, *cells, f"{one.delay:+.2f}", chi2))

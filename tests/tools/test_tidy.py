@@ -11,10 +11,9 @@ import pytest
 from tools.tidy_rules.base import Fault, Rule, Source, Tree, read_tree
 from tools.tidy_rules.core import check_circles as check_core_circles
 from tools.tidy_rules.core import check_layers, check_purity
+from tools.tidy_rules.files import check_bytes, check_lines, check_tests
 from tools.tidy_rules.imports import MAX_CIRCLE, check_circles, describe_circles
-from tools.tidy_rules.layout import check_tests
 from tools.tidy_rules.prose import check_names, check_openers
-from tools.tidy_rules.sizes import check_bytes, check_lines
 from tools.tidy_rules.texts import check_licence, check_machine_paths, check_named_paths
 from tools.tidy_rules.units import check_units
 from tools.tidy_rules.words import WORDS, check_words, read_words

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 
 from tools.tidy_rules.base import Edges, Fault, Source, Tree, find_circles
-from tools.tidy_rules.sizes import RUST_TESTS
+from tools.tidy_rules.files import RUST_TESTS
 
 CORE = "crates/drivetwin-core"
 
