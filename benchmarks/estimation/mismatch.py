@@ -19,7 +19,7 @@ from drivetwin.dyno.scenarios import gearbox, throttle_steps
 from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.integral import identify_shift
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
-from tests.support.bench import Bench, Knowledge, realise
+from tests.support.bench import Bench, Knowledge, record_bench
 
 SHOWN = ("eta", "J_prime_2", "J_out", "Tv_over_if", "J_vehicle", "k_o", "c_o", "mu at 30 rad/s")
 KNOW = Knowledge(J_out=0.1)
@@ -93,7 +93,7 @@ def _fit_all(
 def _fit_one(
     made: Callable[[], Scenario], disturb: tuple[str, SensorTolerance], seed: int
 ) -> dict[str, float]:
-    bench = _remove_drums(realise(made(), seed, KNOW))
+    bench = _remove_drums(record_bench(made(), seed, KNOW))
     return _fit(replace(bench, signals=disturbed(bench.signals, *disturb)))
 
 

@@ -16,7 +16,7 @@ from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.variants import choose
-from tests.support.bench import Bench, Knowledge, realise
+from tests.support.bench import Bench, Knowledge, record_bench
 
 OFF = 0.4
 """Start values lie so far beside the truth, at most, drawn evenly."""
@@ -46,7 +46,7 @@ def count_outcomes(count: int) -> Counter[Outcome]:
 
 def try_start(seed: int, off: float = OFF) -> Outcome:
     """Fit the realisation `seed` from start values up to `off` (relative) away from the truth."""
-    bench = realise(SCENARIOS[TRIED[seed % len(TRIED)]](), seed, KNOW)
+    bench = record_bench(SCENARIOS[TRIED[seed % len(TRIED)]](), seed, KNOW)
     truth = build_guess(bench)
     try:
         found = _fit(bench, draw_start(truth, bench, seed, off))

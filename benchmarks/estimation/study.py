@@ -25,7 +25,7 @@ from drivetwin.identify.likelihood.unknowns import LAW, Point
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.vehicle.spec import PriorValue
-from tests.support.bench import Bench, Knowledge, realise
+from tests.support.bench import Bench, Knowledge, record_bench
 
 SLIPS = {f"mu at {slip:g} rad/s": slip for slip in (10.0, 30.0, 50.0)}
 """Slips [rad/s] at which the friction coefficient is compared, by the name in the tables."""
@@ -55,7 +55,7 @@ class Study:
 
 def run_study(scenario: Scenario, know: Knowledge, seeds: Sequence[int]) -> Study:
     """Fit the noise realisations of `seeds` by the linear and the likelihood method."""
-    truth = build_truth(realise(scenario, 0, know, noise=0.0))
+    truth = build_truth(record_bench(scenario, 0, know, noise=0.0))
     samples: dict[str, dict[str, list[Sample]]] = {"integral": {}, "likelihood": {}}
     failures = dict.fromkeys(samples, 0)
     with ProcessPoolExecutor() as pool:
@@ -76,7 +76,7 @@ Estimates = dict[str, tuple[float, float]]
 
 def _fit_both(scenario: Scenario, know: Knowledge, seed: int) -> tuple[Estimates, Estimates | None]:
     """Fit one realisation by both methods; None if the likelihood method fails."""
-    bench = realise(scenario, seed, know)
+    bench = record_bench(scenario, seed, know)
     linear = identify_shift(bench.signals, bench.driveline, START_INERTIA)
     try:
         best = read_fit(fit_likelihood(bench, linear), bench)
@@ -106,7 +106,7 @@ def read_fit(fit: LikelihoodFit, bench: Bench) -> Estimates:
 
 def compute_bounds(scenario: Scenario, know: Knowledge) -> dict[str, float]:
     """Compute the Cramér-Rao bound of every parameter, as a standard deviation."""
-    clean = realise(scenario, 0, Knowledge(), noise=0.0)
+    clean = record_bench(scenario, 0, Knowledge(), noise=0.0)
     couplings = {
         n: replace(c, P0=PriorValue(c.P0.value, know.P0), drum=PriorValue(c.drum.value, know.drum))
         for n, c in clean.driveline.couplings.items()

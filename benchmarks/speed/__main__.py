@@ -14,13 +14,12 @@ from pathlib import Path
 from benchmarks.speed import c_peer, general, shift
 from benchmarks.speed.batch import measure_batches
 from benchmarks.speed.core import ROOT, Example
-from benchmarks.speed.growth import format_growth
 from benchmarks.speed.instructions import format_instructions
 from benchmarks.speed.measure import Entry, Measured, measure
 from benchmarks.speed.page import format_limits, format_page
 from tests.support.upshift import reference
 from tests.support.upshift.scenario import Scenario, build_scenario
-from tests.support.upshift.statement import Inputs, Problem, inputs, problem
+from tests.support.upshift.statement import Inputs, Problem, make_inputs, make_problem
 
 PAGE = ROOT / "docs" / "benchmarks.md"
 
@@ -28,7 +27,7 @@ PAGE = ROOT / "docs" / "benchmarks.md"
 def main() -> int:
     """Measure and write."""
     options = _parse_options()
-    of, given = problem(), inputs()
+    of, given = make_problem(), make_inputs()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         _show_progress("building the example of the core")
@@ -40,7 +39,7 @@ def main() -> int:
             "What was set out to be reached": format_limits(measured),
             "Many runs": measure_batches(of, given, folder),
             "Instructions": format_instructions(of, given, example, stated, folder),
-            "Growth": format_growth(stated, example),
+            "Growth": general.format_growth(stated, example),
         }
         text = format_page(measured, _find_base(measured), extra)
     _show_progress("")
@@ -51,13 +50,13 @@ def main() -> int:
 
 
 def _collect_entries(of: Problem, given: Inputs, example: Example, stated: Scenario) -> list[Entry]:
-    judge = shift.judge(reference.read())
+    judge = shift.compare_with(reference.read())
     library = c_peer.load_library(example.folder)
     return [
         *(c_peer.make_entries(of, given, judge, library) if library is not None else ()),
-        *shift.entries(of, given, judge, example),
+        *shift.make_entries(of, given, judge, example),
         *shift.make_scipy_entries(of, given, judge),
-        *general.entries(stated, example),
+        *general.make_entries(stated, example),
     ]
 
 

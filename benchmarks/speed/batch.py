@@ -20,7 +20,7 @@ from benchmarks.speed import c_peer, shift
 from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
 from drivetwin.driveline import ENGINE_TORQUE, FloatArray
 from tests.support.upshift.scenario import build_model, build_signals, build_state
-from tests.support.upshift.statement import BAR, Inputs, Problem, inputs, problem, start
+from tests.support.upshift.statement import BAR, Inputs, Problem, make_inputs, make_problem, start
 
 RUNS = 1000
 _SPREAD = 0.05
@@ -173,9 +173,9 @@ def _measure_peak(keep: Keep, runs: int) -> int:
 
 def main() -> None:
     """Run one batch and print the largest memory of this process [byte]."""
-    of = problem()
+    of = make_problem()
     keep, runs = Keep(sys.argv[1]), int(sys.argv[2])
-    simulate_sets(of, inputs(), draw_sets(of, runs), (keep, 2))
+    simulate_sets(of, make_inputs(), draw_sets(of, runs), (keep, 2))
     # The largest memory in the resource usage of a child includes that of its parent.
     (kilobytes,) = re.findall(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text("utf-8"))
     print(1024 * int(kilobytes))

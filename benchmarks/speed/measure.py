@@ -79,7 +79,7 @@ class Measured:
         return min(self.seconds)
 
 
-def timed(run: Callable[[], Solution], repeats: int) -> Sample:
+def time_runs(run: Callable[[], Solution], repeats: int) -> Sample:
     """Time `repeats` runs, the conversion of the last result to a Solution not among them."""
     seconds = []
     for _ in range(repeats):

@@ -45,9 +45,7 @@ _LEGEND = {
 
 
 def format_page(
-    measured: Sequence[Measured],
-    base: Measured | None,
-    extra: Mapping[str, str],
+    measured: Sequence[Measured], base: Measured | None, extra: Mapping[str, str]
 ) -> str:
     """Return the whole page; `extra` are further sections by title."""
     parts = [_HEAD, _describe_machine()]
@@ -129,7 +127,7 @@ def _compute_ratios(time: Times) -> list[tuple[str, float, float]]:
     """Return name, ratio and limit of every row."""
     base = time[_BASE]
     ours = {setting: value for (program, setting), value in time.items() if program != _BASE[0]}
-    span = float(general.gearbox_shift()[general.WHOLE].time[-1])
+    span = float(general.plan_gearbox_shifts()[general.WHOLE].time[-1])
     return [
         ("one shift, network ready, over C", ours[shift.READY] / base, 0.30),
         ("the same, first run of a network", ours[shift.FIRST] / base, 0.30),

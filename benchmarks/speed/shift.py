@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.speed.core import Example
-from benchmarks.speed.measure import Entry, Group, Judge, Quality, timed
+from benchmarks.speed.measure import Entry, Group, Judge, Quality, time_runs
 from drivetwin.driveline import (
     ENGINE_TORQUE,
     Sensitivities,
@@ -38,7 +38,7 @@ PARAMETERS = (
 DERIVED = f"{len(PARAMETERS)} parameters, called from Python"
 
 
-def judge(reference: Solution) -> Judge:
+def compare_with(reference: Solution) -> Judge:
     """Largest deviation of T_o, and of an event where all are found."""
 
     def compare(found: Solution) -> Quality:
@@ -50,44 +50,39 @@ def judge(reference: Solution) -> Judge:
     return compare
 
 
-def entries(of: Problem, given: Inputs, reference: Judge, example: Example) -> list[Entry]:
+def make_entries(of: Problem, given: Inputs, reference: Judge, example: Example) -> list[Entry]:
     """Four outputs on the 1 ms grid, with default settings."""
     path = example.store("shift", build_scenario(of, given))
     model, signals, begin = build_model(of), build_signals(given), build_state(of, given)
     torque = signals.pop(ENGINE_TORQUE)
 
-    def simulated() -> Trajectory:
+    def simulate_once() -> Trajectory:
         return simulate(model, torque, signals, begin, given.time)
 
-    def derived() -> Sensitivities:
+    def derive_once() -> Sensitivities:
         return sensitivities(model, torque, signals, begin, given.time, PARAMETERS)
 
     return [
         Entry(PROGRAM, READY, lambda: example.run(path, _REPEATS, "again"), reference),
         Entry(PROGRAM, FIRST, lambda: example.run(path, _REPEATS, "first"), reference),
-        Entry(
-            PROGRAM,
-            WHOLE,
-            lambda: example.run(path, _REPEATS, "whole"),
-            reference,
-        ),
+        Entry(PROGRAM, WHOLE, lambda: example.run(path, _REPEATS, "whole"), reference),
         Entry(
             PROGRAM,
             PYTHON,
-            lambda: timed(lambda: _solution(simulated()), _REPEATS),
+            lambda: time_runs(lambda: _convert(simulate_once()), _REPEATS),
             reference,
         ),
         Entry(
             PROGRAM,
             DERIVED,
-            lambda: timed(lambda: _solution(derived().run), _REPEATS),
+            lambda: time_runs(lambda: _convert(derive_once().run), _REPEATS),
             reference,
             Group.DERIVATIVES,
         ),
     ]
 
 
-def _solution(run: Trajectory) -> Solution:
+def _convert(run: Trajectory) -> Solution:
     columns = (run.engine_speed, run.output_speed, run.wheel_speed, run.shaft_torque)
     return Solution(np.array(columns), np.array([event.time for event in run.events]))
 
@@ -101,7 +96,7 @@ def make_scipy_entries(of: Problem, given: Inputs, judge: Judge) -> list[Entry]:
             return solve(equations, given.time, method, (rtol, atol, max_step))
 
         setting = f"{method}, rtol {rtol:g}, restart at events"
-        return Entry("SciPy", setting, lambda: timed(run, 1), judge, rounds=3)
+        return Entry("SciPy", setting, lambda: time_runs(run, 1), judge, rounds=3)
 
     return [
         make_entry("RK45", 1e-3, 1e-6, np.inf),

@@ -39,7 +39,7 @@ class Bench:
     run: DynoRun
 
 
-def realise(scenario: Scenario, seed: int, know: Knowledge, noise: float = 1.0) -> Bench:
+def record_bench(scenario: Scenario, seed: int, know: Knowledge, noise: float = 1.0) -> Bench:
     """Record the scenario with the noise of `seed`.
 
     Where the card knows a value only roughly, the card's value is drawn about the truth.
@@ -62,10 +62,10 @@ def realise(scenario: Scenario, seed: int, know: Knowledge, noise: float = 1.0) 
         PriorValue(J_out, know.J_out * model.J_out),
         model.loss_law,
     )
-    return Bench(_signals(made), driveline, dict(made.truth.parameters), made)
+    return Bench(_sample_signals(made), driveline, dict(made.truth.parameters), made)
 
 
-def _signals(made: DynoRun) -> ShiftSignals:
+def _sample_signals(made: DynoRun) -> ShiftSignals:
     scenario, truth = made.scenario, made.truth
     assert truth.torque_start is not None
     assert truth.inertia_start is not None

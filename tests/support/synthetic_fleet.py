@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A made fleet: 60 units whose friction and fill pressure age in a known way, 3 % damaged logs."""
+"""A synthetic fleet: 60 units whose friction and fill pressure age as stated, 3 % damaged logs."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Ageing:
 
 @dataclass(frozen=True)
 class Truth:
-    """What the fleet is made of. In unit `changed`, μ is larger by `step` from `at` [1000 km]."""
+    """Parameters of the fleet. In unit `changed`, μ is larger by `step` from `at` [1000 km]."""
 
     mu: Ageing = Ageing(0.1181, 0.0040, -4.0e-5)
     P0: Ageing = Ageing(8.0e4, 3.0e3, 40.0)
@@ -85,7 +85,7 @@ class Made:
 Rows = list[list[str]]
 
 
-def _cells(change: Callable[[Rows], Rows]) -> Callable[[str], bytes]:
+def _change_cells(change: Callable[[Rows], Rows]) -> Callable[[str], bytes]:
     def changed(text: str) -> bytes:
         rows = change([line.split(",") for line in text.splitlines()])
         return ("\n".join(",".join(row) for row in rows) + "\n").encode()
@@ -93,39 +93,39 @@ def _cells(change: Callable[[Rows], Rows]) -> Callable[[str], bytes]:
     return changed
 
 
-def _column(place: int, change: Callable[[int, str], str]) -> Callable[[str], bytes]:
+def _change_column(place: int, change: Callable[[int, str], str]) -> Callable[[str], bytes]:
     def changed(rows: Rows) -> Rows:
         for number, row in enumerate(rows[2:]):
             row[place] = change(number, row[place])
         return rows
 
-    return _cells(changed)
+    return _change_cells(changed)
 
 
-def _unit(place: int, unit: str) -> Callable[[str], bytes]:
+def _replace_unit(place: int, unit: str) -> Callable[[str], bytes]:
     def changed(rows: Rows) -> Rows:
         rows[1][place] = unit
         return rows
 
-    return _cells(changed)
+    return _change_cells(changed)
 
 
-def _swapped(rows: Rows) -> Rows:
+def _swap_rows(rows: Rows) -> Rows:
     rows[500], rows[501] = rows[501], rows[500]
     return rows
 
 
 DAMAGES: dict[str, Callable[[str], bytes]] = {
-    "missing channel": _cells(lambda rows: [row[:5] + row[6:] for row in rows]),
-    "missing pressure": _cells(lambda rows: [row[:3] + row[4:] for row in rows]),
-    "unknown unit": _unit(4, "Nx"),
-    "missing unit": _unit(5, ""),
-    "unit of another quantity": _unit(2, "Nm"),
-    "time not increasing": _cells(_swapped),
-    "NaN run": _column(6, lambda n, text: "NaN" if n > 100 else text),
-    "constant channel": _column(4, lambda *_: "2400"),
-    "no shift": _cells(lambda rows: rows[: int(1.9 * RATE)]),
-    "pressure 1e5 too large": _column(3, lambda _, text: f"{1e5 * float(text):g}"),
+    "missing channel": _change_cells(lambda rows: [row[:5] + row[6:] for row in rows]),
+    "missing pressure": _change_cells(lambda rows: [row[:3] + row[4:] for row in rows]),
+    "unknown unit": _replace_unit(4, "Nx"),
+    "missing unit": _replace_unit(5, ""),
+    "unit of another quantity": _replace_unit(2, "Nm"),
+    "time not increasing": _change_cells(_swap_rows),
+    "NaN run": _change_column(6, lambda n, text: "NaN" if n > 100 else text),
+    "constant channel": _change_column(4, lambda *_: "2400"),
+    "no shift": _change_cells(lambda rows: rows[: int(1.9 * RATE)]),
+    "pressure 1e5 too large": _change_column(3, lambda _, text: f"{1e5 * float(text):g}"),
     "empty": lambda _: b"",
     "binary": lambda _: bytes(range(256)) * 40,
     "no samples": lambda text: "\n".join(text.splitlines()[:2]).encode(),
@@ -133,8 +133,8 @@ DAMAGES: dict[str, Callable[[str], bytes]] = {
 """Ways in which a log cannot be used, as in `tests/system/test_bad_inputs.py`."""
 
 
-def _aged(mu: float, P0: float) -> Scenario:
-    """The paper's driveline with throttle steps, its on-coming element with this μ at SLIP, P0."""
+def _make_aged(mu: float, P0: float) -> Scenario:
+    """Return the paper's driveline with throttle steps; its on-coming element has μ and P0."""
     base = paper_steps()
     (element,) = (each for each in base.model.elements if each.name == ELEMENT)
     law = element.friction
@@ -155,7 +155,7 @@ def _aged(mu: float, P0: float) -> Scenario:
 
 
 def plan(count: int, truth: Truth, seed: int = 0) -> list[Made]:
-    """What is to be made: logs by number, the same for the same arguments."""
+    """Draw the logs by number; the same for the same arguments."""
     draws = np.random.default_rng(seed)
     mu_unit = truth.mu.mean + truth.mu.spread * draws.standard_normal(UNITS)
     P0_unit = truth.P0.mean + truth.P0.spread * draws.standard_normal(UNITS)
@@ -182,7 +182,7 @@ def plan(count: int, truth: Truth, seed: int = 0) -> list[Made]:
 
 def _write(folder: Path, seed: int, numbered: tuple[int, Made]) -> None:
     number, made = numbered
-    text = log_text(run(_aged(made.mu, made.P0), seed + number))
+    text = log_text(run(_make_aged(made.mu, made.P0), seed + number))
     data = DAMAGES[made.damage](text) if made.damage else text.encode()
     path = folder / made.path
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -197,7 +197,7 @@ def make_fleet(folder: Path, count: int, truth: Truth | None = None, seed: int =
     truth = truth or Truth()
     planned = plan(count, truth, seed)
     folder.mkdir(parents=True, exist_ok=True)
-    card = card_text(_aged(truth.mu.mean, truth.P0.mean))
+    card = card_text(_make_aged(truth.mu.mean, truth.P0.mean))
     known = f"P0_bar = {truth.P0.mean / 1e5}"
     assert known in card
     (folder / "card.toml").write_text(

@@ -11,7 +11,7 @@ from tests.support.upshift import reference
 from tests.support.upshift.equations import Equations
 from tests.support.upshift.scenario import Scenario, build_scenario
 from tests.support.upshift.scipy_solution import solve
-from tests.support.upshift.statement import Solution, inputs, problem
+from tests.support.upshift.statement import Solution, make_inputs, make_problem
 
 
 def _solution(scenario: Scenario) -> Solution:
@@ -33,7 +33,7 @@ def _compare(found: Solution) -> tuple[float, float]:
 
 @pytest.fixture(scope="module")
 def stated() -> Scenario:
-    return build_scenario(problem(), inputs())
+    return build_scenario(make_problem(), make_inputs())
 
 
 def test_default_settings_reach_the_stated_accuracy(stated: Scenario) -> None:
@@ -43,8 +43,8 @@ def test_default_settings_reach_the_stated_accuracy(stated: Scenario) -> None:
 
 
 def test_the_equations_of_the_peers_are_those_of_the_problem() -> None:
-    given = inputs()
-    found = solve(Equations(problem(), given), given.time, "LSODA", (1e-6, 1e-8, 1e-2))
+    given = make_inputs()
+    found = solve(Equations(make_problem(), given), given.time, "LSODA", (1e-6, 1e-8, 1e-2))
     torque, events = _compare(found)
     assert torque < 2.0
     assert events < 1e-5

@@ -13,14 +13,14 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit, fit
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.unknowns import Point
-from tests.support.bench import Bench, Knowledge, realise
+from tests.support.bench import Bench, Knowledge, record_bench
 
 ROUGH = Knowledge(J_out=0.1, P0=5e3)
 
 
 @cache
 def bench(seed: int = 0, noise: float = 1.0, know: Knowledge = ROUGH) -> Bench:
-    return realise(SCENARIOS[ScenarioName.THROTTLE_STEPS](), seed, know, noise)
+    return record_bench(SCENARIOS[ScenarioName.THROTTLE_STEPS](), seed, know, noise)
 
 
 def truth_of(made: Bench) -> dict[str, float]:

@@ -17,7 +17,7 @@ from drivetwin.identify.likelihood.fit import DOUBTFUL, NEAR, Hopeless, fit, nea
 from drivetwin.identify.likelihood.newton import Found
 from drivetwin.identify.likelihood.output_error import in_lower_gear
 from tests.identify.likelihood.made import ROUGH, bench, fitted, problem, truth_of
-from tests.support.bench import Knowledge, realise
+from tests.support.bench import Knowledge, record_bench
 
 DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 
@@ -68,7 +68,7 @@ def test_a_minimum_is_one_over_unknowns_and_inputs_alike() -> None:
         ),
     }
     actuators = {name: replace(base.actuators[name], command=programs[name]) for name in programs}
-    posed, start = problem(realise(replace(base, actuators=actuators, duration=4.6), 1, ROUGH))
+    posed, start = problem(record_bench(replace(base, actuators=actuators, duration=4.6), 1, ROUGH))
     found = nearest(posed, start)
     assert found is not None
     again = posed.weighted_by(found.point).with_expected_inputs(found.point)

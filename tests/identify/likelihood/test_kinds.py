@@ -27,7 +27,7 @@ from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import ROUGH, problem, truth_of
-from tests.support.bench import realise
+from tests.support.bench import record_bench
 
 MEANS = frozenset({"output_torque"})
 UNDECIDED = 78
@@ -39,12 +39,12 @@ AS_READ = 2
 
 @cache
 def _posed() -> Problem:
-    return problem(realise(throttle_steps(), UNDECIDED, ROUGH))[0]
+    return problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))[0]
 
 
 @cache
 def _fit(kinds: frozenset[str]) -> LikelihoodFit:
-    _, start = problem(realise(throttle_steps(), UNDECIDED, ROUGH))
+    _, start = problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))
     found = nearest(_posed().of_kinds(kinds), start)
     assert found is not None
     return found
@@ -63,7 +63,7 @@ def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> N
     told, doubts = averaged_over_kinds(_posed(), _fit(MEANS))
     value, std = _age(told)
     assert all(abs(age - value) < 1.96 * std for age in ages)
-    truth = realise(throttle_steps(), UNDECIDED, ROUGH).truth["te_delay"]
+    truth = record_bench(throttle_steps(), UNDECIDED, ROUGH).truth["te_delay"]
     assert abs(truth - value) < 1.96 * std
     assert len(doubts) == 1
     assert doubts[0].endswith("output torque")
@@ -79,7 +79,7 @@ def test_it_does_not_matter_from_which_kind_one_comes() -> None:
 
 
 def test_a_clear_log_is_left_as_it_is() -> None:
-    posed, start = problem(realise(paper_steps(), 0, ROUGH))
+    posed, start = problem(record_bench(paper_steps(), 0, ROUGH))
     fit = nearest(posed, start)
     assert fit is not None
     told, doubts = averaged_over_kinds(posed, fit)
@@ -123,7 +123,7 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
 @cache
 def _without_torque() -> tuple[Problem, Point, LikelihoodFit]:
     """A problem of samples without an output torque, where its search starts, and its minimum."""
-    made = realise(throttle_steps(), 0, ROUGH)
+    made = record_bench(throttle_steps(), 0, ROUGH)
     signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
     eta = made.truth["eta"]
     scaled = ("J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -170,7 +170,9 @@ def test_from_far_off_signals_are_taken_as_read() -> None:
     assert normal is not None
     assert FAR < normal.cost / posed.size < NEAR
     assert of_signals._promising(weighted, far, normal)  # wrong: there are samples alone
-    likely, other = likely_kinds(posed, far, [realise(throttle_steps(), 0, ROUGH).signals.shift])
+    likely, other = likely_kinds(
+        posed, far, [record_bench(throttle_steps(), 0, ROUGH).signals.shift]
+    )
     assert likely.kinds == frozenset()
     assert other.kinds == frozenset(SPEEDS)
 
@@ -182,7 +184,7 @@ def test_from_far_off_the_lower_gear_tells_kinds() -> None:
         replace(one, rate=100.0, window=0.01) if one.quantity is Quantity.SPEED else one
         for one in base.sensors
     ]
-    made = realise(replace(base, sensors=tuple(sensors)), 0, ROUGH)
+    made = record_bench(replace(base, sensors=tuple(sensors)), 0, ROUGH)
     posed, start = problem(made, off=0.1)
     assert posed.weighted_by(start).cost(start) > FAR * posed.size
     likely, _ = likely_kinds(posed, start, [made.signals.shift])
@@ -221,7 +223,7 @@ def _at_50_hertz(window: float) -> tuple[Problem, LikelihoodFit]:
         else one
         for one in base.sensors
     ]
-    posed, start = problem(realise(replace(base, sensors=tuple(sensors)), AS_READ, ROUGH))
+    posed, start = problem(record_bench(replace(base, sensors=tuple(sensors)), AS_READ, ROUGH))
     fit = nearest(posed, start)
     assert fit is not None
     return posed, with_best_kinds(posed, fit)

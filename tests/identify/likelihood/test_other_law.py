@@ -16,7 +16,7 @@ from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.priors import problem_of
 from tests.identify.likelihood.made import bench, fitted, truth_of
-from tests.support.bench import Bench, Knowledge, realise
+from tests.support.bench import Bench, Knowledge, record_bench
 
 LAWS: tuple[LossLaw, ...] = ("paper", "dissipative")
 
@@ -25,7 +25,7 @@ LAWS: tuple[LossLaw, ...] = ("paper", "dissipative")
 def _made(law: LossLaw) -> Bench:
     """A log whose lock-up oscillation reverses the torque through the gears."""
     base = paper_steps()
-    return realise(replace(base, model=replace(base.model, loss_law=law)), 0, Knowledge())
+    return record_bench(replace(base, model=replace(base.model, loss_law=law)), 0, Knowledge())
 
 
 @cache

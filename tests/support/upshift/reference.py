@@ -14,7 +14,14 @@ import numpy as np
 from reference.dual_clutch_upshift.solve import Line
 from reference.march import Array
 from reference.mechanism import Mechanism, solve, speed
-from tests.support.upshift.statement import Inputs, Problem, Solution, inputs, problem, start
+from tests.support.upshift.statement import (
+    Inputs,
+    Problem,
+    Solution,
+    make_inputs,
+    make_problem,
+    start,
+)
 
 FILE = Path(__file__).with_name("reference.csv")
 _DIGITS = ".12g"
@@ -30,38 +37,38 @@ def read() -> Solution:
 def compute(of: Problem, given: Inputs) -> Solution:
     """Solve anew; takes a minute."""
     found = solve(
-        _mechanism(of, given),
+        _build_mechanism(of, given),
         given.time,
         {
             ("speed", "engine"): speed(1.0, 0.0, 0.0),
             ("speed", "output"): speed(0.0, 1.0, 0.0),
             ("speed", "wheel"): speed(0.0, 0.0, 1.0),
-            ("shaft_torque", "shaft"): lambda _t, v, z, _torque: _shaft(of, v, z),
+            ("shaft_torque", "shaft"): lambda _t, v, z, _torque: _compute_shaft_torque(of, v, z),
         },
     )
-    fills = [crossing for line in _pressures(given) for crossing in line.crossings(of.P0[0])]
+    fills = [crossing for line in _get_pressures(given) for crossing in line.crossings(of.P0[0])]
     times = sorted([*(change.time for change in found.changes), *fills])
     return Solution(np.array(list(found.table.columns.values())), np.array(times))
 
 
-def _shaft(of: Problem, v: Array, z: Array) -> float:
+def _compute_shaft_torque(of: Problem, v: Array, z: Array) -> float:
     return float(of.k * z[0] + of.c * (v[1] - of.i_f * v[2]))
 
 
-def _pressures(given: Inputs) -> tuple[Line, Line]:
+def _get_pressures(given: Inputs) -> tuple[Line, Line]:
     first, second = (Line(given.time.tolist(), one.tolist()) for one in given.pressures)
     return first, second
 
 
-def _mechanism(of: Problem, given: Inputs) -> Mechanism:
+def _build_mechanism(of: Problem, given: Inputs) -> Mechanism:
     torque = Line(given.time.tolist(), given.torque.tolist())
-    pressures = _pressures(given)
+    pressures = _get_pressures(given)
     gains, rows = np.array(of.gain), np.zeros((2, 3))
     for i in range(2):
         rows[i, :2] = 1.0 / (of.i_in * of.i_c[i]), -of.i_out[i]
 
     def force(t: float, v: Array, z: Array) -> list[float]:
-        shaft = _shaft(of, v, z)
+        shaft = _compute_shaft_torque(of, v, z)
         return [of.eta * torque(t), -shaft, of.i_f * shaft - of.T_v]
 
     def capacity(t: float, slip: Array) -> list[float]:
@@ -85,7 +92,7 @@ def _mechanism(of: Problem, given: Inputs) -> Mechanism:
 
 def main() -> None:
     """Write the file."""
-    solution = compute(problem(), inputs())
+    solution = compute(make_problem(), make_inputs())
     rows = [",".join(format(value, _DIGITS) for value in row) for row in solution.columns.T]
     events = ",".join(format(time, _DIGITS) for time in solution.events)
     head = "engine_speed,output_speed,wheel_speed,shaft_torque"

@@ -66,8 +66,8 @@ class Solution:
     events: FloatArray
 
 
-def problem() -> Problem:
-    """The problem, its shaft such that it rings at 12 Hz with ζ = 0.05 in the new gear."""
+def make_problem() -> Problem:
+    """Return the problem; its shaft oscillates at 12 Hz with ζ = 0.05 in the new gear."""
     bare = Problem()
     before = bare.J_e * (bare.i_in * bare.i_c[1] * bare.i_out[1]) ** 2 + bare.J_out
     inertia = 1.0 / (1.0 / before + bare.i_f**2 / bare.J_v)
@@ -78,35 +78,35 @@ def problem() -> Problem:
     return Problem(k=float(stiffness), c=float(damping))
 
 
-def inputs() -> Inputs:
-    """The samples; the order in which noise is drawn is part of the statement."""
+def make_inputs() -> Inputs:
+    """Return the samples; the order in which noise is drawn is part of the statement."""
     time: FloatArray = STEP * np.arange(SAMPLES, dtype=np.float64)
     noise = np.random.default_rng(7)
-    torque = _through(
+    torque = _interpolate(
         time,
         (0.0, 0.55, 0.70, 0.80, 0.95, 1.05, 1.15, _LENGTH),
         (1400.0, 1400.0, 1400.0, 1150.0, 1150.0, 1250.0, 1400.0, 1400.0),
     )
     torque = torque + 6.0 * noise.standard_normal(SAMPLES)
-    leaving = _through(
+    leaving = _interpolate(
         time,
         (0.0, 0.45, 0.50, 0.56, 0.61, 0.64, _LENGTH),
         (10.0, 10.0, 6.5, 5.0, 1.6, 0.0, 0.0),
     )
-    coming = _through(
+    coming = _interpolate(
         time,
         (0.0, 0.40, 0.45, 0.50, 0.54, 0.62, 0.72, 0.80, 1.02, 1.12, 1.2, _LENGTH),
         (0.0, 0.0, 1.4, 0.9, 0.9, 3.0, 6.0, 6.3, 6.4, 6.8, 10.0, 10.0),
     )
     window = np.clip((time - 0.70) / 0.05, 0.0, 1.0) * np.clip((1.1 - time) / 0.05, 0.0, 1.0)
     ripple = 0.25 * np.sin(2.0 * np.pi * 22.0 * time) * window
-    coming = _under_pressure(coming, ripple + 0.01 * noise.standard_normal(SAMPLES))
-    leaving = _under_pressure(leaving, 0.01 * noise.standard_normal(SAMPLES))
+    coming = _add_disturbance(coming, ripple + 0.01 * noise.standard_normal(SAMPLES))
+    leaving = _add_disturbance(leaving, 0.01 * noise.standard_normal(SAMPLES))
     return Inputs(time, torque, (BAR * leaving, BAR * coming))
 
 
 def start(of: Problem, given: Inputs) -> tuple[float, float, float, float]:
-    """ω_e, ω_out, ω_w [rad/s] and T_o [N m] in steady acceleration with the first clutch locked."""
+    """Return ω_e, ω_out, ω_w [rad/s] and T_o [N m]: steady acceleration, first clutch locked."""
     ratio = of.i_in * of.i_c[0] * of.i_out[0]
     engine, vehicle = 185.0, of.J_v / of.i_f**2
     inertia = of.J_e * ratio**2 + of.J_out + vehicle
@@ -115,10 +115,12 @@ def start(of: Problem, given: Inputs) -> tuple[float, float, float, float]:
     return engine, output, output / of.i_f, vehicle * acceleration + of.T_v / of.i_f
 
 
-def _through(time: FloatArray, corners: tuple[float, ...], values: tuple[float, ...]) -> FloatArray:
+def _interpolate(
+    time: FloatArray, corners: tuple[float, ...], values: tuple[float, ...]
+) -> FloatArray:
     return np.asarray(np.interp(time, corners, values), dtype=np.float64)
 
 
-def _under_pressure(level: FloatArray, disturbance: FloatArray) -> FloatArray:
-    """The disturbance where there is pressure; never below zero [bar]."""
+def _add_disturbance(level: FloatArray, disturbance: FloatArray) -> FloatArray:
+    """Add the disturbance wherever there is pressure; never below zero [bar]."""
     return np.clip(np.where(level > 0.0, level + disturbance, 0.0), 0.0, None)
