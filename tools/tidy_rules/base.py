@@ -9,10 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-
 PACKAGE = "python/drivetwin"
 
 
@@ -72,17 +68,25 @@ Edges = set[tuple[str, str]]
 
 def find_circles(edges: Edges) -> list[list[str]]:
     """Return the strongly connected sets of more than one node, the largest first."""
-    names = sorted({name for edge in edges for name in edge})
-    if not names:
-        return []
-    index = {name: number for number, name in enumerate(names)}
-    rows, columns = np.array([(index[a], index[b]) for a, b in edges]).T
-    graph = coo_array((np.ones(rows.size), (rows, columns)), shape=(len(names), len(names)))
-    _, labels = connected_components(graph, connection="strong")
-    sets: dict[int, list[str]] = {}
-    for name, label in zip(names, labels.tolist(), strict=True):
-        sets.setdefault(label, []).append(name)
-    return sorted((one for one in sets.values() if len(one) > 1), key=len, reverse=True)
+    after: dict[str, set[str]] = {}
+    for start, end in edges:
+        after.setdefault(start, set()).add(end)
+    reached: dict[str, set[str]] = {}
+    for start in after:
+        seen: set[str] = set()
+        ahead = [*after[start]]
+        while ahead:
+            name = ahead.pop()
+            if name not in seen:
+                seen.add(name)
+                ahead += after.get(name, ())
+        reached[start] = seen
+    circles = {
+        frozenset(other for other in reached[name] if name in reached.get(other, ()))
+        for name in reached
+        if name in reached[name]
+    }
+    return sorted((sorted(circle) for circle in circles), key=len, reverse=True)
 
 
 def read_tree(root: Path) -> Tree:
