@@ -75,7 +75,7 @@ def measure_pair(seed: int) -> Outcomes:
 
 
 def _draw_card(card: VehicleCard, made: Scenario, seed: int) -> VehicleCard:
-    """The card with a design value of Jo′ that errs as its standard deviation says."""
+    """Draw a card whose design value of Jo′ errs by its standard deviation."""
     std = J_OUT_SPREAD * made.model.J_out
     value = made.model.J_out + std * float(np.random.default_rng(seed).standard_normal())
     return replace(card, J_out=PriorValue(value, std))

@@ -38,13 +38,13 @@ class Example:
             raise FileNotFoundError(self.path)
 
     def store(self, name: str, scenario: Scenario) -> Path:
-        """Scenario as a file."""
+        """Write a scenario to a file."""
         path = self.folder / f"{name}.json"
         path.write_text(scenario.write_json(), encoding="utf-8")
         return path
 
     def run(self, scenario: Path, repeats: int, which: str) -> Sample:
-        """Seconds of `which` (`again`, `first` or `whole`) runs, and the solution."""
+        """Run a scenario; return the seconds of `which` (`again`, `first`, `whole`) and the solution."""
         command = [str(self.path), str(scenario), str(_WARMING + repeats)]
         done = subprocess.run(command, check=True, capture_output=True, text=True)
         result = json.loads(done.stdout)

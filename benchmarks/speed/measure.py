@@ -65,7 +65,7 @@ class Measured:
 
     @property
     def quality(self) -> Quality | None:
-        """How far the last solution is off."""
+        """Error of the last solution."""
         return None if self.solution is None else self.entry.judge(self.solution)
 
     @property
@@ -90,7 +90,7 @@ def time_runs(run: Callable[[], Solution], repeats: int) -> Sample:
 
 
 def measure(entries: Sequence[Entry], rounds: int, tell: Callable[[str], None]) -> list[Measured]:
-    """Go round all entries `rounds` times, one after the other."""
+    """Run all entries in turns, `rounds` times."""
     found = [Measured(entry) for entry in entries]
     for number in range(rounds):
         for one in found:

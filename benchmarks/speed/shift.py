@@ -39,7 +39,7 @@ DERIVED = f"{len(PARAMETERS)} parameters, called from Python"
 
 
 def compare_with(reference: Solution) -> Judge:
-    """Largest deviation of T_o, and of an event where all are found."""
+    """Return a judge: largest errors of T_o, and of an event if all are found."""
 
     def compare(found: Solution) -> Quality:
         error = float(np.abs(found.columns[3] - reference.columns[3]).max())
@@ -51,7 +51,7 @@ def compare_with(reference: Solution) -> Judge:
 
 
 def make_entries(of: Problem, given: Inputs, reference: Judge, example: Example) -> list[Entry]:
-    """Four outputs on the 1 ms grid, with default settings."""
+    """Return the entries: four outputs on the 1 ms grid, with default settings."""
     path = example.store("shift", build_scenario(of, given))
     model, signals, begin = build_model(of), build_signals(given), build_state(of, given)
     torque = signals.pop(ENGINE_TORQUE)
