@@ -44,7 +44,7 @@ class Example:
         return path
 
     def run(self, scenario: Path, repeats: int, which: str) -> Sample:
-        """Run a scenario; return the seconds of `which` (`again`, `first`, `whole`) and the solution."""
+        """Run a scenario; return seconds of `which` (`again`, `first`, `whole`) and solution."""
         command = [str(self.path), str(scenario), str(_WARMING + repeats)]
         done = subprocess.run(command, check=True, capture_output=True, text=True)
         result = json.loads(done.stdout)
