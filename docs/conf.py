@@ -60,7 +60,7 @@ def escape_plain_text(
             for index, part in enumerate(parts)
         )
     if what in ("attribute", "property"):  # else napoleon takes text before a colon for a type
-        lines.insert(0, "")
+        lines.insert(0, "\\ ")
 
 
 def setup(app: Any) -> None:
