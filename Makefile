@@ -69,10 +69,6 @@ test-wheel: wheel ## run the demo from the wheel where there is no Rust
 notices: $(venv)/.dev ## write the licences of the linked crates, after a change of Cargo.lock
 	$(bin)/python -m tools.notices
 
-.PHONY: api
-api: $(venv)/.native ## write the page of the Python names, docs/reference/python.md
-	$(bin)/python -m tools.api
-
 .PHONY: reference
 reference: $(venv)/.native ## solve the reference problems anew with SciPy
 	$(bin)/python -m reference
@@ -145,3 +141,9 @@ $(venv)/.dev: pyproject.toml | prerequisites
 $(venv)/.native: $(venv)/.dev $(rust_sources)
 	VIRTUAL_ENV=$(CURDIR)/$(venv) $(bin)/maturin develop --quiet --release --locked
 	touch $@
+
+.PHONY: docs
+docs: $(venv)/.native ## build the documentation site into out/docs, warnings are errors
+	$(pip) install --quiet --group docs
+	$(bin)/python -m sphinx --quiet --fail-on-warning --keep-going -E -b html docs out/docs
+	cp out/docs/README.html out/docs/index.html
