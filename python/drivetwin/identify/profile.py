@@ -18,11 +18,10 @@ import numpy as np
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.identify.likelihood.derived import parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.newton import minimise
 from drivetwin.identify.likelihood.noise_power import noise_power
-from drivetwin.identify.likelihood.problem import Normal, Problem
-from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import REMEDY
+from drivetwin.identify.optimize.gauss_newton import minimise, minimise_constrained
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.result import Z95, Identification
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.progress import tell
@@ -35,10 +34,6 @@ FURTHEST = 10.0
 """Standard deviations at which a side that does not close is given up: the interval is open."""
 RISE = 3.841
 """Rise of Q at the ends of a 95 % interval: chi-squared of one degree of freedom."""
-SETTLED = 1e-2
-"""Fall of Q that ends the search at one value."""
-SEARCHES = 8
-"""Most steps at one value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +139,22 @@ class _Held:
         return noise_power(self.fit, self.row(self.fit.point)[None, :])
 
 
+class _Target:
+    """Constraint that a parameter has `value`."""
+
+    def __init__(self, held: _Held, value: float) -> None:
+        self.held, self.value = held, value
+        self.tolerance = 1e-3 * held.std
+
+    def miss(self, point: Point) -> float:
+        """Compute the required minus the actual value of the parameter."""
+        return self.value - self.held.value(point)
+
+    def slope(self, point: Point) -> FloatArray:
+        """Compute the derivative (p,) of the parameter by the unknowns."""
+        return self.held.row(point)
+
+
 def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
     """(distance in standard deviations, rise of Q) from the minimum outwards."""
     fit = held.fit
@@ -154,28 +165,13 @@ def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
     while distance < FURTHEST and (distance < REACH or found[-1][1] < RISE):
         distance += STEP
         value = estimate + sign * distance * std
-        reached = _polished(held, _least(held, point, value), value)
+        lowest_there = minimise_constrained(fit.problem, point, _Target(held, value))
+        reached = _polished(held, lowest_there, value)
         if reached is None:
             break
         point, cost = reached
         found.append((sign * distance, (cost - lowest) / unit))
     return found
-
-
-def _least(held: _Held, start: Point, value: float) -> tuple[Point, float] | None:
-    """The point of least Q at which the parameter has `value`; None where simulations fail."""
-    problem, point = held.fit.problem, start
-    cost = float("inf")
-    for _ in range(SEARCHES):
-        normal = problem.normal(point)
-        if normal is None:
-            return None
-        if cost - normal.cost < SETTLED and abs(held.value(point) - value) < 1e-3 * held.std:
-            return point, normal.cost
-        cost = normal.cost
-        step = _constrained(normal, held.row(point), value - held.value(point))
-        point = _within(problem, point, step)
-    return point, problem.cost(point)
 
 
 def _polished(
@@ -194,21 +190,6 @@ def _polished(
     point = found.point
     cost = found.normal.cost - prior.cost(point.values) + problem.prior.cost(point.values)
     return (point, cost) if cost < reached[1] else reached
-
-
-def _constrained(normal: Normal, row: FloatArray, wanted: float) -> FloatArray:
-    """Gauss-Newton step (p,) that moves the parameter by `wanted` and is else the best."""
-    scale = np.sqrt(np.maximum(np.diag(normal.information), 1e-300))
-    unit = normal.information / np.outer(scale, scale)
-    free = np.linalg.lstsq(unit, -normal.gradient / scale, rcond=1e-13)[0]
-    along = np.linalg.lstsq(unit, row / scale, rcond=1e-13)[0]
-    short = wanted - float(row / scale @ free)
-    return np.asarray((free + along * (short / float(row / scale @ along))) / scale)
-
-
-def _within(problem: Problem, point: Point, step: FloatArray) -> Point:
-    """The point after `step`, unknowns held within their bounds."""
-    return point.moved(np.clip(point.values + step, problem.lower, problem.upper))
 
 
 def _crossing(values: FloatArray, rise: FloatArray) -> float:

@@ -13,7 +13,7 @@ from drivetwin.identify.likelihood.derived import parameters
 from drivetwin.identify.likelihood.fit import fit
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.vehicle.spec import PriorValue
 from tests.identify.likelihood.made import bench, fitted, truth_of
 

@@ -16,7 +16,7 @@ import numpy as np
 from drivetwin.driveline import Signal
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import LATEST, Output, Record
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray
 
 STEPS = (1.0, 1.3, 0.5, 1.2, 0.4, 1.1, 0.8, 1.0)

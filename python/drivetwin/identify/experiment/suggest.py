@@ -22,9 +22,9 @@ from drivetwin.identify.likelihood.derived import of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.noise_power import noise_power
 from drivetwin.identify.likelihood.null_space import reduced
-from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.method import Method
 from drivetwin.identify.momentum import MomentumSettings
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Z95, Estimate, Identification, Verdict
 from drivetwin.identify.signals import FloatArray, ShiftSignals

@@ -10,7 +10,7 @@ import numpy as np
 from drivetwin.driveline import Trajectory
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.response import direction
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray
 
 SLIPPING = 1e-6

@@ -14,7 +14,8 @@ import numpy as np
 
 from drivetwin.driveline import in_series
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import OWN, Point, Structure
+from drivetwin.identify.likelihood.unknowns import OWN, Structure
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.parameters import OVER_ETA, spec_of
 

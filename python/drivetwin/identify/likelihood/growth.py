@@ -17,10 +17,11 @@ from scipy.stats import truncnorm
 from drivetwin.identify.conclude import growth_told
 from drivetwin.identify.likelihood.fit import LikelihoodFit, spread_of
 from drivetwin.identify.likelihood.hills import with_one_load
-from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import AERO, Point
+from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.load import SIGNIFICANT
+from drivetwin.identify.optimize.gauss_newton import step_of
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray
 
 

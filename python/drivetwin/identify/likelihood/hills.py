@@ -13,8 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.unknowns import DEPARTURE, Point
+from drivetwin.identify.likelihood.unknowns import DEPARTURE
 from drivetwin.identify.load import are_one
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray
 
 

@@ -29,14 +29,14 @@ from itertools import product
 
 import numpy as np
 
-from drivetwin.identify.likelihood.fit import FAR, LikelihoodFit, nearest
-from drivetwin.identify.likelihood.newton import step_of
+from drivetwin.identify.likelihood.fit import MULTI_START, LikelihoodFit, nearest
 from drivetwin.identify.likelihood.output_error import in_lower_gear
-from drivetwin.identify.likelihood.problem import Normal, Part, Problem
+from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
 from drivetwin.identify.likelihood.score import score_of
-from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import OutOfWork
+from drivetwin.identify.optimize.gauss_newton import step_of
+from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.result import Z95
 from drivetwin.identify.signals import FloatArray
 from drivetwin.shifts.shift import Shift
@@ -109,7 +109,7 @@ def _told_near(problem: Problem, point: Point) -> frozenset[str] | None:
     """The kinds that promise least from `point`; None where it is far from the measurement."""
     weighted = problem.weighted_by(point)
     normal = weighted.normal(point)
-    if normal is None or normal.cost > FAR * problem.size:
+    if normal is None or normal.cost > MULTI_START.far_chi2 * problem.size:
         return None
     return _promising(weighted, point, normal)
 

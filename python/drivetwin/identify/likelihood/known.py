@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from drivetwin.errors import InputError
-from drivetwin.identify.likelihood.unknowns import COMMON, Point, Tie
+from drivetwin.identify.likelihood.unknowns import COMMON, Tie
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.parameters import OVER_ETA

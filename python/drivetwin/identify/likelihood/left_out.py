@@ -21,11 +21,11 @@ from drivetwin.identify.conclude import with_systematic_band
 from drivetwin.identify.friction import stribeck
 from drivetwin.identify.likelihood.contact import carried_slip, contact_of
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of, spread_of
-from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.score import score_of
 from drivetwin.identify.likelihood.smooth import local_mean
 from drivetwin.identify.likelihood.unknowns import LAW
+from drivetwin.identify.optimize.gauss_newton import step_of
 from drivetwin.identify.result import Z95, Estimate, FrictionCurve
 from drivetwin.identify.signals import FloatArray, Sampled
 from drivetwin.identify.uncertainty import doubted

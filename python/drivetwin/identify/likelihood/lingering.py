@@ -19,8 +19,8 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.kinds import TIE, WORSE
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.smooth import ABOUT
-from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import OutOfWork
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.result import Z95
 from drivetwin.progress import part as share_of
 

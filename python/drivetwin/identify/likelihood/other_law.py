@@ -13,7 +13,7 @@ from dataclasses import replace
 from drivetwin.display import in_units
 from drivetwin.driveline import LossLaw
 from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.newton import step_of
+from drivetwin.identify.optimize.gauss_newton import step_of
 from drivetwin.identify.result import Z95
 from drivetwin.identify.signals import FloatArray
 from drivetwin.parameters import spec_of

@@ -31,12 +31,12 @@ from drivetwin.identify.likelihood.unknowns import (
     LAW,
     START,
     TE_OFFSET,
-    Point,
     Structure,
     own_of,
 )
 from drivetwin.identify.load import AERO_SPREAD, mean_speed_of
 from drivetwin.identify.momentum import DELAY_STD_MAX, MomentumSettings, rounding_error
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
 from drivetwin.parameters import SPECS

@@ -25,8 +25,9 @@ from drivetwin.errors import InputError
 from drivetwin.identify.likelihood.covariance import Whiteness, sensor_noise, with_input_noise
 from drivetwin.identify.likelihood.record import TORQUE, Record
 from drivetwin.identify.likelihood.response import Response, observed, response_of
-from drivetwin.identify.likelihood.unknowns import TE_OFFSET, Point, Structure
+from drivetwin.identify.likelihood.unknowns import TE_OFFSET, Structure, retract
 from drivetwin.identify.likelihood.work import EXPANSION, RUN, WEIGHTING, spend
+from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import FloatArray
 
@@ -200,22 +201,6 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Normal:
-    """Q and its Gauss-Newton expansion at one point: gradient (p,), information (p, p).
-
-    `data` (p, p) is the information of the measurements alone. Per part: `residuals` (n,) and the
-    weighted derivatives `regressors` (n, p), Σ⁻¹ times those of the simulated samples.
-    """
-
-    cost: float
-    gradient: FloatArray
-    information: FloatArray
-    data: FloatArray
-    residuals: tuple[FloatArray, ...]
-    regressors: tuple[FloatArray, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class Problem:
     """All parts with the prior and bounds of their unknowns; `lower`, `upper` (p,)."""
 
@@ -276,6 +261,10 @@ class Problem:
                 return float("inf")
             total += square
         return total
+
+    def retract(self, point: Point, step: FloatArray) -> FloatArray:
+        """Compute the values (p,) after a `step` (p,); friction laws move along their valley."""
+        return retract(point, step)
 
     def normal(self, point: Point) -> Normal | None:
         """Expansion of Q at `point`; None where a simulation fails."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.identify.likelihood.problem import Normal, Problem
+from drivetwin.identify.likelihood.problem import Problem
+from drivetwin.identify.optimize.objective import Normal
 from drivetwin.identify.signals import FloatArray
 
 

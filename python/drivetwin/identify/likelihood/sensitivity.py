@@ -16,7 +16,7 @@ import numpy as np
 from drivetwin.identify.likelihood.derived import parameters
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.result import FrictionCurve
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.logs.pressure import pressure_role

@@ -16,7 +16,7 @@ from drivetwin.driveline import Trajectory
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import TORQUE, Output, columns_of
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray
 from drivetwin.logs.pressure import pressed_element
 from drivetwin.vehicle.spec import SensorTolerance

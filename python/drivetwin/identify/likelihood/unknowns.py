@@ -18,7 +18,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivetwin.driveline import DualClutch, LossLaw, RoadLoad, ShiftElement, State, Stribeck
+from drivetwin.identify.friction import stribeck
 from drivetwin.identify.load import AERO as AERO
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import Coupling, Driveline, FloatArray
 
 COMMON = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
@@ -35,23 +37,10 @@ START = ("speed", "wheel_speed", "twist")
 DEPARTURE = "load"
 """Unknown of each shift but the first of a log on a hilly road: d, its load at the output shaft
 less the mean over the shifts of the log [N m]."""
+RETRACTION_SLIPS = np.array([2.0, 25.0, 80.0])
+"""Slips [rad/s] at which a law takes its step: near lock-up, in the middle, at the start."""
 OF_RUN = (*START, DEPARTURE)
 """All unknowns that belong to the run of one shift, by what follows its label and the dot."""
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """One set of values of all unknowns by name; immutable."""
-
-    names: tuple[str, ...]
-    values: FloatArray
-
-    def __getitem__(self, name: str) -> float:
-        return float(self.values[self.names.index(name)])
-
-    def moved(self, values: FloatArray) -> Point:
-        """The same unknowns at other `values` (p,)."""
-        return Point(self.names, values)
 
 
 def own_of(log: int) -> dict[str, str]:
@@ -216,3 +205,23 @@ class Structure:
             table[f"{one.name}.drum"] = [(f"{one.name}.drum_inertia", 1.0)]
         for known, slope in table.get(name, ()):
             yield known, name, slope
+
+
+def retract(point: Point, step: FloatArray) -> FloatArray:
+    """Compute the values (p,) after a `step` (p,), straight in the friction laws' own values.
+
+    The four coefficients of a Stribeck law nearly compensate each other if v_s is as large as the
+    slips that occur. The valley of Q is then curved in the coefficients, and straight in the
+    values of the law at three slips with ln v_s as the fourth coordinate.
+    """
+    values = point.values + step
+    for name in point.names:
+        element, _, key = name.rpartition(".")
+        if key != LAW[-1]:
+            continue
+        index = [point.names.index(f"{element}.{coefficient}") for coefficient in LAW]
+        mu, slopes = stribeck(point.values[index], RETRACTION_SLIPS)
+        target = mu + slopes.T @ step[index]
+        _, linear = stribeck(values[index], RETRACTION_SLIPS)
+        values[index[:-1]] = np.linalg.solve(linear[:-1].T, target)
+    return values

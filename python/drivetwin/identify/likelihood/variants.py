@@ -17,8 +17,7 @@ from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood import growth
 from drivetwin.identify.likelihood.fit import (
-    GOOD,
-    RESTARTS,
+    MULTI_START,
     Hopeless,
     LikelihoodFit,
     checked,
@@ -36,8 +35,9 @@ from drivetwin.identify.likelihood.kinds import (
 from drivetwin.identify.likelihood.lingering import lowest
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import AERO, Point
+from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.likelihood.work import OutOfWork, at_most
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
@@ -120,9 +120,11 @@ def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Like
     Raises IdentificationError where it does not converge with the likeliest kinds.
     """
     likely, other = likely_kinds(problem, start, shifts)
-    best = _tried(likely, start, shifts) or fit(other, start, shifts, restarts=RESTARTS[:1])
+    best = _tried(likely, start, shifts) or fit(
+        other, start, shifts, restarts=MULTI_START.shaft_factors[:1]
+    )
     best = with_best_kinds(problem, best)
-    if best.chi2 < GOOD:
+    if best.chi2 < MULTI_START.accept_chi2:
         return best
     second = checked(best, problem.of_kinds(best.problem.kinds), start, shifts)
     return best if second is best else with_best_kinds(problem, second)

@@ -25,7 +25,7 @@ from drivetwin.identify.design import outside_ranges, without_gain
 from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.inputs import driveline_behind, tolerances_of
 from drivetwin.identify.likelihood.conclude import conclude
-from drivetwin.identify.likelihood.fit import PLAUSIBLE, LikelihoodFit, covariance_of
+from drivetwin.identify.likelihood.fit import MULTI_START, LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.unknowns import AERO, OF_RUN, OWN, own_of
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.method import Method
@@ -210,7 +210,7 @@ def _refuse_apart(alone: Sequence[Identification]) -> None:
     for names, values, information in told:
         away = values - np.array([mean[name] for name in names])
         excess += float(away @ information @ away)
-    if excess > (PLAUSIBLE - 1.0) * sum(fit.problem.size for fit in fits):
+    if excess > (MULTI_START.plausible_chi2 - 1.0) * sum(fit.problem.size for fit in fits):
         raise IdentificationError(f"they disagree by χ² {excess:.3g}", "")
 
 

@@ -24,11 +24,12 @@ from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import driveline_behind
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.guess import TYPICAL_LAW
-from drivetwin.identify.likelihood.newton import minimise
-from drivetwin.identify.likelihood.output_error import CLEAR
+from drivetwin.identify.likelihood.output_error import STAGED_START
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Part, Problem
-from drivetwin.identify.likelihood.unknowns import AERO, LAW, OWN, START, Point, own_of
+from drivetwin.identify.likelihood.unknowns import AERO, LAW, OWN, START, own_of
+from drivetwin.identify.optimize.gauss_newton import minimise
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import root_of
@@ -81,7 +82,9 @@ def expected(
     problem, point = problem_of(held, drivelines, card.loss_law, _known(fit, drivelines))
     problem = problem.of_kinds(fit.problem.kinds)
     unseen = _unseen(fit, problem, point)
-    before = _before(problem, point, unseen, [s.shift.before[1] - CLEAR for s in held])
+    before = _before(
+        problem, point, unseen, [s.shift.before[1] - STAGED_START.clearance for s in held]
+    )
     point, own = before.point, own_of(held[0].log)
     std = np.sqrt(np.diag(before.own))
     told = {

@@ -18,10 +18,11 @@ from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.curves import POINTS
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.priors import spans
-from drivetwin.identify.likelihood.problem import Normal, Part, Problem
+from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import Record, record_of
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
-from drivetwin.identify.likelihood.unknowns import LAW, Point
+from drivetwin.identify.likelihood.unknowns import LAW
+from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.result import Z95, FrictionCurve, Identification

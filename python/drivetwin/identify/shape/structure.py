@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from drivetwin.driveline import FrictionTable, ShiftElement
-from drivetwin.identify.likelihood.unknowns import Point, Structure
+from drivetwin.identify.likelihood.unknowns import Structure
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import Coupling, FloatArray
 
 
