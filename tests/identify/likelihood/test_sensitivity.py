@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.identify.likelihood.curves import curves_of
-from drivetwin.identify.likelihood.sensitivity import Sensitivity, sensitivity
+from drivetwin.identify.likelihood.tolerance import Sensitivity, sensitivity
 from tests.identify.likelihood.made import bench, fitted
 
 

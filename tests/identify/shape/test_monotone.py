@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivetwin.identify.shape.fit import shaped
 from drivetwin.identify.shape.kind import Shape
-from drivetwin.identify.shape.monotone import shaped
 
 
 @settings(max_examples=40, deadline=None)

@@ -15,8 +15,7 @@ from drivetwin.identify.likelihood.derived import absolute_ids, of_log, paramete
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.hills import loads_of
 from drivetwin.identify.likelihood.left_out import left_out
-from drivetwin.identify.likelihood.limits import at_limits
-from drivetwin.identify.likelihood.null_space import null_directions
+from drivetwin.identify.likelihood.null_space import at_limits, null_directions
 from drivetwin.identify.likelihood.other_law import other_law_in_words
 from drivetwin.identify.likelihood.priors import over_eta
 from drivetwin.identify.likelihood.residuals import against, residual_tests, unweighted

@@ -30,10 +30,10 @@ from itertools import product
 import numpy as np
 
 from drivetwin.identify.likelihood.fit import MULTI_START, LikelihoodFit, nearest
+from drivetwin.identify.likelihood.left_out import score_of
 from drivetwin.identify.likelihood.output_error import in_lower_gear
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
-from drivetwin.identify.likelihood.score import score_of
 from drivetwin.identify.likelihood.work import OutOfWork
 from drivetwin.identify.optimize.gauss_newton import step_of
 from drivetwin.identify.optimize.objective import Normal, Point

@@ -11,12 +11,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from drivetwin.display import in_units
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.unknowns import LAW
 from drivetwin.identify.signals import FloatArray
+from drivetwin.parameters import spec_of
 
 LOOSE = 0.2
 """Relative standard deviation along a direction from which it counts as not told."""
+AT = 1e-3
+"""Distance from a bound, in standard deviations, within which an unknown stands on it."""
 SHARE = 0.3
 """Share of a parameter in a direction from which it is named."""
 NAMED = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "mu_c", "P0", "drum")
@@ -65,3 +69,21 @@ def _shown(name: str) -> str:
     element, _, key = name.rpartition(".")
     symbol = SHOWN.get(key, {"mu_c": "μ", "drum": "drum inertia"}.get(key, key))
     return f"{symbol} of {element}" if element else symbol
+
+
+def at_limits(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -> dict[str, str]:
+    """What is said, by id, of parameters that are an unknown on one of its bounds.
+
+    `slopes` (q, p) is the derivative of the parameters `ids` by the unknowns of the fit.
+    """
+    values, near = fit.point.values, AT * np.sqrt(np.diag(fit.covariance))
+    below, above = values <= fit.problem.lower + near, values >= fit.problem.upper - near
+    found = {}
+    for name, row in zip(ids, slopes, strict=True):
+        (acting,) = np.nonzero(row)
+        if acting.size != 1 or not (below | above)[acting[0]]:
+            continue
+        side = "more" if above[acting[0]] else "less"
+        limit = in_units(float(values[acting[0]]), spec_of(name).unit)
+        found[name] = f"{limit} is the limit of the search: the log speaks for {side}"
+    return found

@@ -13,14 +13,9 @@ from itertools import groupby
 import numpy as np
 
 from drivetwin.driveline import LossLaw
+from drivetwin.errors import InputError
 from drivetwin.identify.friction import LAW_PRIOR
 from drivetwin.identify.likelihood.carriers import all_carriers
-from drivetwin.identify.likelihood.known import (
-    gear_inertias,
-    known_unknowns,
-    tie_of,
-    with_gear_inertias,
-)
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import LATEST, record_of
 from drivetwin.identify.likelihood.smooth import local_mean
@@ -32,6 +27,7 @@ from drivetwin.identify.likelihood.unknowns import (
     START,
     TE_OFFSET,
     Structure,
+    Tie,
     own_of,
 )
 from drivetwin.identify.load import AERO_SPREAD, mean_speed_of
@@ -39,7 +35,7 @@ from drivetwin.identify.momentum import DELAY_STD_MAX, MomentumSettings, roundin
 from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
-from drivetwin.parameters import SPECS
+from drivetwin.parameters import OVER_ETA, SPECS
 from drivetwin.shifts.divided import divided
 from drivetwin.vehicle.spec import PriorValue
 
@@ -59,6 +55,7 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
 """Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
 PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
 """Efficiency of a gearbox where no output torque shows it."""
+_GEAR_INERTIA = "J_prime_"
 OFF_DESIGN = 10.0
 """Factor beside the card's Jo′ within which it is sought. Of all inertias it alone may be so small
 that with the shaft's damping one run takes as long as a whole fit."""
@@ -250,3 +247,72 @@ def _priors(
 
 def _is_known(prior: PriorValue | None) -> bool:
     return prior is not None and prior.std == 0.0
+
+
+def known_unknowns(driveline: Driveline, scale_known: bool) -> dict[str, PriorValue]:
+    """Priors of unknowns that are parameters themselves; `std` 0: known.
+
+    Without an output torque the unknowns are the quantities over η, and only what is known of
+    those counts.
+    """
+    found = {}
+    for name, prior in driveline.known.items():
+        unknown = name.removesuffix(OVER_ETA)
+        told = scale_known if unknown == name else not scale_known
+        if unknown in COMMON and (told or unknown == "te_delay"):
+            found[unknown] = prior
+    return found
+
+
+def gear_inertias(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]
+) -> list[tuple[float, PriorValue]]:
+    """Overall ratio of each gear whose J′ is known, with the known value [kg m^2]."""
+    ending = "" if signals[0].scale_known else OVER_ETA
+    ratios: dict[str, float] = {}
+    for s, d in zip(signals, drivelines, strict=True):
+        ratios |= {s.shift.start_gear: d.i_before, s.shift.end_gear: d.i_after}
+    known = drivelines[0].known
+    return [
+        (ratio, known[name])
+        for gear, ratio in ratios.items()
+        if (name := f"{_GEAR_INERTIA}{gear}{ending}") in known
+    ]
+
+
+def tie_of(inertias: Sequence[tuple[float, PriorValue]]) -> Tie | None:
+    """The tie of Je to Jo′ by a J′ that is exactly known.
+
+    Raises InputError for two: between them Jo′ would follow, which has an entry of its own.
+    """
+    exact = [Tie(prior.value, ratio) for ratio, prior in inertias if prior.std == 0.0]
+    if len(exact) > 1:
+        raise InputError(
+            f"J′ of {len(exact)} gears are fixed, and all follow from one inertia and J_out",
+            "fix J′ of one gear, and J_out if it is known",
+        )
+    return exact[0] if exact else None
+
+
+def with_gear_inertias(
+    prior: Prior,
+    point: Point,
+    fixed: Mapping[str, float],
+    inertias: Sequence[tuple[float, PriorValue]],
+) -> Prior:
+    """The prior with what is known of J′ as sums of Je and Jo′."""
+    soft = [(ratio, known) for ratio, known in inertias if known.std > 0.0]
+    if not soft or "J_e" not in point.names:
+        return prior
+    place = [point.names.index(name) for name in ("J_e", "J_out") if name in point.names]
+    precision, mean = prior.precision.copy(), prior.mean.copy()
+    inner = precision[np.ix_(place, place)]
+    pull = inner @ mean[place]
+    for ratio, known in soft:
+        row: FloatArray = np.array([1.0, ratio**-2][: len(place)])
+        rest = 0.0 if len(place) == 2 else fixed["J_out"] / ratio**2
+        inner = inner + np.outer(row, row) / known.std**2
+        pull = pull + row * (known.value - rest) / known.std**2
+    precision[np.ix_(place, place)] = inner
+    mean[place] = np.linalg.lstsq(inner, pull, rcond=None)[0]
+    return Prior(mean, precision)

@@ -24,8 +24,8 @@ import numpy as np
 
 from drivetwin.identify.likelihood.contact import Contact, contact_of
 from drivetwin.identify.likelihood.fit import LikelihoodFit, spread_of
+from drivetwin.identify.likelihood.left_out import score_of
 from drivetwin.identify.likelihood.problem import Part
-from drivetwin.identify.likelihood.score import score_of
 from drivetwin.identify.optimize.gauss_newton import minimise, step_of
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification

@@ -8,12 +8,13 @@ and prior, MacKay 1992).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
-from drivetwin.driveline import FrictionTable, Stribeck
+from drivetwin.driveline import FrictionTable, ShiftElement, Stribeck
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.curves import POINTS
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
@@ -21,15 +22,13 @@ from drivetwin.identify.likelihood.priors import spans
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import Record, record_of
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
-from drivetwin.identify.likelihood.unknowns import LAW
+from drivetwin.identify.likelihood.unknowns import LAW, Structure
 from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.result import Z95, FrictionCurve, Identification
 from drivetwin.identify.shape.kind import Shape
-from drivetwin.identify.shape.monotone import shaped
-from drivetwin.identify.shape.structure import Shaped, Table
-from drivetwin.identify.signals import FloatArray, ShiftSignals, Span
+from drivetwin.identify.signals import Coupling, FloatArray, ShiftSignals, Span
 from drivetwin.vehicle.spec import SensorTolerance
 
 KNOTS = 12
@@ -39,6 +38,38 @@ LEAST = 1e-3
 """Least μ at a knot."""
 LEVEL = (0.12, 0.2)
 """Wide prior of μ at every knot."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Knots (K,) of |slip| [rad/s], the first 0, between which μ is linear."""
+
+    knots: FloatArray
+
+    def names(self, element: str) -> tuple[str, ...]:
+        """Unknowns of an element: its μ at the knots."""
+        return tuple(f"{element}.mu.{k}" for k in range(self.knots.size))
+
+
+@dataclass(frozen=True, eq=False)
+class Shaped(Structure):
+    """A structure whose `tables` take the place of laws, by element."""
+
+    tables: Mapping[str, Table] = field(default_factory=dict)
+
+    def _element(self, point: Point, one: Coupling) -> ShiftElement:
+        element = super()._element(point, one)
+        if one.name not in self.tables:
+            return element
+        table = self.tables[one.name]
+        mu = tuple(point[name] for name in table.names(one.name))
+        return replace(element, friction=FrictionTable(tuple(table.knots.tolist()), mu))
+
+    def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
+        yield from super()._entries(point, name)
+        element, _, key = name.partition(".")
+        if element in self.tables and key.startswith("mu."):
+            yield name, name, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,3 +241,21 @@ def _curve(
         stribeck_covariance=None,
         method=f"likelihood, {shape} shape",
     )
+
+
+def shaped(shape: Shape, mu: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """μ (K,) at the knots and its covariance (K, K) under `shape`, from those of a free fit."""
+    if shape is Shape.FREE:
+        return mu, covariance
+    matrix = np.tril(np.ones((mu.size, mu.size)))
+    if shape is Shape.FALLING:
+        matrix = matrix[::-1]
+    scale = np.sqrt(np.diag(covariance))
+    root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale)))
+    weighted = root @ (matrix / scale[:, None])
+    lower = np.concatenate([[-np.inf], np.zeros(mu.size - 1)])
+    found = lsq_linear(weighted, root @ (mu / scale), bounds=(lower, np.inf), tol=1e-12)
+    moving = np.flatnonzero(found.active_mask == 0)
+    inverse = np.linalg.inv(weighted[:, moving].T @ weighted[:, moving])
+    within = matrix[:, moving] @ inverse @ matrix[:, moving].T
+    return np.asarray(matrix @ found.x), np.asarray(within)
