@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Profile likelihood of one parameter: least Q over all others while it is held.
+"""Profile likelihood of one parameter: minimum of Q over all others while it is fixed.
 
     Q_p(v) = min over θ with q(θ) = v of Q(θ)
 
@@ -54,7 +54,7 @@ class Profile:
 
 
 def profile(found: Identification, parameter: str) -> Profile:
-    """The profile of a parameter of a likelihood identification.
+    """Compute the profile of a parameter of a likelihood identification.
 
     Raises InputError for a parameter that the fit does not have or that is known from design, and
     IdentificationError where the identification is by another method.
@@ -85,7 +85,7 @@ def profile(found: Identification, parameter: str) -> Profile:
 
 
 def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftSignals]]:
-    """The fit behind an identification and the signals it used.
+    """Return the fit behind an identification and its signals.
 
     Raises IdentificationError where it is by another method, or the likelihood method gave up.
     """
@@ -105,7 +105,7 @@ def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftS
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """A fit with one parameter to be held, by its place among the reported ones and its name."""
+    """Fit with one parameter to be fixed, by its index among the reported ones and its name."""
 
     fit: LikelihoodFit
     signals: Sequence[ShiftSignals]
@@ -113,11 +113,11 @@ class _Held:
     parameter: str
 
     def value(self, point: Point) -> float:
-        """The parameter at `point`."""
+        """Compute the parameter at `point`."""
         return list(parameters(self.fit.problem, point, self.signals).values())[self.place]
 
     def row(self, point: Point) -> FloatArray:
-        """Its derivative (p,) by the unknowns."""
+        """Compute its derivative (p,) by the unknowns."""
         std = np.sqrt(np.diag(self.fit.covariance))
         return np.asarray(slopes(self.fit.problem, point, std, self.signals)[self.place])
 
@@ -156,7 +156,7 @@ class _Target:
 
 
 def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
-    """(distance in standard deviations, rise of Q) from the minimum outwards."""
+    """Compute (distance in standard deviations, rise of Q) from the minimum outwards."""
     fit = held.fit
     lowest, unit = fit.normal.cost, held.unit
     estimate, std, point = held.estimate, held.std, fit.point
@@ -177,8 +177,10 @@ def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
 def _polished(
     held: _Held, reached: tuple[Point, float] | None, value: float
 ) -> tuple[Point, float] | None:
-    """The same or a lower point, where the parameter is itself an unknown of the fit: locks make
-    kinks in Q, at which the plain steps can stop early."""
+    """Search on for a lower point if the parameter is itself an unknown of the fit.
+
+    Locks make kinks in Q, at which the constrained steps can stop early.
+    """
     problem = held.fit.problem
     if reached is None or held.parameter not in held.fit.point.names:
         return reached
@@ -193,7 +195,7 @@ def _polished(
 
 
 def _crossing(values: FloatArray, rise: FloatArray) -> float:
-    """Value at which the rise passes `RISE` outwards; infinite where it does not."""
+    """Find the value at which the rise passes `RISE` outwards; infinite if it does not."""
     outwards = float(np.sign(float(values[-1]) - float(values[0])))
     start = int(np.argmin(np.abs(rise)))
     for k in range(start, values.size - 1):

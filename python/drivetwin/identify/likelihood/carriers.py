@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Which elements of a shift slip under load so long that the log shows their friction over slip.
+"""Elements of a shift whose friction law is identifiable, because they slip under load long enough.
 
-The one that comes on always does. One that lets go does where it holds the engine back while the
+The on-coming element always does. An off-going element does if it holds the engine back while the
 speed passes to the other gear: in a power-on downshift and a power-off upshift.
 """
 
@@ -22,7 +22,7 @@ tell μ from P0."""
 
 
 def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
-    """Names of the elements of one shift whose law is free, the on-coming one first."""
+    """Find the elements of one shift whose law is free, the on-coming one first."""
     coming, leaving = driveline.oncoming, driveline.offgoing
     pressure = signals.pressures[leaving.name]
     start, end = signals.shift.inertia_phase
@@ -37,6 +37,6 @@ def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
 def all_carriers(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]
 ) -> tuple[str, ...]:
-    """The same over all shifts, each once."""
+    """Find the elements whose law is free over all shifts, without repetition."""
     pairs = zip(signals, drivelines, strict=True)
     return tuple(dict.fromkeys(name for s, d in pairs for name in carriers(s, d)))

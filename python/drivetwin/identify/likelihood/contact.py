@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What presses and slips in one element of a simulated shift."""
+"""Pressure, slip and friction torque of one element in a simulated shift."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Contact:
 
 
 def contact_of(part: Part, point: Point, run: Trajectory, name: str) -> Contact:
-    """What `run`, that of the part at `point`, shows of element `name`."""
+    """Evaluate element `name` along `run`, the simulation of the part at `point`."""
     middle = 0.5 * (run.time[1:] + run.time[:-1])
     model = part.structure.model(point)
     one = next((e for e in model.elements if e.name == name), None)

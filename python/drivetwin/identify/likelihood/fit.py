@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Maximum likelihood: from start values to the minimum of Q with input noise in the covariance."""
+"""Maximum likelihood from several starts, with input noise in the covariance."""
 
 from __future__ import annotations
 
@@ -62,12 +62,12 @@ _FAILED = (
 
 
 class Hopeless(IdentificationError):
-    """No start leads anywhere near the measurement, whatever its signals are taken for."""
+    """No start leads near the measurement, for any sampling mode of the signals."""
 
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodFit:
-    """The minimum of Q at `point`, and what is told of the unknowns: `mean`, `covariance` (p, p).
+    """Minimum of Q at `point` with the estimate of the unknowns: `mean`, `covariance` (p, p).
 
     `mean` is the minimum, or the average with minima that the log hardly tells from it (kinds.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
@@ -84,7 +84,7 @@ class LikelihoodFit:
 
     @cached_property
     def deviance(self) -> float:
-        """Q + log|Σ|: -2 log of likelihood times prior, but for a constant of the samples.
+        """Q + log|Σ|: -2 log of likelihood times prior, up to a constant of the samples.
 
         Σ is formed anew at the minimum: that of the search is of the point before, where noise
         about P0 opened an element at other instants, and log|Σ| was another by up to a thousand.
@@ -102,7 +102,7 @@ def fit(
     thorough: bool = True,
     restarts: Sequence[float] = MULTI_START.shaft_factors,
 ) -> LikelihoodFit:
-    """Fit from `start`: directly where it is near, by stages and from other starts where not.
+    """Fit from `start`: directly if it is near, else by stages and from other starts.
 
     Unless `thorough` the first plausible minimum is taken, good or not. `restarts` are factors on
     the shaft's stiffness, the first of them 1.
@@ -117,7 +117,7 @@ def fit(
 def checked(
     known: LikelihoodFit, problem: Problem, start: Point, shifts: Sequence[Shift]
 ) -> LikelihoodFit:
-    """The fit that is `known`, or a better one, by starts other than the one that led to it."""
+    """Try other starts than the one that led to `known`; return the best fit."""
     return _best_of(_other_attempts(problem, start, shifts), known) or known
 
 
@@ -126,7 +126,7 @@ def _best_of(
     best: LikelihoodFit | None = None,
     thorough: bool = True,
 ) -> LikelihoodFit | None:
-    """The best of the attempts and of what is known: a good one, or one that is found twice."""
+    """Return the best attempt, `best` included: a good one, or one that is found twice."""
     try:
         for found in _told(attempts):
             if found is None:
@@ -144,7 +144,8 @@ def _best_of(
 
 
 def _told(attempts: Iterator[LikelihoodFit | None]) -> Iterator[LikelihoodFit | None]:
-    """The same fits; each counts as half of what is left, for how many it takes is not known."""
+    """Report progress over the attempts; each counts as half of the remaining work, because
+    their number is not known in advance."""
     done = 0.0
     while True:
         with part(done, 0.5 + 0.5 * done):
@@ -159,7 +160,7 @@ def _told(attempts: Iterator[LikelihoodFit | None]) -> Iterator[LikelihoodFit | 
 def _attempts(
     problem: Problem, start: Point, shifts: Sequence[Shift], restarts: Sequence[float]
 ) -> Iterator[LikelihoodFit | None]:
-    """Fits from `start` and from points beside it, the most promising first.
+    """Yield fits from `start` and from points near it, the most promising first.
 
     Raises Hopeless where the first of these show that none will do.
     """
@@ -175,7 +176,7 @@ def _attempts(
 def _other_attempts(
     problem: Problem, start: Point, shifts: Sequence[Shift]
 ) -> Iterator[LikelihoodFit | None]:
-    """Fits by stages; not the first where that is what `_attempts` began with."""
+    """Yield fits by stages, without the start that `_attempts` began with."""
     restarts = (
         MULTI_START.shaft_factors[:1] if _is_near(problem, start) else MULTI_START.shaft_factors[1:]
     )
@@ -183,14 +184,14 @@ def _other_attempts(
 
 
 def _is_near(problem: Problem, start: Point) -> bool:
-    """Whether the direct way is tried first."""
+    """Return whether the direct search comes first."""
     return problem.weighted_by(start).cost(start) < MULTI_START.direct_chi2 * problem.size
 
 
 def _by_stages(
     problem: Problem, start: Point, shifts: Sequence[Shift], restarts: Sequence[float]
 ) -> Generator[LikelihoodFit | None, None, bool]:
-    """Fits from where stages lead; whether any of them came near the measurement."""
+    """Yield fits from staged starts; return whether any of them came near the measurement."""
     doubtful: list[Found[Problem]] = []
     promising = 0
     for tried, shaft in enumerate(restarts, 1):
@@ -211,7 +212,7 @@ def _by_stages(
 
 
 def _is_doubtful(problem: Problem, near: Found[Problem]) -> bool:
-    """Whether stages that ended at `near` have hardly led to the right minimum."""
+    """Return whether a staged start ended too far from the measurement for the right minimum."""
     if near.normal.cost <= MULTI_START.doubtful_chi2 * problem.size:
         return False
     with_inputs = problem.weighted_by(near.point)
@@ -221,7 +222,7 @@ def _is_doubtful(problem: Problem, near: Found[Problem]) -> bool:
 def nearest(
     problem: Problem, start: Point, most: float = MULTI_START.far_chi2
 ) -> LikelihoodFit | None:
-    """Minimum of Q with input noise; None where Q per sample stays above `most`.
+    """Find the local minimum of Q with input noise; None if Q per sample stays above `most`.
 
     First with the inputs as measured, the weighting following the point; then from there with the
     inputs expected at the minimum. Formed elsewhere they would explain a wrong model away.
@@ -242,7 +243,7 @@ def nearest(
 
 
 def _over_inputs(problem: Problem, found: Found[Problem], limit: float) -> Found[Problem] | None:
-    """The joint minimum over unknowns and inputs, from the one with the inputs as measured.
+    """Find the joint minimum over unknowns and inputs, from the one with the measured inputs.
 
     Where an element slips at a pressure that is steady but for its noise, that noise seems to tell
     μ from P0: the inputs expected at one minimum then lead to another, and so on. None where the
@@ -262,7 +263,7 @@ def _over_inputs(problem: Problem, found: Found[Problem], limit: float) -> Found
 
 
 def spread_of(problem: Problem, normal: Normal, chi2: float) -> FloatArray:
-    """Covariance (p, p) of the unknowns at a minimum, with what its residual has beyond noise.
+    """Compute the covariance (p, p) at a minimum, widened by residual power beyond sensor noise.
 
     The whole is widened where `chi2` exceeds 1, and by slow errors where an output shows them, as
     far as the unknowns hang on that output.
@@ -272,7 +273,7 @@ def spread_of(problem: Problem, normal: Normal, chi2: float) -> FloatArray:
 
 
 def covariance_of(matrix: FloatArray) -> FloatArray:
-    """Inverse of an information matrix (p, p), formed after scaling to a unit diagonal."""
+    """Invert an information matrix (p, p) after scaling to a unit diagonal."""
     scale = np.sqrt(np.diag(matrix))
     inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-14, hermitian=True)
     return np.asarray(inverse / np.outer(scale, scale))

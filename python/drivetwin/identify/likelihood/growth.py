@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whether the load grows with the square of the speed; what is allowed for where it hardly shows.
+"""Growth of the load with the square of the speed.
 
 Every vehicle meets air drag, a load on a dynamometer none. Left out where it is not significant it
 still moves J3 and T_v/i_f, in a short log by several of the standard deviations that the model
@@ -26,13 +26,13 @@ from drivetwin.identify.signals import FloatArray
 
 
 def grows(point: Point, covariance: FloatArray) -> bool:
-    """Whether the growing part of the load differs from none by more than its noise."""
+    """Return whether the growing part of the load is significant against its noise."""
     k = point.names.index(AERO)
     return bool(point[AERO] > SIGNIFICANT * np.sqrt(covariance[k, k]))
 
 
 def told(best: LikelihoodFit) -> list[str]:
-    """What is said of a load that grows with speed; nothing where it does not."""
+    """Describe a load that grows with speed; empty if it does not."""
     if AERO not in best.point.names:
         return []
     k = best.point.names.index(AERO)

@@ -46,7 +46,7 @@ GRID = 200
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What q columns would be if they were free: `amounts` (q,) with their `covariance` (q, q).
+    """Estimate of q effects if they were free: `amounts` (q,) with their `covariance` (q, q).
 
     `moves` (p,) is where the unknowns of the fit would follow, `fall` how much Q would fall.
     """
@@ -63,7 +63,7 @@ class Step:
 
     @property
     def significant(self) -> bool:
-        """Whether noise and slow errors of the sensors hardly make as much."""
+        """True if noise and slow errors of the sensors do not explain the amounts."""
         size = float(self.amounts @ np.linalg.pinv(self.covariance, hermitian=True) @ self.amounts)
         return size > chi2.isf(2.0 * norm.sf(SIGNIFICANT), self.amounts.size)
 
@@ -138,7 +138,7 @@ def left_out(fit: LikelihoodFit) -> Iterator[LeftOut]:
 
 
 def late_torque(fit: LikelihoodFit) -> Step:
-    """How late the output torque is against the speeds [s]: none in a log without one."""
+    """Estimate the delay of the output torque against the speeds [s]; empty without a sensor."""
 
     def columns(part: Part, run: Trajectory) -> FloatArray:
         rate = np.gradient(run.shaft_torque, run.time)
@@ -152,7 +152,7 @@ def late_torque(fit: LikelihoodFit) -> Step:
 
 
 def late_pressure(fit: LikelihoodFit, name: str) -> Step:
-    """How late the measured pressure of an element is against the torque that it makes [s]."""
+    """Estimate the delay of the measured pressure of an element against its torque [s]."""
 
     def columns(part: Part, run: Trajectory) -> FloatArray:
         response, record = part.response(fit.point, run), part.record
@@ -167,7 +167,7 @@ def late_pressure(fit: LikelihoodFit, name: str) -> Step:
 
 
 def other_shape(fit: LikelihoodFit, name: str, shapes: Shapes) -> Step:
-    """How much of each of `shapes` the friction of an element has beside its Stribeck law."""
+    """Estimate the amount of each of `shapes` in the friction of an element."""
 
     def columns(part: Part, run: Trajectory) -> FloatArray:
         response = part.response(fit.point, run)

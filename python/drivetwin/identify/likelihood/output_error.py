@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Staged output error: what to do where the start values are far off.
+"""Staged output-error start for initial values that are far off.
 
 The simulation of a whole shift with wrong parameters locks at the wrong time, and Q has local
 minima. Fitted piece by piece it has none in practice: first the lower gear alone, which fixes
@@ -51,9 +51,9 @@ STAGED_START = StagedStartSettings()
 
 
 def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found[Problem] | None:
-    """Output error over growing spans, weighted by sensor noise.
+    """Fit the output error over growing spans, weighted by sensor noise.
 
-    None where a run fails, and where a stage ends far from the measurement.
+    Returns None if a run fails, or if a stage ends far from the measurement.
     """
     problem = _about(problem, start)
     found = in_lower_gear(problem, start, shifts)
@@ -71,7 +71,7 @@ def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found[Pro
 
 
 def in_lower_gear(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found[Problem] | None:
-    """Output error over the gear before each shift alone; None where a run fails."""
+    """Fit the output error over the gear before each shift alone; None if a run fails."""
     gear = _without_friction(_about(problem, start), start)
     return minimise(
         gear.until([s.before[1] - STAGED_START.clearance for s in shifts]), start, rough=True
@@ -79,13 +79,13 @@ def in_lower_gear(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Fo
 
 
 def _hopeless(found: Found[Problem]) -> bool:
-    """Whether input noise, which the stages leave out, cannot be what is left by one."""
+    """Return whether a stage ended too far from the measurement for input noise to explain it."""
     problem = found.problem.weighted_by(found.point)
     return problem.cost(found.point) > STAGED_START.max_chi2 * problem.size
 
 
 def _without_friction(problem: Problem, start: Point) -> Problem:
-    """The problem with all that belongs to the elements held at the start."""
+    """Fix all parameters of the elements at the start."""
     prior = problem.prior
     elements = {one.name for part in problem.parts for one in part.structure.elements}
     for k, name in enumerate(start.names):
@@ -95,7 +95,7 @@ def _without_friction(problem: Problem, start: Point) -> Problem:
 
 
 def _levelled(problem: Problem, point: Point) -> Point:
-    """The point with the friction levels, of those looked at, that leave least."""
+    """Scale the friction levels to the tried factors with the smallest Q."""
     factors = np.geomspace(
         STAGED_START.min_friction_factor,
         STAGED_START.max_friction_factor,
@@ -113,7 +113,7 @@ def _levelled(problem: Problem, point: Point) -> Point:
 
 
 def _about(problem: Problem, start: Point) -> Problem:
-    """The problem with bounds about the start, of what starts above zero."""
+    """Restrict positive unknowns of `SOUGHT` to bounds about the start."""
     sought = np.array([name in SOUGHT for name in start.names]) & (start.values > 0.0)
     lower = np.where(
         sought, np.maximum(problem.lower, start.values / STAGED_START.search_factor), problem.lower

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Start values from speeds and engine torque alone: everything torque-like is divided by η.
+"""Initial values from speeds and engine torque alone; torque-like values are divided by η.
 
 They tell ratios only (THEORY section 6). With η = 1 in the model, its parameters are those ratios;
 these are their start values:
@@ -33,7 +33,7 @@ RING = (0.05, 0.8)
 def guess_without_torque(
     signals: ShiftSignals, driveline: Driveline, card: VehicleCard
 ) -> dict[str, float]:
-    """A value for every unknown, from speeds and engine torque of one shift.
+    """Compute an initial value of every unknown from speeds and engine torque of one shift.
 
     With an output torque η is a plausible one, and the ratios stand for what they are ratios of.
     """
@@ -64,7 +64,7 @@ def guess_without_torque(
 def _inertias(
     signals: ShiftSignals, driveline: Driveline, card: VehicleCard
 ) -> tuple[float, float, float]:
-    """(Je/η, J_v/η, T_v/i_f/η) over both gears.
+    """Estimate (Je/η, J_v/η, T_v/i_f/η) over both gears.
 
     The vehicle outweighs the engine side, so Je is taken from the middle of the card's range. Noise
     of the slopes would make the vehicle too light by least squares; the slopes that the torque lets
@@ -93,7 +93,7 @@ def _inertias(
 
 
 def _slopes(signals: ShiftSignals, span: Span) -> tuple[FloatArray, FloatArray]:
-    """Centres [s] and differences of the engine speed [rad/s^2] over windows of `STEP`.
+    """Compute centres [s] and slopes of the engine speed [rad/s^2] over windows of `STEP`.
 
     NaN in gaps; a gear held for less than a window has none.
     """
@@ -103,13 +103,13 @@ def _slopes(signals: ShiftSignals, span: Span) -> tuple[FloatArray, FloatArray]:
 
 
 def _mean(signals: ShiftSignals, start: float) -> float:
-    """Mean engine torque over `STEP` from `start` [s]."""
+    """Compute the mean engine torque over `STEP` from `start` [s]."""
     time = np.linspace(start, start + STEP, 11)
     return float(np.mean(signals.engine_torque.at(time)))
 
 
 def _mode(signals: ShiftSignals, driveline: Driveline) -> tuple[float, float]:
-    """Decay rate [1/s] and angular frequency [rad/s] of the twist rate after lock-up."""
+    """Estimate decay rate [1/s] and angular frequency [rad/s] of the twist rate after lock-up."""
     lockup = signals.shift.lockup_time
     part = signals.output_speed.within((lockup + RING[0], lockup + RING[1]))
     time, twist_rate = part.time, part.values
@@ -126,7 +126,7 @@ def _mode(signals: ShiftSignals, driveline: Driveline) -> tuple[float, float]:
 
 
 def _level(signals: ShiftSignals, driveline: Driveline, J_e: float) -> float:
-    """Mean μ/η over the middle half of the inertia phase."""
+    """Estimate the mean μ/η over the middle half of the inertia phase."""
     start, end = signals.shift.inertia_phase
     low, high = start + 0.25 * (end - start), end - 0.25 * (end - start)
     speed, element = signals.engine_speed, driveline.oncoming

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inputs without the part of their noise that the driveline never had.
+"""Removal of input noise that lies above the band of the actuators.
 
 A valve and a clutch volume are slow, sensor noise is not. Noise left on a pressure that drives the
 simulation makes elements lock and break away many times where the real one did so once, adds up to
@@ -39,7 +39,7 @@ INTERVAL = 2.5
 
 
 def smooth_pressure(pressure: Sampled, fill: PriorValue | None = None) -> FloatArray:
-    """Pressure (n,) without its fast noise; as read about corners too sharp for a local cubic.
+    """Remove the fast noise of a pressure (n,); corners too sharp for a local cubic stay as read.
 
     `fill` is P0 [Pa] as the card has it: about it the noise is taken off that a longer cubic takes.
     """
@@ -53,8 +53,8 @@ def smooth_pressure(pressure: Sampled, fill: PriorValue | None = None) -> FloatA
 
 
 def _steady(pressure: Sampled, smooth: FloatArray) -> FloatArray:
-    """Middle (n,) of the longest cubic about each sample that agrees with all shorter ones and with
-    `smooth`, that over `WINDOW` (as `local_mean`).
+    """Compute the middle (n,) of the longest cubic about each sample that agrees with all shorter
+    ones and with `smooth`, that over `WINDOW` (as `local_mean`).
 
     Noise that flickers about P0 gives the fit many minima, and in each a torque that comes and goes
     with the noise seems to tell P0 from μ: 5 kPa above P0 an estimate may be four standard
@@ -77,14 +77,14 @@ def _steady(pressure: Sampled, smooth: FloatArray) -> FloatArray:
 
 
 def _noise_left(size: int) -> float:
-    """Noise of the middle of a cubic over `size` samples, over that of a sample."""
+    """Compute the noise of the middle of a cubic over `size` samples, over that of a sample."""
     if size <= CUBIC + 1:
         return 1.0
     return float(np.linalg.norm(savgol_coeffs(size, CUBIC)))
 
 
 def local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Values (n,) of cubics over `WINDOW` about each sample (Savitzky and Golay 1964).
+    """Fit cubics over `WINDOW` about each sample (n,) (Savitzky and Golay 1964).
 
     The values as they are where the window holds too few samples for a cubic.
     """
@@ -95,7 +95,7 @@ def local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def bend_of(time: FloatArray, values: FloatArray) -> FloatArray:
-    """What to add to samples (n,) so that, joined by straight lines, they have the mean of a curve.
+    """Compute the correction (n,) that gives samples joined by straight lines the mean of a curve.
 
     Chords lie inside a curve, by h²/12 of its second derivative in the mean: in an engine torque
     that comes every 20 ms that is as much as its noise, and always to the same side. Nothing beside
@@ -109,12 +109,12 @@ def bend_of(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _samples(time: FloatArray, window: float = WINDOW) -> int:
-    """Odd number of samples in a `window` [s]."""
+    """Return the odd number of samples in a `window` [s]."""
     return 2 * int(0.5 * window / float(np.median(np.diff(time)))) + 1
 
 
 def local_mean(signal: Sampled) -> FloatArray:
-    """Signal (n,) without its noise, as far as the noise level allows to tell it.
+    """Remove the noise of a signal (n,) by adaptive local averaging.
 
     At every sample the mean over the longest window that agrees with those over all shorter ones
     (intersection of confidence intervals; Goldenshluger and Nemirovski 1997).

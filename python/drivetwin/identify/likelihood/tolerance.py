@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What errors of gain, offset and age of the sensors do to the fit: one weighted column each.
+"""Effect of sensor errors in gain, offset and delay on the unknowns and the results.
 
 An error e(t) of a measured output moves the minimum of Q by F⁻¹Jᵀ Σ⁻¹ e; an error of a measured
 input acts through the linear response of the run to it, with the opposite sign.
@@ -34,7 +34,7 @@ FRICTION = "mu."
 def sensor_shifts(
     fit: LikelihoodFit, tolerances: Mapping[str, SensorTolerance]
 ) -> dict[str, FloatArray]:
-    """Shift (p,) of all unknowns by one standard deviation of each sensor error.
+    """Compute the shift (p,) of all unknowns by one standard deviation of each sensor error.
 
     Keys are `<role> gain`, `<role> offset` and `<role> age`; a sensor that the fit does not use has
     none.
@@ -79,7 +79,7 @@ def _error(part: Part, fit: LikelihoodFit, role: str, kind: str) -> FloatArray |
 
 
 def _output_error(out: Output, run: Trajectory, kind: str) -> FloatArray:
-    """What an error of size one adds to the samples (n,) of an output."""
+    """Compute the change of output samples (n,) by an error of size one."""
     match kind:
         case "gain":
             return out.values
@@ -90,7 +90,7 @@ def _output_error(out: Output, run: Trajectory, kind: str) -> FloatArray:
 
 
 def _input_error(part: Part, point: Point, source: str, kind: str) -> FloatArray:
-    """The same for an input (N-1,), over each step of the grid."""
+    """Compute the change of an input (N-1,) over each step of the grid by an error of size one."""
     record, time = part.record, part.record.time
     one = record.engine_torque if source == TORQUE else record.pressures[source]
     match kind:
@@ -124,7 +124,7 @@ class Sensitivity:
 def sensitivity(
     fit: LikelihoodFit, signals: Sequence[ShiftSignals], friction: Mapping[str, FrictionCurve]
 ) -> Sensitivity:
-    """Change of every parameter and of μ in the middle of the slip range seen.
+    """Compute the change of every parameter and of μ in the middle of the observed slip range.
 
     To first order in the fit's unknowns; costs one linear response of the run per input and kind.
     """
@@ -153,7 +153,7 @@ def sensitivity(
 
 
 def _friction(fit: LikelihoodFit, point: Point, slips: Mapping[str, float]) -> dict[str, float]:
-    """μ of each element at its slip."""
+    """Compute μ of each element at its slip."""
     laws = {
         element.name: element.friction
         for part in fit.problem.parts
@@ -165,7 +165,7 @@ def _friction(fit: LikelihoodFit, point: Point, slips: Mapping[str, float]) -> d
 
 
 def _largest_readings(fit: LikelihoodFit) -> dict[str, float]:
-    """Largest absolute reading by role over all shifts, SI."""
+    """Return the largest absolute reading by role over all shifts, SI."""
     found: dict[str, float] = {}
     for part in fit.problem.parts:
         record = part.record

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The unknowns of the fit and how the simulated model follows from them.
+"""Unknowns of the fit and the simulated model as a function of them.
 
     J1 = Je/η, J2e = 0 (THEORY section 3: only Je = J1·η + J2e can be told)
     load.constant = i_f·(T_v/i_f + d) - aero·mean speed², mu_s = mu_c + mu_drop, v_s = exp(ln_v_s)
@@ -44,7 +44,7 @@ OF_RUN = (*START, DEPARTURE)
 
 
 def own_of(log: int) -> dict[str, str]:
-    """Unknown by name that stands for each of `OWN` in one of several logs, numbered from 1.
+    """Map the log-specific names `OWN` to their unknowns in one of several logs, numbered from 1.
 
     Empty for log 0, the only one.
     """
@@ -61,7 +61,7 @@ class Tie:
 
 @dataclass(frozen=True)
 class Structure:
-    """What is fixed during a fit: structure of one shift and the laws that are not free.
+    """Fixed description of one shift: its elements and every value that is not estimated.
 
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
     start unknowns of this shift. `mean_speed` is that of the wheel over the log [rad/s], at which
@@ -92,18 +92,18 @@ class Structure:
         return tuple(one for one in self.driveline.drums if one.name not in taking_part)
 
     def value(self, point: Point, name: str) -> float:
-        """Value of an unknown, free, fixed or tied."""
+        """Return the value of an unknown, free, fixed or tied."""
         if name == "J_e" and self.tie is not None:
             return self.tie.inertia - self.value(point, "J_out") / self.tie.ratio**2
         free = self.unknown(name)
         return point[free] if free in point.names else self.fixed[name]
 
     def unknown(self, name: str) -> str:
-        """Name of the unknown that stands for `name` in this shift's log."""
+        """Return the name of the unknown that stands for `name` in this shift's log."""
         return own_of(self.log).get(name, name)
 
     def model(self, point: Point) -> DualClutch:
-        """The model to be simulated at `point`."""
+        """Build the model to be simulated at `point`."""
         eta = self.value(point, "eta")
         return DualClutch(
             J1=self.value(point, "J_e") / eta,
@@ -129,7 +129,8 @@ class Structure:
         return RoadLoad(constant=mean - aero * self.mean_speed**2, aero=aero)
 
     def load(self, point: Point) -> float:
-        """Load of this shift at the output shaft [N m], at the mean speed of its log."""
+        """Compute the load of this shift at the output shaft [N m], at the mean speed of its
+        log."""
         departure = sum(factor * point[name] for name, factor in self.departure.items())
         return self.value(point, "Tv_over_if") + departure
 
@@ -147,19 +148,19 @@ class Structure:
         )
 
     def _drum(self, point: Point, one: Coupling) -> ShiftElement:
-        """An element of which only the drum acts."""
+        """Build an element of which only the drum acts."""
         drum = self.value(point, f"{one.name}.drum")
         law = Stribeck(*NO_LAW)
         return ShiftElement(one.name, 1.0 / one.a, one.b, one.gain, one.P0.value, law, 1.0, drum)
 
     def start(self, point: Point) -> State:
-        """Start of the run at `point`: the off-going element is locked."""
+        """Build the initial state of the run at `point`: the off-going element is locked."""
         speed, wheel, twist = (point[f"{self.label}.{key}"] for key in START)
         ratio = self.driveline.i_before
         return State(ratio * speed, speed, wheel, twist, (self.driveline.offgoing.name,))
 
     def slopes(self, point: Point) -> tuple[tuple[str, ...], FloatArray]:
-        """Names the core knows (m,) and the derivative of their values by `point` (m, p)."""
+        """Compute the core's names (m,) and the derivative of their values by `point` (m, p)."""
         entries = [entry for name in point.names for entry in self._entries(point, name)]
         core = tuple(dict.fromkeys(entry[0] for entry in entries))
         matrix = np.zeros((len(core), len(point.names)))
@@ -168,7 +169,8 @@ class Structure:
         return core, matrix
 
     def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
-        """(name in the core, unknown, derivative) of one unknown; nothing for foreign ones."""
+        """Yield (name in the core, unknown, derivative) of one unknown; nothing for foreign
+        ones."""
         i_f, eta, J_e = self.driveline.i_f, self.value(point, "eta"), self.value(point, "J_e")
         by_tie = 0.0 if self.tie is None else -1.0 / (self.tie.ratio**2 * eta)
         table: dict[str, Sequence[tuple[str, float]]] = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the log itself decides about the model: how the load grows and differs, what outputs show.
+"""Model selection by the log: growth and variation of the load, sampling mode of the outputs.
 
 A part of the model that is wrongly left out biases everything (a load that grows with speed moves
 J3 by several per cent), and one that is wrongly left in widens intervals. The growing part is
@@ -62,7 +62,7 @@ def choose(
     loss_law: LossLaw,
     guess: Mapping[str, float],
 ) -> tuple[LikelihoodFit, tuple[str, ...]]:
-    """The fit of the variant that the log speaks for, and what was decided, in words.
+    """Fit the variant that the log supports; return the decisions as sentences.
 
     Raises IdentificationError where no variant converges.
     """
@@ -96,10 +96,10 @@ def choose(
 def _narrowed(
     wider: LikelihoodFit, point: Point, narrower: tuple[Problem, Point], shifts: Sequence[Shift]
 ) -> tuple[LikelihoodFit, Problem] | None:
-    """The fit of a model without what the log does not show, and its problem; None where it shows
-    all, and where the work runs out: the wider model is right all the same.
+    """Fit the model without the effects that the log does not show, and return its problem.
 
-    `narrower` is its problem and start, `point` what the wider fit says of it.
+    Returns None if the log shows all effects, or if the work runs out: the wider model is correct
+    all the same.
     """
     problem, start = narrower
     left_out = [name for name in wider.point.names if name not in start.names]
@@ -115,7 +115,7 @@ def _narrowed(
 
 
 def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:
-    """The fit with every signal of the likeliest kind.
+    """Fit with every signal in its likeliest sampling mode.
 
     Raises IdentificationError where it does not converge with the likeliest kinds.
     """
@@ -131,7 +131,7 @@ def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Like
 
 
 def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit | None:
-    """The first plausible minimum; None where there is none.
+    """Fit up to the first plausible minimum; None if there is none.
 
     Raises Hopeless where none is near.
     """
@@ -144,6 +144,6 @@ def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Likelihoo
 
 
 def _taken(start: Point, found: Point) -> Point:
-    """`start` with the values of `found` where it has them."""
+    """Copy the values of `found` into `start` for the names that it has."""
     values = [found[n] if n in found.names else start[n] for n in start.names]
     return start.moved(np.array(values))

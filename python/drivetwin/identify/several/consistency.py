@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Do the logs of one fit agree on what they share?
+"""Homogeneity test of the logs of a joint fit.
 
 At the common minimum each log alone pulls the shared unknowns θ by g_k against its information
 F_k, what it has of its own eliminated (Schur complement). In coordinates in which the joint
@@ -43,7 +43,7 @@ FAR = 3.0
 
 @dataclass(frozen=True)
 class Move:
-    """How far log `log` moves a parameter from what the others say, in its standard deviations."""
+    """Discrepancy between one log and the others on a parameter, in its standard deviations."""
 
     parameter: str
     log: int
@@ -65,18 +65,18 @@ class Consistency:
 
     @property
     def agree(self) -> bool:
-        """Whether the logs may be of one vehicle in one state."""
+        """True if the logs are consistent with one vehicle in one state."""
         return self.p >= SIGNIFICANT
 
     @property
     def doubtful(self) -> dict[str, Move]:
-        """The parameters on which the logs disagree; empty where they agree."""
+        """Parameters on which the logs disagree; empty if they agree."""
         far = {one.parameter: one for one in self.moves if abs(one.z) > FAR}
         return {} if self.agree else far
 
     @property
     def text(self) -> str:
-        """The outcome in a sentence."""
+        """Outcome as a sentence."""
         figures = f"χ² {self.chi2:.1f} on {self.freedom}, p = {self.p:.2g}"
         if self.agree:
             return f"the logs agree on what they share ({figures})"
@@ -114,7 +114,7 @@ def consistency(
 
 
 def shared_of(fit: LikelihoodFit) -> list[int]:
-    """Places of the unknowns that all logs share: neither a log's own nor a run's."""
+    """Return the indices of the unknowns that all logs share."""
     structures = [part.structure for part in fit.problem.parts]
     own = {name for one in structures for name in own_of(one.log).values()}
     starts = {f"{one.label}.{key}" for one in structures for key in OF_RUN}
@@ -122,7 +122,7 @@ def shared_of(fit: LikelihoodFit) -> list[int]:
 
 
 def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray) -> Pull:
-    """What one log alone says of the shared unknowns at the minimum of all.
+    """Compute information and gradient of one log on the shared unknowns at the common minimum.
 
     Raises IdentificationError where a simulation that the fit had made does not run again.
     """
@@ -144,7 +144,7 @@ def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray)
 
 
 def homogeneity(pulls: Sequence[Pull]) -> tuple[float, int]:
-    """χ² and its degrees of freedom over the directions that each log tells."""
+    """Compute χ² and its degrees of freedom over the directions that each log identifies."""
     rows, targets = [], []
     for one in pulls:
         power, directions = np.linalg.eigh(one.information)
@@ -161,7 +161,7 @@ def homogeneity(pulls: Sequence[Pull]) -> tuple[float, int]:
 def _moves(
     pulls: Sequence[Pull], told: Mapping[str, FloatArray], widened: float
 ) -> tuple[Move, ...]:
-    """The largest move of every parameter by one log: minus what leaving it out would do."""
+    """Find the largest discrepancy of every parameter over the logs."""
     largest: dict[str, Move] = {}
     for one in pulls:
         power, directions = np.linalg.eigh(one.information)
@@ -179,7 +179,7 @@ def _moves(
 def _rows(
     fit: LikelihoodFit, signals: Sequence[ShiftSignals], friction: Mapping[str, FrictionCurve]
 ) -> dict[str, FloatArray]:
-    """Derivative (p,) by the unknowns of every parameter that the logs share, and of friction."""
+    """Compute the derivative (p,) by the unknowns of every shared parameter, and of friction."""
     names = list(parameters(fit.problem, fit.point, signals))
     matrix = slopes(fit.problem, fit.point, np.sqrt(np.diag(fit.covariance)), signals)
     own = np.setdiff1d(np.arange(len(fit.point.names)), shared_of(fit))

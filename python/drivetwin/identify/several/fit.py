@@ -158,7 +158,7 @@ def _refuse_unlike(logs: Sequence[ShiftLog]) -> None:
 
 
 def _same(one: ShiftLog, other: ShiftLog) -> bool:
-    """Whether two logs are one recording, be it in two formats."""
+    """Return whether two logs are the same recording, even in two formats."""
     if one.sha256 == other.sha256:
         return True
     common = [role for role in one.channels if role in other]
@@ -260,7 +260,7 @@ def _share(number: int, log: ShiftLog, alone: Identification, fit: LikelihoodFit
 
 
 def _joined(alone: Sequence[Identification], told: Conclusions, several: Several) -> Identification:
-    """One identification of all logs, but for its evidence."""
+    """Build one identification of all logs, without its evidence."""
     told = judged(told, several.consistency)
     names = [Path(share.source).name for share in several.logs]
     agreed = (several.consistency.text,) if several.consistency.agree else ()
@@ -287,7 +287,7 @@ def _joined(alone: Sequence[Identification], told: Conclusions, several: Several
 
 
 def _covered(alone: Sequence[Identification]) -> dict[str, tuple[float, float]]:
-    """Ranges that any log saw."""
+    """Return the union of the ranges that the logs cover."""
     names = dict.fromkeys(name for one in alone for name in one.validity)
     spans = {name: [one.validity[name] for one in alone if name in one.validity] for name in names}
     return {
@@ -297,7 +297,7 @@ def _covered(alone: Sequence[Identification]) -> dict[str, tuple[float, float]]:
 
 
 def of_one_log(found: Identification, share: LogShare) -> Identification:
-    """What a fit of several logs says of one of them: its own values under their plain ids.
+    """Extract one log from a joint identification: its own values under their plain ids.
 
     For a twin that is to simulate this log; of the shifts only its own are in it.
     """

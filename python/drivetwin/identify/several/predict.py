@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a fit may be expected to leave of a shift that it has not seen.
+"""Prediction bounds for a shift that the fit has not used.
 
 What the shift's log has of its own (load, age of the torque, state at the start) is unknown to
 the fit. It is estimated from the gear held before the shift, the shared parameters θ staying as
@@ -54,7 +54,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Expected:
-    """What is expected of one shift held out.
+    """Prediction for one shift held out.
 
     `own` are values and standard deviations of what its log has of its own, by plain name, where
     the fit has not seen the log; T_v/i_f holds at `mean_speed` of the wheel [rad/s]. `start` is the
@@ -73,7 +73,7 @@ class Expected:
 def expected(
     fit: LikelihoodFit, held: Sequence[ShiftSignals], card: VehicleCard, seed: int = 0
 ) -> tuple[Expected, ...]:
-    """What `fit` leads one to expect of each shift `held` out of one log.
+    """Predict each shift `held` out of one log from `fit`.
 
     The signals' `log` is their number in the fit, or one that it does not have. Raises
     IdentificationError where the stretch before the shift cannot be simulated.
@@ -109,12 +109,12 @@ def expected(
 
 
 def _has_law(fit: LikelihoodFit, part: Part) -> bool:
-    """Whether the fit shows the friction of the element that comes on."""
+    """Return whether the fit identifies the friction of the on-coming element."""
     return f"{part.structure.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
 
 
 def _known(fit: LikelihoodFit, drivelines: Sequence[Driveline]) -> dict[str, float]:
-    """A value for every unknown, from the fit; an element it has not seen takes its partner's law.
+    """Collect a value for every unknown from the fit; an unknown element takes its partner's law.
 
     Where neither has one, that of a usual facing.
     """
@@ -136,7 +136,8 @@ def _known(fit: LikelihoodFit, drivelines: Sequence[Driveline]) -> dict[str, flo
 
 
 def _unseen(fit: LikelihoodFit, problem: Problem, point: Point) -> list[int]:
-    """Places of what belongs to the log or the run and is not known from the fit."""
+    """Return the indices of the unknowns that belong to the log or the run and are not in the
+    fit."""
     structures = [part.structure for part in problem.parts]
     starts = {f"{one.label}.{key}" for one in structures for key in START}
     own = {name for one in structures for name in own_of(one.log).values()}
@@ -146,8 +147,8 @@ def _unseen(fit: LikelihoodFit, problem: Problem, point: Point) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class _Before:
-    """What the gear held before the shifts tells: `point`, covariance `own` (u, u) of what is
-    unseen, and its answer `along` (u, k) to a change of what is known."""
+    """Fit to the gear before the shifts: `point`, covariance `own` (u, u) of the new unknowns,
+    and their response `along` (u, k) to a change of the known ones."""
 
     point: Point
     own: FloatArray
@@ -155,7 +156,7 @@ class _Before:
 
 
 def _before(problem: Problem, point: Point, unseen: list[int], ends: Sequence[float]) -> _Before:
-    """Fit what is unseen to the stretches before the shifts, all else held."""
+    """Fit the new unknowns to the stretches before the shifts, all others fixed."""
     known = [k for k in range(len(point.names)) if k not in unseen]
     prior = problem.prior
     precision = np.zeros_like(prior.precision)
@@ -177,7 +178,7 @@ def _before(problem: Problem, point: Point, unseen: list[int], ends: Sequence[fl
 
 
 def _moved(fit: LikelihoodFit, problem: Problem, before: _Before, unseen: list[int]) -> FloatArray:
-    """Root (p, d) of the covariance of all unknowns of the shifts held out."""
+    """Compute a root (p, d) of the covariance of all unknowns of the held-out shifts."""
     names = before.point.names
     known = [k for k in range(len(names)) if k not in unseen]
     spread = np.zeros((len(known), len(known)))
@@ -196,14 +197,14 @@ def _moved(fit: LikelihoodFit, problem: Problem, before: _Before, unseen: list[i
 
 
 def _inverse(precision: float) -> float:
-    """Variance of what a prior alone tells; 0 where it tells nothing, which then stays."""
+    """Return the variance of a prior alone; 0 without one, which fixes the value."""
     return 1.0 / precision if precision > 0.0 else 0.0
 
 
 def _bounds(
     part: Part, point: Point, moved: FloatArray, rng: np.random.Generator
 ) -> dict[str, Bound]:
-    """Size of the error of each output over draws; empty where the shift cannot be simulated."""
+    """Compute the error of each output over draws; empty if the shift cannot be simulated."""
     part = part.weighted_by(point)
     linear, run, path = part.linearised(point), part.run(point), part.weighting.path
     if linear is None or run is None or path is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the friction law leaves out: drag of open clutches, and μ that goes with pressure or heat.
+"""Deviations from the friction law: drag of open clutches, dependence on pressure or temperature.
 
     T_drag = d·s whatever the pressure        μ(s)·(1 + p·(P - P̄) + h·(θ - θ̄)) while slipping
 
@@ -44,7 +44,7 @@ TOLD = 0.5
 
 
 class Kind(StrEnum):
-    """What departs from the law."""
+    """Kinds of deviations from the friction law."""
 
     DRAG = "drag"
     PRESSURE = "pressure"
@@ -66,7 +66,7 @@ class Departure:
 
     @property
     def text(self) -> str:
-        """What the log says of it."""
+        """Verdict of the log on it."""
         if self.std > TOLD * self.plausible:
             return "not told by this log"
         if abs(self.value) > SIGNIFICANT * self.std:
@@ -85,7 +85,7 @@ class _Effect:
 
 
 def departures(found: Identification, temperature: Sampled | None = None) -> tuple[Departure, ...]:
-    """Departures of all elements of a likelihood identification.
+    """Estimate the deviations of all elements of a likelihood identification.
 
     `temperature` [K] is that of the oil over the log, which changes so slowly that it is also told
     across a gap. Raises IdentificationError where the
@@ -109,7 +109,7 @@ def departures(found: Identification, temperature: Sampled | None = None) -> tup
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """What one step finds: `values` (q,) of the effects, and `columns` (n, q) of each part."""
+    """Result of one step: `values` (q,) of the effects, and `columns` (n, q) of each part."""
 
     effects: list[_Effect]
     columns: list[FloatArray]
@@ -123,7 +123,7 @@ def _step(
     temperature: Sampled | None,
     known: FloatArray | None = None,
 ) -> _Step:
-    """One step from the minimum; `known` (q,) has been put back already."""
+    """Compute one step from the minimum; `known` (q,) is already in the residuals."""
     effects = [e for e in _effects(fit, largest, temperature) if e.plausible > 0.0]
     columns = [_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
     precision = np.array([e.plausible for e in effects]) ** -2.0
@@ -135,7 +135,7 @@ def _step(
 
 
 def _put_back(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodFit | None:
-    """The fit with what the effects do to the outputs taken off the residuals; None if it fails."""
+    """Refit with the effects subtracted from the residuals; None if the fit fails."""
     parts = tuple(
         replace(part, returned=part.returned + z @ total)
         for part, z in zip(fit.problem.parts, step.columns, strict=True)
@@ -147,7 +147,7 @@ def _put_back(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodF
 
 
 def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) -> Iterator[_Effect]:
-    """Every departure of every element."""
+    """Yield every deviation of every element."""
     runs = [part.run(fit.point) for part in fit.problem.parts]
     names = dict.fromkeys(e.name for part in fit.problem.parts for e in part.structure.elements)
     for name in names:
@@ -167,7 +167,7 @@ def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) ->
 
 
 def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray]) -> _Effect:
-    """μ that goes with a quantity, about its mean while the element slips."""
+    """Build the change of μ in proportion to a quantity, about its mean while the element slips."""
     contact = [one.friction * one.per_mu for one in seen]
     weights = np.abs(np.concatenate(contact))
     values = np.concatenate(quantity)
@@ -180,7 +180,7 @@ def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray
 
 
 def _columns(part: Part, fit: LikelihoodFit, effects: list[_Effect], place: int) -> FloatArray:
-    """Change (n, q) of the outputs of one part by a unit of each effect."""
+    """Compute the change (n, q) of the outputs of one part by a unit of each effect."""
     run = part.run(fit.point)
     assert run is not None
     columns = []

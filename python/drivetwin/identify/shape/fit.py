@@ -127,7 +127,8 @@ def shaped_friction(
 
 
 def _knots(curve: FrictionCurve) -> FloatArray:
-    """Knots from no slip to the largest seen, even in the root of slip: denser where μ changes."""
+    """Place knots from zero slip to the largest observed, even in the root of slip: denser where
+    μ changes."""
     return np.asarray(np.linspace(0.0, np.sqrt(curve.slip[-1]), KNOTS) ** 2, dtype=np.float64)
 
 
@@ -136,7 +137,7 @@ def _problem(
     signals: Sequence[ShiftSignals],
     tables: Mapping[str, Table],
 ) -> tuple[Problem, Point]:
-    """The problem with knots in place of laws, and where its search starts."""
+    """Build the problem with knots in place of laws, and its initial point."""
     laws = {f"{name}.{key}" for name in tables for key in LAW}
     kept = [k for k, name in enumerate(base.point.names) if name not in laws]
     names = [base.point.names[k] for k in kept]
@@ -163,7 +164,7 @@ def _problem(
 
 
 def _law_of(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
-    """Friction law of an element at the minimum."""
+    """Return the friction law of an element at the minimum."""
     for part in base.problem.parts:
         for one in part.structure.model(base.point).elements:
             if one.name == name:
@@ -174,7 +175,7 @@ def _law_of(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
 
 
 def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
-    """The part with tables in place of laws."""
+    """Replace the laws of a part by tables."""
     old = part.structure
     laws = {f"{e.name}.{key}" for e in old.elements for key in LAW}
     fixed = {**old.fixed, **{name: old.value(base.point, name) for name in laws}}
@@ -184,12 +185,12 @@ def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
 
 
 def _measured(part: Part, signals: ShiftSignals, span: Span) -> Record:
-    """The record with its inputs as measured: those of a fit are the expected ones."""
+    """Restore the inputs as measured: those of a fit are the expected ones."""
     return record_of(signals, span, part.record.fills).of_kinds(part.record.kinds)
 
 
 def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) -> Prior:
-    """`base` with the level and the smoothness of every μ."""
+    """Add the priors on level and smoothness of every μ to `base`."""
     level, spread = LEVEL
     mean, precision = base.mean.copy(), base.precision.copy()
     for name, table in tables.items():
@@ -202,7 +203,7 @@ def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) 
 
 
 def _evidence(normal: Normal, without: Prior, prior: Prior, point: Point) -> float:
-    """-2·log-evidence of a prior, but for a constant, with Q expanded at `point`."""
+    """Compute -2·log-evidence of a prior, up to a constant, with Q expanded at `point`."""
     gradient = normal.gradient - without.pull(point.values) + prior.pull(point.values)
     information = normal.data + prior.precision
     scale = np.sqrt(np.diag(information))
@@ -221,7 +222,8 @@ def _curve(
     seen: FrictionCurve,
     systematic: FloatArray,
 ) -> FrictionCurve:
-    """μ between the knots over the slip range seen, with the band of noise and sensors."""
+    """Interpolate μ between the knots over the observed slips, with the band of noise and
+    sensors."""
     name, table, shape = one
     first = best.point.names.index(table.names(name)[0])
     part = slice(first, first + table.knots.size)
@@ -244,7 +246,7 @@ def _curve(
 
 
 def shaped(shape: Shape, mu: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """μ (K,) at the knots and its covariance (K, K) under `shape`, from those of a free fit."""
+    """Project μ (K,) at the knots, and its covariance (K, K), onto curves of `shape`."""
     if shape is Shape.FREE:
         return mu, covariance
     matrix = np.tril(np.ones((mu.size, mu.size)))
