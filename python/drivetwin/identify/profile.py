@@ -26,14 +26,24 @@ from drivetwin.identify.result import Z95, Identification
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.progress import tell
 
-REACH = 3.0
-"""Values go this many standard deviations to either side, and on as long as Q has not risen."""
-STEP = 0.5
-"""Distance of neighbouring values in standard deviations."""
-FURTHEST = 10.0
-"""Standard deviations at which a side that does not close is given up: the interval is open."""
-RISE = 3.841
-"""Rise of Q at the ends of a 95 % interval: chi-squared of one degree of freedom."""
+
+@dataclass(frozen=True)
+class ProfileSettings:
+    """Settings of the profile likelihood."""
+
+    min_reach: float = 3.0
+    """Distance to either side that is always covered, in standard deviations [-]."""
+    spacing: float = 0.5
+    """Distance of neighbouring values, in standard deviations [-]."""
+    max_reach: float = 10.0
+    """Distance at which a side that does not close is given up, in standard deviations [-]."""
+    rise: float = 3.841
+    """Rise of Q at the ends of a 95 % interval: chi-squared of one degree of freedom [-]."""
+    tolerance: float = 1e-3
+    """Largest error of the fixed parameter, in standard deviations [-]."""
+
+
+PROFILE = ProfileSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,22 +149,6 @@ class _Held:
         return noise_power(self.fit, self.row(self.fit.point)[None, :])
 
 
-class _Target:
-    """Constraint that a parameter has `value`."""
-
-    def __init__(self, held: _Held, value: float) -> None:
-        self.held, self.value = held, value
-        self.tolerance = 1e-3 * held.std
-
-    def miss(self, point: Point) -> float:
-        """Compute the required minus the actual value of the parameter."""
-        return self.value - self.held.value(point)
-
-    def slope(self, point: Point) -> FloatArray:
-        """Compute the derivative (p,) of the parameter by the unknowns."""
-        return self.held.row(point)
-
-
 def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
     """Compute (distance in standard deviations, rise of Q) from the minimum outwards."""
     fit = held.fit
@@ -162,11 +156,12 @@ def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
     estimate, std, point = held.estimate, held.std, fit.point
     found: list[tuple[float, float]] = []
     distance = 0.0
-    while distance < FURTHEST and (distance < REACH or found[-1][1] < RISE):
-        distance += STEP
+    while distance < PROFILE.max_reach and (
+        distance < PROFILE.min_reach or found[-1][1] < PROFILE.rise
+    ):
+        distance += PROFILE.spacing
         value = estimate + sign * distance * std
-        lowest_there = minimise_constrained(fit.problem, point, _Target(held, value))
-        reached = _polished(held, lowest_there, value)
+        reached = _minimise_at(held, point, value)
         if reached is None:
             break
         point, cost = reached
@@ -174,14 +169,20 @@ def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
     return found
 
 
-def _polished(
-    held: _Held, reached: tuple[Point, float] | None, value: float
-) -> tuple[Point, float] | None:
-    """Search on for a lower point if the parameter is itself an unknown of the fit.
+def _minimise_at(held: _Held, start: Point, value: float) -> tuple[Point, float] | None:
+    """Minimise Q with the parameter fixed at `value`; None if the simulation fails.
 
-    Locks make kinks in Q, at which the constrained steps can stop early.
+    If the parameter is itself an unknown of the fit, the damped search goes on from the constrained
+    one, which may stop early at a kink of Q.
     """
     problem = held.fit.problem
+    reached = minimise_constrained(
+        problem,
+        start,
+        lambda point: value - held.value(point),
+        held.row,
+        PROFILE.tolerance * held.std,
+    )
     if reached is None or held.parameter not in held.fit.point.names:
         return reached
     place = held.fit.point.names.index(held.parameter)
@@ -195,12 +196,12 @@ def _polished(
 
 
 def _crossing(values: FloatArray, rise: FloatArray) -> float:
-    """Find the value at which the rise passes `RISE` outwards; infinite if it does not."""
+    """Find the value at which the rise passes `PROFILE.rise` outwards; infinite if it does not."""
     outwards = float(np.sign(float(values[-1]) - float(values[0])))
     start = int(np.argmin(np.abs(rise)))
     for k in range(start, values.size - 1):
-        if rise[k] < RISE <= rise[k + 1]:
-            share = (np.sqrt(RISE) - np.sqrt(max(rise[k], 0.0))) / (
+        if rise[k] < PROFILE.rise <= rise[k + 1]:
+            share = (np.sqrt(PROFILE.rise) - np.sqrt(max(rise[k], 0.0))) / (
                 np.sqrt(rise[k + 1]) - np.sqrt(max(rise[k], 0.0))
             )
             return float(values[k] + share * (values[k + 1] - values[k]))

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 from scipy.optimize import Bounds, LinearConstraint, lsq_linear, minimize
@@ -242,27 +242,18 @@ def minimise_with_line_search(
     return Found(problem, point, normal, False, settings.max_iter)
 
 
-class Constraint(Protocol):
-    """Equality constraint g(θ) = g₀ on a scalar function of the parameters."""
-
-    tolerance: float
-
-    def miss(self, point: Point) -> float:
-        """Compute g₀ - g(θ)."""
-
-    def slope(self, point: Point) -> FloatArray:
-        """Compute the derivative (p,) of g."""
-
-
 def minimise_constrained(
     problem: Objective,
     start: Point,
-    constraint: Constraint,
+    miss: Callable[[Point], float],
+    slope: Callable[[Point], FloatArray],
+    tolerance: float,
     settings: ConstrainedSettings = CONSTRAINED,
 ) -> tuple[Point, float] | None:
-    """Minimise Q under an equality constraint: the point and Q there.
+    """Minimise Q under an equality constraint g(θ) = g₀: the point and Q there.
 
-    Each step is the Gauss-Newton step with a Lagrange multiplier, clipped at the bounds. Returns
+    `miss` computes g₀ - g(θ), at most `tolerance` at the result, and `slope` the derivative (p,) of
+    g. Each step is the Gauss-Newton step with a Lagrange multiplier, clipped at the bounds. Returns
     None if the model cannot be evaluated.
     """
     point, cost = start, float("inf")
@@ -270,11 +261,11 @@ def minimise_constrained(
         normal = problem.normal(point)
         if normal is None:
             return None
-        is_met = abs(constraint.miss(point)) < constraint.tolerance
+        is_met = abs(miss(point)) < tolerance
         if cost - normal.cost < settings.ftol and is_met:
             return point, normal.cost
         cost = normal.cost
-        step = _solve_constrained(normal, constraint.slope(point), constraint.miss(point))
+        step = _solve_constrained(normal, slope(point), miss(point))
         point = point.moved(np.clip(point.values + step, problem.lower, problem.upper))
     return point, problem.cost(point)
 

@@ -23,6 +23,7 @@ from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import Record, record_of
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
 from drivetwin.identify.likelihood.unknowns import LAW, Structure
+from drivetwin.identify.optimize.gauss_newton import step_of
 from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.regression import Prior
@@ -208,7 +209,7 @@ def _evidence(normal: Normal, without: Prior, prior: Prior, point: Point) -> flo
     information = normal.data + prior.precision
     scale = np.sqrt(np.diag(information))
     unit = information / np.outer(scale, scale)
-    step = np.linalg.lstsq(unit, -gradient / scale, rcond=1e-13)[0] / scale
+    step = step_of(information, gradient)
     fall = float(2.0 * step @ gradient + step @ information @ step)
     known = np.flatnonzero(np.diag(prior.precision))
     block = prior.precision[np.ix_(known, known)]
