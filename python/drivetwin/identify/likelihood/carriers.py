@@ -8,17 +8,26 @@ speed passes to the other gear: in a power-on downshift and a power-off upshift.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from drivetwin.identify.likelihood.smooth import local_mean
 from drivetwin.identify.signals import Driveline, ShiftSignals
 
-SLIDES = 0.15
-"""Time [s] for which an off-going element must be filled in the inertia phase."""
-ABOVE = 3.0
-"""Pressure above P0, in its noise, from which an element is filled: nearer to it, noise seems to
-tell μ from P0."""
+
+@dataclass(frozen=True)
+class SlippingElementSettings:
+    """Settings of the search for elements with an identifiable friction law."""
+
+    min_filled: float = 0.15
+    """Time for which an off-going element must be filled in the inertia phase [s]."""
+    filled_sigma: float = 3.0
+    """Pressure above P0 from which an element is filled, in its noise: closer to P0, noise feigns
+    information on μ [-]."""
+
+
+SLIPPING = SlippingElementSettings()
 
 
 def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
@@ -28,9 +37,9 @@ def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
     start, end = signals.shift.inertia_phase
     steady = local_mean(pressure)  # noise alone lifts single samples far above P0
     inside = (pressure.time > start) & (pressure.time < end)
-    limit = leaving.P0.value + 2.0 * leaving.P0.std + ABOVE * pressure.sigma
+    limit = leaving.P0.value + 2.0 * leaving.P0.std + SLIPPING.filled_sigma * pressure.sigma
     filled = np.count_nonzero(inside & (steady > limit))
-    slides = filled * float(np.median(np.diff(pressure.time))) > SLIDES
+    slides = filled * float(np.median(np.diff(pressure.time))) > SLIPPING.min_filled
     return (coming.name, leaving.name) if slides else (coming.name,)
 
 

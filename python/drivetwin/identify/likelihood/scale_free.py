@@ -10,6 +10,8 @@ these are their start values:
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from drivetwin.driveline import in_series
@@ -22,12 +24,20 @@ from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals, Span
 from drivetwin.identify.wlse import whole
 from drivetwin.vehicle.spec import VehicleCard, middle_of
 
-STEP = 0.1
-"""Time over which speeds are differenced [s]: about a period of the driveline's oscillation."""
-ROUNDS = 3
-"""How often the expected slopes follow what was found with them."""
-RING = (0.05, 0.8)
-"""Stretch after lock-up in which the shaft's oscillation is looked for [s]."""
+
+@dataclass(frozen=True)
+class TorqueFreeGuessSettings:
+    """Settings of the initial values without an output torque."""
+
+    step: float = 0.1
+    """Time over which speeds are differenced: about a period of the driveline oscillation [s]."""
+    iterations: int = 3
+    """Iterations of the instruments, the slopes expected from the estimate [-]."""
+    ringdown: tuple[float, float] = (0.05, 0.8)
+    """Start and end, after lock-up, of the stretch in which the shaft oscillation is sought [s]."""
+
+
+GUESS = TorqueFreeGuessSettings()
 
 
 def guess_without_torque(
@@ -78,13 +88,13 @@ def _inertias(
         time, in_gear = _slopes(signals, span)
         slopes.append(in_gear)
         ratios.append(np.full(in_gear.size, gear))
-        torques.append(np.array([_mean(signals, t - 0.5 * STEP + age) for t in time]))
+        torques.append(np.array([_mean(signals, t - 0.5 * GUESS.step + age) for t in time]))
     every = (np.concatenate(each) for each in (ratios, slopes, torques))
     ratio, slope, torque = whole(*every)
     target, seen = torque - J_e * slope, np.column_stack([slope / ratio**2, 1.0 / ratio])
     limits = np.array(card.J_vehicle_range) / driveline.i_f**2
     found = np.linalg.lstsq(seen, target, rcond=None)[0]
-    for _ in range(ROUNDS):
+    for _ in range(GUESS.iterations):
         expected = (torque - found[1] / ratio) / (J_e * ratio**2 + found[0])
         instrument = np.column_stack([expected, 1.0 / ratio])
         found = np.linalg.lstsq(instrument.T @ seen, instrument.T @ target, rcond=None)[0]
@@ -93,25 +103,25 @@ def _inertias(
 
 
 def _slopes(signals: ShiftSignals, span: Span) -> tuple[FloatArray, FloatArray]:
-    """Compute centres [s] and slopes of the engine speed [rad/s^2] over windows of `STEP`.
+    """Compute centres [s] and slopes of the engine speed [rad/s^2] over windows of `step`.
 
     NaN in gaps; a gear held for less than a window has none.
     """
-    edges = np.arange(span[0], span[1], STEP)
+    edges = np.arange(span[0], span[1], GUESS.step)
     speed = signals.engine_speed
-    return 0.5 * (edges[1:] + edges[:-1]), np.diff(speed.at(edges)) / STEP
+    return 0.5 * (edges[1:] + edges[:-1]), np.diff(speed.at(edges)) / GUESS.step
 
 
 def _mean(signals: ShiftSignals, start: float) -> float:
-    """Compute the mean engine torque over `STEP` from `start` [s]."""
-    time = np.linspace(start, start + STEP, 11)
+    """Compute the mean engine torque over `GUESS.step` from `start` [s]."""
+    time = np.linspace(start, start + GUESS.step, 11)
     return float(np.mean(signals.engine_torque.at(time)))
 
 
 def _mode(signals: ShiftSignals, driveline: Driveline) -> tuple[float, float]:
     """Estimate decay rate [1/s] and angular frequency [rad/s] of the twist rate after lock-up."""
     lockup = signals.shift.lockup_time
-    part = signals.output_speed.within((lockup + RING[0], lockup + RING[1]))
+    part = signals.output_speed.within((lockup + GUESS.ringdown[0], lockup + GUESS.ringdown[1]))
     time, twist_rate = part.time, part.values
     if signals.wheel_speed is not None:
         twist_rate = part.values - driveline.i_f * signals.wheel_speed.at(part.time)

@@ -10,6 +10,7 @@ unless all may be one (hills.py); outputs are samples or means, whichever leaves
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,18 +43,27 @@ from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
-WORK = 700.0
-"""Passes over the log that the search may take: from a bad start and to the end it takes 450."""
-LESS_WORK = 200.0
-"""Passes that the search may take which starts from a minimum of the wider model: it takes 160."""
-LINGER_WORK = 400.0
-"""Passes that may be spent on other minima of an element that lingers about P0, of what the search
-has left: each takes about 100."""
-DOUBT_WORK = 400.0
-"""Passes that may be spent on kinds of signals that the log hardly tells, of what the search has
-left: each takes about 100."""
-SMALL = 1e-3
-"""Growing part of the load [N m s^2/rad^2] to start from: one that is zero has no derivative."""
+
+@dataclass(frozen=True)
+class SelectionSettings:
+    """Settings of the model selection; work is counted in passes over the log."""
+
+    max_work: float = 700.0
+    """Work of the search: one from a bad start takes 450 passes [passes]."""
+    max_restricted_work: float = 200.0
+    """Work of the search that starts from a minimum of the wider model: it takes 160 passes
+    [passes]."""
+    max_touch_point_work: float = 400.0
+    """Work on other minima of an element that stays about P0, at most what the search has left:
+    each takes about 100 passes [passes]."""
+    max_sampling_mode_work: float = 400.0
+    """Work on sampling modes that the log hardly distinguishes, at most what the search has left:
+    each takes about 100 passes [passes]."""
+    min_aero: float = 1e-3
+    """Initial growing part of the load; at zero it has no derivative [N m s^2/rad^2]."""
+
+
+SELECTION = SelectionSettings()
 
 
 def choose(
@@ -67,14 +77,14 @@ def choose(
     Raises IdentificationError where no variant converges.
     """
     shifts = [s.shift for s in signals]
-    growing = {**guess, AERO: max(guess.get(AERO, 0.0), SMALL)}
+    growing = {**guess, AERO: max(guess.get(AERO, 0.0), SELECTION.min_aero)}
     constant = {name: value for name, value in guess.items() if name != AERO}
     problem, start = problem_of(signals, drivelines, loss_law, growing, hilly=True)
-    with part(0.0, 0.45), at_most(WORK) as search:
+    with part(0.0, 0.45), at_most(SELECTION.max_work) as search:
         best = _fit_either(problem, start, shifts)
-    with part(0.45, 0.5, "kinds of signals"), at_most(DOUBT_WORK):
+    with part(0.45, 0.5, "kinds of signals"), at_most(SELECTION.max_sampling_mode_work):
         best = with_slow_outputs(problem, best)
-    with part(0.5, 0.65), at_most(LESS_WORK):
+    with part(0.5, 0.65), at_most(SELECTION.max_restricted_work):
         level = with_one_load(best)
         point, covariance = level or (best.point, best.covariance)
         guess = growing if growth.grows(point, covariance) else constant
@@ -82,11 +92,17 @@ def choose(
         wider = best
         best, problem = _narrowed(best, point, narrower, shifts) or (best, problem)
     notes = growth.told(best)
-    with part(0.65, 0.85, "other minima"), at_most(min(LINGER_WORK, search.left)):
+    with (
+        part(0.65, 0.85, "other minima"),
+        at_most(min(SELECTION.max_touch_point_work, search.left)),
+    ):
         best = lowest(problem, best)
-    with part(0.85, 1.0, "kinds of signals"), at_most(min(DOUBT_WORK, search.left)):
+    with (
+        part(0.85, 1.0, "kinds of signals"),
+        at_most(min(SELECTION.max_sampling_mode_work, search.left)),
+    ):
         best, doubts = averaged_over_kinds(problem, best)
-    with at_most(DOUBT_WORK):
+    with at_most(SELECTION.max_sampling_mode_work):
         best, either = with_either_kind(problem, best)
     if AERO not in best.point.names:
         best = growth.allowed_for(best, wider)

@@ -35,10 +35,18 @@ from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import root_of
 from drivetwin.vehicle.spec import VehicleCard
 
-DRAWS = 120
-"""Draws of noise and parameters: the bound is the third largest."""
-LARGEST = 0.975
-"""Share of the draws below the bound."""
+
+@dataclass(frozen=True)
+class PredictionSettings:
+    """Settings of the prediction bounds."""
+
+    draws: int = 120
+    """Draws of noise and parameters: the bound is the third largest [-]."""
+    upper_quantile: float = 0.975
+    """Share of the draws below the upper bound [-]."""
+
+
+PREDICTION = PredictionSettings()
 
 
 @dataclass(frozen=True)
@@ -211,7 +219,7 @@ def _bounds(
         return {}
     columns, response = linear[1] @ moved, part.response(point, run)
     rms: dict[str, list[float]] = {out.name: [] for out in part.record.outputs}
-    for _ in range(DRAWS):
+    for _ in range(PREDICTION.draws):
         noise = {name: np.sqrt(p) * rng.standard_normal(p.size) for name, p in path.power.items()}
         error = part.seen(point, response.to(noise)) + columns @ rng.standard_normal(
             columns.shape[1]
@@ -223,6 +231,6 @@ def _bounds(
             first += out.values.size
             rms[out.name].append(float(np.sqrt(np.mean(piece**2))))
     return {
-        name: Bound(float(np.median(one)), float(np.quantile(one, LARGEST)))
+        name: Bound(float(np.median(one)), float(np.quantile(one, PREDICTION.upper_quantile)))
         for name, one in rms.items()
     }

@@ -31,16 +31,24 @@ from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification
 from drivetwin.identify.signals import FloatArray, Sampled
 
-DRAG_SHARE = 0.1
-"""Plausible drag of an open clutch at the largest slip, as a share of the largest engine torque."""
-LEVEL_SHARE = 0.3
-"""Plausible change of μ over the pressures or temperatures seen."""
-SIGNIFICANT = 3.0
-"""Standard deviations from zero from which a departure counts as seen."""
-ROUNDS = 2
-"""How often what was found is put back."""
-TOLD = 0.5
-"""Share of what is plausible up to which a standard deviation says something."""
+
+@dataclass(frozen=True)
+class FrictionDependenceSettings:
+    """Settings of the deviations from the friction law."""
+
+    drag_share: float = 0.1
+    """Plausible drag of an open clutch at the largest slip, over the largest engine torque [-]."""
+    level_share: float = 0.3
+    """Plausible change of μ over the observed pressures or temperatures [-]."""
+    significant_sigma: float = 3.0
+    """Distance from zero, in standard deviations, above which a deviation is significant [-]."""
+    rounds: int = 2
+    """Number of refits with the deviations taken off the residuals [-]."""
+    max_relative_std: float = 0.5
+    """Largest standard deviation of an informative value, over the plausible value [-]."""
+
+
+DEPENDENCE = FrictionDependenceSettings()
 
 
 class Kind(StrEnum):
@@ -67,9 +75,9 @@ class Departure:
     @property
     def text(self) -> str:
         """Verdict of the log on it."""
-        if self.std > TOLD * self.plausible:
+        if self.std > DEPENDENCE.max_relative_std * self.plausible:
             return "not told by this log"
-        if abs(self.value) > SIGNIFICANT * self.std:
+        if abs(self.value) > DEPENDENCE.significant_sigma * self.std:
             return "seen"
         return "none seen"
 
@@ -94,7 +102,7 @@ def departures(found: Identification, temperature: Sampled | None = None) -> tup
     fit, signals = likelihood_of(found)
     largest = max(float(np.max(np.abs(s.engine_torque.values))) for s in signals)
     total, step = np.zeros(0), _step(fit, largest, temperature)
-    for _ in range(ROUNDS):
+    for _ in range(DEPENDENCE.rounds):
         total = step.values if total.size == 0 else total + step.values
         again = _put_back(fit, step, total)
         if again is None:
@@ -158,7 +166,7 @@ def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) ->
         ]
         slip = tuple(one.slip for one in seen)
         reach = max(float(np.max(np.abs(s))) for s in slip)
-        yield _Effect(Kind.DRAG, name, slip, DRAG_SHARE * largest / reach)
+        yield _Effect(Kind.DRAG, name, slip, DEPENDENCE.drag_share * largest / reach)
         yield _level(Kind.PRESSURE, name, seen, [one.above for one in seen])
         if temperature is not None:
             known = temperature.time, temperature.values
@@ -176,7 +184,7 @@ def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray
         return _Effect(kind, name, (), 0.0)
     mean = float(np.average(values, weights=weights))
     torques = tuple(one * (part - mean) for one, part in zip(contact, quantity, strict=True))
-    return _Effect(kind, name, torques, LEVEL_SHARE / float(np.ptp(values[slipping])))
+    return _Effect(kind, name, torques, DEPENDENCE.level_share / float(np.ptp(values[slipping])))
 
 
 def _columns(part: Part, fit: LikelihoodFit, effects: list[_Effect], place: int) -> FloatArray:
