@@ -277,9 +277,8 @@ def solve(
     theta = minimise_with_line_search(
         equations, Point(names, values), lambda m, gradient: _inverse(m) @ gradient, tolerance
     ).point.values
-    terms = assemble(theta)
-    point = _evaluate(terms, theta.size)
-    information = point.information - _spurious(terms, point, theta.size)
+    point = equations.evaluate(theta)
+    information = point.information - _spurious(assemble(theta), point, theta.size)
     chi2 = point.q / max(point.residual.size - theta.size, 1)
     # More residual than the stated noise lowers what the data tell, not what the design tells.
     covariance = _inverse(_positive(information) / max(1.0, chi2) + prior.precision)
