@@ -3,8 +3,8 @@
 
 Outputs, engine torque and pressures get noise of the levels found in the log, design priors are
 drawn like measurements. Each search starts at the fit, where it is known to end nearby. The spread
-of the fits is that of the estimator itself, bounds, locks and all; it tells where the covariance is
-too small, and shows a bias. It knows no effect that is not in the model.
+of the fits is that of the estimator itself, bounds, locks and all; it shows
+where the covariance is too small, and a bias. Effects outside the model are not covered.
 """
 
 from __future__ import annotations

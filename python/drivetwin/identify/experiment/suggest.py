@@ -36,7 +36,7 @@ AGE = "te_delay"
 REPEATS = (1, 2, 4)
 """How often the best experiment is repeated at most, in steps."""
 LEAST_KNOWN = 3
-"""How many identified parameters are told how to narrow."""
+"""Number of identified parameters that are ranked beside the open ones."""
 NARROWER = 0.9
 """Share of the present interval to which an experiment must narrow it to be worth recording."""
 NONE_HELPS = "none of the known experiments narrows it by a tenth or more"
@@ -242,7 +242,7 @@ def _suggestion(
         return Suggestion(one.id, one.verdict, half, (), CALIBRATE)
     names = _with_age(fit).names
     row = _row(one.id, fit, signals, names)
-    if not row.any():  # what another log has of its own
+    if not row.any():  # specific to another log
         return Suggestion(one.id, one.verdict, half, ())
     loud = np.sqrt(_noise_power(fit, row))
     best: dict[Experiment, Prospect] = {}

@@ -35,7 +35,7 @@ def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
     coming, leaving = driveline.oncoming, driveline.offgoing
     pressure = signals.pressures[leaving.name]
     start, end = signals.shift.inertia_phase
-    steady = local_mean(pressure)  # noise alone lifts single samples far above P0
+    steady = local_mean(pressure)  # noise lifts single samples above P0
     inside = (pressure.time > start) & (pressure.time < end)
     limit = leaving.P0.value + 2.0 * leaving.P0.std + SLIPPING.filled_sigma * pressure.sigma
     filled = np.count_nonzero(inside & (steady > limit))

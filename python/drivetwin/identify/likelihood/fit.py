@@ -69,7 +69,7 @@ class Hopeless(IdentificationError):
 class LikelihoodFit:
     """Minimum of Q at `point` with the estimate of the unknowns: `mean`, `covariance` (p, p).
 
-    `mean` is the minimum, or the average with minima that the log hardly tells from it (kinds.py).
+    `mean` is the minimum, or the average over minima that the log hardly distinguishes (kinds.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
     the expansion of Q there. The covariance is that of `spread_of`.
     """

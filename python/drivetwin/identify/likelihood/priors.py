@@ -58,11 +58,11 @@ PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
 """Efficiency of a gearbox where no output torque shows it."""
 _GEAR_INERTIA = "J_prime_"
 OFF_DESIGN = 10.0
-"""Factor beside the card's Jo′ within which it is sought. Of all inertias it alone may be so small
-that with the shaft's damping one run takes as long as a whole fit."""
+"""Factor to either side of the card's Jo′ within which it is sought. Only this inertia may become so
+small that, with the shaft's damping, one run takes as long as a whole fit."""
 OFF_GOING = {"mu_c": 0.03, "mu_drop": 0.02}
-"""Spread of the friction of an element that only lets go, about that of the one coming on: what
-shows of it is at what pressure it breaks away, and how its torque then falls with slip."""
+"""Prior standard deviation of the friction of an element that only disengages, about that of the
+engaging one: the log shows the break-away pressure and the decrease of its torque with slip."""
 
 
 def problem_of(

@@ -102,7 +102,7 @@ class Part:
         if not self._whole(found.run):
             return None
         columns = np.column_stack([self.record.stacked(found.derivatives[n]) for n in names])
-        acting = np.any(matrix != 0.0, axis=0)  # of many shifts a part knows few unknowns
+        acting = np.any(matrix != 0.0, axis=0)  # a part depends on few unknowns
         slopes = np.zeros((len(columns), acting.size))
         slopes[:, acting] = columns @ matrix[:, acting]
         response = self.response(point, found.run)

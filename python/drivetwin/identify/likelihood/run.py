@@ -28,7 +28,7 @@ DISAGREE = 5.0
 OUTSIDE = 10.0
 """Factor beside the design range of J3 from which the linear method's value is no start."""
 BEHIND_GEARBOX = ("J_vehicle", "Tv_over_if", "k_o", "c_o")
-"""Unknowns whose start hangs on the linear method's J3."""
+"""Unknowns whose initial value depends on the linear method's J3."""
 OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
 """What a method reads off a load that it takes as constant."""
 

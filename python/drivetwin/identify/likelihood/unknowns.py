@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Unknowns of the fit and the simulated model as a function of them.
 
-    J1 = Je/η, J2e = 0 (THEORY section 3: only Je = J1·η + J2e can be told)
+    J1 = Je/η, J2e = 0 (THEORY section 3: only Je = J1·η + J2e is identifiable)
     load.constant = i_f·(T_v/i_f + d) - aero·mean speed², mu_s = mu_c + mu_drop, v_s = exp(ln_v_s)
 
-On a hilly road the load of each shift departs from T_v/i_f by a d of its own. They add up to zero
+On a hilly road the load of each shift deviates from T_v/i_f by d. The deviations add up to zero
 over the shifts of a log, so T_v/i_f is the mean: the d of the first is minus the sum of the others.
-An element that comes on in one of the shifts has its own Stribeck law; of one that only lets go
-no more than the level of its law shows, through the instant at which it breaks away.
+An element that engages in one of the shifts has its own Stribeck law. Of an element that only
+disengages, the level of the law is identifiable alone, from the instant of break-away.
 """
 
 from __future__ import annotations

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: MIT
 """Homogeneity test of the logs of a joint fit.
 
-At the common minimum each log alone pulls the shared unknowns θ by g_k against its information
-F_k, what it has of its own eliminated (Schur complement). In coordinates in which the joint
+At the common minimum, g_k is the gradient and F_k the information of log k on the shared unknowns
+θ; its log-specific unknowns are eliminated (Schur complement). In coordinates in which the joint
 covariance is the identity, G_k = Lᵀ F_k L has a row of information for each direction that the log
-tells, and
+identifies, and
 
     χ² = min over δ of Σ_k ‖U_kᵀ δ·√w_k + U_kᵀ h_k/√w_k‖²,   G_k = U_k diag(w_k) U_kᵀ,  h_k = Lᵀ g_k
 
 is χ² distributed with as many degrees of freedom as there are rows beyond the rank: the
 homogeneity test of Cochran (1954) for vectors. Design priors take no part in it. How far each
-parameter would move without one log, in standard deviations of that move, says where it comes from.
+parameter would move without one log, in standard deviations of that move, shows the source of an
+inconsistency.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import root_of
 
 TOLD = 0.02
-"""Share of the joint information on a direction below which a log says nothing of it."""
+"""Share of the joint information on a direction below which a log is uninformative."""
 SIGNIFICANT = 0.01
 """Probability of χ² under agreeing logs below which they are said to disagree."""
 FAR = 3.0

@@ -51,8 +51,8 @@ NAMED = 3
 class LogShare:
     """One log of a fit of several: `number` from 1, as in parameter ids such as `te_delay.1`.
 
-    `alone` is what the log tells by itself, by parameter id without the number. T_v/i_f of the log
-    holds at `mean_speed` of the wheel [rad/s].
+    `alone` are the estimates from the log by itself, by parameter id without the number. T_v/i_f of
+    the log holds at `mean_speed` of the wheel [rad/s].
     """
 
     number: int

@@ -64,11 +64,11 @@ class Bound:
 class Expected:
     """Prediction for one shift held out.
 
-    `own` are values and standard deviations of what its log has of its own, by plain name, where
-    the fit has not seen the log; T_v/i_f holds at `mean_speed` of the wheel [rad/s]. `start` is the
-    state at `time` [s] that the whole stretch before the shift tells. `bounds` go
-    by compared signal; empty where the law of the on-coming element is another's, whose spread
-    nobody knows.
+    `own` are values and standard deviations of the log-specific unknowns by plain name, if the log
+    was not part of the fit; T_v/i_f holds at `mean_speed` of the wheel [rad/s]. `start` is the
+    state at `time` [s], estimated from the whole stretch before the shift. `bounds` are by compared
+    signal; empty if the law of the on-coming element is that of another element, whose deviation is
+    unknown.
     """
 
     own: Mapping[str, tuple[float, float]]
