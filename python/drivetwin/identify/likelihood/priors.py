@@ -58,7 +58,7 @@ PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
 """Efficiency of a gearbox where no output torque shows it."""
 _GEAR_INERTIA = "J_prime_"
 OFF_DESIGN = 10.0
-"""Factor to either side of the card's Jo′ within which it is sought. Only this inertia may become so
+"""Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
 small that, with the shaft's damping, one run takes as long as a whole fit."""
 OFF_GOING = {"mu_c": 0.03, "mu_drop": 0.02}
 """Prior standard deviation of the friction of an element that only disengages, about that of the
