@@ -15,7 +15,7 @@ import numpy as np
 from drivetwin.driveline import Signal
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import IndexArray
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import FloatArray
 from tests.support.bench import Bench

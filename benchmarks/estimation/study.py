@@ -21,8 +21,9 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.guess import guess_of
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import LAW, Point
+from drivetwin.identify.likelihood.unknowns import LAW
 from drivetwin.identify.likelihood.variants import choose
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.vehicle.spec import PriorValue
 from tests.support.bench import Bench, Knowledge, record_bench

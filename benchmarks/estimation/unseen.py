@@ -22,8 +22,9 @@ from drivetwin.identify.likelihood.kinds import SPEEDS
 from drivetwin.identify.likelihood.priors import spans
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import TORQUE, record_of
-from drivetwin.identify.likelihood.unknowns import AERO, LAW, TE_OFFSET, Point
+from drivetwin.identify.likelihood.unknowns import AERO, LAW, TE_OFFSET
 from drivetwin.identify.method import DEFAULT_METHOD
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.pipeline import identify
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import FrictionCurve, Identification

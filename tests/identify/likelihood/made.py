@@ -12,7 +12,7 @@ from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.identify.likelihood.fit import LikelihoodFit, fit
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from tests.support.bench import Bench, Knowledge, record_bench
 
 ROUGH = Knowledge(J_out=0.1, P0=5e3)

@@ -12,7 +12,8 @@ import pytest
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.growth import _moments, allowed_for
 from drivetwin.identify.likelihood.priors import problem_of
-from drivetwin.identify.likelihood.unknowns import AERO, Point
+from drivetwin.identify.likelihood.unknowns import AERO
+from drivetwin.identify.optimize.objective import Point
 from tests.identify.likelihood.made import bench, truth_of
 
 MOVED = "J_vehicle"

@@ -12,7 +12,7 @@ import pytest
 from drivetwin.dyno.scenarios import paper_steps, throttle_steps
 from drivetwin.identify.likelihood import kinds as of_signals
 from drivetwin.identify.likelihood.covariance import Whiteness
-from drivetwin.identify.likelihood.fit import FAR, NEAR, LikelihoodFit, nearest
+from drivetwin.identify.likelihood.fit import MULTI_START, LikelihoodFit, nearest
 from drivetwin.identify.likelihood.kinds import (
     SPEEDS,
     averaged_over_kinds,
@@ -23,7 +23,7 @@ from drivetwin.identify.likelihood.kinds import (
 )
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import ROUGH, problem, truth_of
@@ -168,7 +168,7 @@ def test_from_far_off_signals_are_taken_as_read() -> None:
     weighted = posed.weighted_by(far)
     normal = weighted.normal(far)
     assert normal is not None
-    assert FAR < normal.cost / posed.size < NEAR
+    assert MULTI_START.far_chi2 < normal.cost / posed.size < MULTI_START.direct_chi2
     assert of_signals._promising(weighted, far, normal)  # wrong: there are samples alone
     likely, other = likely_kinds(
         posed, far, [record_bench(throttle_steps(), 0, ROUGH).signals.shift]
@@ -186,7 +186,7 @@ def test_from_far_off_the_lower_gear_tells_kinds() -> None:
     ]
     made = record_bench(replace(base, sensors=tuple(sensors)), 0, ROUGH)
     posed, start = problem(made, off=0.1)
-    assert posed.weighted_by(start).cost(start) > FAR * posed.size
+    assert posed.weighted_by(start).cost(start) > MULTI_START.far_chi2 * posed.size
     likely, _ = likely_kinds(posed, start, [made.signals.shift])
     assert frozenset(SPEEDS) <= likely.kinds
 

@@ -76,7 +76,7 @@ def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     made = record_bench(paper_steps(), 0, Knowledge())
-    monkeypatch.setattr(variants, "LESS_WORK", 0.0)
+    monkeypatch.setattr(variants, "SELECTION", replace(variants.SELECTION, max_restricted_work=0.0))
     fit, _ = _chosen(made)
     names, truth = fit.point.names, truth_of(made)
     assert AERO not in names

@@ -11,7 +11,7 @@ import pytest
 from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.derived import parameters, slopes
 from drivetwin.identify.likelihood.fit import nearest
-from drivetwin.identify.likelihood.limits import at_limits
+from drivetwin.identify.likelihood.null_space import at_limits
 from drivetwin.identify.result import Verdict
 from tests.identify.likelihood.made import bench, fitted, problem
 
