@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
@@ -66,7 +66,6 @@ class Kinked(Problem):
         return Normal(self.cost(point), gradient, curvature, curvature, (), ())
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(-1.5, 1.5), min_size=3, max_size=3), st.sampled_from([1.0, 300.0]))
 def test_a_search_goes_along_kinks_to_their_crossing(start: list[float], height: float) -> None:
     """Also far off, where a step promises much more than `CLOSE`: there it crawls a while."""

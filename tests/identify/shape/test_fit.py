@@ -56,7 +56,7 @@ def test_other_methods_are_refused() -> None:
         shaped_friction(by_the_paper(), Shape.FREE, {})
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000), st.integers(2, 8), st.sampled_from([Shape.FALLING, Shape.RISING]))
 def test_is_monotone_and_no_neighbour_is_nearer(seed: int, size: int, shape: Shape) -> None:
     rng = np.random.default_rng(seed)
