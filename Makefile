@@ -10,6 +10,7 @@ bin := $(venv)/bin
 pip := $(bin)/python -m pip --disable-pip-version-check
 # Cargo profile of the native module: it links fast. The wheel and timed programs use `release`.
 profile := develop
+wheel_profile := release
 # Tests run on all cores. Each worker starts with a contiguous share of them, so that the tests of a
 # file stay together, and takes over from others at the end.
 pytest := $(bin)/pytest -q -n auto --dist worksteal
@@ -73,22 +74,34 @@ test-exhaustive: ## many instances, many damaged files
 fault_logs ?= 40
 test-faults: export FLEET_FAULT_LOGS := $(fault_logs)
 $(suites:%=test-%): test-%: $(venv)/.dev native
-	$(pytest) -m $*
+	$(pytest) --timeout 1800 -m $*
 
 .PHONY: test-browser
 test-browser: $(venv)/.dev native ## report and workbench in Chromium; pictures go to out/browser
 	tools/browser.sh
 	$(bin)/pytest -q -m browser
 
+.PHONY: nightly
+nightly: ## what takes hours: all suites, a fleet of 300, the wheel, short fuzzing of `identify`
+	$(MAKE) $(suites:%=test-%) fault_logs=1000
+	$(MAKE) fleet fleet_logs=300
+	$(MAKE) test-browser test-wheel docs
+
 .PHONY: wheel
-wheel: $(venv)/.dev ## the abi3 wheel, into dist/
+wheel: $(venv)/.base ## the abi3 wheel, into dist/
 	rm -f dist/drivetwin-*.whl
-	$(bin)/maturin build --quiet --release --locked --out dist
+	$(bin)/maturin build --quiet --profile $(wheel_profile) --locked --out dist
 	ls dist/drivetwin-*.whl
 
 .PHONY: test-wheel
 test-wheel: wheel ## run the demo from the wheel where there is no Rust
 	tools/try_wheel.sh $(bin)/python dist/drivetwin-*.whl
+
+.PHONY: docs
+docs: $(venv)/.dev native ## build the documentation site into out/docs, warnings are errors
+	$(pip) install --quiet --group docs
+	$(bin)/python -m sphinx --quiet --fail-on-warning --keep-going -E -b html docs out/docs
+	cp out/docs/README.html out/docs/index.html
 
 .PHONY: notices
 notices: $(venv)/.dev ## write the licences of the linked crates, after a change of Cargo.lock
@@ -99,7 +112,8 @@ reference: $(venv)/.dev native ## solve the reference problems anew with SciPy
 	$(bin)/python -m reference
 
 .PHONY: bench
-bench: $(venv)/.dev native ## measure what has a stated limit
+bench: $(venv)/.dev ## measure what has a stated limit
+	$(MAKE) native profile=release
 	$(bin)/python -m benchmarks.limits
 	$(bin)/python -m benchmarks.export_step # writes docs/export-cost.md
 	$(bin)/python -m benchmarks.speed # writes docs/benchmarks.md
@@ -117,11 +131,6 @@ fleet_logs ?= 10000
 .PHONY: fleet
 fleet: $(venv)/.dev native ## a made fleet of fleet_logs=10000 logs, checked against its truth (an hour or two)
 	$(bin)/python -m benchmarks.fleet.acceptance $(fleet_logs) out/fleet
-
-fault_logs ?= 1000
-.PHONY: fleet-faults
-fleet-faults: $(venv)/.dev native ## killed workers and coordinators, a full disk, a lost scheduler: fault_logs=1000 logs each
-	FLEET_FAULT_LOGS=$(fault_logs) $(bin)/pytest -q --timeout 1800 tests/fleet/test_coordinator_faults.py tests/fleet/test_cluster.py
 
 .PHONY: fleet-scaling
 fleet-scaling: $(venv)/.dev native ## overhead, memory, two workers against one, Dask against processes
@@ -148,27 +157,31 @@ fmt: $(venv)/.dev ## format Rust and Python sources
 
 .PHONY: clean
 clean: ## remove everything that was built
-	rm -rf $(venv) target dist out python/drivetwin/_native*.so
+	rm -rf $(venv) .pytest_cache target dist out python/drivetwin/_native*.so
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 .PHONY: prerequisites
 prerequisites:
 	@tools/prerequisites.sh > /dev/null
 
-# The environment with the tools; new when pyproject.toml is.
-$(venv)/.dev: pyproject.toml | prerequisites
+# The environment with the build tool; new when pyproject.toml is.
+$(venv)/.base: pyproject.toml | prerequisites
 	"$$(tools/prerequisites.sh)" -m venv $(venv)
 	$(pip) install --quiet --upgrade 'pip>=25.1'
+	$(pip) install --quiet --group build
+	touch $@
+
+# The tools of a developer.
+$(venv)/.dev: $(venv)/.base
 	$(pip) install --quiet --group dev
 	touch $@
 
-# The package, editable, with its native module; new when a Rust source is.
-$(venv)/.native: $(venv)/.dev $(rust_sources)
-	VIRTUAL_ENV=$(CURDIR)/$(venv) $(bin)/maturin develop --quiet --release --locked
+# The package, editable, with its run-time dependencies and its native module; new when a Rust
+# source is. The stamp has the name of the profile, of which one at a time is installed.
+$(venv)/.native-%: $(venv)/.base $(rust_sources)
+	rm -f $(venv)/.native-*
+	VIRTUAL_ENV=$(CURDIR)/$(venv) $(bin)/maturin develop --quiet --profile $* --locked
 	touch $@
 
-.PHONY: docs
-docs: $(venv)/.dev native ## build the documentation site into out/docs, warnings are errors
-	$(pip) install --quiet --group docs
-	$(bin)/python -m sphinx --quiet --fail-on-warning --keep-going -E -b html docs out/docs
-	cp out/docs/README.html out/docs/index.html
+.PHONY: native
+native: $(venv)/.native-$(profile)

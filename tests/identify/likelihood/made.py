@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
 from drivetwin.dyno.names import ScenarioName
@@ -14,11 +12,12 @@ from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.optimize.objective import Point
 from tests.support.bench import Bench, Knowledge, record_bench
+from tests.support.shared_results import shared
 
 ROUGH = Knowledge(J_out=0.1, P0=5e3)
 
 
-@cache
+@shared
 def bench(seed: int = 0, noise: float = 1.0, know: Knowledge = ROUGH) -> Bench:
     return record_bench(SCENARIOS[ScenarioName.THROTTLE_STEPS](), seed, know, noise)
 
@@ -59,7 +58,7 @@ def problem(made: Bench, off: float = 0.0) -> tuple[Problem, Point]:
     return problem_of([made.signals], [made.driveline], made.run.scenario.model.loss_law, guess)
 
 
-@cache
+@shared
 def fitted(seed: int = 0) -> LikelihoodFit:
     made = bench(seed)
     posed, start = problem(made)

@@ -28,6 +28,7 @@ from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import ROUGH, problem, truth_of
 from tests.support.bench import record_bench
+from tests.support.shared_results import shared
 
 MEANS = frozenset({"output_torque"})
 UNDECIDED = 78
@@ -42,7 +43,7 @@ def _posed() -> Problem:
     return problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))[0]
 
 
-@cache
+@shared
 def _fit(kinds: frozenset[str]) -> LikelihoodFit:
     _, start = problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))
     found = nearest(_posed().of_kinds(kinds), start)
@@ -120,7 +121,7 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
     assert told(8.0) == pytest.approx(told(0.0), abs=0.02 * std)
 
 
-@cache
+@shared
 def _without_torque() -> tuple[Problem, Point, LikelihoodFit]:
     """A problem of samples without an output torque, where its search starts, and its minimum."""
     made = record_bench(throttle_steps(), 0, ROUGH)
@@ -212,7 +213,7 @@ def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
     assert with_either_kind(_posed(), fit) == (fit, [])
 
 
-@cache
+@shared
 def _at_50_hertz(window: float) -> tuple[Problem, LikelihoodFit]:
     """A problem of outputs every 20 ms that are means over the `window` [s], and its minimum with
     the kinds that an expansion tells."""

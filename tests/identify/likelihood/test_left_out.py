@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -18,9 +17,10 @@ from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.result import Verdict
 from tests.identify.likelihood.made import fitted, problem, truth_of
 from tests.support.bench import Bench, Knowledge, record_bench
+from tests.support.shared_results import shared
 
 
-@cache
+@shared
 def _with_delay(delay: float, role: str = "output_torque") -> tuple[Bench, LikelihoodFit]:
     """A log with one sensor late, and its fit."""
     base = paper_steps()

@@ -17,6 +17,7 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.priors import problem_of
 from tests.identify.likelihood.made import bench, fitted, truth_of
 from tests.support.bench import Bench, Knowledge, record_bench
+from tests.support.shared_results import shared
 
 LAWS: tuple[LossLaw, ...] = ("paper", "dissipative")
 
@@ -28,7 +29,7 @@ def _made(law: LossLaw) -> Bench:
     return record_bench(replace(base, model=replace(base.model, loss_law=law)), 0, Knowledge())
 
 
-@cache
+@shared
 def _fit(true: LossLaw, card: LossLaw) -> LikelihoodFit:
     made = _made(true)
     found = nearest(*problem_of([made.signals], [made.driveline], card, truth_of(made)))

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from drivetwin.identify.likelihood.tolerance import Sensitivity, sensitivity, se
 from drivetwin.identify.signals import FloatArray
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.identify.likelihood.made import bench, fitted, problem
+from tests.support.shared_results import shared
 
 AGE = 1e-3
 OTHERS = (
@@ -70,7 +70,7 @@ def test_the_shift_is_that_of_a_fit_of_older_values() -> None:
     assert max(abs(told[name] - moved[name]) for name in told) < 0.5
 
 
-@cache
+@shared
 def found() -> Sensitivity:
     fit = fitted()
     friction = curves_of(fit, {}, np.zeros_like(fit.covariance))
