@@ -83,14 +83,14 @@ def python_function(body_lines: int, arguments: str = "", docstring: str = "") -
         ),
         (
             core_layers,
-            {f"{CORE}/solve/a.rs": "use crate::network::Mode;"},
-            {f"{CORE}/solve/a.rs": "use crate::{network::Mode, model::Clutch};"},
+            {f"{CORE}/solver/a.rs": "use crate::network::Mode;"},
+            {f"{CORE}/solver/a.rs": "use crate::{network::Mode, model::Clutch};"},
             1,
         ),
         (
             core_layers,
-            {f"{CORE}/simulate/a.rs": "use crate::solve::Status;"},
-            {f"{CORE}/network/a.rs": "use crate::solve::Status;"},
+            {f"{CORE}/simulate/a.rs": "use crate::solver::Status;"},
+            {f"{CORE}/network/a.rs": "use crate::solver::Status;"},
             1,
         ),
         (

@@ -18,9 +18,9 @@ _IMPURE = re.compile(
     r"\bpyo3\b|\bstd\s*::\s*(?:fs|io|net|process|env)\b|\b(?:e?print(?:ln)?|dbg)\s*!"
 )
 _MAY_NOT_USE = {
-    "model": ("network", "solve", "simulate"),
-    "network": ("solve", "simulate"),
-    "solve": ("model", "simulate"),
+    "model": ("network", "solver", "simulate"),
+    "network": ("solver", "simulate"),
+    "solver": ("model", "simulate"),
 }
 """Folders of the core and what they must not know; the integrator knows no elements either."""
 

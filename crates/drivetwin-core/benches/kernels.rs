@@ -11,7 +11,7 @@ use drivetwin_core::network::{ModeKey, Network};
 use drivetwin_core::simulate::{
     Keep, Plan, dual_clutch_batch, dual_clutch_outputs, dual_clutch_sensitivities,
 };
-use drivetwin_core::solve::{Known, Settings, Signal};
+use drivetwin_core::solver::{Settings, Signal, SolverCache};
 use std::hint::black_box;
 
 /// Time [s], engine torque [N·m] and pressures [Pa] of a shift from second to third.
@@ -59,7 +59,7 @@ fn kernels(criterion: &mut Criterion) {
     });
     criterion.bench_function("one shift", |b| b.iter(|| plan.run(&network, black_box(&state))));
     criterion.bench_function("one shift, modes known", |b| {
-        let mut known = Known::of(&network);
+        let mut known = SolverCache::new(&network);
         b.iter(|| plan.run_again(&mut known, black_box(&state)));
     });
     let sampled = [("engine torque", &torque), ("B2", &off), ("B3", &on)]

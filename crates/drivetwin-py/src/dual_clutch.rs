@@ -6,7 +6,7 @@ use drivetwin_core::model::DualClutch;
 use drivetwin_core::simulate::{
     DualClutchStart, Trajectory, dual_clutch_sensitivities, simulate_dual_clutch,
 };
-use drivetwin_core::solve::{Settings, Signal};
+use drivetwin_core::solver::{Settings, Signal};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -41,7 +41,7 @@ pub fn simulate<'py>(
         .collect::<PyResult<Vec<_>>>()?;
     let start = start_of(start);
     let (tolerance, max_step, order, sprint, audit) = options;
-    let settings = Settings { tolerance, max_step, order, sprint };
+    let settings = Settings { tolerance, max_step, order, exponential_steps: sprint };
     let run = py
         .detach(|| simulate_dual_clutch(&model, &signals, &start, grid, (settings, audit)))
         .map_err(|e| PyValueError::new_err(e.to_string()))?;

@@ -5,7 +5,7 @@ use crate::plain::{Audit, Event, as_tuple, events_of};
 use drivetwin_core::model::{Driveline, Element};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{Output, Start, run};
-use drivetwin_core::solve::{Settings, Signal};
+use drivetwin_core::solver::{Settings, Signal};
 use numpy::{PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -51,7 +51,7 @@ pub fn simulate_network<'py>(
     let (speeds, twists, locked) = start;
     let start = Start { speeds, twists, locked };
     let (tolerance, max_step, order, sprint, audit) = options;
-    let settings = Settings { tolerance, max_step, order, sprint };
+    let settings = Settings { tolerance, max_step, order, exponential_steps: sprint };
     let trajectory = py
         .detach(|| {
             let network = Network::compile(&driveline)?;

@@ -217,7 +217,7 @@ impl<T> DualClutch<T> {
 
 impl DualClutch<f64> {
     /// The same driveline over another number type.
-    pub fn lifted<T: Number>(&self) -> DualClutch<T> {
+    pub fn promote<T: Number>(&self) -> DualClutch<T> {
         self.map(&|&value| T::of(value))
     }
 }

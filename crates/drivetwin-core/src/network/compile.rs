@@ -231,7 +231,7 @@ impl<T: Number> Network<T> {
     /// Members without mass between friction elements get a negligible one; whether there are any. Behind one
     /// element alone there is nothing to follow while it is open.
     fn give_mass_between_frictions(&mut self) -> bool {
-        let floor = T::lifted(self.inertia.max_abs() * MASSLESS);
+        let floor = T::promote(self.inertia.max_abs() * MASSLESS);
         let mut given = false;
         for j in (0..self.speeds()).filter(|&j| is_nothing(self.mass[(j, j)])) {
             let node = self.coordinates.independent[j];

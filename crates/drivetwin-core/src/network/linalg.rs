@@ -359,7 +359,7 @@ fn subtract_row<T: Number>(
 /// Whether a number is zero in every run and with all its derivatives, so that its products may be left
 /// out.
 pub fn is_zero<T: Number>(value: T) -> bool {
-    value.re().those(|v| v != 0.0) == 0 && value.is_constant()
+    value.re().mask_where(|v| v != 0.0) == 0 && value.is_constant()
 }
 
 /// Whether the value is zero, which is decided.

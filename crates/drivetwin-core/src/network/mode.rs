@@ -16,14 +16,14 @@ use std::sync::OnceLock;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GearState {
     /// Turning, its loss set by direction of motion and of power.
-    Rolling {
+    Meshing {
         /// Sign of the driving side's speed.
         sign: f64,
         /// Power flows from the driven to the driving side.
-        backward: bool,
+        power_reversed: bool,
     },
     /// At rest, held by its own loss.
-    Held,
+    Locked,
 }
 
 /// Something that keeps a speed at zero: friction element or lossy gear, by index.
@@ -40,7 +40,7 @@ pub enum Row {
 pub struct ModeKey {
     stuck: u32,
     held: u32,
-    backward: u32,
+    power_reversed: u32,
     reverse: u32,
 }
 
@@ -51,9 +51,9 @@ impl ModeKey {
         stuck.for_each(|j| key.stuck |= 1 << j);
         for (i, gear) in gears.iter().enumerate() {
             match *gear {
-                GearState::Held => key.held |= 1 << i,
-                GearState::Rolling { sign, backward } => {
-                    key.backward |= u32::from(backward) << i;
+                GearState::Locked => key.held |= 1 << i,
+                GearState::Meshing { sign, power_reversed } => {
+                    key.power_reversed |= u32::from(power_reversed) << i;
                     key.reverse |= u32::from(sign < 0.0) << i;
                 }
             }
@@ -121,8 +121,8 @@ impl<T: Number> Loss<T> {
 
     /// Factor between the torque that enters at the driving side and what the driven side gets, and
     /// the drag that is taken off before (with the sign of motion).
-    fn factor(&self, sign: f64, backward: bool) -> (T, T) {
-        match (self.law, backward) {
+    fn factor(&self, sign: f64, power_reversed: bool) -> (T, T) {
+        match (self.law, power_reversed) {
             (LossLaw::Paper, _) => (self.eta, T::zero_()),
             (LossLaw::Dissipative, false) => (self.eta, self.drag * sign),
             (LossLaw::Dissipative, true) => (self.eta_backward.recip(), self.drag_backward * sign),
@@ -130,8 +130,8 @@ impl<T: Number> Loss<T> {
     }
 
     /// Torque lost at the driving side of a rolling gear that `torque` enters.
-    pub fn loss_torque(&self, torque: T, sign: f64, backward: bool) -> T {
-        let (factor, drag) = self.factor(sign, backward);
+    pub fn loss_torque(&self, torque: T, sign: f64, power_reversed: bool) -> T {
+        let (factor, drag) = self.factor(sign, power_reversed);
         torque * (-factor + 1.0) + drag
     }
 
@@ -144,9 +144,12 @@ impl<T: Number> Loss<T> {
     /// Bounds at rest.
     pub fn bounds(&self) -> GearBounds<T> {
         let forward = (-self.eta + 1.0, self.drag);
-        let backward = (-self.eta_backward.recip() + 1.0, self.drag_backward);
+        let power_reversed = (-self.eta_backward.recip() + 1.0, self.drag_backward);
         let mirrored = |(slope, drag): (T, T)| (slope, -drag);
-        GearBounds { upper: [forward, backward], lower: [mirrored(forward), mirrored(backward)] }
+        GearBounds {
+            upper: [forward, power_reversed],
+            lower: [mirrored(forward), mirrored(power_reversed)],
+        }
     }
 }
 
@@ -185,7 +188,7 @@ impl<T: Number> Network<T> {
         Some(Mode {
             key,
             rates: SparseRows::of(&derivative),
-            radius: T::lifted(radius(&derivative)),
+            radius: T::promote(radius(&derivative)),
             derivative,
             gear_torque: OnceLock::new(),
             stuck_torque: found.torque,
@@ -241,8 +244,8 @@ impl<T: Number> Network<T> {
         constraint_matrix(&self.mechanism, |constraint| {
             let i = self.losses.iter().position(|loss| loss.constraint == constraint)?;
             let held = key.held >> i & 1 == 1;
-            let backward = key.backward >> i & 1 == 1;
-            (!held).then(|| self.losses[i].loss.factor(1.0, backward).0)
+            let power_reversed = key.power_reversed >> i & 1 == 1;
+            (!held).then(|| self.losses[i].loss.factor(1.0, power_reversed).0)
         })
     }
 
@@ -254,7 +257,7 @@ impl<T: Number> Network<T> {
                 continue;
             }
             let sign = if key.reverse >> i & 1 == 1 { -1.0 } else { 1.0 };
-            let (_, drag) = gear.loss.factor(sign, key.backward >> i & 1 == 1);
+            let (_, drag) = gear.loss.factor(sign, key.power_reversed >> i & 1 == 1);
             if is_zero(drag) {
                 continue;
             }
@@ -290,13 +293,13 @@ impl<T: Number> Network<T> {
     fn weights(&self, stuck: &[Row], capacity: &[T]) -> Vec<T> {
         let one = T::Values::of(1.0);
         let largest = capacity.iter().fold(one, |largest, c| c.re().larger(largest));
-        let unbounded = T::lifted(largest * 1e2);
+        let unbounded = T::promote(largest * 1e2);
         let weight = |&row: &Row| match row {
             Row::Friction(j) if !self.frictions[j].one_way => {
                 let least = largest * 1e-3;
                 let enough =
                     capacity[j].re().decide_with(least, |capacity, least| capacity > least);
-                if enough { capacity[j] } else { T::lifted(least) }
+                if enough { capacity[j] } else { T::promote(least) }
             }
             Row::Friction(_) => unbounded,
             Row::Gear(_) => T::of(1.0),

@@ -10,8 +10,8 @@ use super::threads::share_out;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::{Number, Real, together};
-use crate::solve::{
-    Event, EventKind, Inputs, Known, Lanes, NO_POINT, Status, WIDTH, bits, run_together,
+use crate::solver::{
+    Event, EventKind, Inputs, LANES, Lanes, NO_POINT, SolverCache, Status, lane_mask, run_lockstep,
 };
 use std::borrow::Cow;
 
@@ -126,7 +126,7 @@ impl Sets<'_> {
     /// that it has more. The names must be parameters.
     pub fn placed<T: Number>(&self, runs: &[usize]) -> (DualClutch<T>, DualClutchStart<T>) {
         let of = |place: usize| runs.get(place).map_or(runs[0], |&run| run);
-        let mut model = self.model.lifted();
+        let mut model = self.model.promote();
         let mut start = DualClutchStart::gathered(|place| self.start(of(place)));
         let width = self.parameters.len();
         for (i, name) in self.parameters.iter().enumerate() {
@@ -199,7 +199,7 @@ impl Work<'_> {
     fn do_all(&self, jobs: &mut [Job<'_>]) {
         let mut open: Vec<&mut Job<'_>> = jobs.iter_mut().collect();
         for _ in 0..ATTEMPTS {
-            share_out(self.threads, open.chunks_mut(WIDTH), |group| self.do_together(group));
+            share_out(self.threads, open.chunks_mut(LANES), |group| self.do_together(group));
             open.retain(|job| job.outcome.is_none());
         }
         share_out(self.threads, open.iter_mut(), |job| self.do_alone(job));
@@ -230,14 +230,14 @@ impl Work<'_> {
         let runs: Vec<usize> = group.iter().map(|job| job.run).collect();
         let (plan, locked) = (self.plan(runs[0]), &self.sets.start(runs[0]).locked);
         // Fewer are done as fast alone.
-        let enough = runs.len() > WIDTH / 2 && plan.settings.sprint;
+        let enough = runs.len() > LANES / 2 && plan.settings.exponential_steps;
         let Some(points) = plan.points.as_deref().filter(|_| enough) else { return };
         let alike = |&run: &usize| {
             let (knots, others) = (plan.inputs.knots(), self.plan(run).inputs.knots());
             (std::ptr::eq(knots, others) || knots == others)
                 && self.sets.start(run).locked == *locked
         };
-        let alike = bits(runs.iter().map(alike));
+        let alike = lane_mask(runs.iter().map(alike));
         let (prepared, parting) = together(alike, || self.sets.prepared::<Lanes>(&runs));
         let Ok((network, State { x, locked })) = prepared else { return };
         if plan.check(&network).is_err() {
@@ -245,7 +245,7 @@ impl Work<'_> {
         }
         let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &self.plan(run).inputs).collect();
         let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
-        let (known, how) = (Known::of(&network), (plan.settings, alike & !parting));
+        let (known, how) = (SolverCache::new(&network), (plan.settings, alike & !parting));
         let (points, count) = self.keep.recorded(points, plan.grid.len());
         let columns = plan.targets.len() * count;
         let mut spare = Vec::new();
@@ -257,7 +257,7 @@ impl Work<'_> {
         };
         let shared = (all, (&*points, count));
         let mut recorder = abreast::Recorder::new(&network, &plan.targets, shared, values);
-        let events = run_together(known, &inputs, how, (x, &locked), &mut recorder);
+        let events = run_lockstep(known, &inputs, how, (x, &locked), &mut recorder);
         for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
             let Some(events) = events else { continue };
             if !spare.is_empty() {

@@ -10,7 +10,7 @@ use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::Dual;
-use crate::solve::{Settings, Status};
+use crate::solver::{Settings, Status};
 
 /// A number with its derivatives by the parameters of one pass.
 type Derived = Dual<LANES>;

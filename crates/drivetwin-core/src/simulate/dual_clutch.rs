@@ -7,7 +7,7 @@ use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};
 use crate::network::Network;
 use crate::number::{Number, Real};
-use crate::solve::{Settings, Signal};
+use crate::solver::{Settings, Signal};
 
 /// Start of a dual-clutch run.
 #[derive(Clone, Debug)]
@@ -68,7 +68,7 @@ impl<T: Number> DualClutchStart<T> {
 
 impl DualClutchStart<f64> {
     /// The same start over another number type.
-    pub fn lifted<T: Number>(&self) -> DualClutchStart<T> {
+    pub fn promote<T: Number>(&self) -> DualClutchStart<T> {
         Self::gathered(|_| self)
     }
 

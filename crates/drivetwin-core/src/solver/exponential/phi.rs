@@ -5,19 +5,20 @@
 //! Plain loops throughout: the body of a closure would be compiled apart, for the least of all processors.
 //! Matrices are written in place: of several runs side by side they are large, and copied where returned.
 
-use super::operators::SHAPES;
 use crate::number::{Lane, Number, Values};
+use crate::solver::tolerances::SERIES_RTOL;
 
 /// A square matrix by rows.
 type Square<T, const N: usize> = [[T; N]; N];
 
-/// [`integrals`], S_0 first.
-pub type Integrals<T, const N: usize> = [Square<T, N>; CUBIC + 1];
+/// [`phi_functions`], S_0 first.
+pub type PhiFunctions<T, const N: usize> = [Square<T, N>; FORCING_DEGREE + 1];
 
+/// What a channel's cubic over a sample is a sum of, with `t` from 0 to 1 over it: 1, t, t², and Hermite's
+/// `3t² - 2t³` and `t³ - t²`, which raise the value and the slope at its end and nothing else.
+pub const N_BASIS: usize = 5;
 /// Powers of time that a force is integrated with.
-pub const CUBIC: usize = 4;
-/// What may be left of the series, relative to its first term; generous, as A is badly scaled.
-const REMAINDER: f64 = 1e-24;
+pub const FORCING_DEGREE: usize = 4;
 /// Most terms of the series.
 const MAX_SERIES: usize = 40;
 
@@ -30,11 +31,11 @@ fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], (h, reach): (f
     let mut ended = 0;
     for i in 1..MAX_SERIES {
         left *= reach.re() / i as f64;
-        ended |= left.those(|left| left < REMAINDER);
+        ended |= left.mask_where(|left| left < SERIES_RTOL);
         if ended == T::RUNS {
             return i;
         }
-        all[i] = (all[i - 1] * h / (i + CUBIC) as f64).with(ended, T::Values::zero_());
+        all[i] = (all[i - 1] * h / (i + FORCING_DEGREE) as f64).with(ended, T::Values::zero_());
     }
     MAX_SERIES
 }
@@ -43,25 +44,25 @@ fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], (h, reach): (f
 /// `k! S_(k+1) e` the response to a force `e t^k`. The highest by its series, the lower ones by
 /// `S_(k-1) = I h^(k-1)/(k-1)! + A S_k`.
 #[inline(always)]
-pub fn integrals<T: Number, const F: bool, const N: usize>(
+pub fn phi_functions<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
     (h, reach): (f64, T),
-    all: &mut Integrals<T, N>,
+    all: &mut PhiFunctions<T, N>,
 ) {
     let mut series = [T::Values::zero_(); MAX_SERIES + 2];
     let terms = coefficients::<T>(&mut series, (h, reach));
-    let mut weights = [1.0; CUBIC + 1];
-    for k in 1..=CUBIC {
+    let mut weights = [1.0; FORCING_DEGREE + 1];
+    for k in 1..=FORCING_DEGREE {
         weights[k] = weights[k - 1] * h / k as f64;
     }
-    let sum = &mut all[CUBIC];
+    let sum = &mut all[FORCING_DEGREE];
     polynomial::<T, F, N>(a, &series[..terms.next_multiple_of(3)], sum);
     for i in 0..N {
         for j in 0..unrolled::<T, N>() {
-            sum[i][j] *= weights[CUBIC];
+            sum[i][j] *= weights[FORCING_DEGREE];
         }
     }
-    for k in (0..CUBIC).rev() {
+    for k in (0..FORCING_DEGREE).rev() {
         let (lower, higher) = all.split_at_mut(k + 1);
         multiply::<T, F, N>(a, &higher[0], &mut lower[k]);
         add_to_diagonal(&mut lower[k], T::of(weights[k]));
@@ -89,7 +90,7 @@ fn polynomial<T: Number, const F: bool, const N: usize>(
                 sum[i][j] = square[i][j].fma_values::<F>(coefficients[at + 2], low);
             }
         }
-        add_to_diagonal(sum, T::lifted(coefficients[at]));
+        add_to_diagonal(sum, T::promote(coefficients[at]));
     }
 }
 
@@ -145,17 +146,17 @@ pub fn unrolled<T: Number, const N: usize>() -> usize {
     if T::DERIVATIVES || T::RUNS > 1 { std::hint::black_box(N) } else { N }
 }
 
-/// Response of the state at the end to a force `e` times each of the [`SHAPES`].
+/// Response of the state at the end to a force `e` times each of the [`N_BASIS`].
 #[inline(always)]
-pub fn moments<T: Number, const F: bool, const N: usize>(
-    s: &Integrals<T, N>,
+pub fn forcing_response<T: Number, const F: bool, const N: usize>(
+    s: &PhiFunctions<T, N>,
     force: &[T; N],
     h: f64,
-) -> [[T; N]; SHAPES] {
+) -> [[T; N]; N_BASIS] {
     // Those to 1, t, t² and t³ first.
-    let mut all = [[T::zero_(); N]; SHAPES];
+    let mut all = [[T::zero_(); N]; N_BASIS];
     let mut weight = 1.0;
-    for k in 0..CUBIC {
+    for k in 0..FORCING_DEGREE {
         weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
         let response = apply::<T, F, N>(&s[k + 1], force);
         for i in 0..unrolled::<T, N>() {

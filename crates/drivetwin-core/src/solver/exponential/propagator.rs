@@ -2,33 +2,37 @@
 //! Exact step operators of one mode over samples of equal length h.
 //!
 //! In one mode `x' = A x + B u + c + E φ`. Over a sample the inputs are linear and a channel φ is a
-//! cubic, the sum of [`SHAPES`] with the coefficients a, so that the state at the end, the argument of
+//! cubic, the sum of [`N_BASIS`] with the coefficients a, so that the state at the end, the argument of
 //! every channel there and its rate are linear in x, u, u', a. Channels count in their direction of
 //! motion: `τ = sign · φ` over `m = sign · unit · s`.
 
-use super::integrals::{CUBIC, apply, dot, integrals, moments, unrolled};
-use super::lanes::{Task, dispatch};
 use crate::network::smooth::{Law, Line};
 use crate::network::{Mode, Network};
 use crate::number::{Lane, Number, Values};
+use crate::solver::exponential::phi::{
+    FORCING_DEGREE, N_BASIS, apply, dot, forcing_response, phi_functions, unrolled,
+};
+use crate::solver::simd::{Kernel, dispatch_simd};
+use crate::solver::tolerances::{
+    MAX_SPECTRAL_STEP_LINEAR, MAX_SPECTRAL_STEP_SLIPPING, MIN_CHORD_DEVIATION_OF_RISE,
+    MIN_CHORD_DEVIATION_OF_SIZE,
+};
 use smallvec::SmallVec;
+use std::sync::Arc;
 
-/// What a channel's cubic over a sample is a sum of, with `t` from 0 to 1 over it: 1, t, t², and Hermite's
-/// `3t² - 2t³` and `t³ - t²`, which raise the value and the slope at its end and nothing else.
-pub const SHAPES: usize = 5;
 /// Most channels that are carried at once.
 pub const MAX_ACTIVE: usize = 4;
 /// Most torques and speeds that are watched at once.
-pub const MAX_WATCHED: usize = 12;
+pub const MAX_GUARDS: usize = 12;
 
 /// Operators over at most `N` states; unused states, channels and forms are zero.
 #[derive(Clone, Debug)]
-pub struct Operators<L, const N: usize> {
+pub struct Propagator<L, const N: usize> {
     /// Number of states.
     pub states: usize,
     /// What a watched torque may deviate from its chord within a sample, relative to its rise and to its
     /// size.
-    pub bow: [L; 2],
+    pub chord_deviation: [L; 2],
     /// Signs of the carried channels.
     pub signs: [L; MAX_ACTIVE],
     /// Columns of the transition matrix.
@@ -38,15 +42,15 @@ pub struct Operators<L, const N: usize> {
     /// Inputs that act on the state.
     pub drives: Vec<Drive<L, N>>,
     /// Carried channels.
-    pub channels: Vec<Carried<L, N>>,
+    pub channels: Vec<ChannelCoefficients<L, N>>,
     /// Forms that must stay within their limits.
-    pub watched: Vec<Watched<L, N>>,
+    pub guards: Vec<SampleGuard<L, N>>,
     /// Normal loads that must stay above zero.
     pub loads: Vec<Line<L>>,
 }
 
 /// Effect of one input; pairs are those of its value at the start and of its rate, per second. On rates and turns
-/// of the arguments as in [`Carried`].
+/// of the arguments as in [`ChannelCoefficients`].
 #[derive(Clone, Copy, Debug)]
 pub struct Drive<L, const N: usize> {
     /// Its index.
@@ -58,9 +62,9 @@ pub struct Drive<L, const N: usize> {
     /// On the rates of the arguments, directly.
     pub now: [L; MAX_ACTIVE],
     /// On how they turn at the start.
-    pub turn: [[L; 2]; MAX_ACTIVE],
+    pub half_second_derivative: [[L; 2]; MAX_ACTIVE],
     /// On the watched forms.
-    pub watched: [L; MAX_WATCHED],
+    pub guards: [L; MAX_GUARDS],
 }
 
 /// A linear form over state, constant and cubics.
@@ -71,7 +75,7 @@ pub struct StepForm<L, const N: usize> {
     /// Constant.
     pub constant: L,
     /// Over the cubics of the carried channels.
-    pub cubics: [[L; SHAPES]; MAX_ACTIVE],
+    pub cubics: [[L; N_BASIS]; MAX_ACTIVE],
 }
 
 /// A linear form over state, constant and channels at one instant.
@@ -87,28 +91,28 @@ pub struct Form<L, const N: usize> {
 
 /// A channel and what its argument does. Rates are those over a sample: what it rises by if they last.
 #[derive(Clone, Copy, Debug)]
-pub struct Carried<L, const N: usize> {
+pub struct ChannelCoefficients<L, const N: usize> {
     /// Response of the state at the end to the coefficients of the cubic.
-    pub moments: [[L; N]; SHAPES],
+    pub forcing_response: [[L; N]; N_BASIS],
     /// Argument `m` at any instant, over the state.
     pub argument: [L; N],
     /// Argument at the end.
     pub argument_end: StepForm<L, N>,
     /// What the cubics of the carried channels add to its rate at the end by way of the state.
-    pub rate_end: [[L; SHAPES]; MAX_ACTIVE],
+    pub rate_end: [[L; N_BASIS]; MAX_ACTIVE],
     /// Rate of the argument at any instant.
     pub rate: Form<L, N>,
     /// How it turns at the start: half its second derivative over a sample.
-    pub turn: StepForm<L, N>,
+    pub half_second_derivative: StepForm<L, N>,
     /// Its law.
     pub law: Law<L>,
     /// What its normal load rises by in a sample, over the rate of its input.
-    pub ramp: L,
+    pub load_slope: L,
 }
 
 /// A guard, over the torques of the carried channels.
 #[derive(Clone, Copy, Debug)]
-pub struct Watched<L, const N: usize> {
+pub struct SampleGuard<L, const N: usize> {
     /// A torque, or what a speed rises by in a third of a sample at its rate.
     pub form: Form<L, N>,
     /// What must hold.
@@ -130,11 +134,7 @@ pub enum Bound<L, const N: usize> {
     Above([L; N]),
 }
 
-/// Largest `ρ(A) h` for which a cubic follows a slipping element.
-pub const MAX_SLIPPING: f64 = 0.7;
-/// Largest `ρ(A) h` for which the series of the operators is summed directly.
-const MAX_LINEAR: f64 = 3.0;
-impl<T: Number, const N: usize> Operators<T, N> {
+impl<T: Number, const N: usize> Propagator<T, N> {
     /// Build for steps of length `h` [s] with the channels `active` under `laws`; `None` where the step
     /// is too long for the mode. Nothing is watched yet.
     pub fn build(
@@ -143,7 +143,7 @@ impl<T: Number, const N: usize> Operators<T, N> {
         (active, laws): (&[usize], &[Law<T>]),
         h: f64,
     ) -> Option<Self> {
-        dispatch(Build { network, mode, active, laws, h })
+        dispatch_simd(BuildKernel { network, mode, active, laws, h })
     }
 
     /// Add a channel; `argument` is its argument over the states.
@@ -152,7 +152,7 @@ impl<T: Number, const N: usize> Operators<T, N> {
         &mut self,
         slot: usize,
         (network, mode): (&Network<T>, &Mode<T>),
-        (active, moments): (&[usize], &[[[T; N]; SHAPES]]),
+        (active, forcing_response): (&[usize], &[[[T; N]; N_BASIS]]),
         (argument, law, h): ([T; N], Law<T>, f64),
     ) {
         let now = over_basis::<T, F, N>((network, mode), &argument, h);
@@ -160,48 +160,52 @@ impl<T: Number, const N: usize> Operators<T, N> {
         rate[..network.states()].copy_from_slice(&now[..network.states()]);
         let second = over_basis::<T, F, N>((network, mode), &rate, 0.5 * h);
         for drive in &mut self.drives {
-            let ([held, ramp], input) = (&drive.step, network.first_input() + drive.input);
+            let ([held, load_slope], input) = (&drive.step, network.first_input() + drive.input);
             drive.argument[slot] =
-                [dot::<T, F, N>(&argument, held), dot::<T, F, N>(&argument, ramp)];
+                [dot::<T, F, N>(&argument, held), dot::<T, F, N>(&argument, load_slope)];
             drive.now[slot] = now[input];
-            drive.turn[slot] = [second[input], now[input] * (0.5 * h)];
+            drive.half_second_derivative[slot] = [second[input], now[input] * (0.5 * h)];
         }
-        let argument_end = self.at_end::<F>(&argument, moments);
-        let rate_end = over_moments::<T, F, N>(&rate, moments);
+        let argument_end = self.at_end::<F>(&argument, forcing_response);
+        let rate_end = over_moments::<T, F, N>(&rate, forcing_response);
         let rate = Form::over(network, (active, &self.signs), &now);
         let Form { state, constant, channels } =
             Form::over(network, (active, &self.signs), &second);
-        let mut turn = StepForm { state, constant, ..StepForm::idle() };
+        let mut half_second_derivative = StepForm { state, constant, ..StepForm::idle() };
         for other in 0..MAX_ACTIVE {
-            turn.cubics[other][0] = channels[other];
-            turn.cubics[other][1] = rate.channels[other] * 0.5;
+            half_second_derivative.cubics[other][0] = channels[other];
+            half_second_derivative.cubics[other][1] = rate.channels[other] * 0.5;
         }
-        self.channels.push(Carried {
-            moments: moments[slot],
+        self.channels.push(ChannelCoefficients {
+            forcing_response: forcing_response[slot],
             argument,
             argument_end,
             rate_end,
             rate,
-            turn,
+            half_second_derivative,
             law,
-            ramp: law.normal.gain * h,
+            load_slope: law.normal.gain * h,
         });
     }
 
     /// A form over the states, at the end of a sample.
     #[inline(always)]
-    fn at_end<const F: bool>(&self, row: &[T; N], moments: &[[[T; N]; SHAPES]]) -> StepForm<T, N> {
+    fn at_end<const F: bool>(
+        &self,
+        row: &[T; N],
+        forcing_response: &[[[T; N]; N_BASIS]],
+    ) -> StepForm<T, N> {
         let mut form = StepForm::idle();
         for j in 0..N {
             form.state[j] = dot::<T, F, N>(row, &self.transition[j]);
         }
         form.constant = dot::<T, F, N>(row, &self.constant);
-        form.cubics = over_moments::<T, F, N>(row, moments);
+        form.cubics = over_moments::<T, F, N>(row, forcing_response);
         form
     }
 
     /// Watch a torque over the basis (x, u, 1, φ), bounded in both signs or only the negative one.
-    pub fn watch_torque(
+    pub fn guard_torque(
         &mut self,
         network: &Network<T>,
         active: &[usize],
@@ -213,7 +217,7 @@ impl<T: Number, const N: usize> Operators<T, N> {
     }
 
     /// Watch a speed over the states, which must stay above zero, over samples of length `h` [s].
-    pub fn watch_speed(
+    pub fn guard_speed(
         &mut self,
         (network, mode): (&Network<T>, &Mode<T>),
         active: &[usize],
@@ -229,18 +233,18 @@ impl<T: Number, const N: usize> Operators<T, N> {
     }
 
     fn watch(&mut self, network: &Network<T>, active: &[usize], row: &[T], bound: Bound<T, N>) {
-        let place = self.watched.len();
+        let place = self.guards.len();
         for drive in &mut self.drives {
-            drive.watched[place] =
+            drive.guards[place] =
                 row.get(network.first_input() + drive.input).map_or(T::zero_(), |&c| c);
         }
         let form = Form::over(network, (active, &[T::of(1.0); MAX_ACTIVE]), row);
-        self.watched.push(Watched { form, bound });
+        self.guards.push(SampleGuard { form, bound });
     }
 }
 
-/// [`Operators::build`], to be dispatched.
-struct Build<'b, T, const N: usize> {
+/// [`Propagator::build`], to be dispatched.
+struct BuildKernel<'b, T, const N: usize> {
     network: &'b Network<T>,
     mode: &'b Mode<T>,
     active: &'b [usize],
@@ -248,14 +252,15 @@ struct Build<'b, T, const N: usize> {
     h: f64,
 }
 
-impl<T: Number, const N: usize> Task for Build<'_, T, N> {
-    type Output = Option<Operators<T, N>>;
+impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
+    type Output = Option<Propagator<T, N>>;
 
     #[inline(always)]
-    fn run<const F: bool>(self) -> Option<Operators<T, N>> {
+    fn run<const F: bool>(self) -> Option<Propagator<T, N>> {
         let Self { network, mode, active, laws, h } = self;
         let reach = mode.radius * h;
-        let longest = if active.is_empty() { MAX_LINEAR } else { MAX_SLIPPING };
+        let longest =
+            if active.is_empty() { MAX_SPECTRAL_STEP_LINEAR } else { MAX_SPECTRAL_STEP_SLIPPING };
         if reach.re().decide(|reach| reach > longest) {
             return None;
         }
@@ -265,9 +270,9 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
         for i in 0..n {
             a[i][..n].copy_from_slice(&mode.derivative.row(i)[..n]);
         }
-        let mut s = [[[T::zero_(); N]; N]; CUBIC + 1];
-        integrals::<T, F, N>(&a, (h, reach), &mut s);
-        let mut operators = Operators::empty(n, reach);
+        let mut s = [[[T::zero_(); N]; N]; FORCING_DEGREE + 1];
+        phi_functions::<T, F, N>(&a, (h, reach), &mut s);
+        let mut operators = Propagator::empty(n, reach);
         operators.drives.reserve_exact(network.mechanism.inputs.len());
         operators.channels.reserve_exact(active.len());
         for i in 0..N {
@@ -283,14 +288,14 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
                 operators.drives.push(Drive::new(input, step));
             }
         }
-        let mut responses: SmallVec<[[[T; N]; SHAPES]; 2]> = SmallVec::new();
+        let mut responses: SmallVec<[[[T; N]; N_BASIS]; 2]> = SmallVec::new();
         for (slot, &j) in active.iter().enumerate() {
             operators.signs[slot] = laws[slot].sign;
             let mut force = forcing(mode, network.first_channel() + j);
             for i in 0..unrolled::<T, N>() {
                 force[i] *= laws[slot].sign;
             }
-            responses.push(moments::<T, F, N>(&s, &force, h));
+            responses.push(forcing_response::<T, F, N>(&s, &force, h));
         }
         for (slot, &j) in active.iter().enumerate() {
             let mut argument = [T::zero_(); N];
@@ -302,7 +307,7 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
         }
         // Inner loops exist for 0, 1, 2 and 4 channels.
         if operators.channels.len() == 3 {
-            operators.channels.push(Carried::idle());
+            operators.channels.push(ChannelCoefficients::idle());
         }
         Some(operators)
     }
@@ -312,12 +317,12 @@ impl<T: Number, const N: usize> Task for Build<'_, T, N> {
 #[inline(always)]
 fn over_moments<T: Number, const F: bool, const N: usize>(
     row: &[T; N],
-    moments: &[[[T; N]; SHAPES]],
-) -> [[T; SHAPES]; MAX_ACTIVE] {
-    let mut cubics = [[T::zero_(); SHAPES]; MAX_ACTIVE];
-    for (cubic, moments) in cubics.iter_mut().zip(moments) {
-        for k in 0..SHAPES {
-            cubic[k] = dot::<T, F, N>(row, &moments[k]);
+    forcing_response: &[[[T; N]; N_BASIS]],
+) -> [[T; N_BASIS]; MAX_ACTIVE] {
+    let mut cubics = [[T::zero_(); N_BASIS]; MAX_ACTIVE];
+    for (cubic, forcing_response) in cubics.iter_mut().zip(forcing_response) {
+        for k in 0..N_BASIS {
+            cubic[k] = dot::<T, F, N>(row, &forcing_response[k]);
         }
     }
     cubics
@@ -333,25 +338,25 @@ fn forcing<T: Number, const N: usize>(mode: &Mode<T>, column: usize) -> [T; N] {
     force
 }
 
-impl<T: Number, const N: usize> Operators<T, N> {
+impl<T: Number, const N: usize> Propagator<T, N> {
     /// Of `n` states that turn by `reach` within a step, without any effect.
     fn empty(n: usize, reach: T) -> Self {
         let (reach, none) = (reach.re(), T::zero_());
         // A motion that turns by ρh within the sample bends by (ρh)²/8; twice that, and never nothing.
-        let bow = [
-            reach.larger(T::Values::of(0.05)),
-            (reach * 0.25 * reach).larger(T::Values::of(0.005)),
+        let chord_deviation = [
+            reach.larger(T::Values::of(MIN_CHORD_DEVIATION_OF_RISE)),
+            (reach * 0.25 * reach).larger(T::Values::of(MIN_CHORD_DEVIATION_OF_SIZE)),
         ]
-        .map(T::lifted);
+        .map(T::promote);
         Self {
             states: n,
-            bow,
+            chord_deviation,
             signs: [none; MAX_ACTIVE],
             transition: [[none; N]; N],
             constant: [none; N],
             drives: Vec::new(),
             channels: Vec::new(),
-            watched: Vec::new(),
+            guards: Vec::new(),
             loads: Vec::new(),
         }
     }
@@ -370,25 +375,25 @@ impl<L: Lane, const N: usize> Drive<L, N> {
             step: [[none; N]; 2],
             argument: [[none; 2]; MAX_ACTIVE],
             now: [none; MAX_ACTIVE],
-            turn: [[none; 2]; MAX_ACTIVE],
-            watched: [none; MAX_WATCHED],
+            half_second_derivative: [[none; 2]; MAX_ACTIVE],
+            guards: [none; MAX_GUARDS],
         }
     }
 }
 
-impl<L: Lane, const N: usize> Carried<L, N> {
+impl<L: Lane, const N: usize> ChannelCoefficients<L, N> {
     /// Without torque.
     pub fn idle() -> Self {
         let none = L::all(0.0);
         Self {
-            moments: [[none; N]; SHAPES],
+            forcing_response: [[none; N]; N_BASIS],
             argument: [none; N],
             argument_end: StepForm::idle(),
-            rate_end: [[none; SHAPES]; MAX_ACTIVE],
+            rate_end: [[none; N_BASIS]; MAX_ACTIVE],
             rate: Form::idle(),
-            turn: StepForm::idle(),
+            half_second_derivative: StepForm::idle(),
             law: Law::idle(),
-            ramp: none,
+            load_slope: none,
         }
     }
 }
@@ -397,7 +402,7 @@ impl<L: Lane, const N: usize> StepForm<L, N> {
     /// Always zero.
     fn idle() -> Self {
         let none = L::all(0.0);
-        Self { state: [none; N], constant: none, cubics: [[none; SHAPES]; MAX_ACTIVE] }
+        Self { state: [none; N], constant: none, cubics: [[none; N_BASIS]; MAX_ACTIVE] }
     }
 }
 
@@ -426,7 +431,7 @@ impl<T: Number, const N: usize> Form<T, N> {
     }
 }
 
-impl<L: Copy, const N: usize> Operators<L, N> {
+impl<L: Copy, const N: usize> Propagator<L, N> {
     /// Columns worth a product: few are taken as they are, so that their loop unrolls.
     #[inline(always)]
     pub fn columns(&self) -> usize {
@@ -453,3 +458,19 @@ fn over_basis<T: Number, const F: bool, const N: usize>(
     }
     out
 }
+
+/// Operators for the number of states at hand.
+#[derive(Clone, Debug)]
+pub(crate) enum SizedPropagator<T> {
+    /// Up to 4.
+    Four(Arc<Propagator<T, 4>>),
+    /// Up to 8; of one run only.
+    Eight(Arc<Propagator<T, 8>>),
+    /// Up to 12; of plain numbers only.
+    Twelve(Arc<Propagator<T, 12>>),
+    /// Up to [`MAX_STATES`]; likewise.
+    Many(Arc<Propagator<T, MAX_STATES>>),
+}
+
+/// Most states of a network of plain numbers that is marched.
+pub(crate) const MAX_STATES: usize = 24;

@@ -2,56 +2,48 @@
 //! Who stays stuck (THEORY section 1): the box-constrained programme over all friction elements at
 //! zero slip, together with the states of lossy gears.
 
-use super::assignment::Assignment;
-use super::regime::{Regime, RowState, sign_of};
-use super::status::Status;
 use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::{Cell, GearState, Mode, ModeKey, Row};
 use crate::number::{Number, Values, evaluate};
+use crate::solver::hybrid::active_set::ActiveSet;
+use crate::solver::hybrid::event::{FrictionState, signum_nonneg};
+use crate::solver::hybrid::state::HybridState;
+use crate::solver::status::Status;
+use crate::solver::tolerances::{
+    BOUND_RTOL, FORCED_ACCELERATION_RTOL, STRICT_MARGIN_RTOL, SUM_RTOL, T_PLUS, T_PLUS_SHARE,
+    TORQUE_ATOL, ZERO_SLIP_RTOL, negligible, sum_and_scale,
+};
 use std::sync::Arc;
 
-/// What counts as zero in a sum, relative to the size of its terms.
-pub(super) const ROUND_OFF: f64 = 1e-10;
-/// Excess over a bound that is round-off, relative to the terms of all torques that are held.
-pub(super) const NOTHING: f64 = 1e-14;
-/// A torque without meaning, N·m: what gears and freewheels hold at rest where all motion has decayed, and what
-/// goes through a gear there, in whichever direction.
-pub(super) const NO_TORQUE: f64 = 1e-7;
-/// Part of their torques that elements must have left up to their bounds where holding is to last.
-const ROOM: f64 = 1e-9;
-/// Slip acceleration without meaning, rad/s²: what is left where all torques pass through zero.
-pub(super) const NEGLIGIBLE_ACCELERATION: f64 = 1e-9;
-/// How far ahead a decision looks, s.
-const LOOK_AHEAD: f64 = 1e-10;
 /// Most trials before every assignment is tried in turn.
 const MAX_TRIALS: usize = 200;
 /// Most rows at zero speed for which every assignment is tried.
 const MAX_EXHAUSTIVE: usize = 8;
 
 /// What is wrong with an assignment.
-enum Fault {
+enum Violation {
     /// A row at rest carries more than its bounds allow; the torque's sign.
-    Overloaded(Row, f64),
+    TorqueBound(Row, f64),
     /// A row that moves off from zero speed accelerates back.
-    Returning(Row),
+    SlipDirection(Row),
     /// Power through a rolling gear flows the other way.
-    Reversed(usize),
+    PowerDirection(usize),
 }
 
-impl<T: Number> Regime<'_, T> {
+impl<T: Number> HybridState<'_, T> {
     /// Decide anew the state of everything at zero speed. `overloaded` names what has just reached
     /// its bound, with the torque's sign.
-    pub(super) fn decide(&mut self, overloaded: Option<(Row, f64)>) -> Result<(), Status> {
-        self.look_ahead();
+    pub(crate) fn decide(&mut self, overloaded: Option<(Row, f64)>) -> Result<(), Status> {
+        self.evaluate_at_t_plus();
         let candidates = self.at_zero_speed();
         let mut trial = self.assignment();
         match overloaded {
             // An overload asks for more: what has just moved off, or is at its capacity, stays so.
-            Some((row, sign)) => self.give_way(&mut trial, (row, sign), &candidates),
+            Some((row, sign)) => self.release(&mut trial, (row, sign), &candidates),
             None => candidates.iter().for_each(|&row| trial.rest(row)),
         }
-        let mut visited: Vec<Assignment> = Vec::new();
+        let mut visited: Vec<ActiveSet> = Vec::new();
         loop {
             let mode = self.mode(self.key_of(&trial))?;
             let basis = self.basis_now(&trial, &candidates);
@@ -59,17 +51,17 @@ impl<T: Number> Regime<'_, T> {
                 let moving = trial.moving_off(&candidates).0;
                 if moving == 0
                     || self.rank(&candidates) == candidates.len()
-                    || !self.decide_exhaustively(&candidates, Some(moving))
+                    || !self.enumerate_active_sets(&candidates, Some(moving))
                 {
                     let found = (trial, mode, basis);
                     let (trial, mode) =
-                        self.hold_what_stays(found, &candidates, overloaded.is_some());
+                        self.restick_if_feasible(found, &candidates, overloaded.is_some());
                     self.adopt(trial, &candidates, mode);
                 }
                 return Ok(());
             };
             if visited.contains(&trial) || visited.len() > MAX_TRIALS {
-                if self.decide_exhaustively(&candidates, None) {
+                if self.enumerate_active_sets(&candidates, None) {
                     return Ok(());
                 }
                 let element = candidates.first();
@@ -79,14 +71,14 @@ impl<T: Number> Regime<'_, T> {
             }
             visited.push(trial.clone());
             match fault {
-                Fault::Overloaded(row, sign) => {
-                    self.give_way(&mut trial, (row, sign), &candidates);
+                Violation::TorqueBound(row, sign) => {
+                    self.release(&mut trial, (row, sign), &candidates);
                 }
-                Fault::Returning(row) => {
+                Violation::SlipDirection(row) => {
                     trial.rest(row);
-                    self.tell_slipping_from_held(&mut trial, &candidates);
+                    self.classify_saturated(&mut trial, &candidates);
                 }
-                Fault::Reversed(i) => trial.reverse_power(i),
+                Violation::PowerDirection(i) => trial.reverse_power(i),
             }
         }
     }
@@ -97,7 +89,7 @@ impl<T: Number> Regime<'_, T> {
     /// Torques that have been taken to their bounds one by one need not be those with which everything
     /// holds: with `moving`, only assignments count that let fewer than so many go, that last, and in which
     /// all that go have overcome their static capacities.
-    fn decide_exhaustively(&mut self, candidates: &[Row], moving: Option<usize>) -> bool {
+    fn enumerate_active_sets(&mut self, candidates: &[Row], moving: Option<usize>) -> bool {
         let gears = self.gears.len();
         let choices = 3usize.pow(candidates.len().min(MAX_EXHAUSTIVE) as u32) << gears.min(4);
         let feasible = candidates.len() <= MAX_EXHAUSTIVE && gears <= 4;
@@ -114,7 +106,8 @@ impl<T: Number> Regime<'_, T> {
             let basis = self.basis_now(&trial, candidates);
             let is_right = self.fault(&trial, candidates, (&mode, &basis)).is_none()
                 && (moving.is_none()
-                    || self.has_room(&mode, &basis) && self.is_let_go(&trial, candidates, &mode));
+                    || self.is_strictly_feasible(&mode, &basis)
+                        && self.violates_static_limit(&trial, candidates, &mode));
             if is_right {
                 self.adopt(trial, candidates, mode);
                 return true;
@@ -126,14 +119,14 @@ impl<T: Number> Regime<'_, T> {
     /// Let friction elements rest that move off without acceleration, where that is right too: at exactly its
     /// capacity an element holds. After an overload only those that rested before it, and with something else
     /// that moves off in their place.
-    fn hold_what_stays(
+    fn restick_if_feasible(
         &mut self,
-        (mut trial, mut mode, basis): (Assignment, Arc<Mode<T>>, Vec<T>),
+        (mut trial, mut mode, basis): (ActiveSet, Arc<Mode<T>>, Vec<T>),
         candidates: &[Row],
         overloaded: bool,
-    ) -> (Assignment, Arc<Mode<T>>) {
+    ) -> (ActiveSet, Arc<Mode<T>>) {
         let before = self.assignment();
-        let moves = |assignment: &Assignment, row| assignment.direction(row).is_some();
+        let moves = |assignment: &ActiveSet, row| assignment.direction(row).is_some();
         let frictions = candidates.iter().copied().filter(|row| matches!(row, Row::Friction(_)));
         let moving: Vec<Row> = frictions
             .filter(|&row| moves(&trial, row) && !(overloaded && moves(&before, row)))
@@ -144,7 +137,7 @@ impl<T: Number> Regime<'_, T> {
         for row in moving {
             let mut held = trial.clone();
             held.rest(row);
-            self.tell_slipping_from_held(&mut held, candidates);
+            self.classify_saturated(&mut held, candidates);
             let same = |&row: &Row| held.direction(row) == before.direction(row);
             if overloaded && candidates.iter().all(same) || !self.stays(row, (&mode, &basis)) {
                 continue;
@@ -159,11 +152,16 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// Whether what moves off would also do so against static friction.
-    fn is_let_go(&mut self, trial: &Assignment, candidates: &[Row], mode: &Mode<T>) -> bool {
+    fn violates_static_limit(
+        &mut self,
+        trial: &ActiveSet,
+        candidates: &[Row],
+        mode: &Mode<T>,
+    ) -> bool {
         let mut at_capacity = trial.clone();
         for &row in candidates {
             if let (Row::Friction(j), Some(sign)) = (row, trial.direction(row)) {
-                at_capacity.rows[j] = RowState::Saturated { sign };
+                at_capacity.rows[j] = FrictionState::Saturated { sign };
             }
         }
         let basis = self.basis_now(&at_capacity, candidates);
@@ -171,19 +169,19 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// Whether everything at rest carries less than its bounds allow.
-    fn has_room(&self, mode: &Mode<T>, basis: &[T]) -> bool {
+    fn is_strictly_feasible(&self, mode: &Mode<T>, basis: &[T]) -> bool {
         let capacities = self.capacities();
         mode.stuck.iter().enumerate().all(|(i, &row)| {
             let torque = form(mode.stuck_torque.row(i), basis).re();
             let (low, high) = self.bounds(row, &capacities, (mode, basis));
             let room = (torque - low).smaller(high - torque);
-            room.decide_with(torque, |room, torque| room > ROOM * torque.abs())
+            room.decide_with(torque, |room, torque| room > STRICT_MARGIN_RTOL * torque.abs())
         })
     }
 
     /// An assignment by its number: whether power flows back through every lossy gear, and whether every
     /// candidate rests, moves off forwards or backwards. Nothing where one cannot.
-    fn choice(&self, number: usize, candidates: &[Row]) -> Option<Assignment> {
+    fn choice(&self, number: usize, candidates: &[Row]) -> Option<ActiveSet> {
         let (mut trial, gears) = (self.assignment(), self.gears.len());
         let mut digits = number >> gears;
         for &row in candidates {
@@ -196,24 +194,24 @@ impl<T: Number> Regime<'_, T> {
             digits /= 3;
         }
         (0..gears).filter(|i| number >> i & 1 == 1).for_each(|i| trial.reverse_power(i));
-        self.tell_slipping_from_held(&mut trial, candidates);
+        self.classify_saturated(&mut trial, candidates);
         Some(trial)
     }
 
     /// Inputs and state a moment from now, as the present mode would have them: where torques and
     /// capacities agree, or all start from zero, their rates decide.
-    fn look_ahead(&mut self) {
+    fn evaluate_at_t_plus(&mut self) {
         let remaining = self.remaining.re().larger(T::Values::zero_());
-        let moment = T::lifted((remaining * 1e-4).smaller(T::Values::of(LOOK_AHEAD)));
+        let moment = T::promote((remaining * T_PLUS_SHARE).smaller(T::Values::of(T_PLUS)));
         let order = self.expansion.input_order();
-        for (ahead, now) in self.ahead.iter_mut().zip(&self.expansion.inputs) {
+        for (ahead, now) in self.inputs_plus.iter_mut().zip(&self.expansion.inputs) {
             *ahead = *now;
             ahead[0] = evaluate(now, order, moment);
         }
-        self.x_ahead.clone_from(&self.x);
+        self.x_plus.clone_from(&self.x);
         let mut basis = self.basis_without_channels();
-        basis.extend((0..self.network.channels.len()).map(|i| self.channel_ahead(i)));
-        for (i, ahead) in self.x_ahead.iter_mut().enumerate() {
+        basis.extend((0..self.network.channels.len()).map(|i| self.channel_plus(i)));
+        for (i, ahead) in self.x_plus.iter_mut().enumerate() {
             *ahead += form(self.mode.derivative.row(i), &basis) * moment;
         }
     }
@@ -222,8 +220,8 @@ impl<T: Number> Regime<'_, T> {
         matches!(row, Row::Friction(j) if self.network.frictions[j].one_way)
     }
 
-    fn assignment(&self) -> Assignment {
-        Assignment { rows: self.rows.clone(), gears: self.gears.clone() }
+    fn assignment(&self) -> ActiveSet {
+        ActiveSet { rows: self.rows.clone(), gears: self.gears.clone() }
     }
 
     fn at_zero_speed(&self) -> Vec<Row> {
@@ -232,41 +230,45 @@ impl<T: Number> Regime<'_, T> {
             let terms = slip.iter().zip(&self.x);
             let terms = terms.map(|(c, v)| (c.re() * v.re()).magnitude());
             let scale = terms.fold(T::Values::of(1.0), |largest, term| term.larger(largest));
-            form(slip, &self.x).re().decide_with(scale, |slip, scale| slip.abs() <= 1e-11 * scale)
+            form(slip, &self.x)
+                .re()
+                .decide_with(scale, |slip, scale| slip.abs() <= ZERO_SLIP_RTOL * scale)
         };
-        let pressed = |j: &usize| self.rows[*j] != RowState::Open;
+        let pressed = |j: &usize| self.rows[*j] != FrictionState::Open;
         let directional = |i: &usize| self.network.losses[*i].loss.is_directional();
         let frictions = (0..self.rows.len()).filter(pressed).map(Row::Friction);
         let gears = (0..self.gears.len()).filter(directional).map(Row::Gear);
         frictions.chain(gears).filter(|&row| near(row)).collect()
     }
 
-    fn key_of(&self, trial: &Assignment) -> ModeKey {
-        let stuck = (0..trial.rows.len()).filter(|&j| trial.rows[j] == RowState::Stuck);
+    fn key_of(&self, trial: &ActiveSet) -> ModeKey {
+        let stuck = (0..trial.rows.len()).filter(|&j| trial.rows[j] == FrictionState::Sticking);
         ModeKey::new(stuck, &trial.gears)
     }
 
     /// The basis at this instant under a trial.
-    fn basis_now(&mut self, trial: &Assignment, candidates: &[Row]) -> Vec<T> {
+    fn basis_now(&mut self, trial: &ActiveSet, candidates: &[Row]) -> Vec<T> {
         let mut basis = self.basis_without_channels();
         for (j, row) in self.network.frictions.iter().enumerate() {
             let at_rest = candidates.contains(&Row::Friction(j));
-            let slip = if at_rest { T::zero_() } else { form(&row.slip, &self.x_ahead) };
+            let slip = if at_rest { T::zero_() } else { form(&row.slip, &self.x_plus) };
             let normal = self.normal(j);
             basis.push(match trial.rows[j] {
-                RowState::Slipping { sign } => row.law.at(slip * sign) * normal * sign,
-                RowState::Saturated { sign } => row.law.at(T::zero_()) * row.peak * normal * sign,
-                RowState::Stuck | RowState::Open => T::zero_(),
+                FrictionState::Slipping { sign } => row.law.at(slip * sign) * normal * sign,
+                FrictionState::Saturated { sign } => {
+                    row.law.at(T::zero_()) * row.peak * normal * sign
+                }
+                FrictionState::Sticking | FrictionState::Open => T::zero_(),
             });
         }
         let others = self.network.frictions.len()..self.network.channels.len();
-        basis.extend(others.map(|i| self.channel_ahead(i)));
+        basis.extend(others.map(|i| self.channel_plus(i)));
         basis
     }
 
     /// Normal load of an element now, cut at zero.
     fn normal(&self, j: usize) -> T {
-        let normal = self.network.frictions[j].normal.term(&self.ahead, 0);
+        let normal = self.network.frictions[j].normal.term(&self.inputs_plus, 0);
         if self.pressed[j] && normal.re().decide(|normal| normal > 0.0) {
             normal
         } else {
@@ -275,7 +277,7 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// Static capacities of the friction elements.
-    pub(super) fn capacities(&self) -> Vec<T> {
+    pub(crate) fn capacities(&self) -> Vec<T> {
         let capacity = |(j, row): (usize, &crate::network::FrictionRow<T>)| {
             row.law.at(T::zero_()) * row.peak * self.normal(j)
         };
@@ -284,22 +286,24 @@ impl<T: Number> Regime<'_, T> {
 
     fn fault(
         &self,
-        trial: &Assignment,
+        trial: &ActiveSet,
         candidates: &[Row],
         (mode, basis): (&Mode<T>, &[T]),
-    ) -> Option<Fault> {
+    ) -> Option<Violation> {
         self.overload(mode, basis)
-            .or_else(|| self.returning(trial, candidates, (mode, basis)).map(Fault::Returning))
+            .or_else(|| {
+                self.returning(trial, candidates, (mode, basis)).map(Violation::SlipDirection)
+            })
             .or_else(|| {
                 let reversed = |&i: &usize| self.is_reversed(trial.gears[i], i, (mode, basis));
-                (0..trial.gears.len()).find(reversed).map(Fault::Reversed)
+                (0..trial.gears.len()).find(reversed).map(Violation::PowerDirection)
             })
     }
 
     /// A row that moves off from zero speed and accelerates back.
     fn returning(
         &self,
-        trial: &Assignment,
+        trial: &ActiveSet,
         candidates: &[Row],
         (mode, basis): (&Mode<T>, &[T]),
     ) -> Option<Row> {
@@ -319,12 +323,12 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// The row at rest that exceeds its bounds most, relative to their size.
-    fn overload(&self, mode: &Mode<T>, basis: &[T]) -> Option<Fault> {
+    fn overload(&self, mode: &Mode<T>, basis: &[T]) -> Option<Violation> {
         let capacities = self.capacities();
         let rows = || (0..mode.stuck.len()).map(|i| mode.stuck_torque.row(i));
         let sizes = rows().map(|row| sum_and_scale(row, basis).1);
-        let nothing = sizes.fold(T::Values::zero_(), |sum, size| sum + size) * NOTHING;
-        let mut worst: Option<(T::Values, Fault)> = None;
+        let nothing = sizes.fold(T::Values::zero_(), |sum, size| sum + size) * BOUND_RTOL;
+        let mut worst: Option<(T::Values, Violation)> = None;
         for (&row, terms) in mode.stuck.iter().zip(rows()) {
             let torque = form(terms, basis).re();
             let (low, high) = self.bounds(row, &capacities, (mode, basis));
@@ -340,13 +344,14 @@ impl<T: Number> Regime<'_, T> {
             let counts = excess.decide_with(nothing, |excess, nothing| excess > nothing);
             if counts && relative.decide_with(least, |relative, least| relative > least.max(1e-12))
             {
-                worst = Some((relative, Fault::Overloaded(row, sign)));
+                worst = Some((relative, Violation::TorqueBound(row, sign)));
             }
             if worst.is_none() && !self.network.prescribed.is_empty() {
                 let a = self.acceleration(row, mode, basis).0;
                 let forced = self.forced_acceleration();
                 if a.decide_with(forced, |a, forced| a.abs() > forced) {
-                    worst = Some((T::Values::zero_(), Fault::Overloaded(row, sign_of(a))));
+                    worst =
+                        Some((T::Values::zero_(), Violation::TorqueBound(row, signum_nonneg(a))));
                 }
             }
         }
@@ -362,7 +367,7 @@ impl<T: Number> Regime<'_, T> {
     ) -> (T::Values, T::Values) {
         match row {
             Row::Friction(j) if self.network.frictions[j].one_way => {
-                (-capacities[j].re() - T::Values::of(NO_TORQUE), T::Values::of(f64::INFINITY))
+                (-capacities[j].re() - T::Values::of(TORQUE_ATOL), T::Values::of(f64::INFINITY))
             }
             Row::Friction(j) => (-capacities[j].re(), capacities[j].re()),
             Row::Gear(g) => {
@@ -373,9 +378,11 @@ impl<T: Number> Regime<'_, T> {
 
     /// What a row at rest may accelerate by round-off; more is forced on it by prescribed speeds.
     fn forced_acceleration(&self) -> T::Values {
-        let rates = self.network.prescribed.iter().map(|&(_, input)| self.ahead[input][1].re());
+        let rates =
+            self.network.prescribed.iter().map(|&(_, input)| self.inputs_plus[input][1].re());
         let one = T::Values::of(1.0);
-        (rates.fold(T::Values::zero_(), |largest, r| r.magnitude().larger(largest)) + one) * 1e-9
+        (rates.fold(T::Values::zero_(), |largest, r| r.magnitude().larger(largest)) + one)
+            * FORCED_ACCELERATION_RTOL
     }
 
     fn gear_bounds(&self, g: usize, torque: T::Values) -> (T::Values, T::Values) {
@@ -383,12 +390,12 @@ impl<T: Number> Regime<'_, T> {
         let line = |(slope, drag): (T, T)| slope.re() * torque + drag.re();
         let [u, v] = bounds.upper.map(line);
         let [l, m] = bounds.lower.map(line);
-        let more = T::Values::of(NO_TORQUE);
+        let more = T::Values::of(TORQUE_ATOL);
         (l.smaller(m) - more, u.larger(v) + more)
     }
 
     fn is_reversed(&self, gear: GearState, i: usize, (mode, basis): (&Mode<T>, &[T])) -> bool {
-        let GearState::Rolling { sign, backward } = gear else { return false };
+        let GearState::Meshing { sign, power_reversed } = gear else { return false };
         let loss = &self.network.losses[i].loss;
         if !loss.is_directional() {
             return false;
@@ -399,7 +406,7 @@ impl<T: Number> Regime<'_, T> {
         let scale = held.fold(scale, |scale, torque| scale + torque.magnitude());
         let excess = torque * sign - loss.threshold().re();
         excess.decide_with(scale, |excess, scale| {
-            excess.abs() > ROUND_OFF * scale + NO_TORQUE && (excess < 0.0) != backward
+            excess.abs() > SUM_RTOL * scale + TORQUE_ATOL && (excess < 0.0) != power_reversed
         })
     }
 
@@ -415,15 +422,15 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// An overloaded row moves off, or stays at its capacity where others hold its speed.
-    fn give_way(&self, trial: &mut Assignment, (row, sign): (Row, f64), candidates: &[Row]) {
+    fn release(&self, trial: &mut ActiveSet, (row, sign): (Row, f64), candidates: &[Row]) {
         trial.move_off(row, sign);
-        self.tell_slipping_from_held(trial, candidates);
+        self.classify_saturated(trial, candidates);
     }
 
     /// Of the friction elements at zero speed that carry all they can, those slip that nothing at rest
     /// holds; the others stay at their capacity.
-    fn tell_slipping_from_held(&self, trial: &mut Assignment, candidates: &[Row]) {
-        use RowState::{Saturated, Slipping};
+    fn classify_saturated(&self, trial: &mut ActiveSet, candidates: &[Row]) {
+        use FrictionState::{Saturated, Slipping};
         for &row in candidates {
             if let Row::Friction(j) = row
                 && let Slipping { sign } | Saturated { sign } = trial.rows[j]
@@ -435,7 +442,7 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// Whether what is at rest keeps a row that is not from moving.
-    fn held_by_others(&self, trial: &Assignment, row: Row) -> bool {
+    fn held_by_others(&self, trial: &ActiveSet, row: Row) -> bool {
         let mut stuck = self.key_of(trial).rows();
         let alone = self.rank(&stuck);
         stuck.push(row);
@@ -452,14 +459,14 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// Make a trial the state of the run.
-    fn adopt(&mut self, trial: Assignment, candidates: &[Row], mode: Arc<Mode<T>>) {
+    fn adopt(&mut self, trial: ActiveSet, candidates: &[Row], mode: Arc<Mode<T>>) {
         self.released.iter_mut().for_each(|r| *r = false);
         for &row in candidates {
             let index = self.index_of(row);
             self.released[index] = trial.direction(row).is_some();
         }
         for i in 0..trial.gears.len() {
-            let rolling = matches!(trial.gears[i], GearState::Rolling { .. });
+            let rolling = matches!(trial.gears[i], GearState::Meshing { .. });
             let watched = rolling && self.network.losses[i].loss.is_directional();
             self.blocked[i] = watched && self.held_by_others(&trial, Row::Gear(i));
         }
@@ -468,10 +475,10 @@ impl<T: Number> Regime<'_, T> {
         self.gears = trial.gears;
         for (j, row) in self.network.frictions.iter().enumerate() {
             self.cells[j] = match self.rows[j] {
-                RowState::Open | RowState::Stuck => Cell::Off,
+                FrictionState::Open | FrictionState::Sticking => Cell::Off,
                 _ if !self.pressed[j] => Cell::Off,
-                RowState::Saturated { sign } => Cell::Saturated { sign },
-                RowState::Slipping { sign } => {
+                FrictionState::Saturated { sign } => Cell::Saturated { sign },
+                FrictionState::Slipping { sign } => {
                     let (slip, none) = (form(&row.slip, &self.x).re(), T::Values::zero_());
                     let inputs = &self.expansion.inputs;
                     self.network.channels[j].cell_at([slip, none], sign, inputs)
@@ -480,19 +487,4 @@ impl<T: Number> Regime<'_, T> {
         }
         self.mode = mode;
     }
-}
-
-/// Acceleration [rad/s²] without meaning, of the size `scale` of the terms that it is the sum of.
-fn negligible(scale: f64) -> f64 {
-    ROUND_OFF * scale + NEGLIGIBLE_ACCELERATION
-}
-
-/// Real part of the scalar product and of the sum of the magnitudes of its terms, which tells
-/// zero from round-off.
-pub(super) fn sum_and_scale<T: Number>(row: &[T], basis: &[T]) -> (T::Values, T::Values) {
-    let none = T::Values::zero_();
-    row.iter().zip(basis).fold((none, none), |(sum, scale), (a, b)| {
-        let term = a.re() * b.re();
-        (sum + term, scale + term.magnitude())
-    })
 }

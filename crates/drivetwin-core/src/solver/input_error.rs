@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-//! Why signals cannot serve as inputs.
+//! Errors of input signals.
 
 use thiserror::Error;
 
-/// Why signals cannot serve as inputs.
+/// Reason for which signals cannot serve as inputs.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum InputError {
     /// An input of the network has no signal.
@@ -40,7 +40,7 @@ pub enum InputError {
         /// First offending sample.
         index: usize,
     },
-    /// A sine is none.
+    /// A parameter of a sine is not finite.
     #[error("input {name:?}: offset, amplitude, frequency and phase of a sine must be finite")]
     Sine {
         /// Name of the input.
@@ -51,7 +51,7 @@ pub enum InputError {
     Jump {
         /// Name of the input.
         name: String,
-        /// When.
+        /// Time of the jump, s.
         time: f64,
     },
     /// The run asks for times outside the signals.

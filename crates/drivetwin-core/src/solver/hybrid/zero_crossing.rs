@@ -2,9 +2,8 @@
 //! The first instant at which a guard polynomial falls below zero.
 
 use crate::number::{Lane, Number, Series, Values, evaluate, slope};
+use crate::solver::tolerances::GUARD_RTOL;
 
-/// Relative to the size of a guard what counts as zero.
-const NEGLIGIBLE: f64 = 1e-13;
 /// How often a step is halved to tell falls apart.
 const MAX_DEPTH: usize = 50;
 
@@ -15,7 +14,7 @@ const MAX_DEPTH: usize = 50;
 /// how an element that has just changed its mode starts. Excursions inside the step are found too:
 /// the search rests on bounds of the polynomial, not on samples.
 #[inline(always)]
-pub fn first_fall<T: Number>(
+pub fn first_zero_crossing<T: Number>(
     guard: &Series<T>,
     order: usize,
     (mut runs, h): (u32, T::Values),
@@ -27,13 +26,13 @@ pub fn first_fall<T: Number>(
         reach += c.re().magnitude() * power;
     }
     let start = guard[0].re();
-    runs &= !(start - reach).those(|left| left > 0.0);
+    runs &= !(start - reach).mask_where(|left| left > 0.0);
     if runs == 0 {
         return (0, none);
     }
     let mut c = guard.map(|c| c.re());
-    let negligible = (start.magnitude() + reach) * NEGLIGIBLE;
-    let at_zero = runs & !(start - negligible).those(|above| above > 0.0);
+    let negligible = (start.magnitude() + reach) * GUARD_RTOL;
+    let at_zero = runs & !(start - negligible).mask_where(|above| above > 0.0);
     let mut at_once = 0;
     if at_zero != 0 {
         let (falling, rising) = lift_off(&mut c, order, (at_zero, h), negligible);
@@ -56,9 +55,9 @@ fn lift_off<V: Values>(
     let (mut falling, mut rising, mut power) = (0, 0, V::of(1.0));
     for k in 1..=order {
         power *= h;
-        let counts = (c[k].magnitude() * power - negligible).those(|size| size > 0.0);
+        let counts = (c[k].magnitude() * power - negligible).mask_where(|size| size > 0.0);
         let begin = at_zero & counts & !falling & !rising;
-        let below = begin & c[k].those(|leading| leading < 0.0);
+        let below = begin & c[k].mask_where(|leading| leading < 0.0);
         let above = begin & !below;
         if above != 0 {
             for i in 0..=order {
@@ -104,13 +103,13 @@ fn within<V: Values>(
             bend = bend * radius + d[k].magnitude() * k as f64;
         }
     }
-    let positive = (d[0] - swing).those(|left| left > 0.0);
-    let counts = (d[0].magnitude() + swing - negligible).those(|size| size > 0.0);
+    let positive = (d[0] - swing).mask_where(|left| left > 0.0);
+    let counts = (d[0].magnitude() + swing - negligible).mask_where(|size| size > 0.0);
     let open = runs & !positive & counts;
     if open == 0 {
         return (0, to, 0);
     }
-    let falling = open & (-d[1] - bend * radius).those(|fall| fall > 0.0);
+    let falling = open & (-d[1] - bend * radius).mask_where(|fall| fall > 0.0);
     let fallen = falling & below_zero(c, order, to);
     let time = if fallen == 0 { to } else { root(c, order, (fallen, from, to)) };
     (fallen, time, open & !falling)
@@ -131,7 +130,7 @@ fn in_halves<V: Values>(c: &Series<V>, order: usize, (runs, h): (u32, V)) -> (u3
     while depth > 0 {
         let [from, to] = [part, part + 1].map(|end| h * (end as f64 / (1_u64 << depth) as f64));
         let runs = unclear[depth - 1] & !fallen;
-        let (mut falls, mut at, still) = within(c, order, (runs, from, to), size * NEGLIGIBLE);
+        let (mut falls, mut at, still) = within(c, order, (runs, from, to), size * GUARD_RTOL);
         if still != 0 && depth < MAX_DEPTH {
             unclear[depth] = still;
             (part, depth) = (2 * part, depth + 1);
@@ -151,7 +150,7 @@ fn in_halves<V: Values>(c: &Series<V>, order: usize, (runs, h): (u32, V)) -> (u3
 /// The runs, as bits, whose polynomials are negative at `t`.
 #[inline(always)]
 fn below_zero<V: Values>(c: &Series<V>, order: usize, t: V) -> u32 {
-    evaluate(c, order, t).those(|value| value < 0.0)
+    evaluate(c, order, t).mask_where(|value| value < 0.0)
 }
 
 /// Roots of polynomials that fall through zero once in their brackets: Newton kept inside them.
@@ -160,15 +159,16 @@ fn root<V: Values>(c: &Series<V>, order: usize, (mut runs, mut from, mut to): (u
     let mut t = (from + to) * 0.5;
     for _ in 0..100 {
         let value = evaluate(c, order, t);
-        runs &= !value.those(|value| value == 0.0);
-        let above = value.those(|value| value > 0.0);
+        runs &= !value.mask_where(|value| value == 0.0);
+        let above = value.mask_where(|value| value > 0.0);
         from = from.with(runs & above, t);
         to = to.with(runs & !above, t);
         let newton = t - value / slope(c, order, t);
-        let inside = (newton - from).those(|left| left > 0.0) & (to - newton).those(|l| l > 0.0);
+        let inside =
+            (newton - from).mask_where(|left| left > 0.0) & (to - newton).mask_where(|l| l > 0.0);
         let next = ((from + to) * 0.5).with(inside, newton);
-        let narrow = (to - from - to.magnitude() * f64::EPSILON).those(|left| left <= 0.0);
-        let done = (next - t).those(|step| step == 0.0) | narrow;
+        let narrow = (to - from - to.magnitude() * f64::EPSILON).mask_where(|left| left <= 0.0);
+        let done = (next - t).mask_where(|step| step == 0.0) | narrow;
         t = t.with(runs, next);
         runs &= !done;
         if runs == 0 {
@@ -200,7 +200,7 @@ mod tests {
     fn fall(coefficients: &[f64], h: f64) -> Option<f64> {
         let mut series = [0.0; TERMS];
         series[..coefficients.len()].copy_from_slice(coefficients);
-        let (fallen, time) = first_fall(&series, coefficients.len() - 1, (1, h));
+        let (fallen, time) = first_zero_crossing(&series, coefficients.len() - 1, (1, h));
         (fallen == 1).then_some(time)
     }
 
@@ -251,9 +251,9 @@ mod tests {
         ] {
             let falls = u32::from(fold % 2 == 1);
             let guard = std::array::from_fn(|k| Pack::<8>::of(c.get(k).copied().unwrap_or(0.0)));
-            let (fallen, time) = first_fall(&guard, 5, (255, Pack::of(1.0)));
+            let (fallen, time) = first_zero_crossing(&guard, 5, (255, Pack::of(1.0)));
             assert_eq!(fallen, 255 * falls, "{fold}");
-            let width = 2.0 * NEGLIGIBLE.powf(1.0 / f64::from(fold));
+            let width = 2.0 * GUARD_RTOL.powf(1.0 / f64::from(fold));
             assert!(falls == 0 || (time.of_run(7) - 0.3).abs() < width, "{fold}: {time:?}");
         }
     }
@@ -272,10 +272,10 @@ mod tests {
     proptest! {
         #[test]
         fn runs_side_by_side_fall_as_each_alone(guards in guards(), runs in 0_u32..256, h in 0.1..4.0) {
-            let (fallen, time) = first_fall(&guards, 5, (runs, Pack::of(h)));
+            let (fallen, time) = first_zero_crossing(&guards, 5, (runs, Pack::of(h)));
             prop_assert_eq!(fallen & !runs, 0);
             for run in (0..8).filter(|run| runs >> run & 1 == 1) {
-                let (falls, at) = first_fall(&guards.map(|c| c.of_run(run)), 5, (1, h));
+                let (falls, at) = first_zero_crossing(&guards.map(|c| c.of_run(run)), 5, (1, h));
                 prop_assert_eq!(falls, fallen >> run & 1);
                 prop_assert!(falls == 0 || at.to_bits() == time.of_run(run).to_bits());
             }
@@ -286,7 +286,7 @@ mod tests {
             let guard = guards.map(|c| c.of_run(0));
             prop_assume!(guard[0] >= 0.0);
             let value = |t: f64| evaluate(&guard, 5, t);
-            let (falls, at) = first_fall(&guard, 5, (1, h));
+            let (falls, at) = first_zero_crossing(&guard, 5, (1, h));
             let until = if falls == 1 { at } else { h };
             for part in 1..100 {
                 prop_assert!(value(until * f64::from(part) / 100.0) > -1e-9);

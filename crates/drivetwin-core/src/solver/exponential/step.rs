@@ -1,26 +1,21 @@
 // SPDX-License-Identifier: MIT
 //! One sample: the torques of slipping elements as cubics, predicted and corrected.
 
-use super::lanes::{Task, dispatch};
-use super::march::Carry;
-use super::operators::{Carried, Form, MAX_ACTIVE, Operators, SHAPES};
 use crate::network::smooth::Sample;
 use crate::number::{Factor, Lane, SMALL, Values};
-
-/// Largest cubic part of a channel over a sample, relative to the largest of all.
-const MAX_CUBIC: f64 = 2e-4;
-/// Largest distance over which stiction is moved by its series.
-const MAX_MOVE: f64 = 0.05;
-/// Largest change of a channel by the correction, likewise.
-const MAX_CORRECTION: f64 = 3e-6;
+use crate::solver::exponential::phi::N_BASIS;
+use crate::solver::exponential::propagator::{ChannelCoefficients, MAX_ACTIVE, Propagator};
+use crate::solver::exponential::samples::{ChannelState, over_channels};
+use crate::solver::simd::{Kernel, dispatch_simd};
+use crate::solver::tolerances::{CORRECTION_RTOL, CUBIC_RTOL, MAX_LINEARIZED_DISTANCE};
 
 /// Number of shapes that value, rate and second derivative at the start give.
-const START: usize = 3;
+const N_START: usize = 3;
 /// Number of those after them, which raise the value and the slope at the end.
-const END: usize = SHAPES - START;
+const N_END: usize = N_BASIS - N_START;
 
 /// What a sample leads to, as far as it is known.
-struct Sampling<L: Lane, const N: usize, const A: usize> {
+struct StepWork<L: Lane, const N: usize, const A: usize> {
     /// State at the end.
     end: [L; N],
     /// Arguments at the end, and the part of their rates there that comes from the state.
@@ -29,12 +24,12 @@ struct Sampling<L: Lane, const N: usize, const A: usize> {
     /// The part of these rates that comes from the inputs.
     direct: [L; A],
     /// How the arguments turn at the start, without channels and state, and by the state.
-    turn: [L; A],
-    turning: [L; A],
+    half_second_derivative: [L; A],
+    state_half_second_derivative: [L; A],
     /// Normal loads at the start and what they rise by.
     normal: [[L; 2]; A],
     /// The torques by what is known at the start.
-    cubics: [[L; START]; A],
+    cubics: [[L; N_START]; A],
     /// Size of the torques at the start.
     size: L::Values,
     /// Negative where a guard has fallen.
@@ -44,39 +39,39 @@ struct Sampling<L: Lane, const N: usize, const A: usize> {
 /// Pass one sample; returns something negative where a guard of the carried channels has fallen.
 #[inline(always)]
 pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize>(
-    op: &Operators<L, N>,
+    op: &Propagator<L, N>,
     (sample, h): (&Sample<U>, f64),
-    (x, carry): (&mut [L; N], &mut [Carry<L>; A]),
+    (x, carry): (&mut [L; N], &mut [ChannelState<L>; A]),
 ) -> L::Values {
     let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
     let none = L::all(0.0);
-    let mut sampling = Sampling {
+    let mut sampling = StepWork {
         end: op.constant,
         argument: [none; A],
         rate: [none; A],
         direct: [none; A],
-        turn: [none; A],
-        turning: [none; A],
+        half_second_derivative: [none; A],
+        state_half_second_derivative: [none; A],
         normal: [[none; 2]; A],
-        cubics: [[none; START]; A],
+        cubics: [[none; N_START]; A],
         size: none.values(),
         guard: none.values(),
     };
-    sampling.know::<F, U>(op, channels, (sample, h), x);
-    let about = sampling.foresee::<F>(channels, carry);
+    sampling.apply_linear::<F, U>(op, channels, (sample, h), x);
+    let about = sampling.extrapolate::<F>(channels, carry);
     sampling.predict::<F>(op, channels, (carry, &about));
     sampling.correct::<F>(channels, carry);
     *x = sampling.end;
     sampling.guard
 }
 
-impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
+impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
     /// What state and inputs alone lead to.
     #[inline(always)]
-    fn know<const F: bool, U: Factor<L>>(
+    fn apply_linear<const F: bool, U: Factor<L>>(
         &mut self,
-        op: &Operators<L, N>,
-        channels: &[Carried<L, N>; A],
+        op: &Propagator<L, N>,
+        channels: &[ChannelCoefficients<L, N>; A],
         (sample, h): (&Sample<U>, f64),
         x: &[L; N],
     ) {
@@ -85,8 +80,8 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             let c = &channels[a];
             s.argument[a] = c.argument_end.constant;
             s.direct[a] = c.rate.constant;
-            s.turn[a] = c.turn.constant;
-            let rise = sample[c.law.normal.input][1].product(c.ramp);
+            s.half_second_derivative[a] = c.half_second_derivative.constant;
+            let rise = sample[c.law.normal.input][1].product(c.load_slope);
             s.normal[a] = [c.law.normal.start::<F, U>(sample), rise];
         }
         for drive in &op.drives {
@@ -100,7 +95,11 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                     s.argument[a] = pair::<L, U, F>(&drive.argument[a], (u, du), s.argument[a]);
                 }
                 s.direct[a] = u_end.onto::<F>(drive.now[a], s.direct[a]);
-                s.turn[a] = pair::<L, U, F>(&drive.turn[a], (u, du), s.turn[a]);
+                s.half_second_derivative[a] = pair::<L, U, F>(
+                    &drive.half_second_derivative[a],
+                    (u, du),
+                    s.half_second_derivative[a],
+                );
             }
         }
         for j in 0..op.columns() {
@@ -115,17 +114,18 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
             }
         }
         for a in 0..A {
-            s.turning[a] = over_state::<L, F, N>(op, &channels[a].turn.state, x);
+            s.state_half_second_derivative[a] =
+                over_state::<L, F, N>(op, &channels[a].half_second_derivative.state, x);
         }
     }
 
     /// The cubics by value, rate and second derivative at the start. Returns the arguments about which the
     /// law is taken at the end, with stiction there, and leaves those of the next sample to carry.
     #[inline(always)]
-    fn foresee<const F: bool>(
+    fn extrapolate<const F: bool>(
         &mut self,
-        channels: &[Carried<L, N>; A],
-        carry: &mut [Carry<L>; A],
+        channels: &[ChannelCoefficients<L, N>; A],
+        carry: &mut [ChannelState<L>; A],
     ) -> [[L; 2]; A] {
         let mut about = [[L::all(0.0); 2]; A];
         let mut faded = [L::all(0.0); A];
@@ -138,21 +138,23 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         }
         let mut farthest = L::Values::all(0.0);
         for a in 0..A {
-            let turn = over_cubics::<L, F, A, 0, 2>(
-                &channels[a].turn.cubics,
+            let half_second_derivative = over_cubics::<L, F, A, 0, 2>(
+                &channels[a].half_second_derivative.cubics,
                 &self.cubics.map(|[value, slope, _]| [value, slope]),
-                self.turn[a],
+                self.half_second_derivative[a],
             );
-            let turn = turn + self.turning[a];
+            let half_second_derivative =
+                half_second_derivative + self.state_half_second_derivative[a];
             let (v, rate) = (&carry[a].value, carry[a].rate);
             let bent = v.bend.fma::<F>(rate, v.mixed * self.normal[a][1]) * rate;
-            self.cubics[a][2] = v.by_argument.fma::<F>(turn, bent);
+            self.cubics[a][2] = v.by_argument.fma::<F>(half_second_derivative, bent);
             if L::DERIVATIVES {
                 continue;
             }
-            about[a] = [carry[a].near, carry[a].stiction];
-            carry[a].near = turn.fma_times::<F>(4.0, rate + rate + carry[a].argument);
-            let decay = about[a][0] - carry[a].near;
+            about[a] = [carry[a].predicted_argument, carry[a].stiction];
+            carry[a].predicted_argument =
+                half_second_derivative.fma_times::<F>(4.0, rate + rate + carry[a].argument);
+            let decay = about[a][0] - carry[a].predicted_argument;
             farthest = farthest.larger(decay.values().magnitude());
             faded[a] = carry[a].stiction.grown::<F>(decay);
         }
@@ -161,7 +163,12 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         }
         let far = (L::Values::all(SMALL) - farthest).negative();
         if far != 0 {
-            faded = anew(channels, std::array::from_fn(|a| carry[a].near), faded, far);
+            faded = evaluate_stiction(
+                channels,
+                std::array::from_fn(|a| carry[a].predicted_argument),
+                faded,
+                far,
+            );
         }
         for a in 0..A {
             carry[a].stiction = faded[a];
@@ -173,14 +180,14 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
     #[inline(always)]
     fn predict<const F: bool>(
         &mut self,
-        op: &Operators<L, N>,
-        channels: &[Carried<L, N>; A],
-        (carry, about): (&mut [Carry<L>; A], &[[L; 2]; A]),
+        op: &Propagator<L, N>,
+        channels: &[ChannelCoefficients<L, N>; A],
+        (carry, about): (&mut [ChannelState<L>; A], &[[L; 2]; A]),
     ) {
-        add_moments::<L, F, N, A, 0, START>(channels, &self.cubics, &mut self.end);
+        add_moments::<L, F, N, A, 0, N_START>(channels, &self.cubics, &mut self.end);
         for a in 0..A {
-            let Carried { argument, argument_end, rate, law, .. } = &channels[a];
-            let [near, stiction] = about[a];
+            let ChannelCoefficients { argument, argument_end, rate, law, .. } = &channels[a];
+            let [predicted_argument, stiction] = about[a];
             let normal = self.normal[a][1] + self.normal[a][0];
             self.rate[a] = over_state::<L, F, N>(op, &rate.state, &self.end);
             if L::DERIVATIVES {
@@ -191,13 +198,13 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
                 carry[a].value = law.about::<F>(self.argument[a], stiction).here(normal);
                 continue;
             }
-            let (cubics, from_near) = (&self.cubics, self.argument[a] - near);
+            let (cubics, from_near) = (&self.cubics, self.argument[a] - predicted_argument);
             let distance =
-                over_cubics::<L, F, A, 0, START>(&argument_end.cubics, cubics, from_near);
-            self.argument[a] = near + distance;
-            let friction = law.about::<F>(near, stiction);
+                over_cubics::<L, F, A, 0, N_START>(&argument_end.cubics, cubics, from_near);
+            self.argument[a] = predicted_argument + distance;
+            let friction = law.about::<F>(predicted_argument, stiction);
             carry[a].value = friction.at::<F>(distance, normal);
-            let guard = L::Values::all(MAX_MOVE) - distance.values().magnitude();
+            let guard = L::Values::all(MAX_LINEARIZED_DISTANCE) - distance.values().magnitude();
             self.guard = self.guard.negative_with(guard);
         }
     }
@@ -205,8 +212,12 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
     /// The cubics through the predicted end, the channels where these lead to, the end that follows from
     /// the torques there, and the channels at it.
     #[inline(always)]
-    fn correct<const F: bool>(&mut self, channels: &[Carried<L, N>; A], carry: &mut [Carry<L>; A]) {
-        let mut missing = [[L::all(0.0); END]; A];
+    fn correct<const F: bool>(
+        &mut self,
+        channels: &[ChannelCoefficients<L, N>; A],
+        carry: &mut [ChannelState<L>; A],
+    ) {
+        let mut missing = [[L::all(0.0); N_END]; A];
         let mut raised = [L::all(0.0); A];
         for a in 0..A {
             let (v, [a0, a1, a2]) = (&carry[a].value, self.cubics[a]);
@@ -221,34 +232,34 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
         let mut reached = self.argument;
         for a in 0..A {
             let (form, none) = (&channels[a].argument_end.cubics, L::all(0.0));
-            let ds = over_cubics::<L, F, A, START, END>(form, &missing, none);
+            let ds = over_cubics::<L, F, A, N_START, N_END>(form, &missing, none);
             reached[a] = reached[a] + ds;
             let corrected = carry[a].value.moved::<F>(ds);
             let correction = (corrected.value - carry[a].value.value).values().magnitude();
-            let close = size.times(MAX_CORRECTION) - correction;
+            let close = size.times(CORRECTION_RTOL) - correction;
             self.guard = self.guard.negative_with(close);
             carry[a].value = corrected;
         }
         for a in 0..A {
             missing[a][0] = carry[a].value.value - raised[a];
         }
-        add_moments::<L, F, N, A, START, END>(channels, &missing, &mut self.end);
+        add_moments::<L, F, N, A, N_START, N_END>(channels, &missing, &mut self.end);
         let mut early = [L::Values::all(0.0); A];
         for a in 0..A {
-            let Carried { argument_end, rate_end, .. } = &channels[a];
+            let ChannelCoefficients { argument_end, rate_end, .. } = &channels[a];
             let (argument, rate) = (self.argument[a], self.rate[a]);
-            self.rate[a] = over_cubics::<L, F, A, START, END>(rate_end, &missing, rate);
+            self.rate[a] = over_cubics::<L, F, A, N_START, N_END>(rate_end, &missing, rate);
             let [value, slope] = missing[a];
             let cubic = (slope - (value + value)).values().magnitude();
-            self.guard = self.guard.negative_with(size.times(MAX_CUBIC) - cubic);
+            self.guard = self.guard.negative_with(size.times(CUBIC_RTOL) - cubic);
             early[a] = carry[a].rate.values().times(1.0 / 3.0) + carry[a].argument.values();
             carry[a].argument =
-                over_cubics::<L, F, A, START, END>(&argument_end.cubics, &missing, argument);
+                over_cubics::<L, F, A, N_START, N_END>(&argument_end.cubics, &missing, argument);
             let (v, left) = (&mut carry[a].value, carry[a].argument - reached[a]);
             v.value = v.by_argument.fma::<F>(left, v.value);
         }
         for a in 0..A {
-            let Carried { rate, law, .. } = &channels[a];
+            let ChannelCoefficients { rate, law, .. } = &channels[a];
             let known = self.rate[a] + self.direct[a];
             carry[a].rate = over_channels::<L, F, N, A>(rate, carry, known);
             // Between its ends the argument stays within these (Bernstein's form of the cubic).
@@ -265,30 +276,30 @@ impl<L: Lane, const N: usize, const A: usize> Sampling<L, N, A> {
 /// instructions, which the compiler keeps in vectors.
 #[cold]
 #[inline(never)]
-fn anew<L: Lane, const N: usize, const A: usize>(
-    channels: &[Carried<L, N>; A],
-    near: [L; A],
+fn evaluate_stiction<L: Lane, const N: usize, const A: usize>(
+    channels: &[ChannelCoefficients<L, N>; A],
+    predicted_argument: [L; A],
     faded: [L; A],
     far: u32,
 ) -> [L; A] {
-    dispatch(Anew { channels, near, faded, far })
+    dispatch_simd(StictionKernel { channels, predicted_argument, faded, far })
 }
 
-/// [`anew`], to be dispatched.
-struct Anew<'c, L, const N: usize, const A: usize> {
-    channels: &'c [Carried<L, N>; A],
-    near: [L; A],
+/// [`evaluate_stiction`], to be dispatched.
+struct StictionKernel<'c, L, const N: usize, const A: usize> {
+    channels: &'c [ChannelCoefficients<L, N>; A],
+    predicted_argument: [L; A],
     faded: [L; A],
     far: u32,
 }
 
-impl<L: Lane, const N: usize, const A: usize> Task for Anew<'_, L, N, A> {
+impl<L: Lane, const N: usize, const A: usize> Kernel for StictionKernel<'_, L, N, A> {
     type Output = [L; A];
 
     #[inline(always)]
     fn run<const F: bool>(mut self) -> [L; A] {
         for a in 0..A {
-            let stiction = self.channels[a].law.stiction::<F>(self.near[a]);
+            let stiction = self.channels[a].law.stiction::<F>(self.predicted_argument[a]);
             self.faded[a] = self.faded[a].with(self.far, stiction);
         }
         self.faded
@@ -309,14 +320,14 @@ fn add_moments<
     const FROM: usize,
     const COUNT: usize,
 >(
-    channels: &[Carried<L, N>; A],
+    channels: &[ChannelCoefficients<L, N>; A],
     cubics: &[[L; COUNT]; A],
     end: &mut [L; N],
 ) {
     for k in 0..COUNT {
         for a in 0..A {
             for i in 0..N {
-                end[i] = channels[a].moments[FROM + k][i].fma::<F>(cubics[a][k], end[i]);
+                end[i] = channels[a].forcing_response[FROM + k][i].fma::<F>(cubics[a][k], end[i]);
             }
         }
     }
@@ -325,7 +336,7 @@ fn add_moments<
 /// Value of a form over the state.
 #[inline(always)]
 fn over_state<L: Lane, const F: bool, const N: usize>(
-    op: &Operators<L, N>,
+    op: &Propagator<L, N>,
     form: &[L; N],
     x: &[L; N],
 ) -> L {
@@ -339,7 +350,7 @@ fn over_state<L: Lane, const F: bool, const N: usize>(
 
 #[inline(always)]
 fn over_cubics<L: Lane, const F: bool, const A: usize, const FROM: usize, const COUNT: usize>(
-    form: &[[L; SHAPES]; MAX_ACTIVE],
+    form: &[[L; N_BASIS]; MAX_ACTIVE],
     cubics: &[[L; COUNT]; A],
     sum: L,
 ) -> L {
@@ -348,19 +359,6 @@ fn over_cubics<L: Lane, const F: bool, const A: usize, const FROM: usize, const 
         for a in 0..A {
             sum = form[a][FROM + k].fma::<F>(cubics[a][k], sum);
         }
-    }
-    sum
-}
-
-#[inline(always)]
-pub fn over_channels<L: Lane, const F: bool, const N: usize, const A: usize>(
-    form: &Form<L, N>,
-    carry: &[Carry<L>; A],
-    sum: L,
-) -> L {
-    let mut sum = sum;
-    for a in 0..A {
-        sum = form.channels[a].fma::<F>(carry[a].value.value, sum);
     }
     sum
 }

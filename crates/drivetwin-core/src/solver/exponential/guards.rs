@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT
 //! What must hold while samples are passed: torques within their limits, speeds above zero, loads above zero.
 
-use super::march::{Carry, Column, Source, Trail};
-use super::operators::{Bound, MAX_WATCHED, Operators, Watched};
 use crate::network::smooth::{Line, Sample};
 use crate::number::{Factor, Lane, Values};
+use crate::solver::exponential::propagator::{Bound, MAX_GUARDS, Propagator, SampleGuard};
+use crate::solver::exponential::samples::{ChannelState, InputSource, SampleBuffer, SampleColumn};
 
 /// Of the watched forms at the start of a sample, what torques are off their limits by or what speeds are,
 /// and what the forms are.
-pub type Guards<V> = [[V; 2]; MAX_WATCHED];
+pub type Guards<V> = [[V; 2]; MAX_GUARDS];
 
 /// Of what is not watched.
-pub fn idle_guards<V: Values>() -> Guards<V> {
-    [[V::all(1.0), V::all(0.0)]; MAX_WATCHED]
+pub fn inactive_guards<V: Values>() -> Guards<V> {
+    [[V::all(1.0), V::all(0.0)]; MAX_GUARDS]
 }
 
-impl<L: Lane, const N: usize> Operators<L, N> {
+impl<L: Lane, const N: usize> Propagator<L, N> {
     /// Whether every normal load stays above zero over samples, in all runs.
     #[inline(always)]
-    pub fn stays_loaded<S: Source<L>, const F: bool>(
+    pub fn stays_loaded<S: InputSource<L>, const F: bool>(
         &self,
         source: &S,
         samples: (usize, usize),
@@ -36,21 +36,21 @@ impl<L: Lane, const N: usize> Operators<L, N> {
     ///
     /// Apart from what falls in the step: sums over a loop that start from nothing stay in vectors.
     #[inline(always)]
-    pub fn leaves<V: Factor<L::Values>, const F: bool, const A: usize>(
+    pub fn crossed<V: Factor<L::Values>, const F: bool, const A: usize>(
         &self,
         guards: &mut Guards<L::Values>,
         (input, loads): (impl Fn(usize) -> V, bool),
-        at: (&[L; N], &[Carry<L>; A]),
+        at: (&[L; N], &[ChannelState<L>; A]),
     ) -> L::Values {
         let mut left = [L::Values::all(0.0)];
-        for (place, before) in guards.iter_mut().enumerate().take(self.watched.len()) {
+        for (place, before) in guards.iter_mut().enumerate().take(self.guards.len()) {
             let after = self.guard::<V, F, A>(place, &input, at);
-            self.falls::<F, _>(place, (before, &after.map(|value| [value])), &mut left);
+            self.may_cross::<F, _>(place, (before, &after.map(|value| [value])), &mut left);
             *before = after;
         }
         if loads {
             for load in &self.loads {
-                load.falls::<_, F, 1>(&[input(load.input)], &mut left);
+                load.may_cross::<_, F, 1>(&[input(load.input)], &mut left);
             }
         }
         left[0]
@@ -58,21 +58,21 @@ impl<L: Lane, const N: usize> Operators<L, N> {
 
     /// The same of `some` samples together, by what the trail has of them and by the inputs at their ends.
     #[inline(always)]
-    pub fn left<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
+    pub fn crossed_in_block<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
         &self,
         guards: &mut Guards<L::Values>,
         (ends, loads): (impl Fn(usize) -> [V; W], bool),
-        (trail, from, some): (&Trail<L, N>, usize, usize),
+        (trail, from, some): (&SampleBuffer<L, N>, usize, usize),
     ) -> [L::Values; W] {
         let mut left = [L::Values::all(0.0); W];
-        for (place, before) in guards.iter_mut().enumerate().take(self.watched.len()) {
+        for (place, before) in guards.iter_mut().enumerate().take(self.guards.len()) {
             let after = self.guards_after::<_, F, A, W>(place, &ends, (trail, from));
-            self.falls::<F, _>(place, (before, &after), &mut left);
+            self.may_cross::<F, _>(place, (before, &after), &mut left);
             *before = after.map(|values| values[some - 1]);
         }
         if loads {
             for load in &self.loads {
-                load.falls::<_, F, W>(&ends(load.input), &mut left);
+                load.may_cross::<_, F, W>(&ends(load.input), &mut left);
             }
         }
         left
@@ -83,10 +83,10 @@ impl<L: Lane, const N: usize> Operators<L, N> {
     pub fn guards<U: Factor<L, Values: Factor<L::Values>>, const F: bool, const A: usize>(
         &self,
         sample: &Sample<U>,
-        at: (&[L; N], &[Carry<L>; A]),
+        at: (&[L; N], &[ChannelState<L>; A]),
     ) -> Guards<L::Values> {
-        let mut guards = idle_guards();
-        for (place, guard) in guards.iter_mut().enumerate().take(self.watched.len()) {
+        let mut guards = inactive_guards();
+        for (place, guard) in guards.iter_mut().enumerate().take(self.guards.len()) {
             *guard = self.guard::<_, F, A>(place, |input| sample[input][0].values(), at);
         }
         guards
@@ -98,12 +98,12 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         &self,
         place: usize,
         input: impl Fn(usize) -> V,
-        (x, carry): (&[L; N], &[Carry<L>; A]),
+        (x, carry): (&[L; N], &[ChannelState<L>; A]),
     ) -> [L::Values; 2] {
-        let Watched { form, bound } = &self.watched[place];
+        let SampleGuard { form, bound } = &self.guards[place];
         let mut value = form.constant.values();
         for drive in &self.drives {
-            value = input(drive.input).onto::<F>(drive.watched[place].values(), value);
+            value = input(drive.input).onto::<F>(drive.guards[place].values(), value);
         }
         for i in 0..self.columns() {
             value = form.state[i].values().fma::<F>(x[i].values(), value);
@@ -134,12 +134,12 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         &self,
         place: usize,
         ends: &impl Fn(usize) -> [V; W],
-        (trail, from): (&Trail<L, N>, usize),
+        (trail, from): (&SampleBuffer<L, N>, usize),
     ) -> [[L::Values; W]; 2] {
-        let Watched { form, bound } = &self.watched[place];
+        let SampleGuard { form, bound } = &self.guards[place];
         let mut values = [form.constant.values(); W];
         for drive in &self.drives {
-            add::<L, V, F, W>(&mut values, drive.watched[place], &ends(drive.input));
+            add::<L, V, F, W>(&mut values, drive.guards[place], &ends(drive.input));
         }
         self.add_states::<F, W>(&mut values, &form.state, (trail, from));
         for a in 0..A {
@@ -171,7 +171,7 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         &self,
         sums: &mut [L::Values; W],
         row: &[L; N],
-        (trail, from): (&Trail<L, N>, usize),
+        (trail, from): (&SampleBuffer<L, N>, usize),
     ) {
         for i in 0..self.columns() {
             let column: &[L; W] = after(trail.states(i), from);
@@ -190,7 +190,7 @@ impl<L: Lane, const N: usize> Operators<L, N> {
     /// Of a speed near zero its size says nothing: it stays above the least corner of the cubic through its
     /// values and rates (Bernstein's form), to fourth order.
     #[inline(always)]
-    fn falls<const F: bool, const W: usize>(
+    fn may_cross<const F: bool, const W: usize>(
         &self,
         place: usize,
         (before, after): (&[L::Values; 2], &[[L::Values; W]; 2]),
@@ -199,11 +199,13 @@ impl<L: Lane, const N: usize> Operators<L, N> {
         let [mut margin, mut value] = *before;
         for k in 0..W {
             let (margin_after, value_after) = (after[0][k], after[1][k]);
-            let left = if let Bound::Within { .. } = self.watched[place].bound {
+            let left = if let Bound::Within { .. } = self.guards[place].bound {
                 let rise = (value_after - value).magnitude();
                 let size = value.magnitude().larger(value_after.magnitude());
-                let bow = self.bow[0].values().fma::<F>(rise, self.bow[1].values() * size);
-                margin.smaller(margin_after) - bow
+                let chord_deviation = self.chord_deviation[0]
+                    .values()
+                    .fma::<F>(rise, self.chord_deviation[1].values() * size);
+                margin.smaller(margin_after) - chord_deviation
             } else {
                 let corners = (margin + value).smaller(margin_after - value_after);
                 corners.smaller(margin).smaller(margin_after)
@@ -216,7 +218,7 @@ impl<L: Lane, const N: usize> Operators<L, N> {
 
 /// The samples after those from `from` on.
 #[inline(always)]
-fn after<L, const W: usize>(column: &Column<L>, from: usize) -> &[L; W] {
+fn after<L, const W: usize>(column: &SampleColumn<L>, from: usize) -> &[L; W] {
     column[from + 1..].first_chunk().expect("stretches that divide a block")
 }
 
@@ -250,7 +252,7 @@ impl<L: Lane> Line<L> {
 
     /// Make negative where the line falls below zero at the end of a sample.
     #[inline(always)]
-    fn falls<V: Factor<L::Values>, const F: bool, const W: usize>(
+    fn may_cross<V: Factor<L::Values>, const F: bool, const W: usize>(
         &self,
         ends: &[V; W],
         fallen: &mut [L::Values; W],

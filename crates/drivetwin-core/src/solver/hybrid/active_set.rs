@@ -1,32 +1,32 @@
 // SPDX-License-Identifier: MIT
 //! Who rests, slips or moves off: what a decision tries and then makes the state of a run.
 
-use super::regime::RowState;
 use crate::network::{GearState, Row};
+use crate::solver::hybrid::event::FrictionState;
 
 /// A trial: the state of every friction element and of every lossy gear.
 #[derive(Clone, PartialEq)]
-pub(super) struct Assignment {
+pub(crate) struct ActiveSet {
     /// Friction elements.
-    pub rows: Vec<RowState>,
+    pub rows: Vec<FrictionState>,
     /// Lossy gears.
     pub gears: Vec<GearState>,
 }
 
-impl Assignment {
+impl ActiveSet {
     /// Let a row rest.
     pub fn rest(&mut self, row: Row) {
         match row {
-            Row::Friction(j) => self.rows[j] = RowState::Stuck,
-            Row::Gear(i) => self.gears[i] = GearState::Held,
+            Row::Friction(j) => self.rows[j] = FrictionState::Sticking,
+            Row::Gear(i) => self.gears[i] = GearState::Locked,
         }
     }
 
     /// Let a row move off in a direction.
     pub fn move_off(&mut self, row: Row, sign: f64) {
         match row {
-            Row::Friction(j) => self.rows[j] = RowState::Slipping { sign },
-            Row::Gear(i) => self.gears[i] = GearState::Rolling { sign, backward: false },
+            Row::Friction(j) => self.rows[j] = FrictionState::Slipping { sign },
+            Row::Gear(i) => self.gears[i] = GearState::Meshing { sign, power_reversed: false },
         }
     }
 
@@ -35,14 +35,14 @@ impl Assignment {
         let friction =
             |row: &Row| if let Row::Friction(j) = *row { Some(self.rows[j]) } else { None };
         let rows = || candidates.iter().filter_map(friction);
-        let moving = rows().filter(|row| matches!(row, RowState::Slipping { .. })).count();
-        (moving, moving + rows().filter(RowState::is_saturated).count())
+        let moving = rows().filter(|row| matches!(row, FrictionState::Slipping { .. })).count();
+        (moving, moving + rows().filter(FrictionState::is_saturated).count())
     }
 
     /// Let power through a rolling gear flow the other way.
     pub fn reverse_power(&mut self, i: usize) {
-        if let GearState::Rolling { backward, .. } = &mut self.gears[i] {
-            *backward = !*backward;
+        if let GearState::Meshing { power_reversed, .. } = &mut self.gears[i] {
+            *power_reversed = !*power_reversed;
         }
     }
 
@@ -50,12 +50,12 @@ impl Assignment {
     pub fn direction(&self, row: Row) -> Option<f64> {
         match row {
             Row::Friction(j) => match self.rows[j] {
-                RowState::Slipping { sign } => Some(sign),
+                FrictionState::Slipping { sign } => Some(sign),
                 _ => None,
             },
             Row::Gear(i) => match self.gears[i] {
-                GearState::Rolling { sign, .. } => Some(sign),
-                GearState::Held => None,
+                GearState::Meshing { sign, .. } => Some(sign),
+                GearState::Locked => None,
             },
         }
     }

@@ -5,10 +5,12 @@ use crate::network::channel::{ChannelSeries, form};
 use crate::network::linalg::is_zero;
 use crate::network::{Cell, Channel, Mode, Network};
 use crate::number::{INVERSE, Lane, Number, Series, TERMS, Values, evaluate, slope};
+use crate::solver::settings::Accuracy;
+use crate::solver::tolerances::{MAX_STICTION_EXPONENT_CHANGE, STICTION_RANGE};
 
 /// Coefficients of states and channels over one step, and the working space to compute them.
 #[derive(Clone, Debug)]
-pub struct Expansion<T> {
+pub struct TaylorExpansion<T> {
     /// States (speeds, twists).
     pub states: Vec<Series<T>>,
     /// Channels.
@@ -23,22 +25,7 @@ pub struct Expansion<T> {
     scales: Vec<T>,
 }
 
-/// What the step control needs.
-#[derive(Clone, Copy, Debug)]
-pub struct Accuracy {
-    /// Truncation error allowed per step, relative to `scale` of each state.
-    pub tolerance: f64,
-    /// Fixed order; `None` lets the order follow the tolerance.
-    pub order: Option<usize>,
-}
-
-/// Most that the exponent of stiction changes by within a step: its series then falls from its second term
-/// on.
-const MAX_DECAY: f64 = 2.0;
-/// Slip [Stribeck speeds] at which stiction is nothing, e^-40.
-const NO_STICTION: f64 = 40.0;
-
-impl<T: Number> Expansion<T> {
+impl<T: Number> TaylorExpansion<T> {
     /// Working space for a network.
     pub fn new(network: &Network<T>) -> Self {
         Self {
@@ -103,7 +90,7 @@ impl<T: Number> Expansion<T> {
             sizes[k + 1] = power * if curved { size.larger(self.input_size(k + 1)) } else { size };
             if accuracy.order.is_none() {
                 let recent = largest(&sizes[(k + 2).saturating_sub(window)..k + 2]);
-                ended[k + 1] = recent.those(|size| size <= accuracy.tolerance) & growing;
+                ended[k + 1] = recent.mask_where(|size| size <= accuracy.tolerance) & growing;
                 growing &= !ended[k + 1];
             }
             if growing == 0 {
@@ -138,10 +125,10 @@ impl<T: Number> Expansion<T> {
                 swing += term.re().magnitude() * power;
             }
             // Further away stiction is nothing throughout.
-            let room = slip[0].re().magnitude() - speed.re() * NO_STICTION;
-            let room = room.larger(speed.re() * MAX_DECAY);
+            let room = slip[0].re().magnitude() - speed.re() * STICTION_RANGE;
+            let room = room.larger(speed.re() * MAX_STICTION_EXPONENT_CHANGE);
             let shorter = within.smaller(h * (room / swing.larger(room)));
-            let none = stiction.re().those(|v| v == 0.0 && stiction.is_constant());
+            let none = stiction.re().mask_where(|v| v == 0.0 && stiction.is_constant());
             within = shorter.with(none, within);
         }
         within
@@ -268,7 +255,7 @@ impl<T: Number> Expansion<T> {
         for (i, (scale, state)) in self.scales.iter_mut().zip(&self.states).enumerate() {
             let floor = if twists.contains(&i) { 1e-3 } else { 1.0 };
             let size = state[0].re().magnitude().larger(T::Values::of(floor));
-            *scale = T::lifted(size.recip());
+            *scale = T::promote(size.recip());
         }
     }
 }

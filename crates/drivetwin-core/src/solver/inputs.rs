@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! Inputs over time, linear between samples.
 
-use super::input_error::InputError;
 use crate::number::{Real, Series};
+use crate::solver::input_error::InputError;
 
 /// How one input varies.
 #[derive(Clone, Copy, Debug)]

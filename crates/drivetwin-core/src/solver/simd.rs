@@ -5,7 +5,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 /// Work that is compiled once for every instruction set; mark `run` and all that it calls in its inner
 /// loops `#[inline(always)]`.
-pub trait Task {
+pub trait Kernel {
     /// Result.
     type Output;
 
@@ -15,7 +15,7 @@ pub trait Task {
 
 struct Dispatched<T>(T);
 
-impl<T: Task> WithSimd for Dispatched<T> {
+impl<T: Kernel> WithSimd for Dispatched<T> {
     type Output = T::Output;
 
     #[inline(always)]
@@ -25,6 +25,6 @@ impl<T: Task> WithSimd for Dispatched<T> {
 }
 
 /// Run a task on the widest instruction set there is.
-pub fn dispatch<T: Task>(task: T) -> T::Output {
+pub fn dispatch_simd<T: Kernel>(task: T) -> T::Output {
     Arch::new().dispatch(Dispatched(task))
 }

@@ -1,30 +1,19 @@
 // SPDX-License-Identifier: MIT
 //! The operators that pass samples in the present regime, and the guards they watch.
 
-use super::decide::NO_TORQUE;
-use super::operators::{MAX_ACTIVE, MAX_WATCHED, Operators};
-use super::regime::{Regime, RowState};
-use crate::network::channel::{self, Channel};
+use crate::network::channel;
 use crate::network::smooth::{Law, Line, MAX_INPUTS, line_of};
-use crate::network::{Cell, GearState, ModeKey, Network, Row};
+use crate::network::{Cell, Channel, GearState, Network, Row};
 use crate::number::{Lane, Number};
+use crate::solver::exponential::propagator::{
+    MAX_ACTIVE, MAX_GUARDS, MAX_STATES, Propagator, SizedPropagator,
+};
+use crate::solver::exponential::propagator_cache::PropagatorCache;
+use crate::solver::exponential::propagator_cache::PropagatorKey;
+use crate::solver::hybrid::event::FrictionState;
+use crate::solver::hybrid::state::HybridState;
+use crate::solver::tolerances::TORQUE_ATOL;
 use std::sync::Arc;
-
-/// Operators for the number of states at hand.
-#[derive(Clone, Debug)]
-pub(super) enum AnySize<T> {
-    /// Up to 4.
-    Four(Arc<Operators<T, 4>>),
-    /// Up to 8; of one run only.
-    Eight(Arc<Operators<T, 8>>),
-    /// Up to 12; of plain numbers only.
-    Twelve(Arc<Operators<T, 12>>),
-    /// Up to [`MAX_STATES`]; likewise.
-    Many(Arc<Operators<T, MAX_STATES>>),
-}
-
-/// Most states of a network of plain numbers that is marched.
-const MAX_STATES: usize = 24;
 
 /// Most states of a network over `T` that is marched. With derivatives the gain with more does not pay for the
 /// code, and several runs side by side are drivelines of two clutches.
@@ -39,7 +28,7 @@ const fn max_states<T: Lane>() -> usize {
 }
 
 /// Whether a network is of the kind that passes samples by exact operators.
-pub fn can_march<T: Number>(network: &Network<T>) -> bool {
+pub fn supports_fixed_step<T: Number>(network: &Network<T>) -> bool {
     let smooth = |channel: &Channel<T>| {
         matches!(channel.law, channel::Law::Friction { .. } | channel::Law::Quadratic(_))
     };
@@ -49,65 +38,63 @@ pub fn can_march<T: Number>(network: &Network<T>) -> bool {
         && network.channels.iter().all(smooth)
 }
 
-/// What operators belong to: mode, active channels with their branches, and step length.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Key {
-    mode: ModeKey,
-    /// Bits of the active channels, of their directions, and of what is watched or pressed.
-    branches: [u64; 3],
-    pieces: [u8; MAX_ACTIVE],
-    /// Step length, ps: times that differ by round-off share their operators.
-    step: u64,
-}
-
 /// What passing samples needs.
-pub(super) struct Ready<T> {
+pub(crate) struct StepPlan<T> {
     /// Operators of the present mode.
-    pub operators: AnySize<T>,
+    pub operators: SizedPropagator<T>,
     /// Channels that are not off.
     pub active: Vec<usize>,
 }
 
-impl<T: Number> Regime<'_, T> {
+impl<T: Number> HybridState<'_, T> {
     /// What passing samples of length `h` [s] needs, if it is possible.
-    pub(super) fn ready(&mut self, h: f64) -> Option<Ready<T>> {
+    pub(crate) fn plan_steps(
+        &mut self,
+        propagators: &mut PropagatorCache<T>,
+        h: f64,
+    ) -> Option<StepPlan<T>> {
         if !self.is_simple() {
             return None;
         }
         let on = |j: &usize| self.cells[*j] != Cell::Off;
         let active: Vec<usize> = (0..self.cells.len()).filter(on).collect();
-        let operators = self.operators(&active, h)?;
-        Some(Ready { operators, active })
+        let operators = self.operators(propagators, &active, h)?;
+        Some(StepPlan { operators, active })
     }
 
     /// Operators of the present mode, if they apply.
-    fn operators(&mut self, active: &[usize], h: f64) -> Option<AnySize<T>> {
+    fn operators(
+        &mut self,
+        propagators: &mut PropagatorCache<T>,
+        active: &[usize],
+        h: f64,
+    ) -> Option<SizedPropagator<T>> {
         if active.len() > MAX_ACTIVE {
             return None;
         }
         let key = self.key(active, h);
-        if let Some(known) = self.known.operators.get(&key) {
+        if let Some(known) = propagators.entries.get(&key) {
             return known.clone();
         }
         let laws = active.iter().map(|&j| Law::of(&self.network.channels[j], self.cells[j]));
         let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| match self.network.states() {
-            0..=4 => self.build::<4>(active, &laws, h).map(|o| AnySize::Four(Arc::new(o))),
+            0..=4 => self.build::<4>(active, &laws, h).map(|o| SizedPropagator::Four(Arc::new(o))),
             5..=8 if T::RUNS == 1 => {
-                self.build::<8>(active, &laws, h).map(|o| AnySize::Eight(Arc::new(o)))
+                self.build::<8>(active, &laws, h).map(|o| SizedPropagator::Eight(Arc::new(o)))
             }
             9..=12 if max_states::<T>() == MAX_STATES => {
-                self.build::<12>(active, &laws, h).map(|o| AnySize::Twelve(Arc::new(o)))
+                self.build::<12>(active, &laws, h).map(|o| SizedPropagator::Twelve(Arc::new(o)))
             }
-            13..=MAX_STATES if max_states::<T>() == MAX_STATES => {
-                self.build::<MAX_STATES>(active, &laws, h).map(|o| AnySize::Many(Arc::new(o)))
-            }
+            13..=MAX_STATES if max_states::<T>() == MAX_STATES => self
+                .build::<MAX_STATES>(active, &laws, h)
+                .map(|o| SizedPropagator::Many(Arc::new(o))),
             _ => None,
         });
-        self.known.operators.insert(key, built.clone());
+        propagators.entries.insert(key, built.clone());
         built
     }
 
-    fn key(&self, active: &[usize], h: f64) -> Key {
+    fn key(&self, active: &[usize], h: f64) -> PropagatorKey {
         let mut branches = [0; 3];
         let mut pieces = [0; MAX_ACTIVE];
         for (slot, &j) in active.iter().enumerate() {
@@ -119,9 +106,9 @@ impl<T: Number> Regime<'_, T> {
         }
         for (j, row) in self.rows.iter().enumerate() {
             branches[2] |= u64::from(self.pressed[j]) << j;
-            branches[2] |= u64::from(matches!(row, RowState::Slipping { .. })) << (32 + j);
+            branches[2] |= u64::from(matches!(row, FrictionState::Slipping { .. })) << (32 + j);
         }
-        Key { mode: self.mode.key, branches, pieces, step: (h * 1e12).round() as u64 }
+        PropagatorKey { mode: self.mode.key, branches, pieces, step: (h * 1e12).round() as u64 }
     }
 
     /// Whether the present mode has only what a sprint covers.
@@ -131,8 +118,8 @@ impl<T: Number> Regime<'_, T> {
             && !self.mode.redundant
             && !self.blocked.contains(&true)
             && !self.released.contains(&true)
-            && !self.rows.iter().any(RowState::is_saturated)
-            && self.gears.iter().all(|gear| *gear != GearState::Held)
+            && !self.rows.iter().any(FrictionState::is_saturated)
+            && self.gears.iter().all(|gear| *gear != GearState::Locked)
     }
 
     /// Build operators that watch all guards of the present mode.
@@ -141,27 +128,28 @@ impl<T: Number> Regime<'_, T> {
         active: &[usize],
         laws: &[Law<T>],
         h: f64,
-    ) -> Option<Operators<T, N>> {
-        let mut operators = Operators::build(self.network, &self.mode, (active, laws), h)?;
-        self.watch_frictions((active, h), &mut operators);
-        self.watch_gears((active, h), &mut operators);
-        (operators.watched.len() <= MAX_WATCHED).then_some(operators)
+    ) -> Option<Propagator<T, N>> {
+        let mut operators = Propagator::build(self.network, &self.mode, (active, laws), h)?;
+        self.guard_frictions((active, h), &mut operators);
+        self.guard_gears((active, h), &mut operators);
+        (operators.guards.len() <= MAX_GUARDS).then_some(operators)
     }
 
-    fn watch_frictions<const N: usize>(
+    fn guard_frictions<const N: usize>(
         &self,
         (active, h): (&[usize], f64),
-        operators: &mut Operators<T, N>,
+        operators: &mut Propagator<T, N>,
     ) {
         for (j, row) in self.network.frictions.iter().enumerate() {
             let side = if self.pressed[j] { 1.0 } else { -1.0 };
             let load = line_of(&row.normal);
             // At the end of a sample the load is a sum, with round-off of its own.
-            let nothing = row.normal.nothing() + if self.pressed[j] { NO_TORQUE } else { 0.0 };
+            let nothing =
+                row.normal.load_tolerance() + if self.pressed[j] { TORQUE_ATOL } else { 0.0 };
             let above = Line { offset: load.offset - nothing, ..load };
             operators.loads.push(above.map(|v| v * side));
             match self.rows[j] {
-                RowState::Stuck => {
+                FrictionState::Sticking => {
                     let mu = if self.pressed[j] {
                         row.law.at(T::zero_()) * row.peak
                     } else {
@@ -171,35 +159,35 @@ impl<T: Number> Regime<'_, T> {
                     let position = position.expect("a stuck element belongs to the mode");
                     let torque = self.mode.stuck_torque.row(position);
                     let mut limit = load.map(|v| v * mu);
-                    limit.offset += if row.one_way { NO_TORQUE } else { 0.0 };
-                    operators.watch_torque(self.network, active, torque, (limit, !row.one_way));
+                    limit.offset += if row.one_way { TORQUE_ATOL } else { 0.0 };
+                    operators.guard_torque(self.network, active, torque, (limit, !row.one_way));
                 }
-                RowState::Slipping { sign } if !active.contains(&j) => {
+                FrictionState::Slipping { sign } if !active.contains(&j) => {
                     let speed: Vec<T> = row.slip.iter().map(|&c| c * sign).collect();
-                    operators.watch_speed((self.network, &self.mode), active, &speed, h);
+                    operators.guard_speed((self.network, &self.mode), active, &speed, h);
                 }
                 _ => {}
             }
         }
     }
 
-    fn watch_gears<const N: usize>(
+    fn guard_gears<const N: usize>(
         &self,
         (active, h): (&[usize], f64),
-        operators: &mut Operators<T, N>,
+        operators: &mut Propagator<T, N>,
     ) {
         for (i, gear) in self.network.losses.iter().enumerate() {
-            let GearState::Rolling { sign, backward } = self.gears[i] else { continue };
+            let GearState::Meshing { sign, power_reversed } = self.gears[i] else { continue };
             if !gear.loss.is_directional() {
                 continue;
             }
-            let side = if backward { -1.0 } else { 1.0 };
+            let side = if power_reversed { -1.0 } else { 1.0 };
             let scaled = |row: &[T], by: f64| row.iter().map(|&c| c * by).collect::<Vec<T>>();
             let power = scaled(self.mode.gear_torque(self.network).row(i), sign * side);
-            let limit = constant(-gear.loss.threshold() * side + NO_TORQUE);
-            operators.watch_torque(self.network, active, &power, (limit, false));
+            let limit = constant(-gear.loss.threshold() * side + TORQUE_ATOL);
+            operators.guard_torque(self.network, active, &power, (limit, false));
             let speed = scaled(&gear.speed, sign);
-            operators.watch_speed((self.network, &self.mode), active, &speed, h);
+            operators.guard_speed((self.network, &self.mode), active, &speed, h);
         }
     }
 }

@@ -1,55 +1,54 @@
 // SPDX-License-Identifier: MIT
 //! Changes of mode at events and at jumps of the inputs.
 
-use super::assignment::Assignment;
-use super::guard::Cause;
-use super::regime::{Event, EventKind, Regime, RowState, self_locking, sign_of};
-use super::status::Status;
 use crate::network::channel::form;
 use crate::network::linalg::Matrix;
 use crate::network::{GearState, Hold, ModeKey, Row};
 use crate::number::{Number, Values};
+use crate::solver::hybrid::active_set::ActiveSet;
+use crate::solver::hybrid::event::{Event, EventCause, EventKind, FrictionState, signum_nonneg};
+use crate::solver::hybrid::state::{HybridState, self_locking};
+use crate::solver::status::Status;
+use crate::solver::tolerances::{STALLED_SLIP, START_SPEED_RTOL, VENT_TIME};
 
-/// Speed of what is to rest that is no more than round-off of a start, relative to the fastest.
-const ROUND_OFF: f64 = 1e-9;
-
-impl<T: Number> Regime<'_, T> {
+impl<T: Number> HybridState<'_, T> {
     /// Carry out what an event caused; the inputs are those about this instant.
-    pub(super) fn change(&mut self, cause: Cause) -> Result<(), Status> {
+    pub(crate) fn change(&mut self, cause: EventCause) -> Result<(), Status> {
         match cause {
-            Cause::AtRest(row) => {
-                self.bring_to_rest(&[row]);
+            EventCause::SlipZero(row) => {
+                self.apply_locking_impulse(&[row]);
                 self.decide(None)
             }
-            Cause::Pressed(j) => {
+            EventCause::LoadOnset(j) => {
                 self.press(j, !self.pressed[j]);
                 self.decide(None)
             }
-            Cause::Overload(Row::Friction(j), _) | Cause::OverloadAtKnot(Row::Friction(j))
+            EventCause::TorqueLimit(Row::Friction(j), _)
+            | EventCause::TorqueLimitAtKnot(Row::Friction(j))
                 if self.is_about_to_vent(j) =>
             {
                 self.press(j, false);
                 self.decide(None)
             }
-            Cause::Overload(row, sign) => {
-                self.bring_to_rest(&[]);
+            EventCause::TorqueLimit(row, sign) => {
+                self.apply_locking_impulse(&[]);
                 self.decide(Some((row, sign)))
             }
-            Cause::OverloadAtKnot(_) => {
-                self.bring_to_rest(&[]);
+            EventCause::TorqueLimitAtKnot(_) => {
+                self.apply_locking_impulse(&[]);
                 self.decide(None)
             }
-            Cause::PowerReversal(i) => {
-                if let GearState::Rolling { backward, .. } = &mut self.gears[i] {
-                    *backward = !*backward;
+            EventCause::PowerReversal(i) => {
+                if let GearState::Meshing { power_reversed, .. } = &mut self.gears[i] {
+                    *power_reversed = !*power_reversed;
                 }
                 self.decide(None)
             }
-            Cause::Stalled => {
-                self.bring_to_rest(&self.nearly_at_rest());
+            EventCause::Stalled => {
+                self.apply_locking_impulse(&self.nearly_at_rest());
                 self.decide(None)
             }
-            Cause::Border(channel, cell) => {
+            EventCause::BranchBoundary(channel, cell) => {
                 self.cells[channel] = cell;
                 Ok(())
             }
@@ -63,11 +62,11 @@ impl<T: Number> Regime<'_, T> {
 
     /// Rows that can have moved only within the moment that a stalled run moved on.
     fn nearly_at_rest(&self) -> Vec<Row> {
-        let frictions = (0..self.rows.len()).filter(|&j| self.rows[j] != RowState::Open);
+        let frictions = (0..self.rows.len()).filter(|&j| self.rows[j] != FrictionState::Open);
         let directional = |i: &usize| self.network.losses[*i].loss.is_directional();
         let gears = (0..self.gears.len()).filter(directional);
         let rows = frictions.map(Row::Friction).chain(gears.map(Row::Gear));
-        rows.filter(|&row| self.slip(row).re().decide(|slip| slip.abs() < 1e-6)).collect()
+        rows.filter(|&row| self.slip(row).re().decide(|slip| slip.abs() < STALLED_SLIP)).collect()
     }
 
     /// Whether the normal load is gone within round-off of the time: what is left of the capacity is
@@ -75,25 +74,28 @@ impl<T: Number> Regime<'_, T> {
     fn is_about_to_vent(&self, j: usize) -> bool {
         let normal = &self.network.frictions[j].normal;
         let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
-        self.pressed[j] && now.decide_with(rate, |now, rate| now <= -rate * 1e-11)
+        self.pressed[j] && now.decide_with(rate, |now, rate| now <= -rate * VENT_TIME)
     }
 
     /// The first element of which the normal load is gone from an instant on in some runs, as bits, by the values
     /// of inputs there and their rates: a load that ends at nothing falls through nothing.
-    pub(super) fn gone(&self, inputs: impl Fn(usize) -> [T::Values; 2]) -> Option<(usize, u32)> {
+    pub(crate) fn find_unloaded(
+        &self,
+        inputs: impl Fn(usize) -> [T::Values; 2],
+    ) -> Option<(usize, u32)> {
         let pressed = (0..self.rows.len()).filter(|&j| self.pressed[j]);
         pressed
-            .map(|j| (j, self.network.frictions[j].normal.is_gone(&inputs)))
+            .map(|j| (j, self.network.frictions[j].normal.is_unloaded(&inputs)))
             .find(|&(_, runs)| runs != 0)
     }
 
     /// Start of a run: prescribed speeds, elements at rest, directions of gears, cells.
-    pub(super) fn take_up(&mut self, locked: &[usize]) -> Result<(), Status> {
+    pub(crate) fn engage_initial(&mut self, locked: &[usize]) -> Result<(), Status> {
         let locked: Vec<Row> = locked.iter().map(|&j| Row::Friction(j)).collect();
         if !self.network.losses.is_empty() {
             self.lock_through_gears(&locked)?;
         }
-        self.bring_to_rest(&locked);
+        self.apply_locking_impulse(&locked);
         self.turn_gears();
         for i in self.rows.len()..self.network.channels.len() {
             self.cells[i] = self.cell_now(i);
@@ -104,11 +106,11 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// Take up everything that follows the inputs anew at this instant, as after a jump.
-    pub(super) fn refresh(&mut self) -> Result<(), Status> {
+    pub(crate) fn refresh(&mut self) -> Result<(), Status> {
         for j in 0..self.rows.len() {
             let normal = &self.network.frictions[j].normal;
             let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
-            let there = now.decide_with(normal.nothing().re(), |now, nothing| now > nothing);
+            let there = now.decide_with(normal.load_tolerance().re(), |now, nothing| now > nothing);
             let sets_in = now.decide_with(rate, |now, rate| now >= 0.0 && rate > 0.0);
             self.press(j, there || sets_in);
         }
@@ -122,8 +124,8 @@ impl<T: Number> Regime<'_, T> {
 
     /// Whether one of the locks carries its full capacity, or their split follows the capacities: they are
     /// then decided anew at every sample; accelerations do not depend on the split.
-    pub(super) fn is_split(&self) -> bool {
-        let saturated = self.rows.iter().any(RowState::is_saturated);
+    pub(crate) fn is_split(&self) -> bool {
+        let saturated = self.rows.iter().any(FrictionState::is_saturated);
         self.mode.redundant || saturated || self.blocked.contains(&true)
     }
 
@@ -133,13 +135,13 @@ impl<T: Number> Regime<'_, T> {
         self.pressed[j] = pressed;
         let slip = form(&row.slip, &self.x).re();
         let state = match (pressed, self.rows[j]) {
-            (_, RowState::Open) if row.one_way => RowState::Slipping { sign: -1.0 },
+            (_, FrictionState::Open) if row.one_way => FrictionState::Slipping { sign: -1.0 },
             (false, state) if row.one_way => state,
-            (false, _) => RowState::Open,
-            (true, RowState::Open) => RowState::Slipping { sign: sign_of(slip) },
+            (false, _) => FrictionState::Open,
+            (true, FrictionState::Open) => FrictionState::Slipping { sign: signum_nonneg(slip) },
             (true, state) => state,
         };
-        let mut after = Assignment { rows: self.rows.clone(), gears: self.gears.clone() };
+        let mut after = ActiveSet { rows: self.rows.clone(), gears: self.gears.clone() };
         after.rows[j] = state;
         self.record_changes(&after);
         self.rows = after.rows;
@@ -148,8 +150,8 @@ impl<T: Number> Regime<'_, T> {
     /// Directions of lossy gears by their speeds, power taken to flow forward.
     fn turn_gears(&mut self) {
         for (gear, loss) in self.gears.iter_mut().zip(&self.network.losses) {
-            let sign = sign_of(form(&loss.speed, &self.x).re());
-            *gear = GearState::Rolling { sign, backward: false };
+            let sign = signum_nonneg(form(&loss.speed, &self.x).re());
+            *gear = GearState::Meshing { sign, power_reversed: false };
         }
     }
 
@@ -160,8 +162,9 @@ impl<T: Number> Regime<'_, T> {
         let excess = self.excess(rows);
         let speed = |largest: T::Values, v: &T| v.re().magnitude().larger(largest);
         let fastest = self.x[..network.speeds()].iter().fold(T::Values::zero_(), speed);
-        let is_round_off =
-            excess.max_abs().decide_with(fastest, |excess, fastest| excess <= ROUND_OFF * fastest);
+        let is_round_off = excess
+            .max_abs()
+            .decide_with(fastest, |excess, fastest| excess <= START_SPEED_RTOL * fastest);
         if is_round_off && !T::DERIVATIVES {
             return Ok(());
         }
@@ -172,11 +175,11 @@ impl<T: Number> Regime<'_, T> {
             let (change, entering) = found.ok_or_else(|| self_locking(network, self.time()))?;
             let before = self.gears.clone();
             for (i, gear) in self.gears.iter_mut().enumerate() {
-                if let GearState::Rolling { sign, backward } = gear
+                if let GearState::Meshing { sign, power_reversed } = gear
                     && network.losses[i].loss.is_directional()
                     && !is_round_off
                 {
-                    *backward = entering[(i, 0)].re().decide(|impulse| impulse * *sign < 0.0);
+                    *power_reversed = entering[(i, 0)].re().decide(|impulse| impulse * *sign < 0.0);
                 }
             }
             if self.gears == before {
@@ -204,12 +207,13 @@ impl<T: Number> Regime<'_, T> {
 
     /// Set prescribed speeds and remove the round-off speed of everything at rest and of `more`,
     /// changing the momentum least.
-    pub(super) fn bring_to_rest(&mut self, more: &[Row]) {
+    pub(crate) fn apply_locking_impulse(&mut self, more: &[Row]) {
         let network = self.network;
-        let resting =
-            |j: usize| matches!(self.rows[j], RowState::Stuck | RowState::Saturated { .. });
+        let resting = |j: usize| {
+            matches!(self.rows[j], FrictionState::Sticking | FrictionState::Saturated { .. })
+        };
         let frictions = (0..self.rows.len()).filter(|&j| resting(j)).map(Row::Friction);
-        let held = |i: &usize| self.gears[*i] == GearState::Held;
+        let held = |i: &usize| self.gears[*i] == GearState::Locked;
         let gears = (0..self.gears.len()).filter(held).map(Row::Gear);
         let mut rows: Vec<Row> = frictions.chain(gears).collect();
         rows.extend(more.iter().filter(|row| !rows.contains(row)).copied().collect::<Vec<_>>());
@@ -233,10 +237,10 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// State and inputs of the basis for a decision, without the channels.
-    pub(super) fn basis_without_channels(&self) -> Vec<T> {
-        let inputs = &self.ahead;
+    pub(crate) fn basis_without_channels(&self) -> Vec<T> {
+        let inputs = &self.inputs_plus;
         let mut basis = Vec::with_capacity(self.network.basis());
-        basis.extend_from_slice(&self.x_ahead);
+        basis.extend_from_slice(&self.x_plus);
         basis.extend(inputs.iter().map(|input| input[0]));
         basis.extend(self.network.prescribed.iter().map(|&(_, input)| inputs[input][1]));
         basis.push(T::of(1.0));
@@ -244,12 +248,12 @@ impl<T: Number> Regime<'_, T> {
     }
 
     /// Torque of a channel for a decision, in its present cell.
-    pub(super) fn channel_ahead(&mut self, i: usize) -> T {
-        let (channel, series) = (&self.network.channels[i], &mut self.channel_ahead);
+    pub(crate) fn channel_plus(&mut self, i: usize) -> T {
+        let (channel, series) = (&self.network.channels[i], &mut self.channel_plus);
         for (argument, row) in series.arguments.iter_mut().zip(&channel.arguments) {
-            argument[0] = form(row, &self.x_ahead);
+            argument[0] = form(row, &self.x_plus);
         }
-        channel.term(self.cells[i], &self.ahead, series, 0);
+        channel.term(self.cells[i], &self.inputs_plus, series, 0);
         series.torque[0]
     }
 
@@ -259,20 +263,20 @@ impl<T: Number> Regime<'_, T> {
         for (argument, row) in arguments.iter_mut().zip(&channel.arguments) {
             *argument = form(row, &self.x).re();
         }
-        channel.cell_at(arguments, sign_of(arguments[0]), &self.expansion.inputs)
+        channel.cell_at(arguments, signum_nonneg(arguments[0]), &self.expansion.inputs)
     }
 
     /// Note every difference between the present modes and `after` as an event.
-    pub(super) fn record_changes(&mut self, after: &Assignment) {
-        use RowState::{Open, Saturated, Slipping, Stuck};
+    pub(crate) fn record_changes(&mut self, after: &ActiveSet) {
+        use FrictionState::{Open, Saturated, Slipping, Sticking};
         let mut events = Vec::new();
         for (element, (&before, &after)) in self.rows.iter().zip(&after.rows).enumerate() {
             let kind = match (before, after) {
                 (Open, Open) => continue,
-                (_, Open) => EventKind::Vent,
-                (Open, _) => EventKind::Fill,
-                (Slipping { .. }, Stuck | Saturated { .. }) => EventKind::Lock,
-                (Stuck | Saturated { .. }, Slipping { .. }) => EventKind::BreakAway,
+                (_, Open) => EventKind::ClutchVented,
+                (Open, _) => EventKind::ClutchFilled,
+                (Slipping { .. }, Sticking | Saturated { .. }) => EventKind::Lock,
+                (Sticking | Saturated { .. }, Slipping { .. }) => EventKind::BreakAway,
                 (Slipping { sign: a }, Slipping { sign: b }) if a != b => EventKind::Reverse,
                 _ => continue,
             };
@@ -280,9 +284,9 @@ impl<T: Number> Regime<'_, T> {
         }
         for (i, (&before, &after)) in self.gears.iter().zip(&after.gears).enumerate() {
             let kind = match (before, after) {
-                (GearState::Rolling { .. }, GearState::Held) => EventKind::Lock,
-                (GearState::Held, GearState::Rolling { .. }) => EventKind::BreakAway,
-                (GearState::Rolling { sign: a, .. }, GearState::Rolling { sign: b, .. })
+                (GearState::Meshing { .. }, GearState::Locked) => EventKind::Lock,
+                (GearState::Locked, GearState::Meshing { .. }) => EventKind::BreakAway,
+                (GearState::Meshing { sign: a, .. }, GearState::Meshing { sign: b, .. })
                     if a != b =>
                 {
                     EventKind::Reverse
