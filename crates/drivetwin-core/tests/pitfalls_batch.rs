@@ -34,12 +34,13 @@ impl Deref for Kept {
 fn columns_of(
     model: &DualClutch<f64>,
     plan: Plan<f64>,
-    (names, sets): (&[&str], &[f64]),
+    names: &[&str],
+    sets: &[f64],
     size: usize,
 ) -> Kept {
     let mut values = vec![f64::INFINITY; sets.len() / names.len() * size];
     let (scenarios, how) = ([(plan, second_gear())], (Keep::Columns, 1));
-    let batch = dual_clutch_batch(model, &scenarios, (names, sets), how, &mut values);
+    let batch = dual_clutch_batch(model, &scenarios, names, sets, how.0, how.1, &mut values);
     Kept { values, batch: batch.expect("names") }
 }
 
@@ -53,7 +54,7 @@ fn shifts_of(names: &[&str], sets: &[f64], settings: Settings) -> Kept {
     let outputs = &dual_clutch_outputs(&model)[4..5];
     let grid = &columns[0].1;
     let plan = Plan::new(&network, &signals, grid, outputs, (settings, false)).expect("a plan");
-    columns_of(&model, plan, (names, sets), grid.len())
+    columns_of(&model, plan, names, sets, grid.len())
 }
 
 /// The same under several efficiencies.
@@ -193,7 +194,7 @@ fn jumps_between_samples_are_met_together_and_alone() {
     let run = |settings, eta: &[f64]| {
         let plan =
             Plan::new(&network, &signals, &grid, outputs, (settings, false)).expect("a plan");
-        columns_of(&model, plan, (&["eta"], eta), grid.len())
+        columns_of(&model, plan, &["eta"], eta, grid.len())
     };
     let eta = efficiencies(LANES);
     let (fast, exact) = (run(Settings::default(), &eta), run(Settings::exact(), &eta));
@@ -225,7 +226,7 @@ fn a_coarse_grid_is_met_at_its_points() {
         let grid: Vec<f64> = columns[0].1.iter().copied().step_by(every).collect();
         let plan = Plan::new(&network, &signals, &grid, outputs, (Settings::default(), false));
         let (plan, size) = (plan.expect("a plan"), outputs.len() * grid.len());
-        let batch = columns_of(&model, plan, (&["eta"], &efficiencies(LANES)), size);
+        let batch = columns_of(&model, plan, &["eta"], &efficiencies(LANES), size);
         (batch.values, grid.len())
     };
     let (fine, points) = run(1);

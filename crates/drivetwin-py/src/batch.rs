@@ -57,7 +57,7 @@ pub fn simulate_batch<'py>(
     let keep = keep_of(&wanted.1, &measured)?;
     let values = values.as_slice_mut()?;
     let batch = py
-        .detach(|| dual_clutch_batch(&model, &plans, (&names, sets), (keep, threads), values))
+        .detach(|| dual_clutch_batch(&model, &plans, &names, sets, keep, threads, values))
         .map_err(|e| refused(&e))?;
     Ok(ends(py, batch))
 }

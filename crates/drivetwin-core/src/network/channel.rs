@@ -19,7 +19,7 @@ pub enum Law<T> {
     Friction {
         /// μ over |slip|.
         mu: FrictionLaw<T>,
-        /// What μ is multiplied by.
+        /// Factor of μ.
         normal: Normal<T>,
         /// Static over kinetic capacity.
         peak: T,

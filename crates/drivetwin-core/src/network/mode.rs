@@ -12,7 +12,7 @@ use crate::number::{Number, Values};
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
-/// How a lossy gear moves.
+/// State of a lossy gear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GearState {
     /// Turning, its loss set by direction of motion and of power.
@@ -35,7 +35,7 @@ pub enum Row {
     Gear(usize),
 }
 
-/// Which friction elements are stuck and how the lossy gears move, as bits.
+/// Key of a mode: sticking friction elements and states of lossy gears, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ModeKey {
     stuck: u32,
@@ -70,7 +70,7 @@ impl ModeKey {
 /// Linear maps over the basis.
 #[derive(Clone, Debug)]
 pub struct Mode<T> {
-    /// What it was compiled for.
+    /// Key the mode was compiled for.
     pub key: ModeKey,
     /// State derivatives, states × basis.
     pub derivative: Matrix<T>,
@@ -90,7 +90,7 @@ pub struct Mode<T> {
     pub redundant: bool,
 }
 
-/// What all modes with the same states of the lossy gears share.
+/// Matrices shared by all modes with the same states of the lossy gears.
 #[derive(Clone, Debug)]
 pub struct Motion<T> {
     /// Generalised forces per node torque, speeds × nodes.
@@ -180,7 +180,7 @@ impl<T: Number> Network<T> {
             Held { acceleration, torque, redundant: false }
         } else {
             let (speeds, nodes) = self.held_speeds(&stuck);
-            let hold = self.hold(&motion, (speeds, &nodes), stuck.len());
+            let hold = self.hold(&motion, speeds, &nodes, stuck.len());
             let rates = self.rates(stuck.len());
             hold.solve((&motion.forces, rates.as_ref()), || self.weights(&stuck, capacity))?
         };
@@ -201,7 +201,8 @@ impl<T: Number> Network<T> {
     fn hold<'m>(
         &self,
         motion: &'m Motion<T>,
-        (rows, nodes): (Matrix<T>, &[mechanism::Row<T>]),
+        rows: Matrix<T>,
+        nodes: &[mechanism::Row<T>],
         resting: usize,
     ) -> Hold<'m, T> {
         let acting = (!self.losses.is_empty()).then(|| motion.force_map.times_columns(nodes));
@@ -329,7 +330,7 @@ impl<T: Number> Network<T> {
     ) -> Option<(Matrix<T>, Matrix<T>)> {
         let motion = self.motion_of(key)?;
         let (speeds, nodes) = self.held_speeds(rows);
-        let hold = self.hold(&motion, (speeds, &nodes), rows.len());
+        let hold = self.hold(&motion, speeds, &nodes, rows.len());
         let change = hold.stop(excess)?;
         let mut residual = Matrix::zeros(self.inertia.rows, 1);
         residual.subtract(&self.inertia.times(&self.coordinates.speeds).times(&change));
@@ -390,7 +391,7 @@ fn subtract_held<T: Number>(
 ) {
     for (i, held) in nodes.iter().enumerate() {
         for &(node, direction) in held {
-            node_torques.subtract_from_row(node, (torques.row(i), direction));
+            node_torques.subtract_from_row(node, torques.row(i), direction);
         }
     }
 }

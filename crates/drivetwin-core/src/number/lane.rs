@@ -12,7 +12,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 pub trait Lane:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// Whether a value carries derivatives, so that inputs may jump in these alone.
+    /// True if a value carries derivatives, so that inputs may jump in these alone.
     const DERIVATIVES: bool;
 
     /// All runs, as bits.
@@ -21,7 +21,7 @@ pub trait Lane:
     /// The values alone.
     type Values: Values;
 
-    /// The same value in every run.
+    /// Set all lanes to one value.
     fn all(value: f64) -> Self;
 
     /// `self · a + b`.

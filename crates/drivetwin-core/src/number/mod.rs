@@ -64,7 +64,7 @@ pub trait Number:
         self.values()
     }
 
-    /// Whether it has no derivatives other than zero.
+    /// Return true if all derivatives are zero.
     fn is_constant(&self) -> bool;
 
     /// Its magnitude and those of its derivatives.

@@ -110,7 +110,8 @@ impl Kernel for Passed<'_, '_, '_, '_> {
             transpose(
                 #[inline(always)]
                 |at| total(&sum, at),
-                (block, stretch.count),
+                block,
+                stretch.count,
             );
             for (run, values) in values.iter_mut().enumerate() {
                 let (from, to) = stretch.spans[run];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Where the energy of a run went.
+//! Energy balance of a run.
 
 use crate::model::mechanism::{Account, ForceLaw, SpringLaw, Stop};
 use crate::network::channel::form;
@@ -26,7 +26,7 @@ pub struct EnergyAudit {
     pub converter: f64,
     /// Energy that gears created, as a positive number; part of `gear_loss`.
     pub created: f64,
-    /// What is missing in the balance.
+    /// Residual of the balance.
     pub error: f64,
 }
 

@@ -15,7 +15,7 @@ use crate::solver::{
 };
 use std::borrow::Cow;
 
-/// What is kept of every run.
+/// Output kept of every run.
 #[derive(Clone, Copy, Debug)]
 pub enum Keep<'m> {
     /// Every output on the grid: runs × outputs × grid.
@@ -27,7 +27,7 @@ pub enum Keep<'m> {
     Misfit(&'m [Vec<f64>]),
 }
 
-/// How one run of a batch ended.
+/// Outcome of one run of a batch.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// It ran; its status.
@@ -36,10 +36,10 @@ pub enum Outcome {
     Refused(SimulateError),
 }
 
-/// What has become of the runs of a batch, in their order.
+/// Outcomes of the runs of a batch, in their order.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// How each run ended.
+    /// Outcome of each run.
     pub outcomes: Vec<Outcome>,
     /// Number of events of each run.
     pub events: Vec<u32>,
@@ -60,12 +60,14 @@ pub struct Batch {
 pub fn dual_clutch_batch(
     model: &DualClutch<f64>,
     scenarios: &[(Plan<f64>, DualClutchStart<f64>)],
-    (parameters, sets): (&[&str], &[f64]),
-    (keep, threads): (Keep<'_>, usize),
+    parameters: &[&str],
+    sets: &[f64],
+    keep: Keep<'_>,
+    threads: usize,
     values: &mut [f64],
 ) -> Result<Batch, SensitivityError> {
     if let Some((_, start)) = scenarios.first() {
-        check_names(model, start, (parameters, sets))?;
+        check_names(model, start, parameters, sets)?;
     }
     let starts = scenarios.iter().map(|(_, start)| start).collect();
     let plans: Vec<&Plan<f64>> = scenarios.iter().map(|(plan, _)| plan).collect();
@@ -74,14 +76,15 @@ pub fn dual_clutch_batch(
     let size = plans.first().map_or(0, |plan| keep.size(plan.targets.len(), plan.grid.len()));
     let work = Work { sets, plans, keep, threads };
     assert_eq!(values.len(), count * size, "places for what is kept");
-    Ok(work.result((count, size), values))
+    Ok(work.result(count, size, values))
 }
 
 /// Refuse names that are no parameters.
 pub(super) fn check_names(
     model: &DualClutch<f64>,
     start: &DualClutchStart<f64>,
-    (parameters, sets): (&[&str], &[f64]),
+    parameters: &[&str],
+    sets: &[f64],
 ) -> Result<(), SensitivityError> {
     let (mut model, mut start) = (model.clone(), start.clone());
     let unknown = |name: &&&str| place(&mut model, &mut start, name).is_none();
@@ -152,7 +155,7 @@ pub(super) fn last_lock<T: Real>(events: &[Event<T>]) -> Option<T> {
 /// A run of a batch.
 struct Job<'v> {
     run: usize,
-    /// What is kept of it.
+    /// Output kept of the run.
     values: &'v mut [f64],
     outcome: Option<Outcome>,
     events: Vec<Event<f64>>,
@@ -176,7 +179,7 @@ impl Work<'_> {
     }
 
     /// Do so many runs, of each of which `size` numbers are kept.
-    fn result(&self, (count, size): (usize, usize), values: &mut [f64]) -> Batch {
+    fn result(&self, count: usize, size: usize, values: &mut [f64]) -> Batch {
         let mut rest = values;
         let job = |run| {
             let (values, others) = std::mem::take(&mut rest).split_at_mut(size);
@@ -257,7 +260,7 @@ impl Work<'_> {
         };
         let shared = (all, (&*points, count));
         let mut recorder = abreast::Recorder::new(&network, &plan.targets, shared, values);
-        let events = run_lockstep(known, &inputs, how, (x, &locked), &mut recorder);
+        let events = run_lockstep(known, &inputs, how.0, how.1, x, &locked, &mut recorder);
         for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
             let Some(events) = events else { continue };
             if !spare.is_empty() {

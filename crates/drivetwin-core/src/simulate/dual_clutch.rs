@@ -62,12 +62,12 @@ impl<T: Number> DualClutchStart<T> {
     pub fn state(&self, network: &Network<T>) -> Result<State<T>, StartError> {
         let speeds =
             [(ENGINE, self.engine_speed), (OUTPUT, self.output_speed), (WHEEL, self.wheel_speed)];
-        state_of(network, (&speeds, &[(SHAFT, self.twist)]), &self.locked)
+        state_of(network, &speeds, &[(SHAFT, self.twist)], &self.locked)
     }
 }
 
 impl DualClutchStart<f64> {
-    /// The same start over another number type.
+    /// Convert the start to another number type.
     pub fn promote<T: Number>(&self) -> DualClutchStart<T> {
         Self::gathered(|_| self)
     }

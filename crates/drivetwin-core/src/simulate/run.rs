@@ -97,7 +97,7 @@ impl<T: Real> Plan<T> {
         self.run_again(&mut SolverCache::new(network), start)
     }
 
-    /// The same, with what runs before have compiled of the network.
+    /// Run with the modes and propagators that earlier runs have compiled.
     pub fn run_again<'r>(
         &'r self,
         known: &mut SolverCache<'r, T>,

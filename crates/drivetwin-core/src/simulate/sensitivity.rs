@@ -64,7 +64,8 @@ pub fn dual_clutch_sensitivities(
     signals: &[Sampled<'_>],
     start: &DualClutchStart<f64>,
     grid: &[f64],
-    (settings, parameters): (Settings, &[&str]),
+    settings: Settings,
+    parameters: &[&str],
 ) -> Result<Sensitivities, SensitivityError> {
     check_corners(parameters, model)?;
     let mut found: Option<Sensitivities> = None;

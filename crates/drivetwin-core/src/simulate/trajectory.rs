@@ -112,7 +112,7 @@ pub struct Trajectory<T: Real> {
     pub elements: Vec<String>,
     /// Events of friction elements.
     pub events: Vec<Event<T>>,
-    /// How the run ended.
+    /// Status at the end of the run.
     pub status: Status,
     /// Time [s] and element of the first event that only grazed its guard: no derivatives after it.
     pub grazing: Option<(f64, String)>,
@@ -265,7 +265,7 @@ impl<T: Real> Passed<'_, '_, T> {
     }
 }
 
-/// What stands at a position of the basis while samples are passed.
+/// Source of an entry of the basis while samples are passed.
 pub(super) enum Entry {
     /// State.
     State(usize),
@@ -314,7 +314,7 @@ pub(super) fn passing_terms<'c, T: Number>(
 }
 
 impl<T: Number> Column<T> {
-    /// That of a target.
+    /// Return the column of a target.
     pub fn of(network: &Network<T>, target: Target) -> Self {
         let speed = |node| network.over_speeds(&[(node, T::of(1.0))]);
         match target {

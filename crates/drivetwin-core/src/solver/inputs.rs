@@ -4,7 +4,7 @@
 use crate::number::{Real, Series};
 use crate::solver::input_error::InputError;
 
-/// How one input varies.
+/// Time history of one input.
 #[derive(Clone, Copy, Debug)]
 pub enum Signal<'a, T> {
     /// Linear between samples; a time that stands twice is a jump.
@@ -47,7 +47,7 @@ pub struct Inputs<T> {
     /// Derivatives of the delays: numbers of value zero.
     shifts: Vec<T>,
     sines: Vec<Option<Sine<T>>>,
-    /// For every segment the number of segments of its length from it on.
+    /// Number of segments of equal length from each segment on.
     equal: Vec<u32>,
     /// See [`usual_lengths`].
     usual: Vec<f64>,
@@ -61,7 +61,7 @@ const WORTH_WHILE: usize = 8;
 /// Segments of which the extremes are known together.
 const STRETCH: usize = 64;
 
-/// Of a knot that is no point of the grid.
+/// Point number of a knot outside the grid.
 pub const NO_POINT: usize = usize::MAX;
 
 /// Offset, amplitude, angular frequency [rad/s], phase [rad].
@@ -85,8 +85,8 @@ impl<T: Real> Inputs<T> {
                     let raster = (times, delay.re());
                     check_values(name, times, values)?;
                     // Most signals stand on one raster.
-                    if !is_raster(checked, raster) {
-                        check_times(name, times, (start - raster.1, end - raster.1))?;
+                    if !is_raster(checked, raster.0, raster.1) {
+                        check_times(name, times, start - raster.1, end - raster.1)?;
                         let twice = times.windows(2).filter(|w| w[0] == w[1]);
                         jumps.extend(twice.map(|w| w[0] + raster.1));
                         checked = Some(raster);
@@ -103,8 +103,8 @@ impl<T: Real> Inputs<T> {
                 }
             }
         }
-        let inner = inner_times(signals, grid, (start, end));
-        let knots = merge_knots(&inner, &jumps, (start, end));
+        let inner = inner_times(signals, grid, start, end);
+        let knots = merge_knots(&inner, &jumps, start, end);
         let width = signals.len().max(1);
         let mut lines = vec![[0.0; 2]; (knots.len() - 1) * width];
         for (input, (_, signal)) in signals.iter().enumerate() {
@@ -112,13 +112,14 @@ impl<T: Real> Inputs<T> {
             let to = lines[input..].iter_mut().step_by(width);
             fill(to, (&knots, jumps.is_empty()), (times, values, delay.re()));
         }
-        Ok(Self::of_lines(knots, lines, (shifts, sines)))
+        Ok(Self::of_lines(knots, lines, shifts, sines))
     }
 
     fn of_lines(
         knots: Vec<f64>,
         lines: Vec<[f64; 2]>,
-        (shifts, sines): (Vec<T>, Vec<Option<Sine<T>>>),
+        shifts: Vec<T>,
+        sines: Vec<Option<Sine<T>>>,
     ) -> Self {
         let equal = equal_lengths(&knots);
         let usual = usual_lengths(&knots, &equal);
@@ -126,7 +127,7 @@ impl<T: Real> Inputs<T> {
         Self { knots, lines, shifts, sines, equal, usual, extremes }
     }
 
-    /// The same inputs over shorter segments: one of length l [s] becomes `parts(l)`.
+    /// Divide segments: one of length l [s] becomes `parts(l)`.
     pub fn divided(self, parts: impl Fn(f64) -> usize) -> Self {
         let parts: Vec<usize> =
             self.knots.windows(2).map(|span| parts(span[1] - span[0])).collect();
@@ -145,7 +146,7 @@ impl<T: Real> Inputs<T> {
             }
         }
         knots.push(self.knots[self.segments()]);
-        Self::of_lines(knots, lines, (self.shifts, self.sines))
+        Self::of_lines(knots, lines, self.shifts, self.sines)
     }
 
     /// Number of segments from `i` on, itself included, that are as long as it.
@@ -198,7 +199,7 @@ impl<T: Real> Inputs<T> {
         start + rate * (self.knot(i) - self.knot(i - 1))
     }
 
-    /// Whether all inputs are linear within every segment.
+    /// Return true if all inputs are linear within every segment.
     pub fn is_sampled(&self) -> bool {
         self.sines.iter().all(Option::is_none)
     }
@@ -251,7 +252,7 @@ impl<T: Real> Inputs<T> {
         shifted(&self.lines(i)[input], self.shifts[input])
     }
 
-    /// The same of every input.
+    /// Lines of every input.
     #[inline(always)]
     pub fn lines_at(&self, i: usize) -> impl Iterator<Item = [T; 2]> {
         self.lines(i).iter().zip(&self.shifts).map(|(line, &shift)| shifted(line, shift))
@@ -357,7 +358,7 @@ fn sine_series<T: Real>(&(offset, amplitude, omega, phase): &Sine<T>, t: T) -> S
 }
 
 /// Whether a raster, times [s] and delay [s], is the known one.
-fn is_raster(known: Option<(&[f64], f64)>, (times, delay): (&[f64], f64)) -> bool {
+fn is_raster(known: Option<(&[f64], f64)>, times: &[f64], delay: f64) -> bool {
     known.is_some_and(|(others, d)| d == delay && (std::ptr::eq(others, times) || others == times))
 }
 
@@ -372,7 +373,7 @@ fn check_values(name: &str, times: &[f64], values: &[f64]) -> Result<(), InputEr
     }
 }
 
-fn check_times(name: &str, times: &[f64], (start, end): (f64, f64)) -> Result<(), InputError> {
+fn check_times(name: &str, times: &[f64], start: f64, end: f64) -> Result<(), InputError> {
     let ordered = |i: usize| {
         times[i].is_finite()
             && (i == 0 || times[i] >= times[i - 1])
@@ -395,14 +396,15 @@ fn check_times(name: &str, times: &[f64], (start, end): (f64, f64)) -> Result<()
 fn inner_times<T: Real>(
     signals: &[(&str, Signal<'_, T>)],
     grid: &[f64],
-    (start, end): (f64, f64),
+    start: f64,
+    end: f64,
 ) -> Vec<(f64, bool)> {
     let within = |(t, _): &(f64, bool)| (start..end).contains(t);
     let mut sorted: Vec<(f64, bool)> = grid.iter().map(|&t| (t, true)).filter(within).collect();
     let mut last = (!grid.is_empty()).then_some((grid, 0.0));
     for (_, signal) in signals {
         let Signal::Samples { times, delay, .. } = *signal else { continue };
-        if is_raster(last, (times, delay.re())) {
+        if is_raster(last, times, delay.re()) {
             continue;
         }
         last = Some((times, delay.re()));
@@ -418,7 +420,7 @@ fn inner_times<T: Real>(
 
 /// Start, distinct inner times and end; times closer than round-off count as one, that of the grid; inner
 /// jumps stand twice.
-fn merge_knots(sorted: &[(f64, bool)], jumps: &[f64], (start, end): (f64, f64)) -> Vec<f64> {
+fn merge_knots(sorted: &[(f64, bool)], jumps: &[f64], start: f64, end: f64) -> Vec<f64> {
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
     let mut knots: Vec<f64> = Vec::with_capacity(sorted.len() + 2);
     knots.push(start);

@@ -24,9 +24,9 @@ pub struct Integrator<'a, T: Real> {
     pub grazing: Option<(f64, String)>,
     pub(crate) inputs: &'a Inputs<T>,
     pub(crate) settings: Settings,
-    /// Whether samples are passed by operators.
+    /// True if propagators pass whole samples.
     uses_fixed_step: bool,
-    /// Working space of a march.
+    /// Working space of fixed steps.
     pub(crate) trail: Vec<SampleColumn<T>>,
     pub(crate) segment: usize,
     /// Propagators, including those of this run.
@@ -188,7 +188,7 @@ impl<'a, T: Real> Integrator<'a, T> {
         if !self.state.x.iter().all(|v| v.re().is_finite()) {
             return Err(Status::NotFinite { time });
         }
-        self.progress.note((time, length), self.pending.is_some()).map_err(|lack| match lack {
+        self.progress.note(time, length, self.pending.is_some()).map_err(|lack| match lack {
             Stall::TooSmall => Status::StepTooSmall { time },
             Stall::Zeno => {
                 let element =
@@ -209,7 +209,7 @@ impl<'a, T: Real> Integrator<'a, T> {
         self.inputs.at_knot(i, input)
     }
 
-    /// Whether the inputs end here.
+    /// Return true at the end of the inputs.
     pub fn is_at_end(&self) -> bool {
         self.state.t.re() >= self.inputs.knot(self.inputs.segments())
     }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 //! Sets of lanes as bit masks.
 
-/// Runs for which the answer is yes, as bits.
+/// Collect answers by lane into a bit mask.
 pub fn lane_mask(answers: impl Iterator<Item = bool>) -> u32 {
     answers.enumerate().fold(0, |mask, (run, answer)| mask | u32::from(answer) << run)
 }
 
-/// Numbers of the runs in a set of bits.
+/// Iterate over the lanes of a mask.
 pub(crate) fn lanes_in(mut runs: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let run = (runs != 0).then(|| runs.trailing_zeros() as usize);

@@ -20,7 +20,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Of expansions, also between samples that are passed by operators.
+    /// Accuracy of Taylor steps, also between samples that propagators pass.
     pub(crate) fn accuracy(&self, uses_fixed_step: bool) -> Accuracy {
         let least = if uses_fixed_step { TAYLOR_TOL_BETWEEN_SAMPLES } else { 0.0 };
         Accuracy { tolerance: self.tolerance.max(least), order: self.order }
@@ -43,7 +43,7 @@ impl Default for Settings {
     }
 }
 
-/// What the step control needs.
+/// Accuracy of a Taylor step.
 #[derive(Clone, Copy, Debug)]
 pub struct Accuracy {
     /// Truncation error allowed per step, relative to `scale` of each state.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! The widest instruction set of the machine, chosen at run time.
+//! Dispatch to the widest instruction set of the machine, at run time.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -9,7 +9,7 @@ pub trait Kernel {
     /// Result.
     type Output;
 
-    /// Do it; `F` where multiply-add is one instruction.
+    /// Execute; `F` where multiply-add is one instruction.
     fn run<const F: bool>(self) -> Self::Output;
 }
 

@@ -13,7 +13,7 @@ use crate::solver::exponential::samples::{
 use crate::solver::integrator::Integrator;
 use crate::solver::simd::{Kernel, dispatch_simd};
 
-/// Takes samples that were passed in one mode.
+/// Consumer of the samples that fixed steps pass in one mode.
 pub trait SampleSink<T: Real> {
     /// Samples `(first, count)` with the channels `active`; see [`Samples`].
     fn write_block(
@@ -65,7 +65,8 @@ impl<T: Real> Integrator<'_, T> {
         }
     }
 
-    /// What a sprint from here on needs, if one is possible: with the length [s] and number of its samples.
+    /// Plan fixed steps from the present sample on. Return the plan with the length [s] and number
+    /// of its samples, None if fixed steps are not possible.
     fn plan_fixed_steps(&mut self) -> Option<(StepPlan<T>, (f64, usize))> {
         let (from, _) = self.inputs.span(self.segment);
         let h = self.inputs.usual_length(self.segment, self.settings.max_step)?;
@@ -160,7 +161,7 @@ impl<T: Real, S: SampleSink<T>, const N: usize, const A: usize> FixedStepRun<'_,
         run.state.x.copy_from_slice(&x[..n]);
         run.state.t = T::of(run.inputs.knot(run.segment));
         if run.segment == run.inputs.segments() {
-            trail.store(operators, 0, (&x, &carry));
+            trail.store(operators, 0, &x, &carry);
             sink.write_block(run, active, trail.samples(), (run.segment, 1));
             run.segment -= 1;
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! How a run ended; a value, not a failure.
+//! Outcome of a run, as a value.
 
 use std::fmt;
 

@@ -44,7 +44,7 @@ pub fn step_samples<
     let mut outcome = (count, 0);
     let loaded = op.stays_loaded::<S, F>(source, (first, count));
     let looks = !loaded || !op.guards.is_empty();
-    trail.store(op, at, (&x, &carry));
+    trail.store(op, at, &x, &carry);
     'samples: for from in (0..count).step_by(W) {
         let some = W.min(count - from);
         let (mut fallen, mut left) = ([L::Values::all(0.0); W], [L::Values::all(0.0); W]);
@@ -52,20 +52,20 @@ pub fn step_samples<
             let u = source.read(first + from + k, &mut room);
             if S::Input::DERIVATIVES {
                 carry = ChannelState::start::<F, N, A, _>(op, u, &x);
-                trail.store(op, at + from + k, (&x, &carry));
+                trail.store(op, at + from + k, &x, &carry);
             }
             *fallen = step::<L, _, F, N, A>(op, (u, h), (&mut x, &mut carry));
-            trail.store(op, at + from + k + 1, (&x, &carry));
+            trail.store(op, at + from + k + 1, &x, &carry);
             if W == 1 {
                 let end = |i: usize| line_end(u[i], h);
-                left[k] = op.crossed::<_, F, A>(guards, (end, !loaded), (&x, &carry));
+                left[k] = op.crossed::<_, F, A>(guards, end, !loaded, (&x, &carry));
             }
         }
         if W > 1 && looks {
             let to = (&*trail, at + from, some);
             // Apart, which leaves the step the processor's registers.
-            let ends = |input| ends_of(source, input, (first + from, some), h);
-            left = op.crossed_in_block::<_, F, A, W>(guards, (ends, !loaded), to);
+            let ends = |input| ends_of(source, input, first + from, some, h);
+            left = op.crossed_in_block::<_, F, A, W>(guards, ends, !loaded, to.0, to.1, to.2);
         }
         for k in 0..some {
             let fallen = fallen[k].negative_with(left[k]);
@@ -90,7 +90,8 @@ pub fn step_samples<
 fn ends_of<L: Lane, S: InputSource<L>, const W: usize>(
     source: &S,
     input: usize,
-    (first, count): (usize, usize),
+    first: usize,
+    count: usize,
     h: f64,
 ) -> [<S::Input as Lane>::Values; W] {
     let (mut room, mut ends) = (room(), [Lane::all(0.0); W]);

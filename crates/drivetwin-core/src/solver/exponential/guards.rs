@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! What must hold while samples are passed: torques within their limits, speeds above zero, loads above zero.
+//! Guards of fixed steps: torques within their limits, speeds above zero, normal loads above zero.
 
 use crate::network::smooth::{Line, Sample};
 use crate::number::{Factor, Lane, Values};
@@ -10,13 +10,13 @@ use crate::solver::exponential::samples::{ChannelState, InputSource, SampleBuffe
 /// and what the forms are.
 pub type Guards<V> = [[V; 2]; MAX_GUARDS];
 
-/// Of what is not watched.
+/// Guards that never cross.
 pub fn inactive_guards<V: Values>() -> Guards<V> {
     [[V::all(1.0), V::all(0.0)]; MAX_GUARDS]
 }
 
 impl<L: Lane, const N: usize> Propagator<L, N> {
-    /// Whether every normal load stays above zero over samples, in all runs.
+    /// Return true if every normal load stays above zero over samples, in all lanes.
     #[inline(always)]
     pub fn stays_loaded<S: InputSource<L>, const F: bool>(
         &self,
@@ -39,12 +39,13 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
     pub fn crossed<V: Factor<L::Values>, const F: bool, const A: usize>(
         &self,
         guards: &mut Guards<L::Values>,
-        (input, loads): (impl Fn(usize) -> V, bool),
+        input: impl Fn(usize) -> V,
+        loads: bool,
         at: (&[L; N], &[ChannelState<L>; A]),
     ) -> L::Values {
         let mut left = [L::Values::all(0.0)];
         for (place, before) in guards.iter_mut().enumerate().take(self.guards.len()) {
-            let after = self.guard::<V, F, A>(place, &input, at);
+            let after = self.guard::<V, F, A>(place, &input, at.0, at.1);
             self.may_cross::<F, _>(place, (before, &after.map(|value| [value])), &mut left);
             *before = after;
         }
@@ -61,12 +62,15 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
     pub fn crossed_in_block<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
         &self,
         guards: &mut Guards<L::Values>,
-        (ends, loads): (impl Fn(usize) -> [V; W], bool),
-        (trail, from, some): (&SampleBuffer<L, N>, usize, usize),
+        ends: impl Fn(usize) -> [V; W],
+        loads: bool,
+        trail: &SampleBuffer<L, N>,
+        from: usize,
+        some: usize,
     ) -> [L::Values; W] {
         let mut left = [L::Values::all(0.0); W];
         for (place, before) in guards.iter_mut().enumerate().take(self.guards.len()) {
-            let after = self.guards_after::<_, F, A, W>(place, &ends, (trail, from));
+            let after = self.guards_after::<_, F, A, W>(place, &ends, trail, from);
             self.may_cross::<F, _>(place, (before, &after), &mut left);
             *before = after.map(|values| values[some - 1]);
         }
@@ -87,7 +91,7 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
     ) -> Guards<L::Values> {
         let mut guards = inactive_guards();
         for (place, guard) in guards.iter_mut().enumerate().take(self.guards.len()) {
-            *guard = self.guard::<_, F, A>(place, |input| sample[input][0].values(), at);
+            *guard = self.guard::<_, F, A>(place, |input| sample[input][0].values(), at.0, at.1);
         }
         guards
     }
@@ -98,7 +102,8 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
         &self,
         place: usize,
         input: impl Fn(usize) -> V,
-        (x, carry): (&[L; N], &[ChannelState<L>; A]),
+        x: &[L; N],
+        carry: &[ChannelState<L>; A],
     ) -> [L::Values; 2] {
         let SampleGuard { form, bound } = &self.guards[place];
         let mut value = form.constant.values();
@@ -128,20 +133,21 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
         }
     }
 
-    /// The same at the end of `W` samples from `from` on.
+    /// Margins or speeds, and values, of a guard at the ends of `W` samples from `from` on.
     #[inline(always)]
     fn guards_after<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
         &self,
         place: usize,
         ends: &impl Fn(usize) -> [V; W],
-        (trail, from): (&SampleBuffer<L, N>, usize),
+        trail: &SampleBuffer<L, N>,
+        from: usize,
     ) -> [[L::Values; W]; 2] {
         let SampleGuard { form, bound } = &self.guards[place];
         let mut values = [form.constant.values(); W];
         for drive in &self.drives {
             add::<L, V, F, W>(&mut values, drive.guards[place], &ends(drive.input));
         }
-        self.add_states::<F, W>(&mut values, &form.state, (trail, from));
+        self.add_states::<F, W>(&mut values, &form.state, trail, from);
         for a in 0..A {
             let column: &[L; W] = after(trail.torques(a), from);
             for k in 0..W {
@@ -159,7 +165,7 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
             }
             Bound::Above(row) => {
                 let mut speeds = [L::Values::all(0.0); W];
-                self.add_states::<F, W>(&mut speeds, row, (trail, from));
+                self.add_states::<F, W>(&mut speeds, row, trail, from);
                 [speeds, values]
             }
         }
@@ -171,7 +177,8 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
         &self,
         sums: &mut [L::Values; W],
         row: &[L; N],
-        (trail, from): (&SampleBuffer<L, N>, usize),
+        trail: &SampleBuffer<L, N>,
+        from: usize,
     ) {
         for i in 0..self.columns() {
             let column: &[L; W] = after(trail.states(i), from);
@@ -234,14 +241,14 @@ fn add<L: Lane, V: Factor<L::Values>, const F: bool, const W: usize>(
     }
 }
 
-/// What a torque is off its limit by: see [`Bound::Within`].
+/// Distance of a torque to its limit, see [`Bound::Within`].
 #[inline(always)]
 fn margin<L: Lane, const F: bool>(side: L, limit: L::Values, torque: L::Values) -> L::Values {
     (limit + torque).smaller(side.values().fma::<F>(-torque, limit))
 }
 
 impl<L: Lane> Line<L> {
-    /// Whether the line stays above zero in all runs while its input stays within bounds.
+    /// Return true if the line stays above zero in all lanes while its input stays within bounds.
     #[inline(always)]
     fn stays_positive<const F: bool>(&self, [low, high]: [L::Values; 2]) -> bool {
         let (gain, offset) = (self.gain.values(), self.offset.values());

@@ -25,7 +25,7 @@ const MAX_SERIES: usize = 40;
 /// Coefficients of the series of the operators but for its first factor, and their number. Those that a run
 /// does not need are zero.
 #[inline(always)]
-fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], (h, reach): (f64, T)) -> usize {
+fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], h: f64, reach: T) -> usize {
     let mut left = T::Values::of(1.0);
     all[0] = left;
     let mut ended = 0;
@@ -46,11 +46,12 @@ fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], (h, reach): (f
 #[inline(always)]
 pub fn phi_functions<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
-    (h, reach): (f64, T),
+    h: f64,
+    reach: T,
     all: &mut PhiFunctions<T, N>,
 ) {
     let mut series = [T::Values::zero_(); MAX_SERIES + 2];
-    let terms = coefficients::<T>(&mut series, (h, reach));
+    let terms = coefficients::<T>(&mut series, h, reach);
     let mut weights = [1.0; FORCING_DEGREE + 1];
     for k in 1..=FORCING_DEGREE {
         weights[k] = weights[k - 1] * h / k as f64;

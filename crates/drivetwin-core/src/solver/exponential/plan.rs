@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! The operators that pass samples in the present regime, and the guards they watch.
+//! Plan of fixed steps in the present mode: the propagator and its guards.
 
 use crate::network::channel;
 use crate::network::smooth::{Law, Line, MAX_INPUTS, line_of};
@@ -27,7 +27,7 @@ const fn max_states<T: Lane>() -> usize {
     }
 }
 
-/// Whether a network is of the kind that passes samples by exact operators.
+/// Return true if propagators can pass the samples of a network.
 pub fn supports_fixed_step<T: Number>(network: &Network<T>) -> bool {
     let smooth = |channel: &Channel<T>| {
         matches!(channel.law, channel::Law::Friction { .. } | channel::Law::Quadratic(_))
@@ -38,7 +38,7 @@ pub fn supports_fixed_step<T: Number>(network: &Network<T>) -> bool {
         && network.channels.iter().all(smooth)
 }
 
-/// What passing samples needs.
+/// Propagator and active channels of fixed steps.
 pub(crate) struct StepPlan<T> {
     /// Operators of the present mode.
     pub operators: SizedPropagator<T>,
@@ -47,7 +47,7 @@ pub(crate) struct StepPlan<T> {
 }
 
 impl<T: Number> HybridState<'_, T> {
-    /// What passing samples of length `h` [s] needs, if it is possible.
+    /// Plan fixed steps of length `h` [s]. Return None if the mode does not allow them.
     pub(crate) fn plan_steps(
         &mut self,
         propagators: &mut PropagatorCache<T>,
@@ -111,7 +111,7 @@ impl<T: Number> HybridState<'_, T> {
         PropagatorKey { mode: self.mode.key, branches, pieces, step: (h * 1e12).round() as u64 }
     }
 
-    /// Whether the present mode has only what a sprint covers.
+    /// Return true if fixed steps cover the present mode.
     fn is_simple(&self) -> bool {
         self.network.prescribed.is_empty()
             && self.network.mechanism.inputs.len() <= MAX_INPUTS
@@ -130,14 +130,15 @@ impl<T: Number> HybridState<'_, T> {
         h: f64,
     ) -> Option<Propagator<T, N>> {
         let mut operators = Propagator::build(self.network, &self.mode, (active, laws), h)?;
-        self.guard_frictions((active, h), &mut operators);
-        self.guard_gears((active, h), &mut operators);
+        self.guard_frictions(active, h, &mut operators);
+        self.guard_gears(active, h, &mut operators);
         (operators.guards.len() <= MAX_GUARDS).then_some(operators)
     }
 
     fn guard_frictions<const N: usize>(
         &self,
-        (active, h): (&[usize], f64),
+        active: &[usize],
+        h: f64,
         operators: &mut Propagator<T, N>,
     ) {
         for (j, row) in self.network.frictions.iter().enumerate() {
@@ -160,11 +161,11 @@ impl<T: Number> HybridState<'_, T> {
                     let torque = self.mode.stuck_torque.row(position);
                     let mut limit = load.map(|v| v * mu);
                     limit.offset += if row.one_way { TORQUE_ATOL } else { 0.0 };
-                    operators.guard_torque(self.network, active, torque, (limit, !row.one_way));
+                    operators.guard_torque(self.network, active, torque, limit, !row.one_way);
                 }
                 FrictionState::Slipping { sign } if !active.contains(&j) => {
                     let speed: Vec<T> = row.slip.iter().map(|&c| c * sign).collect();
-                    operators.guard_speed((self.network, &self.mode), active, &speed, h);
+                    operators.guard_speed(self.network, &self.mode, active, &speed, h);
                 }
                 _ => {}
             }
@@ -173,7 +174,8 @@ impl<T: Number> HybridState<'_, T> {
 
     fn guard_gears<const N: usize>(
         &self,
-        (active, h): (&[usize], f64),
+        active: &[usize],
+        h: f64,
         operators: &mut Propagator<T, N>,
     ) {
         for (i, gear) in self.network.losses.iter().enumerate() {
@@ -185,9 +187,9 @@ impl<T: Number> HybridState<'_, T> {
             let scaled = |row: &[T], by: f64| row.iter().map(|&c| c * by).collect::<Vec<T>>();
             let power = scaled(self.mode.gear_torque(self.network).row(i), sign * side);
             let limit = constant(-gear.loss.threshold() * side + TORQUE_ATOL);
-            operators.guard_torque(self.network, active, &power, (limit, false));
+            operators.guard_torque(self.network, active, &power, limit, false);
             let speed = scaled(&gear.speed, sign);
-            operators.guard_speed((self.network, &self.mode), active, &speed, h);
+            operators.guard_speed(self.network, &self.mode, active, &speed, h);
         }
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Exact step operators of one mode over samples of equal length h.
+//! Propagator of one mode: exact step operators over samples of equal length h.
 //!
 //! In one mode `x' = A x + B u + c + E φ`. Over a sample the inputs are linear and a channel φ is a
 //! cubic, the sum of [`N_BASIS`] with the coefficients a, so that the state at the end, the argument of
@@ -37,7 +37,7 @@ pub struct Propagator<L, const N: usize> {
     pub signs: [L; MAX_ACTIVE],
     /// Columns of the transition matrix.
     pub transition: [[L; N]; N],
-    /// What is there without state and inputs.
+    /// State at the end without initial state and inputs.
     pub constant: [L; N],
     /// Inputs that act on the state.
     pub drives: Vec<Drive<L, N>>,
@@ -102,11 +102,11 @@ pub struct ChannelCoefficients<L, const N: usize> {
     pub rate_end: [[L; N_BASIS]; MAX_ACTIVE],
     /// Rate of the argument at any instant.
     pub rate: Form<L, N>,
-    /// How it turns at the start: half its second derivative over a sample.
+    /// Half the second derivative of the argument at the start, over a sample.
     pub half_second_derivative: StepForm<L, N>,
     /// Its law.
     pub law: Law<L>,
-    /// What its normal load rises by in a sample, over the rate of its input.
+    /// Rise of the normal load in a sample, over the rate of its input.
     pub load_slope: L,
 }
 
@@ -115,11 +115,11 @@ pub struct ChannelCoefficients<L, const N: usize> {
 pub struct SampleGuard<L, const N: usize> {
     /// A torque, or what a speed rises by in a third of a sample at its rate.
     pub form: Form<L, N>,
-    /// What must hold.
+    /// Condition that must hold.
     pub bound: Bound<L, N>,
 }
 
-/// What must hold of a watched form.
+/// Condition of a guard.
 #[derive(Clone, Copy, Debug)]
 pub enum Bound<L, const N: usize> {
     /// A torque stays within a limit over an input: `limit(u) - |form|` where both signs are bounded and
@@ -127,7 +127,7 @@ pub enum Bound<L, const N: usize> {
     Within {
         /// The limit.
         limit: Line<L>,
-        /// Which signs are bounded.
+        /// 1 if both signs are bounded, -1 if only the negative one is.
         side: L,
     },
     /// A speed over the states stays above zero.
@@ -155,10 +155,10 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         (active, forcing_response): (&[usize], &[[[T; N]; N_BASIS]]),
         (argument, law, h): ([T; N], Law<T>, f64),
     ) {
-        let now = over_basis::<T, F, N>((network, mode), &argument, h);
+        let now = over_basis::<T, F, N>(network, mode, &argument, h);
         let mut rate = [T::zero_(); N];
         rate[..network.states()].copy_from_slice(&now[..network.states()]);
-        let second = over_basis::<T, F, N>((network, mode), &rate, 0.5 * h);
+        let second = over_basis::<T, F, N>(network, mode, &rate, 0.5 * h);
         for drive in &mut self.drives {
             let ([held, load_slope], input) = (&drive.step, network.first_input() + drive.input);
             drive.argument[slot] =
@@ -210,7 +210,8 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         network: &Network<T>,
         active: &[usize],
         row: &[T],
-        (limit, both): (Line<T>, bool),
+        limit: Line<T>,
+        both: bool,
     ) {
         let side = T::of(if both { 1.0 } else { -1.0 });
         self.watch(network, active, row, Bound::Within { limit, side });
@@ -219,7 +220,8 @@ impl<T: Number, const N: usize> Propagator<T, N> {
     /// Watch a speed over the states, which must stay above zero, over samples of length `h` [s].
     pub fn guard_speed(
         &mut self,
-        (network, mode): (&Network<T>, &Mode<T>),
+        network: &Network<T>,
+        mode: &Mode<T>,
         active: &[usize],
         row: &[T],
         h: f64,
@@ -228,7 +230,7 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         for (to, &c) in speed.iter_mut().zip(row).take(network.states()) {
             *to = c;
         }
-        let third = over_basis::<T, false, N>((network, mode), &speed, h / 3.0);
+        let third = over_basis::<T, false, N>(network, mode, &speed, h / 3.0);
         self.watch(network, active, &third, Bound::Above(speed));
     }
 
@@ -271,7 +273,7 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
             a[i][..n].copy_from_slice(&mode.derivative.row(i)[..n]);
         }
         let mut s = [[[T::zero_(); N]; N]; FORCING_DEGREE + 1];
-        phi_functions::<T, F, N>(&a, (h, reach), &mut s);
+        phi_functions::<T, F, N>(&a, h, reach, &mut s);
         let mut operators = Propagator::empty(n, reach);
         operators.drives.reserve_exact(network.mechanism.inputs.len());
         operators.channels.reserve_exact(active.len());
@@ -367,7 +369,7 @@ impl<L: Lane, const N: usize> Drive<L, N> {
         Self { input, step, ..Self::idle() }
     }
 
-    /// Without effect.
+    /// Create an input without effect.
     pub fn idle() -> Self {
         let none = L::all(0.0);
         Self {
@@ -382,7 +384,7 @@ impl<L: Lane, const N: usize> Drive<L, N> {
 }
 
 impl<L: Lane, const N: usize> ChannelCoefficients<L, N> {
-    /// Without torque.
+    /// Create a channel without torque.
     pub fn idle() -> Self {
         let none = L::all(0.0);
         Self {
@@ -442,7 +444,8 @@ impl<L: Copy, const N: usize> Propagator<L, N> {
 /// A form over the states, differentiated and scaled: over the basis.
 #[inline(always)]
 fn over_basis<T: Number, const F: bool, const N: usize>(
-    (network, mode): (&Network<T>, &Mode<T>),
+    network: &Network<T>,
+    mode: &Mode<T>,
     row: &[T; N],
     scale: f64,
 ) -> Vec<T> {

@@ -5,7 +5,7 @@ use crate::network::ModeKey;
 use crate::solver::exponential::propagator::{MAX_ACTIVE, SizedPropagator};
 use std::collections::BTreeMap;
 
-/// What operators belong to: mode, active channels with their branches, and step length.
+/// Key of a propagator: mode, active channels with their branches, and step length.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PropagatorKey {
     pub mode: ModeKey,

@@ -36,7 +36,7 @@ pub fn room<U: Lane>() -> InputScratch<U> {
     [[U::all(0.0); 2]; MAX_INPUTS]
 }
 
-/// What a line, value and rate, comes to after `h` [s], without derivatives.
+/// Evaluate a line (value, rate) after `h` [s], without derivatives.
 #[inline(always)]
 pub(crate) fn line_end<U: Lane>([start, rate]: [U; 2], h: f64) -> U::Values {
     rate.values().times(h) + start.values()
@@ -95,7 +95,7 @@ pub struct ChannelState<L> {
 }
 
 impl<L: Lane> ChannelState<L> {
-    /// Nothing carried.
+    /// State of an inactive channel.
     pub fn idle() -> Self {
         let none = L::all(0.0);
         Self {
@@ -107,7 +107,7 @@ impl<L: Lane> ChannelState<L> {
         }
     }
 
-    /// Those of another in the runs named by bits.
+    /// Replace the values of the lanes in a mask by those of `other`.
     #[inline(always)]
     pub fn with(&self, runs: u32, other: &Self) -> Self {
         let (own, value) = (&self.value, &other.value);
@@ -190,7 +190,7 @@ pub type SampleColumn<L> = [L; BLOCK + FOUR];
 pub struct SampleBuffer<L, const N: usize>(Vec<SampleColumn<L>>);
 
 impl<L: Lane, const N: usize> SampleBuffer<L, N> {
-    /// For so many carried channels, in columns of old.
+    /// Create a buffer for a number of channels from columns of an earlier one.
     pub fn in_columns(mut columns: Vec<SampleColumn<L>>, channels: usize) -> Self {
         if columns.len() < N + channels {
             columns.resize(N + channels, [L::all(0.0); BLOCK + FOUR]);
@@ -198,7 +198,7 @@ impl<L: Lane, const N: usize> SampleBuffer<L, N> {
         Self(columns)
     }
 
-    /// What has been set.
+    /// Return the stored samples.
     pub fn samples(&self) -> Samples<'_, L> {
         let (states, torques) = self.0.split_at(N);
         Samples { states, torques }
@@ -215,7 +215,8 @@ impl<L: Lane, const N: usize> SampleBuffer<L, N> {
         &mut self,
         op: &Propagator<L, N>,
         k: usize,
-        (x, carry): (&[L; N], &[ChannelState<L>; A]),
+        x: &[L; N],
+        carry: &[ChannelState<L>; A],
     ) {
         let (states, torques) = self.0.split_first_chunk_mut::<N>().expect("a column by state");
         for i in 0..op.columns() {
@@ -242,8 +243,8 @@ impl<L: Lane, const N: usize> SampleBuffer<L, N> {
 /// States and torques of the active channels at the start of samples, at least of those passed.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'s, L> {
-    /// By state.
+    /// States, one column each.
     pub states: &'s [SampleColumn<L>],
-    /// By the number of the active channel.
+    /// Torques, one column per active channel.
     pub torques: &'s [SampleColumn<L>],
 }

@@ -14,7 +14,7 @@ const N_START: usize = 3;
 /// Number of those after them, which raise the value and the slope at the end.
 const N_END: usize = N_BASIS - N_START;
 
-/// What a sample leads to, as far as it is known.
+/// Intermediate results of one step.
 struct StepWork<L: Lane, const N: usize, const A: usize> {
     /// State at the end.
     end: [L; N],
@@ -57,22 +57,23 @@ pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize
         size: none.values(),
         guard: none.values(),
     };
-    sampling.apply_linear::<F, U>(op, channels, (sample, h), x);
+    sampling.apply_linear::<F, U>(op, channels, sample, h, x);
     let about = sampling.extrapolate::<F>(channels, carry);
-    sampling.predict::<F>(op, channels, (carry, &about));
+    sampling.predict::<F>(op, channels, carry, &about);
     sampling.correct::<F>(channels, carry);
     *x = sampling.end;
     sampling.guard
 }
 
 impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
-    /// What state and inputs alone lead to.
+    /// Apply the linear part of the propagator: state and inputs without channels.
     #[inline(always)]
     fn apply_linear<const F: bool, U: Factor<L>>(
         &mut self,
         op: &Propagator<L, N>,
         channels: &[ChannelCoefficients<L, N>; A],
-        (sample, h): (&Sample<U>, f64),
+        sample: &Sample<U>,
+        h: f64,
         x: &[L; N],
     ) {
         let s = self;
@@ -182,7 +183,8 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
         &mut self,
         op: &Propagator<L, N>,
         channels: &[ChannelCoefficients<L, N>; A],
-        (carry, about): (&mut [ChannelState<L>; A], &[[L; 2]; A]),
+        carry: &mut [ChannelState<L>; A],
+        about: &[[L; 2]; A],
     ) {
         add_moments::<L, F, N, A, 0, N_START>(channels, &self.cubics, &mut self.end);
         for a in 0..A {

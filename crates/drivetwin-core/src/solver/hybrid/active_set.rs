@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Who rests, slips or moves off: what a decision tries and then makes the state of a run.
+//! Active set of the friction programme: the trial state of every friction element and gear.
 
 use crate::network::{GearState, Row};
 use crate::solver::hybrid::event::FrictionState;
@@ -14,7 +14,7 @@ pub(crate) struct ActiveSet {
 }
 
 impl ActiveSet {
-    /// Let a row rest.
+    /// Set a row to sticking.
     pub fn rest(&mut self, row: Row) {
         match row {
             Row::Friction(j) => self.rows[j] = FrictionState::Sticking,
@@ -22,7 +22,7 @@ impl ActiveSet {
         }
     }
 
-    /// Let a row move off in a direction.
+    /// Set a row to slipping in a direction.
     pub fn move_off(&mut self, row: Row, sign: f64) {
         match row {
             Row::Friction(j) => self.rows[j] = FrictionState::Slipping { sign },
@@ -30,7 +30,7 @@ impl ActiveSet {
         }
     }
 
-    /// How many of the friction elements move off, and how many do not rest.
+    /// Count the friction elements that slip, and those that do not stick.
     pub fn moving_off(&self, candidates: &[Row]) -> (usize, usize) {
         let friction =
             |row: &Row| if let Row::Friction(j) = *row { Some(self.rows[j]) } else { None };
@@ -39,7 +39,7 @@ impl ActiveSet {
         (moving, moving + rows().filter(FrictionState::is_saturated).count())
     }
 
-    /// Let power through a rolling gear flow the other way.
+    /// Reverse the power direction of a meshing gear.
     pub fn reverse_power(&mut self, i: usize) {
         if let GearState::Meshing { power_reversed, .. } = &mut self.gears[i] {
             *power_reversed = !*power_reversed;

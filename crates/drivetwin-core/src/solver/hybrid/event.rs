@@ -4,7 +4,7 @@
 use crate::network::{Cell, Row};
 use crate::number::{Pack, Values};
 
-/// What happens when a guard falls.
+/// Cause of an event: the guard that crossed zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventCause {
     /// The slip of a friction element, or the speed of a lossy gear, reaches zero.
@@ -13,7 +13,7 @@ pub enum EventCause {
     LoadOnset(usize),
     /// The torque of a row at rest leaves its bounds; its sign.
     TorqueLimit(Row, f64),
-    /// The same within round-off of a knot of the inputs, which may end there.
+    /// Torque limit reached within round-off of a knot of the inputs, where the inputs may end.
     TorqueLimitAtKnot(Row),
     /// Power through a rolling gear changes its direction.
     PowerReversal(usize),
@@ -24,7 +24,7 @@ pub enum EventCause {
 }
 
 impl EventCause {
-    /// The same, found to happen at a knot: what holds from there on decides.
+    /// Return the cause for an event at a knot of the inputs.
     pub fn at_knot(self) -> Self {
         match self {
             Self::TorqueLimit(row, _) => Self::TorqueLimitAtKnot(row),
@@ -53,13 +53,13 @@ pub enum FrictionState {
 }
 
 impl FrictionState {
-    /// Whether it carries all it can at zero speed while others hold the rest.
+    /// Return true for an element at its capacity whose zero speed other elements hold.
     pub(crate) fn is_saturated(&self) -> bool {
         matches!(self, Self::Saturated { .. })
     }
 }
 
-/// What happened at an event.
+/// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
     /// Slip came to rest.
@@ -77,16 +77,16 @@ pub enum EventKind {
 /// A change of friction mode.
 #[derive(Clone, Debug)]
 pub struct Event<T> {
-    /// When, s; carries derivatives.
+    /// Time, s; carries derivatives.
     pub time: T,
     /// Index of the friction element, or after these of the lossy gear.
     pub element: usize,
-    /// What.
+    /// Kind of the change.
     pub kind: EventKind,
 }
 
 impl<const K: usize> Event<Pack<K>> {
-    /// That of one run.
+    /// Return the event of one lane.
     pub(crate) fn of_run(&self, run: usize) -> Event<f64> {
         Event { time: self.time.0[run], element: self.element, kind: self.kind }
     }

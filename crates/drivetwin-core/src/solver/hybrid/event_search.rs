@@ -19,21 +19,22 @@ pub fn earliest<T: Real>(state: &HybridState<'_, T>, h: f64) -> Option<(T, Event
     let mut best: Option<(f64, Series<T>, EventCause)> = None;
     all_guards(state, &mut |series: Series<T>, cause: EventCause| {
         let horizon = best.as_ref().map_or(h, |b| b.0);
-        let (falls, t) = first_zero_crossing(&series, state.expansion.order, (1, horizon));
+        let (falls, t) = first_zero_crossing(&series, state.expansion.order, 1, horizon);
         if falls == 1 && best.as_ref().is_none_or(|b| t < b.0) {
             best = Some((t, series, cause));
         }
     });
     best.map(|(t, series, cause)| {
         let order = state.expansion.order;
-        (refined(&series, order, t), cause, grazes(&series, order, (t, h)))
+        (refined(&series, order, t), cause, grazes(&series, order, t, h))
     })
 }
 
 /// The earliest falls of several runs, `runs` as bits, each within its own `h` [s].
 pub fn earliest_per_lane<const K: usize>(
     state: &HybridState<'_, Pack<K>>,
-    (runs, h): (u32, Pack<K>),
+    runs: u32,
+    h: Pack<K>,
 ) -> [Option<(f64, EventCause)>; K] {
     let (mut causes, mut fallen, mut earliest) = ([None; K], 0, h);
     all_guards(state, &mut |series: Series<Pack<K>>, cause: EventCause| {
@@ -58,7 +59,7 @@ impl<const K: usize> Kernel for ZeroCrossingKernel<'_, K> {
 
     #[inline(always)]
     fn run<const F: bool>(self) -> Self::Output {
-        first_zero_crossing(self.guard.0, self.guard.1, self.span)
+        first_zero_crossing(self.guard.0, self.guard.1, self.span.0, self.span.1)
     }
 }
 
@@ -220,7 +221,7 @@ fn combined<T: Number>(a: &Series<T>, b: &Series<T>, sign: f64) -> Series<T> {
 
 /// Whether a guard falls so flatly that its parabola dips below zero by next to nothing: the event, and
 /// with it everything after, then hangs on round-off and has no usable derivative.
-fn grazes<T: Real>(guard: &Series<T>, order: usize, (t, h): (f64, f64)) -> bool {
+fn grazes<T: Real>(guard: &Series<T>, order: usize, t: f64, h: f64) -> bool {
     let g: Series<f64> = guard.map(|c| c.re());
     let (fall, mut bend, mut size, mut power) = (slope(&g, order, t), 0.0, 0.0, 1.0);
     for k in (2..=order).rev() {

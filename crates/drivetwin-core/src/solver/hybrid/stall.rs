@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Whether a run gets ahead.
+//! Detection of runs without advance: stalls, Zeno behaviour and step underflow.
 
 use crate::solver::tolerances::{
     ADVANCE_RTOL, MIN_ADVANCE_OF_EVENTS, MIN_ADVANCE_OF_STEPS, TIME_RTOL,
@@ -12,7 +12,7 @@ const PROGRESS_WINDOW: usize = 1000;
 /// Steps over which a run must advance by at least [`MIN_ADVANCE_OF_STEPS`].
 const STEP_WINDOW: usize = 10_000;
 
-/// The advance of a run over its last steps.
+/// Counters of the advance of a run over its last steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StallDetector {
     /// Events in a row without progress.
@@ -23,33 +23,33 @@ pub(crate) struct StallDetector {
     steps: (usize, f64),
 }
 
-/// How a run fails to get ahead.
+/// Kind of a stall.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Stall {
-    /// Its steps are too small.
+    /// Steps are too small.
     TooSmall,
-    /// Its events follow each other too closely.
+    /// Events accumulate (Zeno behaviour).
     Zeno,
 }
 
-/// Whether a step of length `h` before the time `end` [s] is lost in round-off.
+/// Return true if a step of length `h` before the time `end` [s] is lost in round-off.
 pub(crate) fn underflows(h: f64, end: f64) -> bool {
     h < TIME_RTOL * (1.0 + end.abs())
 }
 
 impl StallDetector {
-    /// Of a run that starts at `time` [s].
+    /// Create the detector of a run that starts at `time` [s].
     pub fn from(time: f64) -> Self {
         Self { stalled: 0, events: (0, time), steps: (0, time) }
     }
 
-    /// Whether events at one instant do not come to an end.
+    /// Return true if events at one instant do not end.
     pub fn is_stalled(&self) -> bool {
         self.stalled >= MAX_STALLED
     }
 
-    /// Take note of a step, the time it led to and its length [s], and whether an event ended it.
-    pub fn note(&mut self, (time, length): (f64, f64), event: bool) -> Result<(), Stall> {
+    /// Record a step: the time it led to, its length [s], and whether an event ended it.
+    pub fn note(&mut self, time: f64, length: f64, event: bool) -> Result<(), Stall> {
         self.steps.0 += 1;
         if self.steps.0 == STEP_WINDOW {
             if time - self.steps.1 < MIN_ADVANCE_OF_STEPS {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! What holds at an instant: the state, who sticks and who slips, and the mode that follows.
+//! Hybrid state: continuous state, friction states and the compiled mode.
 
 use crate::network::channel::ChannelSeries;
 use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
@@ -34,11 +34,11 @@ pub struct HybridState<'a, T> {
     /// Time to the end of the segment, s, without derivatives.
     pub(crate) remaining: T,
     pub(crate) cells: Vec<Cell>,
-    /// Whether an element or gear moves off from exact zero at the start of the step.
+    /// Elements and gears that leave exact zero speed at the start of the step.
     pub(crate) released: Vec<bool>,
-    /// Whether an element has a normal load.
+    /// Elements with a normal load.
     pub(crate) pressed: Vec<bool>,
-    /// Whether a gear that carries all it can is kept from rolling by others.
+    /// Gears at their torque bound whose speed other elements hold at zero.
     pub(crate) blocked: Vec<bool>,
     /// Inputs and state as decisions see them.
     pub(crate) inputs_plus: Vec<Series<T>>,

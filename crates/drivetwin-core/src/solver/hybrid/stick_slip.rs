@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-//! Who stays stuck (THEORY section 1): the box-constrained programme over all friction elements at
+//! Stick-slip decision (THEORY section 1): the box-constrained programme over all friction elements
+//! at
 //! zero slip, together with the states of lossy gears.
 
 use crate::network::channel::form;
@@ -21,7 +22,7 @@ const MAX_TRIALS: usize = 200;
 /// Most rows at zero speed for which every assignment is tried.
 const MAX_EXHAUSTIVE: usize = 8;
 
-/// What is wrong with an assignment.
+/// Violated condition of an active set.
 enum Violation {
     /// A row at rest carries more than its bounds allow; the torque's sign.
     TorqueBound(Row, f64),
@@ -40,22 +41,27 @@ impl<T: Number> HybridState<'_, T> {
         let mut trial = self.assignment();
         match overloaded {
             // An overload asks for more: what has just moved off, or is at its capacity, stays so.
-            Some((row, sign)) => self.release(&mut trial, (row, sign), &candidates),
+            Some((row, sign)) => self.release(&mut trial, row, sign, &candidates),
             None => candidates.iter().for_each(|&row| trial.rest(row)),
         }
         let mut visited: Vec<ActiveSet> = Vec::new();
         loop {
             let mode = self.mode(self.key_of(&trial))?;
             let basis = self.basis_now(&trial, &candidates);
-            let Some(fault) = self.fault(&trial, &candidates, (&mode, &basis)) else {
+            let Some(fault) = self.fault(&trial, &candidates, &mode, &basis) else {
                 let moving = trial.moving_off(&candidates).0;
                 if moving == 0
                     || self.rank(&candidates) == candidates.len()
                     || !self.enumerate_active_sets(&candidates, Some(moving))
                 {
                     let found = (trial, mode, basis);
-                    let (trial, mode) =
-                        self.restick_if_feasible(found, &candidates, overloaded.is_some());
+                    let (trial, mode) = self.restick_if_feasible(
+                        found.0,
+                        found.1,
+                        found.2,
+                        &candidates,
+                        overloaded.is_some(),
+                    );
                     self.adopt(trial, &candidates, mode);
                 }
                 return Ok(());
@@ -72,7 +78,7 @@ impl<T: Number> HybridState<'_, T> {
             visited.push(trial.clone());
             match fault {
                 Violation::TorqueBound(row, sign) => {
-                    self.release(&mut trial, (row, sign), &candidates);
+                    self.release(&mut trial, row, sign, &candidates);
                 }
                 Violation::SlipDirection(row) => {
                     trial.rest(row);
@@ -104,7 +110,7 @@ impl<T: Number> HybridState<'_, T> {
             }
             let Ok(mode) = self.mode(self.key_of(&trial)) else { continue };
             let basis = self.basis_now(&trial, candidates);
-            let is_right = self.fault(&trial, candidates, (&mode, &basis)).is_none()
+            let is_right = self.fault(&trial, candidates, &mode, &basis).is_none()
                 && (moving.is_none()
                     || self.is_strictly_feasible(&mode, &basis)
                         && self.violates_static_limit(&trial, candidates, &mode));
@@ -121,7 +127,9 @@ impl<T: Number> HybridState<'_, T> {
     /// that moves off in their place.
     fn restick_if_feasible(
         &mut self,
-        (mut trial, mut mode, basis): (ActiveSet, Arc<Mode<T>>, Vec<T>),
+        mut trial: ActiveSet,
+        mut mode: Arc<Mode<T>>,
+        basis: Vec<T>,
         candidates: &[Row],
         overloaded: bool,
     ) -> (ActiveSet, Arc<Mode<T>>) {
@@ -139,19 +147,19 @@ impl<T: Number> HybridState<'_, T> {
             held.rest(row);
             self.classify_saturated(&mut held, candidates);
             let same = |&row: &Row| held.direction(row) == before.direction(row);
-            if overloaded && candidates.iter().all(same) || !self.stays(row, (&mode, &basis)) {
+            if overloaded && candidates.iter().all(same) || !self.stays(row, &mode, &basis) {
                 continue;
             }
             let Ok(mode_held) = self.mode(self.key_of(&held)) else { continue };
             let basis_held = self.basis_now(&held, candidates);
-            if self.fault(&held, candidates, (&mode_held, &basis_held)).is_none() {
+            if self.fault(&held, candidates, &mode_held, &basis_held).is_none() {
                 (trial, mode) = (held, mode_held);
             }
         }
         (trial, mode)
     }
 
-    /// Whether what moves off would also do so against static friction.
+    /// Return true if every slipping candidate also slips against its static capacity.
     fn violates_static_limit(
         &mut self,
         trial: &ActiveSet,
@@ -165,10 +173,10 @@ impl<T: Number> HybridState<'_, T> {
             }
         }
         let basis = self.basis_now(&at_capacity, candidates);
-        self.returning(trial, candidates, (mode, &basis)).is_none()
+        self.returning(trial, candidates, mode, &basis).is_none()
     }
 
-    /// Whether everything at rest carries less than its bounds allow.
+    /// Return true if every holding torque lies strictly within its bounds.
     fn is_strictly_feasible(&self, mode: &Mode<T>, basis: &[T]) -> bool {
         let capacities = self.capacities();
         mode.stuck.iter().enumerate().all(|(i, &row)| {
@@ -288,14 +296,15 @@ impl<T: Number> HybridState<'_, T> {
         &self,
         trial: &ActiveSet,
         candidates: &[Row],
-        (mode, basis): (&Mode<T>, &[T]),
+        mode: &Mode<T>,
+        basis: &[T],
     ) -> Option<Violation> {
         self.overload(mode, basis)
             .or_else(|| {
-                self.returning(trial, candidates, (mode, basis)).map(Violation::SlipDirection)
+                self.returning(trial, candidates, mode, basis).map(Violation::SlipDirection)
             })
             .or_else(|| {
-                let reversed = |&i: &usize| self.is_reversed(trial.gears[i], i, (mode, basis));
+                let reversed = |&i: &usize| self.is_reversed(trial.gears[i], i, mode, basis);
                 (0..trial.gears.len()).find(reversed).map(Violation::PowerDirection)
             })
     }
@@ -305,7 +314,8 @@ impl<T: Number> HybridState<'_, T> {
         &self,
         trial: &ActiveSet,
         candidates: &[Row],
-        (mode, basis): (&Mode<T>, &[T]),
+        mode: &Mode<T>,
+        basis: &[T],
     ) -> Option<Row> {
         let returns = |&row: &Row| {
             trial.direction(row).is_some_and(|sign| {
@@ -316,8 +326,8 @@ impl<T: Number> HybridState<'_, T> {
         candidates.iter().copied().find(returns)
     }
 
-    /// Whether a row has no acceleration but round-off.
-    fn stays(&self, row: Row, (mode, basis): (&Mode<T>, &[T])) -> bool {
+    /// Return true if the acceleration of a row is round-off.
+    fn stays(&self, row: Row, mode: &Mode<T>, basis: &[T]) -> bool {
         let (a, scale) = self.acceleration(row, mode, basis);
         a.decide_with(scale, |a, scale| a.abs() <= negligible(scale))
     }
@@ -376,7 +386,8 @@ impl<T: Number> HybridState<'_, T> {
         }
     }
 
-    /// What a row at rest may accelerate by round-off; more is forced on it by prescribed speeds.
+    /// Acceleration of a row at rest that is round-off, rad/s². Prescribed speeds force larger
+    /// values.
     fn forced_acceleration(&self) -> T::Values {
         let rates =
             self.network.prescribed.iter().map(|&(_, input)| self.inputs_plus[input][1].re());
@@ -394,7 +405,7 @@ impl<T: Number> HybridState<'_, T> {
         (l.smaller(m) - more, u.larger(v) + more)
     }
 
-    fn is_reversed(&self, gear: GearState, i: usize, (mode, basis): (&Mode<T>, &[T])) -> bool {
+    fn is_reversed(&self, gear: GearState, i: usize, mode: &Mode<T>, basis: &[T]) -> bool {
         let GearState::Meshing { sign, power_reversed } = gear else { return false };
         let loss = &self.network.losses[i].loss;
         if !loss.is_directional() {
@@ -422,7 +433,7 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// An overloaded row moves off, or stays at its capacity where others hold its speed.
-    fn release(&self, trial: &mut ActiveSet, (row, sign): (Row, f64), candidates: &[Row]) {
+    fn release(&self, trial: &mut ActiveSet, row: Row, sign: f64, candidates: &[Row]) {
         trial.move_off(row, sign);
         self.classify_saturated(trial, candidates);
     }
@@ -441,7 +452,7 @@ impl<T: Number> HybridState<'_, T> {
         }
     }
 
-    /// Whether what is at rest keeps a row that is not from moving.
+    /// Return true if the elements at rest hold the speed of a row that is not at rest.
     fn held_by_others(&self, trial: &ActiveSet, row: Row) -> bool {
         let mut stuck = self.key_of(trial).rows();
         let alone = self.rank(&stuck);

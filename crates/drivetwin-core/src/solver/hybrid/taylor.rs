@@ -260,7 +260,7 @@ impl<T: Number> TaylorExpansion<T> {
     }
 }
 
-/// Whether an input is no line.
+/// Return true if an input is not linear in time.
 fn is_curved<T: Number>(input: &Series<T>) -> bool {
     !is_zero(input[2]) || !is_zero(input[3])
 }

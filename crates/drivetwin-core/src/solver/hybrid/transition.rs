@@ -105,7 +105,8 @@ impl<T: Number> HybridState<'_, T> {
         Ok(())
     }
 
-    /// Take up everything that follows the inputs anew at this instant, as after a jump.
+    /// Update normal loads, branches and friction states from the inputs at this instant, as after
+    /// a jump.
     pub(crate) fn refresh(&mut self) -> Result<(), Status> {
         for j in 0..self.rows.len() {
             let normal = &self.network.frictions[j].normal;

@@ -4,7 +4,7 @@
 use crate::number::{Lane, Number, Series, Values, evaluate, slope};
 use crate::solver::tolerances::GUARD_RTOL;
 
-/// How often a step is halved to tell falls apart.
+/// Largest number of bisections of a step.
 const MAX_DEPTH: usize = 50;
 
 /// First times in [0, h] from which the guards `Σ c_k t^k` of the runs `runs`, as bits, are negative, with the
@@ -17,7 +17,8 @@ const MAX_DEPTH: usize = 50;
 pub fn first_zero_crossing<T: Number>(
     guard: &Series<T>,
     order: usize,
-    (mut runs, h): (u32, T::Values),
+    mut runs: u32,
+    h: T::Values,
 ) -> (u32, T::Values) {
     let none = T::Values::zero_();
     let (mut reach, mut power) = (none, T::Values::of(1.0));
@@ -35,10 +36,10 @@ pub fn first_zero_crossing<T: Number>(
     let at_zero = runs & !(start - negligible).mask_where(|above| above > 0.0);
     let mut at_once = 0;
     if at_zero != 0 {
-        let (falling, rising) = lift_off(&mut c, order, (at_zero, h), negligible);
+        let (falling, rising) = lift_off(&mut c, order, at_zero, h, negligible);
         (at_once, runs) = (falling, runs & !at_zero | rising);
     }
-    let (fallen, time) = search(&c, order, (runs, h));
+    let (fallen, time) = search(&c, order, runs, h);
     (fallen | at_once, time.with(at_once, none))
 }
 
@@ -49,7 +50,8 @@ pub fn first_zero_crossing<T: Number>(
 fn lift_off<V: Values>(
     c: &mut Series<V>,
     order: usize,
-    (at_zero, h): (u32, V),
+    at_zero: u32,
+    h: V,
     negligible: V,
 ) -> (u32, u32) {
     let (mut falling, mut rising, mut power) = (0, 0, V::of(1.0));
@@ -76,12 +78,12 @@ fn lift_off<V: Values>(
 
 /// First roots within [0, h] of the polynomials of some runs, as bits, that are positive at the start.
 #[inline(always)]
-fn search<V: Values>(c: &Series<V>, order: usize, (runs, h): (u32, V)) -> (u32, V) {
-    let (fallen, time, unclear) = within(c, order, (runs, V::zero_(), h), V::zero_());
+fn search<V: Values>(c: &Series<V>, order: usize, runs: u32, h: V) -> (u32, V) {
+    let (fallen, time, unclear) = within(c, order, runs, V::zero_(), h, V::zero_());
     if unclear == 0 {
         return (fallen, time);
     }
-    let (late, at) = in_halves(c, order, (unclear, h));
+    let (late, at) = in_halves(c, order, unclear, h);
     (fallen | late, time.with(late, at))
 }
 
@@ -91,7 +93,9 @@ fn search<V: Values>(c: &Series<V>, order: usize, (runs, h): (u32, V)) -> (u32, 
 fn within<V: Values>(
     c: &Series<V>,
     order: usize,
-    (runs, from, to): (u32, V, V),
+    runs: u32,
+    from: V,
+    to: V,
     negligible: V,
 ) -> (u32, V, u32) {
     let (middle, radius) = ((from + to) * 0.5, (to - from) * 0.5);
@@ -111,7 +115,7 @@ fn within<V: Values>(
     }
     let falling = open & (-d[1] - bend * radius).mask_where(|fall| fall > 0.0);
     let fallen = falling & below_zero(c, order, to);
-    let time = if fallen == 0 { to } else { root(c, order, (fallen, from, to)) };
+    let time = if fallen == 0 { to } else { root(c, order, fallen, from, to) };
     (fallen, time, open & !falling)
 }
 
@@ -121,7 +125,7 @@ fn within<V: Values>(
 /// passed over, as the search in all its halves would not end.
 #[cold]
 #[inline(never)]
-fn in_halves<V: Values>(c: &Series<V>, order: usize, (runs, h): (u32, V)) -> (u32, V) {
+fn in_halves<V: Values>(c: &Series<V>, order: usize, runs: u32, h: V) -> (u32, V) {
     let size = (0..=order).rev().fold(V::zero_(), |size, k| size * h + c[k].magnitude());
     let (mut fallen, mut time) = (0, h);
     let mut unclear = [runs; MAX_DEPTH];
@@ -130,7 +134,7 @@ fn in_halves<V: Values>(c: &Series<V>, order: usize, (runs, h): (u32, V)) -> (u3
     while depth > 0 {
         let [from, to] = [part, part + 1].map(|end| h * (end as f64 / (1_u64 << depth) as f64));
         let runs = unclear[depth - 1] & !fallen;
-        let (mut falls, mut at, still) = within(c, order, (runs, from, to), size * GUARD_RTOL);
+        let (mut falls, mut at, still) = within(c, order, runs, from, to, size * GUARD_RTOL);
         if still != 0 && depth < MAX_DEPTH {
             unclear[depth] = still;
             (part, depth) = (2 * part, depth + 1);
@@ -155,7 +159,7 @@ fn below_zero<V: Values>(c: &Series<V>, order: usize, t: V) -> u32 {
 
 /// Roots of polynomials that fall through zero once in their brackets: Newton kept inside them.
 #[inline(always)]
-fn root<V: Values>(c: &Series<V>, order: usize, (mut runs, mut from, mut to): (u32, V, V)) -> V {
+fn root<V: Values>(c: &Series<V>, order: usize, mut runs: u32, mut from: V, mut to: V) -> V {
     let mut t = (from + to) * 0.5;
     for _ in 0..100 {
         let value = evaluate(c, order, t);
@@ -200,7 +204,7 @@ mod tests {
     fn fall(coefficients: &[f64], h: f64) -> Option<f64> {
         let mut series = [0.0; TERMS];
         series[..coefficients.len()].copy_from_slice(coefficients);
-        let (fallen, time) = first_zero_crossing(&series, coefficients.len() - 1, (1, h));
+        let (fallen, time) = first_zero_crossing(&series, coefficients.len() - 1, 1, h);
         (fallen == 1).then_some(time)
     }
 
@@ -251,7 +255,7 @@ mod tests {
         ] {
             let falls = u32::from(fold % 2 == 1);
             let guard = std::array::from_fn(|k| Pack::<8>::of(c.get(k).copied().unwrap_or(0.0)));
-            let (fallen, time) = first_zero_crossing(&guard, 5, (255, Pack::of(1.0)));
+            let (fallen, time) = first_zero_crossing(&guard, 5, 255, Pack::of(1.0));
             assert_eq!(fallen, 255 * falls, "{fold}");
             let width = 2.0 * GUARD_RTOL.powf(1.0 / f64::from(fold));
             assert!(falls == 0 || (time.of_run(7) - 0.3).abs() < width, "{fold}: {time:?}");
@@ -272,10 +276,10 @@ mod tests {
     proptest! {
         #[test]
         fn runs_side_by_side_fall_as_each_alone(guards in guards(), runs in 0_u32..256, h in 0.1..4.0) {
-            let (fallen, time) = first_zero_crossing(&guards, 5, (runs, Pack::of(h)));
+            let (fallen, time) = first_zero_crossing(&guards, 5, runs, Pack::of(h));
             prop_assert_eq!(fallen & !runs, 0);
             for run in (0..8).filter(|run| runs >> run & 1 == 1) {
-                let (falls, at) = first_zero_crossing(&guards.map(|c| c.of_run(run)), 5, (1, h));
+                let (falls, at) = first_zero_crossing(&guards.map(|c| c.of_run(run)), 5, 1, h);
                 prop_assert_eq!(falls, fallen >> run & 1);
                 prop_assert!(falls == 0 || at.to_bits() == time.of_run(run).to_bits());
             }
@@ -286,7 +290,7 @@ mod tests {
             let guard = guards.map(|c| c.of_run(0));
             prop_assume!(guard[0] >= 0.0);
             let value = |t: f64| evaluate(&guard, 5, t);
-            let (falls, at) = first_zero_crossing(&guard, 5, (1, h));
+            let (falls, at) = first_zero_crossing(&guard, 5, 1, h);
             let until = if falls == 1 { at } else { h };
             for part in 1..100 {
                 prop_assert!(value(until * f64::from(part) / 100.0) > -1e-9);

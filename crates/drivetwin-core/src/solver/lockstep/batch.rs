@@ -22,7 +22,7 @@ use crate::solver::lockstep::fixed_step::FixedStepPass;
 use crate::solver::lockstep::lane::{LANES, LaneRun, LaneSink, LaneStatus, Lanes};
 use crate::solver::settings::Settings;
 
-/// Runs in one regime.
+/// Lanes in one hybrid state.
 struct LockstepBatch<'a> {
     state: HybridState<'a, Lanes>,
     propagators: PropagatorCache<Lanes>,
@@ -41,8 +41,10 @@ struct LockstepBatch<'a> {
 pub fn run_lockstep<'a>(
     cache: SolverCache<'a, Lanes>,
     inputs: &[&'a Inputs<f64>],
-    (settings, runs): (Settings, u32),
-    (x, locked): (Vec<Lanes>, &[usize]),
+    settings: Settings,
+    runs: u32,
+    x: Vec<Lanes>,
+    locked: &[usize],
     record: &mut impl LaneSink,
 ) -> Vec<Option<Vec<Event<f64>>>> {
     let events = vec![None; inputs.len()];
@@ -121,7 +123,7 @@ impl LockstepBatch<'_> {
         }
     }
 
-    /// Let an event within round-off of a knot happen there.
+    /// Move an event within round-off of a knot to the knot.
     fn move_to_knot(&mut self, run: usize) {
         let (lane, t) = (&mut self.lanes[run], &mut self.state.t.0[run]);
         if let LaneStatus::Event(cause) = lane.status
@@ -132,7 +134,7 @@ impl LockstepBatch<'_> {
         }
     }
 
-    /// Let runs decide together, by the inputs about their instants.
+    /// Decide for several lanes together, by the inputs at their instants.
     fn decide<E>(
         &mut self,
         runs: u32,
@@ -163,7 +165,7 @@ impl LockstepBatch<'_> {
         }
     }
 
-    /// See where a run stands now that it has got on.
+    /// Update the status of a lane after it has advanced.
     fn update_lane_status(&mut self, run: usize) {
         let (lane, t) = (&mut self.lanes[run], self.state.t.0[run]);
         let segments = lane.inputs.segments();
@@ -241,7 +243,7 @@ impl LockstepBatch<'_> {
         let accuracy = self.settings.accuracy(true);
         let ((h, events), diverged_mask) = together(runs, || {
             let h = self.state.expand(runs, (wish, accuracy));
-            (h, earliest_per_lane(&self.state, (runs, h)))
+            (h, earliest_per_lane(&self.state, runs, h))
         });
         let mut lengths = h;
         for run in lanes_in(runs) {
@@ -289,7 +291,7 @@ impl LockstepBatch<'_> {
         let end = lane.inputs.span(lane.segment).1;
         *t = if whole && event.is_none() { end } else { *t + length };
         let finite = self.state.x.iter().all(|x| x.0[run].is_finite());
-        let advances = lane.progress.note((*t, length), event.is_some()).is_ok();
+        let advances = lane.progress.note(*t, length, event.is_some()).is_ok();
         let lost = underflows(h, end) && !whole;
         if lost || !finite || !advances || lane.progress.is_stalled() {
             lane.status = LaneStatus::Diverged;

@@ -116,7 +116,7 @@ impl<R: LaneSink, const N: usize, const A: usize> PassKernel<'_, '_, '_, R, N, A
             if fallen != 0 {
                 for run in lanes_in(fallen) {
                     let x = |i: usize| trail.states(i)[stretch.count].0[run];
-                    leave(state, &mut lanes[run], run, (segment, x));
+                    leave(state, &mut lanes[run], run, segment, x);
                     lanes[run].status = LaneStatus::NeedsTaylorStep;
                 }
                 // Those that have not fallen have passed the sample in which others did.
@@ -126,7 +126,7 @@ impl<R: LaneSink, const N: usize, const A: usize> PassKernel<'_, '_, '_, R, N, A
             }
         }
         for run in lanes_in(active_mask) {
-            leave(state, &mut lanes[run], run, (segment, |i: usize| front.x[i].0[run]));
+            leave(state, &mut lanes[run], run, segment, |i: usize| front.x[i].0[run]);
         }
         if segment == last {
             stretch.add(1, active_mask);
@@ -145,7 +145,7 @@ struct LaneState<const N: usize, const A: usize> {
 }
 
 impl<const N: usize, const A: usize> LaneState<N, A> {
-    /// Take runs in, as bits, with their states.
+    /// Add lanes (mask) with their states.
     #[inline(always)]
     fn join<const F: bool, U: Factor<Lanes, Values: Factor<Lanes>>>(
         &mut self,
@@ -167,12 +167,13 @@ impl<const N: usize, const A: usize> LaneState<N, A> {
     }
 }
 
-/// Let a run go with its state at the start of a segment.
+/// Write the state of a lane at the start of a segment back.
 fn leave(
     state: &mut HybridState<'_, Lanes>,
     lane: &mut LaneRun<'_>,
     run: usize,
-    (segment, x): (usize, impl Fn(usize) -> f64),
+    segment: usize,
+    x: impl Fn(usize) -> f64,
 ) {
     for (i, to) in state.x.iter_mut().enumerate() {
         to.0[run] = x(i);

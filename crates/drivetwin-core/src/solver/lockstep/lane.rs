@@ -9,13 +9,13 @@ use crate::solver::hybrid::state::HybridState;
 use crate::solver::inputs::Inputs;
 use crate::solver::lane_mask::lanes_in;
 
-/// Runs in a formation: two vectors of the narrower sets, one of the widest.
+/// Lanes of a batch: two vectors of the narrower instruction sets, one of the widest.
 pub const LANES: usize = 8;
 
-/// A number of every run of a formation.
+/// A number of every lane of a batch.
 pub type Lanes = Pack<LANES>;
 
-/// Takes what the runs of a formation come by.
+/// Consumer of the samples of a lockstep batch.
 pub trait LaneSink {
     /// A stretch of samples that were passed in one mode with the channels `active`.
     fn write_block(
@@ -35,12 +35,12 @@ pub trait LaneSink {
     );
 }
 
-/// Where a run stands.
+/// Status of a lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum LaneStatus {
     /// At the start of its segment, to pass samples.
     AtSample,
-    /// In need of an expansion.
+    /// A Taylor step comes next.
     NeedsTaylorStep,
     /// At an event.
     Event(EventCause),
@@ -48,12 +48,12 @@ pub(crate) enum LaneStatus {
     AtInputJump,
     /// At the end of the inputs.
     Finished,
-    /// On its own from here on.
+    /// Diverged from the batch; runs again alone or in another batch.
     Diverged,
 }
 
 impl LaneStatus {
-    /// Whether the run is still on its way.
+    /// Return true while the lane has not finished or diverged.
     pub(crate) fn is_open(self) -> bool {
         !matches!(self, Self::Finished | Self::Diverged)
     }
@@ -66,7 +66,7 @@ pub(crate) struct LaneRun<'a> {
     pub inputs: &'a Inputs<f64>,
     /// Segment in which it stands; their number at the end.
     pub segment: usize,
-    /// Where there.
+    /// Status there.
     pub status: LaneStatus,
     pub progress: StallDetector,
 }
@@ -75,9 +75,9 @@ pub(crate) struct LaneRun<'a> {
 pub struct SampleBlock {
     /// Number of the first.
     pub first: usize,
-    /// How many.
+    /// Number of samples.
     pub count: usize,
-    /// Of these those at which each run stood: from one to before another.
+    /// Range of these samples for each lane: first, end.
     pub spans: [(usize, usize); LANES],
 }
 
