@@ -66,33 +66,19 @@ fn kernels(criterion: &mut Criterion) {
         .map(|(n, v)| (n, &time[..], &v[..], 0.0));
     let names = ["eta", "J1", "k_o", "B3.P0", "B3.mu_c", "B3.mu_s", "start.twist", "delay.B3"];
     criterion.bench_function("8 derivatives", |b| {
-        let settings = (Settings::default(), &names[..]);
+        let (settings, time) = (Settings::default(), &time);
         b.iter(|| {
-            dual_clutch_sensitivities(
-                &model,
-                &sampled,
-                &begin,
-                black_box(&time),
-                settings.0,
-                settings.1,
-            )
+            let time = black_box(time);
+            dual_clutch_sensitivities(&model, &sampled, &begin, time, settings, &names)
         });
     });
     let scenarios = [(plan.clone(), begin.clone())];
     let sets: Vec<f64> = (0..64).map(|i| 0.80 + 0.001 * f64::from(i)).collect();
     criterion.bench_function("64 runs, one thread", |b| {
-        let sets = (&["eta"][..], &sets[..]);
-        let (how, mut ends) = ((Keep::Last, 1), vec![0.0; sets.1.len()]);
+        let mut ends = vec![0.0; sets.len()];
         b.iter(|| {
-            dual_clutch_batch(
-                &model,
-                black_box(&scenarios),
-                sets.0,
-                sets.1,
-                how.0,
-                how.1,
-                &mut ends,
-            )
+            let scenarios = black_box(&scenarios);
+            dual_clutch_batch(&model, scenarios, &["eta"], &sets, Keep::Last, 1, &mut ends)
         });
     });
 }

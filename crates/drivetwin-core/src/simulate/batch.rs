@@ -248,7 +248,7 @@ impl Work<'_> {
         }
         let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &self.plan(run).inputs).collect();
         let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
-        let (known, how) = (SolverCache::new(&network), (plan.settings, alike & !parting));
+        let (cache, mask) = (SolverCache::new(&network), alike & !parting);
         let (points, count) = self.keep.recorded(points, plan.grid.len());
         let columns = plan.targets.len() * count;
         let mut spare = Vec::new();
@@ -260,7 +260,7 @@ impl Work<'_> {
         };
         let shared = (all, (&*points, count));
         let mut recorder = abreast::Recorder::new(&network, &plan.targets, shared, values);
-        let events = run_lockstep(known, &inputs, how.0, how.1, x, &locked, &mut recorder);
+        let events = run_lockstep(cache, &inputs, plan.settings, mask, x, &locked, &mut recorder);
         for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
             let Some(events) = events else { continue };
             if !spare.is_empty() {

@@ -41,6 +41,17 @@ pub fn simulate_dual_clutch<T: Real>(
     Ok(plan.run(&network, &start.state(&network)?))
 }
 
+/// [`simulate_dual_clutch`] over plain numbers, compiled once for all callers.
+pub fn run_dual_clutch(
+    model: &DualClutch<f64>,
+    signals: &[(&str, Signal<'_, f64>)],
+    start: &DualClutchStart<f64>,
+    grid: &[f64],
+    options: (Settings, bool),
+) -> Result<DualClutchRun<f64>, SimulateError> {
+    simulate_dual_clutch(model, signals, start, grid, options)
+}
+
 /// The usual outputs, see [`DualClutchRun`].
 pub fn dual_clutch_outputs<T>(model: &DualClutch<T>) -> Vec<Output> {
     let mut outputs = vec![

@@ -147,6 +147,18 @@ pub fn run<T: Real>(
     Ok(plan.run(network, &start.state(network)?))
 }
 
+/// [`run`] over plain numbers, compiled once for all callers.
+pub fn run_network(
+    network: &Network<f64>,
+    signals: &[(&str, Signal<'_, f64>)],
+    start: &Start<f64>,
+    grid: &[f64],
+    outputs: &[Output],
+    options: (Settings, bool),
+) -> Result<Trajectory<f64>, SimulateError> {
+    run(network, signals, start, grid, outputs, options)
+}
+
 /// `ρ(A) h` to which too long segments are divided: a cubic then leaves a few 1e-3 N·m.
 const FINE: f64 = 0.4;
 /// Most parts of a segment.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-//! Stick-slip decision (THEORY section 1): the box-constrained programme over all friction elements
-//! at
-//! zero slip, together with the states of lossy gears.
+//! Stick-slip decision (THEORY section 1): the box-constrained programme over all friction
+//! elements at zero slip, together with the states of lossy gears.
 
 use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows};
@@ -54,14 +53,9 @@ impl<T: Number> HybridState<'_, T> {
                     || self.rank(&candidates) == candidates.len()
                     || !self.enumerate_active_sets(&candidates, Some(moving))
                 {
-                    let found = (trial, mode, basis);
-                    let (trial, mode) = self.restick_if_feasible(
-                        found.0,
-                        found.1,
-                        found.2,
-                        &candidates,
-                        overloaded.is_some(),
-                    );
+                    let after = overloaded.is_some();
+                    let (trial, mode) =
+                        self.restick_if_feasible(trial, mode, basis, &candidates, after);
                     self.adopt(trial, &candidates, mode);
                 }
                 return Ok(());

@@ -84,11 +84,7 @@ impl<R: LaneSink, const N: usize, const A: usize> PassKernel<'_, '_, '_, R, N, A
         };
         let mut trail = SampleBuffer::in_columns(std::mem::take(columns), A);
         let mut stretch = SampleBlock::new(segment);
-        let mut front = LaneState {
-            x: [Lanes::zero_(); N],
-            carry: [ChannelState::idle(); A],
-            guards: inactive_guards(),
-        };
+        let mut front = LaneState::idle();
         let (mut active_mask, mut room) = (0, room());
         while segment < end {
             let joining_mask = pending_mask & lanes_at_segment(&segments_of_lanes, segment);
@@ -137,7 +133,7 @@ impl<R: LaneSink, const N: usize, const A: usize> PassKernel<'_, '_, '_, R, N, A
     }
 }
 
-/// States, channels and guards of the runs abreast.
+/// States, channels and guards of the active lanes.
 struct LaneState<const N: usize, const A: usize> {
     x: [Lanes; N],
     carry: [ChannelState<Lanes>; A],
@@ -145,6 +141,12 @@ struct LaneState<const N: usize, const A: usize> {
 }
 
 impl<const N: usize, const A: usize> LaneState<N, A> {
+    /// Create the state before any lane has joined.
+    #[inline(always)]
+    fn idle() -> Self {
+        Self { x: [Lanes::zero_(); N], carry: [ChannelState::idle(); A], guards: inactive_guards() }
+    }
+
     /// Add lanes (mask) with their states.
     #[inline(always)]
     fn join<const F: bool, U: Factor<Lanes, Values: Factor<Lanes>>>(
