@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.driveline import Accuracy, Signal, simulate
 from drivetwin.export.c.write import write_c
 from drivetwin.export.compiler import native_compiler
+from drivetwin.simulation.dual_clutch import Accuracy, Signal, simulate
 from tests.export.cases import CASES, Case
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -28,7 +28,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before NumPy reads it: one core is m
 
 import numpy as np
 
-from drivetwin.logs.formats import open_recording
+from drivetwin.logs.formats.detect import open_recording
 
 CHANNELS, BLOCK, STEP = 58, 200_000, 1e-3
 RECORD = 8 + 4 * CHANNELS
@@ -67,10 +67,10 @@ def measure_identify(_argument: str) -> Iterator[Figure]:
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.scenarios import throttle_steps
-    from drivetwin.identify.method import Method
-    from drivetwin.identify.pipeline import identify
+    from drivetwin.estimation.identify import identify
+    from drivetwin.estimation.result.method import Method
     from drivetwin.logs.read import read_log
-    from drivetwin.shifts.find import find_shifts
+    from drivetwin.shifts.detect import find_shifts
     from drivetwin.vehicle.card import load_card
 
     with tempfile.TemporaryDirectory() as folder:
@@ -92,12 +92,12 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
     from dash import Patch
     from plotly.io.json import to_json_plotly
 
-    from drivetwin.app.folder import Folder
-    from drivetwin.app.session import Sessions
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.scenarios import paper_steps
-    from drivetwin.identify.method import Method
+    from drivetwin.estimation.result.method import Method
+    from drivetwin.workbench.session import Sessions
+    from drivetwin.workbench.workspace_folder import Folder
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -18,14 +18,14 @@ from pathlib import Path
 import numpy as np
 
 import drivetwin
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.observe import observed
-from drivetwin.shifts.find import find_shifts
-from drivetwin.twin import Twin
+from drivetwin.shifts.detect import find_shifts
+from drivetwin.twin.twin import Twin
 
 ROUNDS = 12
 ONSET = 0.4

@@ -21,17 +21,18 @@ import numpy as np
 
 import drivetwin
 from drivetwin.cli.synth import write_run
-from drivetwin.driveline import RoadLoad
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.held_out import Outcome
-from drivetwin.identify.result import Identification
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.validation import Outcome
 from drivetwin.parameters import log_of
-from drivetwin.shifts.usable import usable_shifts
-from drivetwin.together import Source, Together, identify_together
-from drivetwin.vehicle.spec import PriorValue, VehicleCard
+from drivetwin.shifts.detect import usable_shifts
+from drivetwin.simulation.dual_clutch import RoadLoad
+from drivetwin.validation.multi_log import Source, Together, identify_together
+from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
 COUNT = 40
 LEVEL, LOAD = 0.85, 2000.0

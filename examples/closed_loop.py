@@ -15,10 +15,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.driveline import DualClutch, FloatArray, Signal, State, Stribeck, simulate
 from drivetwin.dyno.scenarios import paper
 from drivetwin.export.c.loaded import CModel, CObserver, Estimates
 from drivetwin.export.subject import Subject, steady_start
+from drivetwin.simulation.dual_clutch import (
+    DualClutch,
+    FloatArray,
+    Signal,
+    State,
+    Stribeck,
+    simulate,
+)
 
 TASK = 0.010
 """Period of the controller [s]."""

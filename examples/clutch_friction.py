@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from drivetwin import network
-from drivetwin.driveline import (
+from drivetwin.simulation import network
+from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FrictionTable,
     RoadLoad,

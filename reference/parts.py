@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivetwin.driveline import Signal
-from drivetwin.network import Element
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import Element
 
 
 def inertia(node: str, value: float) -> Element:

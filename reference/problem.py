@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a reference problem states for `drivetwin.network.simulate`, and its run."""
+"""What a reference problem states for `drivetwin.simulation.network.simulate`, and its run."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.driveline import Event, FloatArray, Signal
-from drivetwin.network import Element, NetworkRun, Output, Sine, Start, simulate
+from drivetwin.simulation.dual_clutch import Event, FloatArray, Signal
+from drivetwin.simulation.network import Element, NetworkRun, Output, Sine, Start, simulate
 
 ROOT = Path(__file__).resolve().parent
 

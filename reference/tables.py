@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Column = tuple[str, str]
-"""Kind of output and name of its node or element, as in `drivetwin.network`."""
+"""Kind of output and name of its node or element, as in `drivetwin.simulation.network`."""
 
 
 class Change(NamedTuple):

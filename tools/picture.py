@@ -15,11 +15,11 @@ from pathlib import Path
 
 from plotly.io import to_html
 
-from drivetwin.cli.pipeline import Outcome, run
+from drivetwin.cli.identify_run import Outcome, run
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.identify.method import DEFAULT_METHOD
+from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.report.figures.validation import validation_figure
 from drivetwin.report.html import save_report
 

@@ -19,7 +19,7 @@ from benchmarks.estimation.report import (
 from benchmarks.estimation.starts import count_outcomes
 from benchmarks.estimation.study import run_study
 from benchmarks.estimation.unseen import identify_unseen
-from drivetwin.atomic import write_text
+from drivetwin._util.atomic import write_text
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from tests.support.bench import Knowledge

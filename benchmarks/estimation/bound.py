@@ -12,12 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.driveline import Signal
-from drivetwin.identify.likelihood.problem import Part
-from drivetwin.identify.likelihood.record import IndexArray
-from drivetwin.identify.optimize.objective import Point
-from drivetwin.identify.regression import Prior
-from drivetwin.identify.signals import FloatArray
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.data.shift_record import IndexArray
+from drivetwin.estimation.likelihood.objective import Part
+from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.simulation.dual_clutch import Signal
 from tests.support.bench import Bench
 
 STEPS = {"engine torque": 1.0}

@@ -16,8 +16,8 @@ import numpy as np
 from benchmarks.estimation.study import START_INERTIA, fit_likelihood, read_fit
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import gearbox, throttle_steps
-from drivetwin.identify.inputs import disturbed
-from drivetwin.identify.integral import identify_shift
+from drivetwin.estimation.linear.multi_shift import disturbed
+from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.support.bench import Bench, Knowledge, record_bench
 

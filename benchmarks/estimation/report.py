@@ -12,7 +12,7 @@ from benchmarks.estimation.mismatch import SHOWN, Shift
 from benchmarks.estimation.starts import OFF, Outcome
 from benchmarks.estimation.study import Sample, Study
 from benchmarks.estimation.unseen import HALF, Log, collect
-from drivetwin.identify.signals import FloatArray
+from drivetwin._util.arrays import FloatArray
 
 HEAD = """# Accuracy of the estimators
 

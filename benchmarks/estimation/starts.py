@@ -14,8 +14,8 @@ from benchmarks.estimation.study import build_guess, read_fit
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.variants import choose
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.selection.select_model import choose
 from tests.support.bench import Bench, Knowledge, record_bench
 
 OFF = 0.4

@@ -11,20 +11,21 @@ from functools import partial
 import numpy as np
 
 from benchmarks.estimation.bound import compute_bound
-from drivetwin.driveline import Stribeck
+from drivetwin._util.arrays import FloatArray
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.friction import stribeck
-from drivetwin.identify.integral import IntegralShift, identify_shift
-from drivetwin.identify.likelihood.derived import parameters, slopes
-from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.guess import guess_of
-from drivetwin.identify.likelihood.priors import problem_of
-from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import LAW
-from drivetwin.identify.likelihood.variants import choose
-from drivetwin.identify.optimize.objective import Point
-from drivetwin.identify.signals import FloatArray, ShiftSignals
+from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.objective import Problem
+from drivetwin.estimation.likelihood.optimize.initial_guess import guess_of
+from drivetwin.estimation.likelihood.parametrization import LAW
+from drivetwin.estimation.likelihood.priors import problem_of
+from drivetwin.estimation.likelihood.selection.select_model import choose
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import parameters, slopes
+from drivetwin.estimation.linear.friction_points import stribeck
+from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
+from drivetwin.estimation.optimize.objective import Point
+from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PriorValue
 from tests.support.bench import Bench, Knowledge, record_bench
 

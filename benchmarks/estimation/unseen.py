@@ -14,24 +14,27 @@ import numpy as np
 from benchmarks.estimation.bound import compute_bound
 from benchmarks.estimation.study import build_guess, build_point, propagate
 from benchmarks.estimation.vehicles import add_tolerances, draw_errors, draw_vehicle
+from drivetwin._util.arrays import FloatArray
 from drivetwin.cli.synth import write_run
-from drivetwin.driveline import DualClutch, Stribeck
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.errors import DrivetwinError
-from drivetwin.identify.likelihood.kinds import SPEEDS
-from drivetwin.identify.likelihood.priors import spans
-from drivetwin.identify.likelihood.problem import Part
-from drivetwin.identify.likelihood.record import TORQUE, record_of
-from drivetwin.identify.likelihood.unknowns import AERO, LAW, TE_OFFSET
-from drivetwin.identify.method import DEFAULT_METHOD
-from drivetwin.identify.optimize.objective import Point
-from drivetwin.identify.pipeline import identify
-from drivetwin.identify.profile import likelihood_of
-from drivetwin.identify.result import FrictionCurve, Identification
-from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals
-from drivetwin.identify.uncertainty import DELAY_IDENTIFIED
+from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identify import identify
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, record_of
+from drivetwin.estimation.likelihood.objective import Part
+from drivetwin.estimation.likelihood.parametrization import LAW, TE_OFFSET
+from drivetwin.estimation.likelihood.priors import spans
+from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS
+from drivetwin.estimation.linear.load_balance import AERO
+from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.result.estimate import FrictionCurve
+from drivetwin.estimation.result.method import DEFAULT_METHOD
+from drivetwin.estimation.result.verdict import DELAY_IDENTIFIED
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.find import find_shifts
+from drivetwin.shifts.detect import find_shifts
+from drivetwin.simulation.dual_clutch import DualClutch, Stribeck
 from drivetwin.vehicle.card import load_card
 from tests.support.bench import Bench
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import tomlkit
 
-from drivetwin.driveline import DualClutch, RoadLoad, ShiftElement, Stribeck
+from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import Actuator, Program, Vibration
 from drivetwin.dyno.files import card_text
 from drivetwin.dyno.scenario import HeldGear, Scenario
 from drivetwin.dyno.sensors import Sensor
-from drivetwin.logs.shiftlog import Quantity
-from drivetwin.logs.units import BAR
+from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck
 
 GEARS = (HeldGear("2", "B2"), HeldGear("3", "B3"))
 SHIFT, FILL, MAIN = 3.5, 0.2, 1.5e6

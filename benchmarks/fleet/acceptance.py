@@ -17,15 +17,15 @@ from pathlib import Path
 from time import perf_counter
 
 from drivetwin.cli.fleet_view import watching
+from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.events import Event, Settled
-from drivetwin.fleet.joint.estimate import joint_estimates
-from drivetwin.fleet.joint.result import Interval, JointEstimate
+from drivetwin.fleet.mixed_model.estimate import joint_estimates
+from drivetwin.fleet.mixed_model.result import Interval, JointEstimate
 from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.run import FleetRun, run_fleet
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import State
-from drivetwin.identify.method import Method
 from tests.support.synthetic_fleet import (
     ELEMENT,
     ODOMETER,

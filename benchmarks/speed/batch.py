@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.speed import c_peer, shift
-from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
-from drivetwin.driveline import ENGINE_TORQUE, FloatArray
+from drivetwin.simulation.batch import Batch, Keep, Scenario, simulate_batch
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray
 from tests.support.upshift.scenario import build_model, build_signals, build_state
 from tests.support.upshift.statement import BAR, Inputs, Problem, make_inputs, make_problem, start
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.speed.measure import Entry, Judge, Sample
-from drivetwin.driveline import FloatArray
+from drivetwin.simulation.dual_clutch import FloatArray
 from tests.support.upshift.statement import BAR, SAMPLES, STEP, Inputs, Problem, Solution, start
 
 SOURCE = Path(__file__).resolve().parents[3] / "shared" / "peers" / "shift.c"

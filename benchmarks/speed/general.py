@@ -11,13 +11,13 @@ import numpy as np
 from benchmarks.speed.core import Example
 from benchmarks.speed.measure import Entry, Group, Judge, Quality
 from benchmarks.speed.shift import PROGRAM
-from drivetwin.driveline import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.export.modelica.dual_clutch import network_of, network_start
 from drivetwin.gearbox import load_gearbox
 from drivetwin.gearbox import reduce as reduce_shift
 from drivetwin.gearbox.compare import SHAFT, WHEEL, dual_clutch_form, whole_gearbox
 from drivetwin.gearbox.maneuver import plan, signals, time_grid
-from drivetwin.network import Element, Output, Start, simulate
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, FloatArray, Signal
+from drivetwin.simulation.network import Element, Output, Start, simulate
 from reference import tables
 from reference.problem import ROOT, load
 from tests.support.upshift.scenario import OUTPUTS, Scenario

@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.speed.core import Example
 from benchmarks.speed.measure import Entry, Group, Judge, Quality, time_runs
-from drivetwin.driveline import (
+from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     Sensitivities,
     Trajectory,
@@ -15,12 +15,7 @@ from drivetwin.driveline import (
     simulate,
 )
 from tests.support.upshift.equations import Equations
-from tests.support.upshift.scenario import (
-    build_model,
-    build_scenario,
-    build_signals,
-    build_state,
-)
+from tests.support.upshift.scenario import build_model, build_scenario, build_signals, build_state
 from tests.support.upshift.scipy_solution import Method, solve
 from tests.support.upshift.statement import Inputs, Problem, Solution
 

@@ -8,8 +8,8 @@
 # %%
 import drivetwin
 from drivetwin.cli import main
-from drivetwin.report.candidates import Candidate, agreements
 from drivetwin.report.comparison import save_comparison, trials_of
+from drivetwin.report.find_reports import Candidate, agreements
 
 results, twins, logs = {}, {}, {}
 for name, seed in (("monday", "1"), ("tuesday", "2")):

@@ -24,18 +24,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from drivetwin.driveline import DualClutch, simulate
     from drivetwin.errors import DrivetwinError
-    from drivetwin.identify.experiment.suggest import examined
-    from drivetwin.identify.method import Method
-    from drivetwin.identify.pipeline import identify as identify_shifts
+    from drivetwin.estimation.analysis.experiment_design import examined
+    from drivetwin.estimation.identify import identify as identify_shifts
+    from drivetwin.estimation.result.method import Method
+    from drivetwin.files.result_file import save_result
     from drivetwin.logs.read import read_log
     from drivetwin.report.html import save_report
-    from drivetwin.results.result_file import save_result
-    from drivetwin.shifts.find import find_shifts
-    from drivetwin.twin import Twin
-    from drivetwin.validate import validate as validate_shift
-    from drivetwin.validate import validated
+    from drivetwin.shifts.detect import find_shifts
+    from drivetwin.simulation.dual_clutch import DualClutch, simulate
+    from drivetwin.twin.twin import Twin
+    from drivetwin.validation.simulate_log import validate as validate_shift
+    from drivetwin.validation.simulate_log import validated
     from drivetwin.vehicle.card import load_card
 
 _HOME = {

@@ -6,8 +6,8 @@ from __future__ import annotations
 import os
 import sys
 
-INTERRUPTED = 130
-"""Exit code of a program that Ctrl-C stopped."""
+from drivetwin.errors import INTERRUPTED
+
 LINEAR_ALGEBRA = ("OPENBLAS", "OMP", "MKL", "VECLIB")
 """Libraries below NumPy that would start threads. With one each, unless the environment says
 otherwise, results do not depend on the number of processors. The matrices are narrow: more threads

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+INTERRUPTED = 130
+"""Exit code of a program that Ctrl-C stopped."""
+
 
 @dataclass(frozen=True)
 class Where:

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from drivetwin.network import Start
+from drivetwin.simulation.network import Start
 from reference.parts import inertia, spring
 from reference.problem import Phase, Problem
 

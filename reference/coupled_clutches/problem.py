@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray
-from drivetwin.network import Output, Sine, Start
+from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.network import Output, Sine, Start
 from reference.parts import clutch, inertia, step, torque
 from reference.problem import Phase, Problem
 

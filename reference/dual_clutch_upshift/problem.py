@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.network import Element, Output, Start
+from drivetwin.simulation.network import Element, Output, Start
 from reference.parts import inertia, line, spring, torque
 from reference.problem import Phase, Problem
 

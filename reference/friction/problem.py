@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from drivetwin.network import Sine, Start
+from drivetwin.simulation.network import Sine, Start
 from reference.parts import clutch, constant, inertia, spring, torque
 from reference.problem import Phase, Problem
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin.network import Element
+from drivetwin.simulation.network import Element
 from reference.lossy_gear.problem import PROBLEM as WITHOUT_BEARING
 
 BEARING: Element = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.network import Sine, Start
+from drivetwin.simulation.network import Sine, Start
 from reference.parts import inertia, line, torque
 from reference.problem import Phase, Problem
 

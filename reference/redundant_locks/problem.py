@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.network import Start
+from drivetwin.simulation.network import Start
 from reference.parts import clutch, constant, inertia, line, torque
 from reference.problem import Phase, Problem
 

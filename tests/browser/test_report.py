@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from drivetwin.cli.pipeline import run
+from drivetwin.cli.identify_run import run
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.identify.method import DEFAULT_METHOD
-from drivetwin.report.candidates import Candidate
+from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.report.comparison import save_comparison, trials_of
+from drivetwin.report.find_reports import Candidate
 from drivetwin.report.html import save_report
-from drivetwin.validate import with_fit
+from drivetwin.validation.simulate_log import with_fit
 from tests.browser.watch import grave_findings
 from tests.report.sample import identification, log, validation
 

@@ -20,8 +20,8 @@ from playwright.sync_api import Browser, BrowserContext, FloatRect, Locator, Pag
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenarios import paper_steps
-from tests.app.bad_files import bad_files
 from tests.browser.watch import Watch, grave_findings
+from tests.workbench.bad_files import bad_files
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 

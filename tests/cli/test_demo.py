@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.identify.method import DEFAULT_METHOD
+from drivetwin.estimation.result.method import DEFAULT_METHOD
 
 
 def test_demo_compares_both_methods_with_the_truth(

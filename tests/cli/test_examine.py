@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.twin import Twin
+from drivetwin.twin.twin import Twin
 from tests.cli.conftest import Files
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.fleet.joint.observed import facts
+from drivetwin.fleet.mixed_model.observations import facts
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
 from tests.support.synthetic_fleet import make_fleet

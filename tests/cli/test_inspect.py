@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
+from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.channels.read_options import TimeColumn
 from drivetwin.cli import main
-from drivetwin.logs.csv import read_csv
-from drivetwin.logs.profile import read_mapping
-from drivetwin.logs.raw import RawLog, TimeColumn
+from drivetwin.logs.formats.csv import read_csv
+from drivetwin.logs.raw import RawLog
 from tests.cli.conftest import Files
 
 
@@ -42,7 +43,7 @@ def test_a_file_is_parsed_once(
         parsed.append(file)
         return read_csv(data, file, time)
 
-    monkeypatch.setattr("drivetwin.logs.formats.read_csv", counted)
+    monkeypatch.setattr("drivetwin.logs.formats.detect.read_csv", counted)
     _inspect(capsys, str(bench_files.log), "--vehicle", str(bench_files.card))
     assert parsed == [str(bench_files.log)]
 

@@ -12,12 +12,13 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.cli.observe import observed_channels
 from drivetwin.errors import DamagedChannelError
-from drivetwin.logs.formats import open_recording
+from drivetwin.logs.formats.detect import open_recording
+from drivetwin.observer.kind import Observer
 from drivetwin.observer.observe import observed
-from drivetwin.observer.observed import Band, Observation, Observer
-from drivetwin.shifts.find import FoundShifts
+from drivetwin.observer.result import Band, Observation
+from drivetwin.shifts.detect import FoundShifts
 from tests.observer.conftest import Bench, bench
-from tests.shifts.test_divided import CHAIN
+from tests.shifts.test_split_gears import CHAIN
 
 __all__ = ["bench"]
 
@@ -74,7 +75,7 @@ def test_a_shift_with_a_gap_is_left_out_and_told(
 
     monkeypatch.setattr("drivetwin.observer.observe.observed", told)
     monkeypatch.setattr(
-        "drivetwin.shifts.usable.usable_shifts", lambda *_: FoundShifts(tuple(shifts), ())
+        "drivetwin.shifts.detect.usable_shifts", lambda *_: FoundShifts(tuple(shifts), ())
     )
     command = ["observe", *map(str, bench.files), "--json"]
     assert main(command) == 0

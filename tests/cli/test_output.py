@@ -12,9 +12,9 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
+from drivetwin._util.progress import tell
 from drivetwin.cli import main
 from drivetwin.cli.output import say, show, step, table_of
-from drivetwin.progress import tell
 from tests.cli.conftest import Files
 
 COMMANDS = ("inspect", "shifts")

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.results.result_file import save_result
-from drivetwin.twin import Twin
-from drivetwin.validate import with_fit
+from drivetwin.files.result_file import save_result
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import with_fit
 from tests.cli.conftest import Files
 from tests.report.sample import card, identification, validation
 

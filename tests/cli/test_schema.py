@@ -8,7 +8,7 @@ import json
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.schemas import FileKind, json_schema
+from drivetwin.files.schemas import FileKind, json_schema
 
 
 def test_without_a_kind_it_lists_them(capsys: pytest.CaptureFixture[str]) -> None:

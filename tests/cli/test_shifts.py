@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.identify.result import Z95
+from drivetwin.estimation.result.estimate import Z95
 from tests.cli.conftest import Files
 
 

@@ -11,11 +11,12 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.cli.simulate import traces_text
+from drivetwin.estimation.result.validation import Validation
 from drivetwin.logs.read import read_raw
 from drivetwin.shifts.shift import Shift
-from drivetwin.validate import Validation, validate
+from drivetwin.validation.simulate_log import validate
 from tests.observer.conftest import Bench, bench
-from tests.shifts.test_divided import CHAIN
+from tests.shifts.test_split_gears import CHAIN
 
 __all__ = ["bench"]
 

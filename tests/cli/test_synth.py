@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.find import find_shifts
+from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 
 

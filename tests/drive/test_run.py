@@ -28,9 +28,9 @@ from drivetwin.drive.shift import ShiftKind
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, gear_statics, load_gearbox
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.find import find_shifts
+from drivetwin.shifts.detect import find_shifts
 from tests.drive.bus import REFERENCE, candump
-from tests.shifts.made import make_card
+from tests.shifts.fixtures import make_card
 
 
 def test_energy_of_a_launch_to_the_highest_gear_closes(gearbox: Gearbox, truck: Powertrain) -> None:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from drivetwin.cli.synth import write_run
-from drivetwin.driveline import Signal, simulate
 from drivetwin.dyno.converter_scenario import open_converter
 from drivetwin.dyno.dyno import run
+from drivetwin.simulation.dual_clutch import Signal, simulate
 from drivetwin.vehicle.card import load_card
 
 

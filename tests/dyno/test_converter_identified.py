@@ -10,10 +10,10 @@ import pytest
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.converter_scenario import open_converter
 from drivetwin.dyno.dyno import run
-from drivetwin.identify.inputs import driveline_behind
-from drivetwin.identify.pipeline import MAP_EXACT, identify
+from drivetwin.estimation.data.prepare import driveline_behind
+from drivetwin.estimation.identify import MAP_EXACT, identify
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.find import find_shifts
+from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 
 KINDS = "samples are means"

@@ -12,11 +12,11 @@ from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.files import card_text, log_text
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import scenario_of
-from drivetwin.identify.method import Method
-from drivetwin.identify.pipeline import identify
-from drivetwin.identify.result import Identification
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identify import identify
+from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.find import find_shifts
+from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 
 SLIPS = np.array([10.0, 30.0, 50.0])

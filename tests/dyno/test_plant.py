@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin import driveline
-from drivetwin.driveline import FloatArray, Signal, Trajectory
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.plant import Surroundings, form_of, plant_of
@@ -17,6 +15,8 @@ from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import scenario_of
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox import gear_statics, load_gearbox, reduce
+from drivetwin.simulation import dual_clutch
+from drivetwin.simulation.dual_clutch import FloatArray, Signal, Trajectory
 
 
 def both(scenario: Scenario) -> tuple[Trajectory, Trajectory]:
@@ -93,5 +93,5 @@ def test_a_form_is_a_driveline_that_runs() -> None:
     held = {name: Signal(time, np.full(21, 1e6)) for name in ("C4", "C3")}
     held["C3"] = Signal(time, np.zeros(21))
     torque = Signal(time, np.full(21, 1545.0))
-    result = driveline.simulate(scenario.model, torque, held, scenario.start(), time)
+    result = dual_clutch.simulate(scenario.model, torque, held, scenario.start(), time)
     assert result.status == "completed"

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.sensors import Sensor
-from drivetwin.logs.shiftlog import Quantity
 
 
 def _sensor(rate: float = 100.0, noise: float = 3.0, resolution: float = 0.0) -> Sensor:

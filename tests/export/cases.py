@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.driveline import (
+from drivetwin.export.subject import Subject, steady_start
+from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
     RoadLoad,
@@ -21,7 +22,6 @@ from drivetwin.driveline import (
     State,
     Stribeck,
 )
-from drivetwin.export.subject import Subject, steady_start
 from reference.dual_clutch_upshift.problem import DAMPING, FINAL_DRIVE, START, STIFFNESS, WET
 from reference.problem import ROOT, load
 from reference.tables import read

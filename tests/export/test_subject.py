@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.driveline import RoadLoad
 from drivetwin.errors import InputError
+from drivetwin.export.fixed_step import InputKind, stepped_run
 from drivetwin.export.subject import steady_start, subject_of
-from drivetwin.stepped import stepped_run
-from drivetwin.stepping import InputKind
+from drivetwin.simulation.dual_clutch import RoadLoad
 from tests.export.cases import paper_model
 from tests.export.parameters.sample import twin
 

@@ -17,9 +17,9 @@ from pathlib import Path
 import pytest
 
 from drivetwin.errors import SchedulerError
+from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.cluster import DaskPool
 from drivetwin.fleet.task import Recipe, Task, WorkerSpec
-from drivetwin.identify.method import Method
 from tests.fleet.test_coordinator_faults import COUNT, takes_long, undisturbed
 from tests.fleet.toys import ROOT, contents, make_logs
 

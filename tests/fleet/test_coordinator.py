@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from drivetwin.errors import StoreError
+from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.coordinator import Wishes
 from drivetwin.fleet.events import Started, Summary
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import State, WorkerSpec
-from drivetwin.identify.method import Method
 from tests.fleet.toys import LIMITS, contents, make_logs, names, run_toys
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.fleet.figures import drift_figure, unit_label, units_figure
-from drivetwin.fleet.joint.result import (
+from drivetwin.fleet.mixed_model.result import (
     Change,
     Drift,
     JointEstimate,

@@ -13,12 +13,12 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.errors import FileFormatError, StoreError
+from drivetwin.estimation.result.method import Method
+from drivetwin.files.records import program_version
 from drivetwin.fleet.identify import identify_log
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.scan import inputs_of
 from drivetwin.fleet.task import Recipe, Task
-from drivetwin.identify.method import Method
-from drivetwin.results.version import program_version
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drivetwin.fleet.joint.observed import facts
+from drivetwin.fleet.mixed_model.observations import facts
 from drivetwin.fleet.query import ask
 from drivetwin.fleet.store import Store
 from tests.fleet.toys import make_logs, run_toys

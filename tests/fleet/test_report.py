@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.fleet.joint.result import Drift, JointEstimate, Points
+from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, Points
 from drivetwin.fleet.report import ageing, remark
 from drivetwin.report.sections.blocks import FigureBlock
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.index import FileRow
 from drivetwin.fleet.rules import FieldTable, RulesFile, RuleTable
 from drivetwin.fleet.scan import Scan, Scanned, settings_of
 from drivetwin.fleet.sources import Sources
-from drivetwin.identify.method import Method
 
 
 @pytest.fixture

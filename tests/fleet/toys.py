@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.coordinator import Wishes
 from drivetwin.fleet.events import Event, Settled, Summary, document
 from drivetwin.fleet.rules import RulesFile, RuleTable
@@ -19,7 +20,6 @@ from drivetwin.fleet.run import FleetRun, run_fleet
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import Limits, WorkerSpec
-from drivetwin.identify.method import Method
 
 ROOT = Path(__file__).parents[2]
 LIMITS = Limits(seconds=30.0, memory=200 * 2**20)

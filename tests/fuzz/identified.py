@@ -19,19 +19,19 @@ from pathlib import Path
 
 import numpy as np
 
+from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text, recorded_channels
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import scenario_of
 from drivetwin.errors import DrivetwinError
-from drivetwin.identify.method import Method
-from drivetwin.identify.pipeline import identify
-from drivetwin.identify.result import Identification
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identify import identify
+from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
-from drivetwin.logs.shiftlog import FloatArray
-from drivetwin.shifts.usable import usable_shifts
-from drivetwin.twin import Twin
-from drivetwin.validate import validated
+from drivetwin.shifts.detect import usable_shifts
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import validated
 from drivetwin.vehicle.card import load_card
 from tests.fuzz import harness
 from tests.fuzz.mutate import mutate

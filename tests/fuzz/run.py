@@ -18,7 +18,7 @@ from drivetwin.logs.read import read_log, read_raw
 from tests.fuzz import harness
 from tests.fuzz.mutate import mutate
 from tests.fuzz.seeds import SEEDS
-from tests.logs.made import card
+from tests.logs.fixtures import card
 
 
 def outcome(path: Path, folder: Path) -> str:

@@ -11,10 +11,10 @@ from typing import Literal
 
 import numpy as np
 
+from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.logs.raw import RawChannel
-from drivetwin.logs.shiftlog import FloatArray
 from drivetwin.logs.write import write_log
-from tests.logs.made import UNITS, columns
+from tests.logs.fixtures import UNITS, columns
 
 
 def channels() -> list[RawChannel]:

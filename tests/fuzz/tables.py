@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.logs.shiftlog import FloatArray
+from drivetwin.channels.shiftlog import FloatArray
 
 TIME = "time"
 

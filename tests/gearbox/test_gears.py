@@ -8,13 +8,7 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.gearbox import (
-    Gearbox,
-    builtin_gearboxes,
-    gear_statics,
-    load_gearbox,
-    ratio_remarks,
-)
+from drivetwin.gearbox import Gearbox, builtin_gearboxes, gear_statics, load_gearbox, ratio_remarks
 
 ALL_GEARS = [(name, gear.name) for name in builtin_gearboxes() for gear in load_gearbox(name).gears]
 

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivetwin.channels.roles import NEEDED
+from drivetwin.channels.shiftlog import FloatArray, Quantity, ShiftLog
 from drivetwin.errors import (
     DamagedChannelError,
     FileFormatError,
@@ -20,10 +22,8 @@ from drivetwin.errors import (
     UnitError,
 )
 from drivetwin.logs.read import read_log, read_raw
-from drivetwin.logs.roles import NEEDED
-from drivetwin.logs.shiftlog import FloatArray, Quantity, ShiftLog
 from drivetwin.vehicle.card import load_card
-from tests.logs.made import UNITS, card, columns, write
+from tests.logs.fixtures import UNITS, card, columns, write
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared" / "logs"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.logs.formats import open_recording
+from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.summary import Summary, summarise
 from drivetwin.logs.write import write_log

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.atomic import keeping
+from drivetwin._util.atomic import keeping
+from drivetwin.channels.shiftlog import Channel, Quantity
 from drivetwin.errors import FileFormatError, InputError, TimeError, UnitError
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
-from drivetwin.logs.shiftlog import Channel, Quantity
 from drivetwin.logs.write import as_recorded, write_log
 from drivetwin.vehicle.card import load_card
-from tests.logs.made import card, columns, write
+from tests.logs.fixtures import card, columns, write
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared"

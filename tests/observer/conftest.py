@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import drivetwin
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
-from drivetwin.driveline import Trajectory
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.observer.observed import FloatArray, Observation
+from drivetwin.observer.result import FloatArray, Observation
 from drivetwin.shifts.shift import Shift
-from drivetwin.twin import Twin
-from drivetwin.vehicle.spec import VehicleCard
+from drivetwin.simulation.dual_clutch import Trajectory
+from drivetwin.twin.twin import Twin
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DamagedChannelError, MissingChannelError, MissingParameterError
-from drivetwin.identify.likelihood.derived import TORQUE_LIKE
-from drivetwin.identify.result import Verdict
-from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import TORQUE_LIKE
+from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.observe import observed
-from drivetwin.observer.observed import Band, FloatArray
+from drivetwin.observer.result import Band, FloatArray
 from drivetwin.parameters import OVER_ETA, spec_of
 from tests.observer.conftest import Bench, brief
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.observer.observed import FloatArray
+from drivetwin.observer.result import FloatArray
 from drivetwin.observer.smoother import Measurement, Process, filtered, smoothed
 
 

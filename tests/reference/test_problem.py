@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from drivetwin.driveline import Event
+from drivetwin.simulation.dual_clutch import Event
 from reference import tables
 from reference.problem import ROOT, load, names, run
 from reference.tables import Change

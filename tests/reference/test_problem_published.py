@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from drivetwin.driveline import FloatArray
-from drivetwin.network import Output
+from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.network import Output
 from reference.problem import load, run
 
 PUBLISHED = Path(__file__).resolve().parents[3] / "shared" / "msl"

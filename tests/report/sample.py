@@ -5,19 +5,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.driveline import Event, Signal, Stribeck, Trajectory
-from drivetwin.identify.result import (
-    Estimate,
-    FloatArray,
-    FrictionCurve,
-    Identification,
-    Method,
-    Verdict,
-)
-from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
+from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
-from drivetwin.twin import Twin
-from drivetwin.validate import SignalTrace, Validation, fit_of, phases_of
+from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import fit_of, phases_of
 from drivetwin.vehicle.card import ElementSpec, Gear, PriorValue, VehicleCard
 
 TIME = np.arange(0.0, 3.0, 1e-3)

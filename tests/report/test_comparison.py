@@ -8,16 +8,16 @@ from functools import cache
 
 import numpy as np
 
-from drivetwin.identify.result import Z95
-from drivetwin.report.candidates import Candidate, Trial
+from drivetwin.estimation.result.estimate import Z95
 from drivetwin.report.comparison import render_comparison, trials_of
 from drivetwin.report.figures.comparison import agreement_figure, trial_figure
+from drivetwin.report.find_reports import Candidate, Trial
 from drivetwin.report.sections.blocks import FigureBlock, TableBlock
 from drivetwin.report.sections.comparison import agreement_section, trial_sections
 from drivetwin.report.style import candidate_style
-from drivetwin.twin import Twin
+from drivetwin.twin.twin import Twin
 from tests.report.sample import SHIFT, card, friction, identification, log, validation
-from tests.report.test_candidates import candidate
+from tests.report.test_find_reports import candidate
 
 
 @cache

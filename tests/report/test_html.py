@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.identify.evidence import Evidence
-from drivetwin.identify.result import Identification
+from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.identification import Identification
 from drivetwin.report.html import render_report, report_sections, save_report
 from drivetwin.report.sections.blocks import FigureBlock
-from drivetwin.validate import with_fit
+from drivetwin.validation.simulate_log import with_fit
 from tests.report.sample import identification, log, validation
 
 

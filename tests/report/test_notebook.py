@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.identify.evidence import Evidence
-from drivetwin.identify.result import Identification
-from drivetwin.logs.shiftlog import Channel, Quantity
+from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.identification import Identification
 from drivetwin.report.notebook import figure_of, summary_of
-from drivetwin.twin import Twin
-from drivetwin.validate import with_fit
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import with_fit
 from tests.report.sample import card, identification, log, validation
 
 

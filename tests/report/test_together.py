@@ -7,7 +7,7 @@ import re
 from dataclasses import replace
 
 from drivetwin.report.together import render_together
-from tests.identify.several.made import loaded, together
+from tests.estimation.multi_log.fixtures import loaded, together
 
 
 def test_the_page_shows_logs_predictions_and_every_shift_once() -> None:

@@ -6,10 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.shifts.find import find_shifts
+from drivetwin.shifts.detect import find_shifts
 from drivetwin.shifts.shift import ShiftKind
-from drivetwin.vehicle.spec import PriorValue, VehicleCard
-from tests.shifts.made import load_measured, load_reference, make_card
+from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.vehicle_card import VehicleCard
+from tests.shifts.fixtures import load_measured, load_reference, make_card
 
 _CASES = ("upshift", "drum_inertia", "weak_then_catch")
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import MissingChannelError
-from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.shifts.pressures import one_clutch, shift_pressures
 from drivetwin.shifts.shift import Shift, ShiftKind
 

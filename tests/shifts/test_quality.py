@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.shifts.find import find_shifts
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.shifts.detect import find_shifts
 from drivetwin.shifts.quality import QUALITY_UNITS, shift_quality
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.vehicle.spec import PriorValue
-from tests.shifts.made import load_reference, make_card, make_log
+from tests.shifts.fixtures import load_reference, make_card, make_log
 
 _CARD = make_card({"2": 2.0, "3": 1.5})
 _SHIFT = Shift(

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import scenario_of
-from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
-from drivetwin.shifts.find import find_shifts
+from drivetwin.shifts.detect import find_shifts
 from drivetwin.shifts.torque_onset import pressure_onset, smoothed, torque_dip_onset
 from drivetwin.vehicle.card import load_card
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.identify.inputs import sampled
-from drivetwin.identify.noise import resolution
-from drivetwin.identify.signals import Coupling, Driveline, ShiftSignals
+from drivetwin.estimation.data.noise import resolution
+from drivetwin.estimation.data.prepare import sampled
+from drivetwin.estimation.data.shift_data import Coupling, Driveline, ShiftSignals
 from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 

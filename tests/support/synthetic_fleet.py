@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.driveline import Stribeck
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dual_scenarios import paper_steps
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text, log_text
 from drivetwin.dyno.scenario import Scenario
+from drivetwin.simulation.dual_clutch import Stribeck
 
 UNITS = 60
 DAMAGED = 0.03

@@ -12,7 +12,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 import numpy as np
 
 import drivetwin
-from drivetwin.driveline import Signal
+from drivetwin.simulation.dual_clutch import Signal
 
 
 def own_dataclasses() -> dict[type, dict[str, Any]]:

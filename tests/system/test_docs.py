@@ -9,9 +9,9 @@ from typing import Any, get_args
 
 import pytest
 
+from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.cli.synth import ScenarioOption
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.logs.profile import read_mapping
 from drivetwin.parameters import SPECS, ParameterSpec
 from drivetwin.vehicle.card import load_card
 

@@ -12,9 +12,9 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from drivetwin.driveline import Signal
 from drivetwin.errors import InputError
-from drivetwin.network import OutputKind, Start, simulate
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import OutputKind, Start, simulate
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "elements.md").read_text(
     encoding="utf-8"

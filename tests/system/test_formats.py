@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.cli.pipeline import run
+from drivetwin.cli.identify_run import run
 from drivetwin.dyno import dyno
 from drivetwin.dyno.files import card_text, recorded_channels
 from drivetwin.dyno.scenarios import paper_steps
-from drivetwin.identify.method import Method
-from drivetwin.identify.result import Identification
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.method import Method
 from drivetwin.logs.write import write_log
 
 ROUND_OFF = 1e-9

@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.errors import DrivetwinError
-from drivetwin.identify.method import Method
+from drivetwin.estimation.result.method import Method
 from tests.fuzz.identified import Base, base, identified, parted, told, written
 from tests.fuzz.tables import DAMAGING, HARMLESS
 

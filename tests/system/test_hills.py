@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import drivetwin
-from drivetwin.identify.method import Method
-from drivetwin.identify.pipeline import identify
-from drivetwin.identify.result import Identification
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.shifts.usable import usable_shifts
-from drivetwin.twin import Twin
-from tests.identify.several.made import LOADS, card, pair, scenario
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identify import identify
+from drivetwin.estimation.result.method import Method
+from drivetwin.shifts.detect import usable_shifts
+from drivetwin.twin.twin import Twin
+from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario
 from tests.support.shared_results import shared
 
 LATER = 60.0

@@ -14,10 +14,10 @@ import pytest
 
 from drivetwin.errors import MappingError, MissingChannelError
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.converter import lock_ups
-from drivetwin.shifts.find import FoundShifts, find_shifts
+from drivetwin.shifts.detect import FoundShifts, find_shifts
+from drivetwin.shifts.lockup_clutch import lock_ups
 from drivetwin.vehicle.card import load_card
-from tests.shifts.made import ROOT, shared
+from tests.shifts.fixtures import ROOT, shared
 
 CARD = load_card(ROOT / "examples" / "vehicles" / "j1939_class6.toml")
 SPAN = (4.0, 11.2)

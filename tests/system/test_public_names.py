@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import drivetwin
-from drivetwin.results.result_file import load_result
-from tests.logs import made
+from drivetwin.files.result_file import load_result
+from tests.logs import fixtures
 from tests.report import sample
 
 
@@ -33,8 +33,8 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
 
 
 def test_files_may_be_named_by_text(tmp_path: Path) -> None:
-    made.card(tmp_path)
-    made.write(tmp_path)
+    fixtures.card(tmp_path)
+    fixtures.write(tmp_path)
     (tmp_path / "map.toml").write_text("", encoding="utf-8")
     place = str(tmp_path)
     card = drivetwin.load_card(f"{place}/card.toml")

@@ -8,16 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.cli.pipeline import run
+from drivetwin.cli.identify_run import run
 from drivetwin.cli.synth import write_run
-from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.dyno import dyno
 from drivetwin.dyno.files import card_text
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.dyno.truth import Truth
-from drivetwin.identify.method import Method
-from drivetwin.identify.result import FrictionCurve, Identification, Verdict
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import FrictionCurve, Verdict
+from drivetwin.estimation.result.method import Method
+from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 
 MODULATED = (ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS)
 WITHIN_HALF_A_PERCENT = (

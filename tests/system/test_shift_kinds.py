@@ -12,10 +12,10 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.cli.synth import write_run
-from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 
 RATE = 500.0
 """Hz of the logger: less than usual, so that seven identifications take less time."""

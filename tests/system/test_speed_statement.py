@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.network import simulate
+from drivetwin.simulation.network import simulate
 from tests.support.upshift import reference
 from tests.support.upshift.equations import Equations
 from tests.support.upshift.scenario import Scenario, build_scenario

@@ -10,12 +10,12 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-from drivetwin.driveline import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.gearbox import Gearbox, builtin_gearboxes, load_gearbox, reduce
 from drivetwin.gearbox.compare import WholeGearbox, whole_gearbox
 from drivetwin.gearbox.maneuver import plan
 from drivetwin.gearbox.network import network_elements
-from drivetwin.network import Element, NetworkRun, Output, Start, simulate
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, FloatArray, Signal
+from drivetwin.simulation.network import Element, NetworkRun, Output, Start, simulate
 
 BOXES = [name for name in builtin_gearboxes() if not load_gearbox(name).dogs]
 SECOND = np.array([0.0, 1.0])

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.errors import CardError
-from drivetwin.logs.mapping import ChannelSpec
 from drivetwin.vehicle.card import PriorValue, SensorTolerance, VehicleCard, load_card
-from tests.logs.made import CARD
+from tests.logs.fixtures import CARD
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "vehicles"
 

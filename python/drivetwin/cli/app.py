@@ -9,7 +9,6 @@ from typing import Annotated
 
 import typer
 
-from drivetwin.__main__ import INTERRUPTED
 from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
@@ -28,7 +27,7 @@ from drivetwin.cli.shifts import shifts
 from drivetwin.cli.simulate import simulate
 from drivetwin.cli.synth import synth
 from drivetwin.cli.workbench import workbench
-from drivetwin.errors import DrivetwinError, InputError, Where
+from drivetwin.errors import INTERRUPTED, DrivetwinError, InputError, Where
 
 app = typer.Typer(
     name="drivetwin",
@@ -62,7 +61,7 @@ for entry in (*app.registered_commands, *fleet.registered_commands):
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from drivetwin.results.version import program_version
+        from drivetwin.files.records import program_version
 
         typer.echo(f"drivetwin {program_version()}")
         raise typer.Exit

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from drivetwin.logs.shiftlog import ShiftLog
+    from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.vehicle.card import VehicleCard
 
 LogFile = Annotated[

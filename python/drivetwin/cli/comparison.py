@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from drivetwin.dyno.truth import Truth
-from drivetwin.identify.method import Method
-from drivetwin.identify.result import Identification
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.method import Method
 from drivetwin.parameters import spec_of
 
 _SLIPS = (10.0, 30.0, 50.0, 80.0)

@@ -11,7 +11,7 @@ import typer
 from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
 from drivetwin.cli.synth import NoiseOption, ScenarioOption, SeedOption
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.identify.method import DEFAULT_METHOD, Method
+from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -32,7 +32,7 @@ def demo(
 ) -> None:
     """Make a log with the paper's numbers, identify it both ways, compare with the truth."""
     from drivetwin.cli.comparison import compare
-    from drivetwin.cli.pipeline import REPORT, run, write
+    from drivetwin.cli.identify_run import REPORT, run, write
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run as run_dyno
     from drivetwin.dyno.scenarios import SCENARIOS

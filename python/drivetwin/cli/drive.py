@@ -77,7 +77,7 @@ def drive(
 
 def _write(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
     """Write figure and traces, both or none."""
-    from drivetwin.cli.staging import staged
+    from drivetwin.cli.atomic_outputs import staged
     from drivetwin.report.drive import render_drive, traces_text
 
     texts = {FIGURE: render_drive(motion, title), TRACES: traces_text(motion)}

@@ -14,18 +14,18 @@ import typer
 from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile
 from drivetwin.cli.numbers import around, shown
 from drivetwin.cli.output import JsonFlag, print_json, say, show, step, table_of
-from drivetwin.identify.shape.kind import Shape
+from drivetwin.estimation.analysis.friction_shape_prior import Shape
 from drivetwin.parameters import spec_of
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from drivetwin.cli.pipeline import Outcome
-    from drivetwin.identify.bootstrap import Bootstrap
-    from drivetwin.identify.profile import Profile
-    from drivetwin.identify.result import Identification
-    from drivetwin.identify.shape.departures import Departure
-    from drivetwin.twin import Twin
+    from drivetwin.cli.identify_run import Outcome
+    from drivetwin.estimation.analysis.bootstrap import Bootstrap
+    from drivetwin.estimation.analysis.friction_dependence import Departure
+    from drivetwin.estimation.analysis.profile_likelihood import Profile
+    from drivetwin.estimation.identification import Identification
+    from drivetwin.twin.twin import Twin
 
 SUGGESTIONS, BOOTSTRAP = "suggestions.json", "bootstrap.json"
 FRICTION, DEPARTURES = "friction.json", "departures.json"
@@ -66,8 +66,8 @@ def examine(
     profile likelihood, which needs no linearity, parametric bootstrap, friction of free or monotone
     shape (with a twin that has it), and what departs from the friction law.
     """
-    from drivetwin.cli.pipeline import run
-    from drivetwin.identify.method import Method
+    from drivetwin.cli.identify_run import run
+    from drivetwin.estimation.result.method import Method
 
     for name in profile or ():
         spec_of(name)
@@ -108,43 +108,43 @@ class Answer:
 def _answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
     """Every answer, in the order in which they are printed."""
     from drivetwin.cli.tables import suggestion_table
-    from drivetwin.identify.bootstrap import bootstrap
-    from drivetwin.identify.experiment.suggest import suggest
-    from drivetwin.identify.profile import profile
-    from drivetwin.identify.shape.departures import departures
-    from drivetwin.results import doubts
+    from drivetwin.estimation.analysis.bootstrap import bootstrap
+    from drivetwin.estimation.analysis.experiment_design import suggest
+    from drivetwin.estimation.analysis.friction_dependence import departures
+    from drivetwin.estimation.analysis.profile_likelihood import profile
+    from drivetwin.files import analysis_files
 
     found = outcome.found
     with step("comparing experiments"):
         suggestions = found.evidence.suggestions or suggest(found)
     yield Answer(
         SUGGESTIONS,
-        doubts.suggestions_text(suggestions),
+        analysis_files.suggestions_text(suggestions),
         suggestion_table(suggestions, found.estimates),
     )
     for name in asked.profiles:
         with step(f"profile likelihood of {name}"):
             one = profile(found, name)
-        yield Answer(f"profile.{name}.json", doubts.profile_text(one), _profile(one, found))
+        yield Answer(f"profile.{name}.json", analysis_files.profile_text(one), _profile(one, found))
     if asked.bootstrap:
         with step(f"bootstrap of {asked.bootstrap} fits"):
             refits = bootstrap(found, asked.bootstrap, asked.seed)
-        yield Answer(BOOTSTRAP, doubts.bootstrap_text(refits), _bootstrap(refits, found))
+        yield Answer(BOOTSTRAP, analysis_files.bootstrap_text(refits), _bootstrap(refits, found))
     if asked.friction is not None:
         yield _friction(outcome, asked.friction)
     if asked.departures:
         with step("looking for what departs from the friction law"):
             seen = departures(found)
-        yield Answer(DEPARTURES, doubts.departures_text(seen), _departures(seen))
+        yield Answer(DEPARTURES, analysis_files.departures_text(seen), _departures(seen))
 
 
 def _friction(outcome: Outcome, shape: Shape) -> Answer:
     """Friction of a shape, with the twin that has it."""
     from drivetwin.cli.tables import friction_table
-    from drivetwin.identify.inputs import tolerances_of
-    from drivetwin.identify.shape.fit import shaped_friction
-    from drivetwin.results.doubts import friction_text
-    from drivetwin.twin import Twin
+    from drivetwin.estimation.analysis.friction_shape import shaped_friction
+    from drivetwin.estimation.data.prepare import tolerances_of
+    from drivetwin.files.analysis_files import friction_text
+    from drivetwin.twin.twin import Twin
 
     found = outcome.found
     with step(f"fitting {shape} friction"):
@@ -157,8 +157,8 @@ def _friction(outcome: Outcome, shape: Shape) -> Answer:
 
 def _write(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     """Write all files or none."""
-    from drivetwin.cli.pipeline import TWIN
-    from drivetwin.cli.staging import staged
+    from drivetwin.cli.atomic_outputs import staged
+    from drivetwin.cli.identify_run import TWIN
 
     names: list[str] = []
     with staged(folder) as beside:
@@ -185,7 +185,7 @@ def _profile(one: Profile, found: Identification) -> Table:
 
 
 def _bootstrap(one: Bootstrap, found: Identification) -> Table:
-    from drivetwin.identify.result import Z95
+    from drivetwin.estimation.result.estimate import Z95
 
     title = f"Bootstrap: {len(one.values)} fits, {one.failed} failed"
     numbers = ("by covariance", "by bootstrap", "bias")
@@ -206,8 +206,8 @@ def _bootstrap(one: Bootstrap, found: Identification) -> Table:
 
 
 def _departures(found: tuple[Departure, ...]) -> Table:
-    from drivetwin.identify.result import Z95
-    from drivetwin.identify.shape.departures import UNITS
+    from drivetwin.estimation.analysis.friction_dependence import UNITS
+    from drivetwin.estimation.result.estimate import Z95
 
     table = table_of(
         "Departures from the friction law", "element", "departure", "value", "± (95 %)", "unit", "",

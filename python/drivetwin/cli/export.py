@@ -17,11 +17,11 @@ from drivetwin.export.platforms import Platform
 from drivetwin.export.targets import Target
 
 if TYPE_CHECKING:
-    from drivetwin.converter import Converter
     from drivetwin.export.fmu.experiment import Experiment
     from drivetwin.export.parameters.content import ParameterSet
     from drivetwin.export.subject import Subject
-    from drivetwin.twin import Twin
+    from drivetwin.simulation.converter_map import Converter
+    from drivetwin.twin.twin import Twin
 
 
 _Output = Annotated[
@@ -79,7 +79,7 @@ def export(
     the Standard Library's components.
     Parameter files (ssv, cdfx, dcm, m, json, csv) hold what is known, with units and intervals.
     """
-    from drivetwin.twin import Twin
+    from drivetwin.twin.twin import Twin
 
     model = Twin.load(twin)
     path = output or Path(f"{twin.stem}.{to.ending}")

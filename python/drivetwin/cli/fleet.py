@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from drivetwin.__main__ import INTERRUPTED
 from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step, table_of
-from drivetwin.identify.method import DEFAULT_METHOD, Method
+from drivetwin.errors import INTERRUPTED
+from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
     from drivetwin.fleet.events import Summary
-    from drivetwin.fleet.joint.result import Change, JointEstimate, UnitValue
+    from drivetwin.fleet.mixed_model.result import Change, JointEstimate, UnitValue
 
 RUN = "run"
 
@@ -190,7 +190,7 @@ def estimate(
     as_json: JsonFlag = False,
 ) -> None:
     """Estimate over all logs: shared values, spread over units, ageing, changes, outliers."""
-    from drivetwin.fleet.joint.estimate import joint_estimates, untold
+    from drivetwin.fleet.mixed_model.estimate import joint_estimates, untold
     from drivetwin.fleet.store import Store
 
     with step("estimating over the fleet"), Store(store) as opened:
@@ -205,8 +205,8 @@ def estimate(
 
 
 def _print_estimates(found: list[JointEstimate]) -> None:
+    from drivetwin._util.display_units import display_of, significant
     from drivetwin.cli.numbers import shown
-    from drivetwin.display import display_of, significant
 
     rules = {one.rule for one in found}
     table = table_of(
@@ -258,7 +258,7 @@ def _odd(one: JointEstimate, unit: UnitValue) -> str:
 def _with_error(one: JointEstimate, size: float, std: float) -> str:
     """A difference with its 95 % interval and unit."""
     from drivetwin.cli.numbers import shown
-    from drivetwin.identify.result import Z95
+    from drivetwin.estimation.result.estimate import Z95
 
     ends = (size - Z95 * std, size + Z95 * std)
     return " ".join(shown(size, ends, one.si_unit)).removesuffix(" –")

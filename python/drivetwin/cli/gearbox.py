@@ -65,7 +65,7 @@ def gearbox(
 
 
 def _write_modelica(box: Gearbox, path: Path) -> None:
-    from drivetwin.atomic import write_text
+    from drivetwin._util.atomic import write_text
     from drivetwin.export.modelica.model import package_text
     from drivetwin.gearbox import network_elements
 

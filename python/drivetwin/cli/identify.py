@@ -11,21 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, VehicleFile
-from drivetwin.cli.output import (
-    JsonFlag,
-    error_document,
-    note,
-    print_json,
-    say,
-    show,
-    show_error,
-)
-from drivetwin.cli.staging import refuse_alike
+from drivetwin.cli.atomic_outputs import refuse_alike
+from drivetwin.cli.output import JsonFlag, error_document, note, print_json, say, show, show_error
 from drivetwin.errors import DrivetwinError
-from drivetwin.identify.method import DEFAULT_METHOD, Method
+from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
-    from drivetwin.identify.result import Identification
+    from drivetwin.estimation.identification import Identification
     from drivetwin.shifts.shift import Shift
 
 
@@ -89,7 +81,7 @@ def _one(
     log: Path, how: tuple[Path, Path | None, Method], folder: Path | None, as_json: bool
 ) -> dict[str, Any]:
     """Identify a log, write and print what was found; `how` are card, mapping and method."""
-    from drivetwin.cli.pipeline import run, write
+    from drivetwin.cli.identify_run import run, write
 
     outcome = run(log, *how)
     files = () if folder is None else write(outcome, folder)
@@ -108,7 +100,7 @@ def _together(
     as_json: bool,
 ) -> None:
     """Fit all logs as one and predict what is held out; `how` are card, mapping and method."""
-    from drivetwin.cli.together import print_together, run, write
+    from drivetwin.cli.identify_joint import print_together, run, write
 
     outcome = run(logs, *how, hold_out)
     files = write(outcome, output) if output is not None else ()
@@ -135,7 +127,7 @@ def _document(found: Identification, files: tuple[Path, ...]) -> dict[str, Any]:
     """The content of result.json, with the files that were written."""
     import json
 
-    from drivetwin.results.result_file import ResultFile
+    from drivetwin.files.result_file import ResultFile
 
     document: dict[str, Any] = json.loads(ResultFile.of(found).to_json())
     return {**document, "files": [str(file) for file in files]}

@@ -8,7 +8,7 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from drivetwin.atomic import check_kept, keeping
+from drivetwin._util.atomic import check_kept, keeping
 
 _OUTPUTS = frozenset(("output", "figure", "write_mapping", "modelica"))
 """Parameters of commands that name what is written; files that all others name are read."""

@@ -24,7 +24,7 @@ from drivetwin.errors import DrivetwinError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from drivetwin.logs.mapping import Mapped
+    from drivetwin.channels.mapping import Mapped
     from drivetwin.logs.raw import Recording
     from drivetwin.vehicle.card import VehicleCard
 
@@ -48,10 +48,10 @@ def inspect(
 
     And what `shifts` and `identify` would warn of in it, or refuse it for.
     """
-    from drivetwin.atomic import write_text
-    from drivetwin.logs.formats import open_recording
-    from drivetwin.logs.mapping import Mapped
-    from drivetwin.logs.profile import mapping_text, read_mapping
+    from drivetwin._util.atomic import write_text
+    from drivetwin.channels.mapping import Mapped
+    from drivetwin.channels.mapping_file import mapping_text, read_mapping
+    from drivetwin.logs.formats.detect import open_recording
     from drivetwin.logs.survey import survey
     from drivetwin.vehicle.card import load_card
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from drivetwin.display import display_of, significant, with_uncertainty
+from drivetwin._util.display_units import display_of, significant, with_uncertainty
 
 Interval = tuple[float, float]
 

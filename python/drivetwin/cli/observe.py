@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from drivetwin.logs.raw import RawChannel
-    from drivetwin.observer.observed import Observation
+    from drivetwin.observer.result import Observation
     from drivetwin.shifts.shift import Shift
 
 
@@ -51,12 +51,12 @@ def observe(
 
     For logs without torque sensors. An output torque in the log is not used.
     """
-    from drivetwin.atomic import write_text
+    from drivetwin._util.atomic import write_text
     from drivetwin.logs.read import read_log
     from drivetwin.observer.observe import observed
     from drivetwin.report.observer import render_observations
-    from drivetwin.shifts.usable import usable_shifts
-    from drivetwin.twin import Twin
+    from drivetwin.shifts.detect import usable_shifts
+    from drivetwin.twin.twin import Twin
     from drivetwin.vehicle.card import load_card
 
     model = Twin.load(twin)
@@ -103,7 +103,7 @@ def _each(
 
 
 def _write(path: Path, found: Sequence[Observation]) -> None:
-    from drivetwin.cli.staging import staged
+    from drivetwin.cli.atomic_outputs import staged
     from drivetwin.export.parameters.spelling import flat_name
     from drivetwin.logs.write import write_log
 
@@ -122,7 +122,7 @@ def observed_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
     import numpy as np
 
     from drivetwin.logs.raw import RawChannel
-    from drivetwin.shifts.divided import own_samples
+    from drivetwin.shifts.split_gears import own_samples
 
     own = own_samples([one.shift for one in found], [one.time for one in found])
     parts: dict[str, list[tuple[Any, Any]]] = {}

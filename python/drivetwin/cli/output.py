@@ -80,7 +80,7 @@ def table_of(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
 
 def print_json(value: Mapping[str, Any]) -> None:
     """Print one strict JSON document on stdout; NaN and infinities become null."""
-    from drivetwin.results.result_file import plain
+    from drivetwin.files.result_file import plain
 
     text = json.dumps(plain(dict(value)), allow_nan=False, ensure_ascii=False, indent=2)
     sys.stdout.write(text + "\n")
@@ -94,8 +94,8 @@ def step(text: str) -> Iterator[None]:
     """
     from rich.progress import Progress, SpinnerColumn, TextColumn
 
-    from drivetwin.cli.remaining import Remaining
-    from drivetwin.progress import listening
+    from drivetwin._util.progress import listening
+    from drivetwin.cli.time_left import Remaining
 
     clock = Remaining(text)
     columns = (SpinnerColumn(), TextColumn("{task.fields[clock]}", markup=False))

@@ -14,8 +14,8 @@ from drivetwin.cli.output import JsonFlag, print_json, say, step
 from drivetwin.errors import InputError, ResultFileError, Where
 
 if TYPE_CHECKING:
-    from drivetwin.report.candidates import Candidate, Trial
-    from drivetwin.twin import Twin
+    from drivetwin.report.find_reports import Candidate, Trial
+    from drivetwin.twin.twin import Twin
 
 
 def report(
@@ -67,8 +67,8 @@ def _is_made(source: Path) -> bool:
 
 
 def _name_page(source: Path, *, as_json: bool) -> None:
-    from drivetwin.cli.pipeline import REPORT, RESULT
-    from drivetwin.results.result_file import load_result
+    from drivetwin.cli.identify_run import REPORT, RESULT
+    from drivetwin.files.result_file import load_result
 
     result = source / RESULT if source.is_dir() else source
     content = load_result(result)
@@ -117,10 +117,10 @@ def _names(made: Sequence[Path]) -> dict[str, Path]:
 
 
 def _candidate(name: str, source: Path) -> Candidate:
-    from drivetwin.cli.pipeline import RESULT
-    from drivetwin.report.candidates import Candidate
-    from drivetwin.results.result_file import load_result
-    from drivetwin.twin import Twin
+    from drivetwin.cli.identify_run import RESULT
+    from drivetwin.files.result_file import load_result
+    from drivetwin.report.find_reports import Candidate
+    from drivetwin.twin.twin import Twin
 
     if source.suffix == ".toml":
         return Candidate.of_twin(name, Twin.load(source))
@@ -129,8 +129,8 @@ def _candidate(name: str, source: Path) -> Candidate:
 
 def _twin(source: Path) -> Twin:
     """The twin behind a source: the file itself, or the one beside its result."""
-    from drivetwin.cli.pipeline import TWIN
-    from drivetwin.twin import Twin
+    from drivetwin.cli.identify_run import TWIN
+    from drivetwin.twin.twin import Twin
 
     if source.suffix == ".toml":
         return Twin.load(source)
@@ -141,7 +141,7 @@ def _trials(twins: Mapping[str, Twin], log: Path, channels: Path | None) -> list
     """Every shift of a log by every twin; shifts are found with the ratios of the first."""
     from drivetwin.logs.read import read_log
     from drivetwin.report.comparison import trials_of
-    from drivetwin.shifts.usable import usable_shifts
+    from drivetwin.shifts.detect import usable_shifts
 
     card = next(iter(twins.values())).card()
     with step(f"simulating {log.name}"):

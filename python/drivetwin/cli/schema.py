@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from drivetwin.cli.output import JsonFlag, print_json, say
-from drivetwin.schemas import FileKind, json_schema
+from drivetwin.files.schemas import FileKind, json_schema
 
 
 def schema(

@@ -13,11 +13,11 @@ from drivetwin.cli.output import JsonFlag, note, print_json, show, step
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from drivetwin.identify.held_gear import HeldGear
-    from drivetwin.identify.resonance import Resonance
-    from drivetwin.logs.shiftlog import ShiftLog
-    from drivetwin.shifts.converter import LockUp
-    from drivetwin.shifts.find import FoundShifts
+    from drivetwin.channels.shiftlog import ShiftLog
+    from drivetwin.estimation.linear.inertia_in_gear import HeldGear
+    from drivetwin.estimation.linear.resonance import Resonance
+    from drivetwin.shifts.detect import FoundShifts
+    from drivetwin.shifts.lockup_clutch import LockUp
     from drivetwin.shifts.shift import Shift
     from drivetwin.vehicle.card import VehicleCard
 
@@ -31,8 +31,8 @@ def shifts(
     inertia over η in each gear held, where the log carries them.
     """
     from drivetwin.cli.tables import shift_table
-    from drivetwin.shifts.converter import lock_ups
-    from drivetwin.shifts.find import find_shifts, held_spans
+    from drivetwin.shifts.detect import find_shifts, held_spans
+    from drivetwin.shifts.lockup_clutch import lock_ups
 
     with step(f"reading {log.name}"):
         recording, card = load(log, vehicle, channels)
@@ -60,8 +60,8 @@ class _Seen(NamedTuple):
 
 
 def _from_speeds(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> _Seen:
-    from drivetwin.identify.held_gear import held_gears
-    from drivetwin.identify.resonance import after_shift
+    from drivetwin.estimation.linear.inertia_in_gear import held_gears
+    from drivetwin.estimation.linear.resonance import after_shift
 
     if "output_torque" in log:
         return _Seen()
@@ -71,7 +71,7 @@ def _from_speeds(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> _
 
 
 def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> dict[str, Any]:
-    from drivetwin.results.result_file import RejectedRecord, ShiftRecord
+    from drivetwin.files.result_file import RejectedRecord, ShiftRecord
 
     return {
         "shifts": [ShiftRecord.of(one).model_dump(by_alias=True) for one in found.shifts],
@@ -119,8 +119,8 @@ def _said(swing: Resonance | str) -> str:
 
 def _spread(value: float, std: float) -> str:
     """A value ± the half width of its 95 % interval."""
-    from drivetwin.display import with_uncertainty
-    from drivetwin.identify.result import Z95
+    from drivetwin._util.display_units import with_uncertainty
+    from drivetwin.estimation.result.estimate import Z95
 
     return " ± ".join(filter(None, with_uncertainty(value, Z95 * std)))
 

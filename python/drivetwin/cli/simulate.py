@@ -11,11 +11,11 @@ import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
 from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step
-from drivetwin.stepping import DEFAULT_STEP, InputKind
+from drivetwin.export.fixed_step import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
-    from drivetwin.twin import Twin
-    from drivetwin.validate import Validation
+    from drivetwin.estimation.result.validation import Validation
+    from drivetwin.twin.twin import Twin
 
 
 def simulate(
@@ -54,13 +54,13 @@ def simulate(
     Measured engine torque and pressures drive the model; the log may be another than the twin's.
     Ratios and shift elements are the twin's own, so no vehicle card is needed.
     """
-    from drivetwin.atomic import write_text
+    from drivetwin._util.atomic import write_text
     from drivetwin.cli.tables import fit_table
+    from drivetwin.export.fixed_step import Stepping, stepped_again
     from drivetwin.logs.read import read_log
-    from drivetwin.shifts.usable import usable_shifts
-    from drivetwin.stepped import Stepping, stepped_again
-    from drivetwin.twin import Twin
-    from drivetwin.validate import validate
+    from drivetwin.shifts.detect import usable_shifts
+    from drivetwin.twin.twin import Twin
+    from drivetwin.validation.simulate_log import validate
     from drivetwin.vehicle.card import load_card
 
     model = Twin.load(twin) if parameters is None else _edited(Twin.load(twin), parameters)
@@ -123,8 +123,8 @@ def traces_text(runs: Sequence[Validation]) -> str:
     import numpy as np
 
     from drivetwin.report.labels import channel_unit
-    from drivetwin.shifts.divided import own_samples
-    from drivetwin.validate import SIGNALS, simulated_signals
+    from drivetwin.shifts.split_gears import own_samples
+    from drivetwin.validation.simulate_log import SIGNALS, simulated_signals
 
     own = own_samples([run.shift for run in runs], [run.trajectory.time for run in runs])
     lines = [",".join(["time", *SIGNALS]), ",".join(["s", *map(channel_unit, SIGNALS)])]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from drivetwin.cli.atomic_outputs import staged
 from drivetwin.cli.output import JsonFlag, print_json, say, step
-from drivetwin.cli.staging import staged
 from drivetwin.dyno.names import ScenarioName
 
 if TYPE_CHECKING:

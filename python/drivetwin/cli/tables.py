@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 from drivetwin.cli.numbers import around, percent, quantity, shown
 from drivetwin.cli.output import table_of
-from drivetwin.identify.result import Z95
+from drivetwin.estimation.result.estimate import Z95
 from drivetwin.report.labels import channel_unit
 from drivetwin.shifts.quality import QUALITY_UNITS
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from drivetwin.identify.experiment.suggest import Suggestion
-    from drivetwin.identify.result import Estimate, FrictionCurve, SignalFit
+    from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, SignalFit
+    from drivetwin.estimation.result.suggestion import Suggestion
     from drivetwin.shifts.shift import Shift
 
 _BESIDE = 3

@@ -13,8 +13,8 @@ from drivetwin.cli.output import note, say
 from drivetwin.errors import MissingExtraError
 
 if TYPE_CHECKING:
-    from drivetwin.app.folder import Folder
-    from drivetwin.app.server import Start
+    from drivetwin.workbench.views.page import Start
+    from drivetwin.workbench.workspace_folder import Folder
 
 LOOPBACK = "127.0.0.1"
 
@@ -45,9 +45,9 @@ def workbench(
     Works without a network. Other machines reach it only with --host.
     """
     _require_dash()
-    from drivetwin.app.folder import Folder
-    from drivetwin.app.guard import is_loopback
-    from drivetwin.app.server import build, listen
+    from drivetwin.workbench.access_control import is_loopback
+    from drivetwin.workbench.server import build, listen
+    from drivetwin.workbench.workspace_folder import Folder
 
     place = Folder.at(folder)
     app, sessions = build(place, _start(place, log, vehicle, channels), host)
@@ -86,8 +86,8 @@ def _require_dash() -> None:
 
 def _start(place: Folder, log: Path | None, card: Path | None, mapping: Path | None) -> Start:
     """The files of the command line, as far as the folder holds them. Raises RefusedError."""
-    from drivetwin.app.server import Start
-    from drivetwin.app.work import Source
+    from drivetwin.workbench.session_state import Source
+    from drivetwin.workbench.views.page import Start
 
     def source(path: Path | None) -> Source | None:
         if path is None:

@@ -6,11 +6,11 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from drivetwin._util.toml import did_you_mean, raise_faults, read_toml, schema_faults
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schema import PowertrainFile
 from drivetwin.errors import CardError
 from drivetwin.gearbox import Gearbox
-from drivetwin.tomlfile import did_you_mean, raise_faults, read_toml, schema_faults
 
 _FILES = Path(__file__).parent / "powertrains"
 

@@ -14,7 +14,7 @@ from drivetwin.drive.powertrain import Powertrain
 from drivetwin.errors import InputError
 from drivetwin.gearbox import Drive, Gearbox, gear_statics, network_elements
 from drivetwin.gearbox.spec import ElementKind
-from drivetwin.network import Element, Output, Start, element
+from drivetwin.simulation.network import Element, Output, Start, element
 
 CRANK, AXLE, WHEEL = "crankshaft", "axle beyond the shaft", "wheel of the vehicle"
 SHAFT, ROAD = "shaft to the axle", "rolling resistance"

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
-from drivetwin.converter import Converter
-from drivetwin.driveline import FloatArray, RoadLoad
 from drivetwin.gearbox.spec import Capacity
+from drivetwin.simulation.converter_map import Converter
+from drivetwin.simulation.dual_clutch import FloatArray, RoadLoad
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ import numpy as np
 from drivetwin.drive.network import BRAKE, CRANK, PEDAL, SHAFT, WHEEL, friction_elements
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schedule import Schedule
-from drivetwin.driveline import EnergyAudit, Event, FloatArray
 from drivetwin.gearbox import Gearbox
-from drivetwin.network import NetworkRun
+from drivetwin.simulation.dual_clutch import EnergyAudit, Event, FloatArray
+from drivetwin.simulation.network import NetworkRun
 
 _OF_MASS = (0.75, 1.5)
 """Inertia of a vehicle over that of its mass: wheels and axles add to it, few numbers are exact."""

@@ -15,6 +15,7 @@ from functools import cache
 
 import numpy as np
 
+from drivetwin._util.progress import tell
 from drivetwin.drive.network import (
     BRAKE,
     CRANK,
@@ -29,11 +30,10 @@ from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.result import Action, DriveRun, observe
 from drivetwin.drive.schedule import Knots, Schedule
 from drivetwin.drive.shift import CLOSE, FILL, OPEN, RAMP, ShiftPlan, pressure
-from drivetwin.driveline import FloatArray
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, Reduction, reduce
-from drivetwin.network import NetworkRun, Output, simulate
-from drivetwin.progress import tell
+from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.network import NetworkRun, Output, simulate
 
 STEP = 1e-3
 """Time between recorded samples, s: eighty per period of the output shaft."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray, Signal
+from drivetwin.simulation.dual_clutch import FloatArray, Signal
 
 Knots = tuple[tuple[float, float], ...]
 

@@ -10,11 +10,11 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
+from drivetwin._util.toml import StrictModel
+from drivetwin.channels.units import BAR, RPM
 from drivetwin.drive.powertrain import Control, Engine, Powertrain
-from drivetwin.driveline import RoadLoad, Stribeck
 from drivetwin.gearbox.spec import Capacity
-from drivetwin.logs.units import BAR, RPM
-from drivetwin.tomlfile import StrictModel
+from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck
 from drivetwin.vehicle.converter import ConverterTable, Curve
 
 AIR_DENSITY = 1.188

@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from drivetwin.driveline import DualClutch, RoadLoad, ShiftElement, Stribeck
 from drivetwin.dyno.actuators import Actuator, Program
 from drivetwin.dyno.dual_scenarios import can_torque, log_sensors, torque_steps
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import HeldGear, Scenario
 from drivetwin.dyno.sensors import Sensor
+from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck
 
 _DEAD_TIME, _LAG = 0.010, 0.015
 _WET = Stribeck(mu_c=0.115, mu_s=0.130, v_s=8.0, mu_v=5e-5)

@@ -9,9 +9,16 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from drivetwin.converter import Converter
-from drivetwin.driveline import DualClutch, FloatArray, ShiftElement, Signal, State, Trajectory
-from drivetwin.network import Element, Output, Start, element, simulate
+from drivetwin.simulation.converter_map import Converter
+from drivetwin.simulation.dual_clutch import (
+    DualClutch,
+    FloatArray,
+    ShiftElement,
+    Signal,
+    State,
+    Trajectory,
+)
+from drivetwin.simulation.network import Element, Output, Start, element, simulate
 
 _CRANK, _TURBINE, _INPUT, _OUTPUT = "crankshaft", "turbine", "input", "output"
 _AXLE, _WHEEL, _SHAFT = "axle", "wheel", "output shaft"

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.converter import OpenConverter
 from drivetwin.dyno.dual_scenarios import paper_steps
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.sensors import Sensor
-from drivetwin.logs.shiftlog import Quantity
 from drivetwin.vehicle.converter import ConverterTable
 
 _MAP = ConverterTable(

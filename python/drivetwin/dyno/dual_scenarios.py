@@ -12,13 +12,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from drivetwin.driveline import DualClutch, RoadLoad, ShiftElement, Stribeck
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.actuators import Actuator, Program, Vibration
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import HeldGear, Scenario, TorqueReduction
 from drivetwin.dyno.sensors import Sensor
-from drivetwin.logs.pressure import pressure_role
-from drivetwin.logs.shiftlog import Quantity
+from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck
 
 _DEAD_TIME = 0.012
 _LAG = 0.020

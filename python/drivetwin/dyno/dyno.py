@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin import driveline
-from drivetwin.driveline import Signal, Trajectory
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.dyno.truth import Truth, truth_of
 from drivetwin.errors import InputError, SimulationError, Where
-from drivetwin.logs.pressure import pressure_role
-from drivetwin.logs.shiftlog import Channel
+from drivetwin.simulation import dual_clutch
+from drivetwin.simulation.dual_clutch import Signal, Trajectory
 
 FloatArray = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[st
         trajectory, crank = scenario.converter.simulate(*given)
         speeds["engine_speed"] = Signal(time, crank)
     else:
-        run = driveline.simulate if scenario.plant is None else scenario.plant.simulate
+        run = dual_clutch.simulate if scenario.plant is None else scenario.plant.simulate
         trajectory = run(*given)
     if trajectory.status != "completed":
         raise SimulationError(

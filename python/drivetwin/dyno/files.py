@@ -9,12 +9,12 @@ from io import StringIO
 import numpy as np
 import tomlkit
 
+from drivetwin.channels.pressure_roles import pressed_element
+from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.channels.units import BAR
 from drivetwin.dyno.dyno import DynoRun
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.logs.pressure import pressed_element
 from drivetwin.logs.raw import RawChannel
-from drivetwin.logs.shiftlog import Channel, FloatArray
-from drivetwin.logs.units import BAR
 from drivetwin.logs.write import as_recorded
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.spec import brake_ratios

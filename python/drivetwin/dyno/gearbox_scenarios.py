@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from drivetwin.driveline import RoadLoad
 from drivetwin.dyno.actuators import Actuator, Fill, Program, Vibration
 from drivetwin.dyno.dual_scenarios import can_torque, log_sensors, torque_steps
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.plant import Surroundings, form_of, plant_of
 from drivetwin.dyno.scenario import HeldGear, Scenario, TorqueReduction
 from drivetwin.gearbox import Gearbox, load_gearbox
+from drivetwin.simulation.dual_clutch import RoadLoad
 
 DRUM = 0.05
 """Inertia of each brake drum, kg m^2: usual for a heavy-duty gearbox."""

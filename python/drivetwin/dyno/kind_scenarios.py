@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin.driveline import Stribeck
 from drivetwin.dyno.actuators import Actuator, Program
 from drivetwin.dyno.dual_scenarios import paper, paper_steps, torque_steps
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import HeldGear, Scenario
+from drivetwin.simulation.dual_clutch import Stribeck
 
 _DEAD_TIME, _LAG = 0.012, 0.020
 _MAIN, _KISS = 1.4e6, 7.6e4

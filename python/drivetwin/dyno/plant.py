@@ -9,7 +9,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from drivetwin.driveline import (
+from drivetwin.gearbox import Gearbox, gear_statics, network_elements, reduce
+from drivetwin.gearbox.dual import shift_element
+from drivetwin.gearbox.reduction import ElementRatios
+from drivetwin.gearbox.spec import GROUND
+from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
     RoadLoad,
@@ -17,11 +21,7 @@ from drivetwin.driveline import (
     State,
     Trajectory,
 )
-from drivetwin.gearbox import Gearbox, gear_statics, network_elements, reduce
-from drivetwin.gearbox.dual import shift_element
-from drivetwin.gearbox.reduction import ElementRatios
-from drivetwin.gearbox.spec import GROUND
-from drivetwin.network import Element, Output, Start, element, simulate
+from drivetwin.simulation.network import Element, Output, Start, element, simulate
 
 _ENGINE, _AXLE, _WHEEL, _SHAFT = "engine", "axle", "wheel", "output shaft"
 _TORQUE = "engine torque"

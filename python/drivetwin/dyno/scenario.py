@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.driveline import DualClutch, ShiftElement, State
 from drivetwin.dyno.actuators import Actuator, Program
 from drivetwin.dyno.converter import OpenConverter
 from drivetwin.dyno.plant import Plant
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.errors import InputError, Where
+from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, State
 
 FloatArray = NDArray[np.float64]
 

@@ -9,12 +9,7 @@ from drivetwin.dyno.car_scenarios import dual_clutch, manual
 from drivetwin.dyno.converter_scenario import open_converter
 from drivetwin.dyno.dual_scenarios import paper, paper_steps, throttle_steps
 from drivetwin.dyno.gearbox_scenarios import gearbox, gearbox_chain
-from drivetwin.dyno.kind_scenarios import (
-    input_gear,
-    power_off_down,
-    power_off_up,
-    power_on_down,
-)
+from drivetwin.dyno.kind_scenarios import input_gear, power_off_down, power_off_up, power_on_down
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import InputError, Where

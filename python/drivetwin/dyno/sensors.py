@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.logs.shiftlog import Channel, Quantity
+from drivetwin.channels.shiftlog import Channel, Quantity
 
 FloatArray = NDArray[np.float64]
 

@@ -8,9 +8,15 @@ from itertools import pairwise
 from math import inf, pi, sqrt
 from typing import Any
 
-from drivetwin.driveline import DualClutch, FrictionTable, Stribeck, Trajectory, in_series
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.parameters import spec_of
+from drivetwin.simulation.dual_clutch import (
+    DualClutch,
+    FrictionTable,
+    Stribeck,
+    Trajectory,
+    in_series,
+)
 
 SCHEMA = "drivetwin-truth/2"
 

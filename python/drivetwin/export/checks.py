@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from drivetwin.border import as_json
-from drivetwin.driveline import DualClutch, FrictionTable, State
 from drivetwin.errors import InputError
 from drivetwin.export.entries import Entry, entries_of
+from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, State
+from drivetwin.simulation.serialize import as_json
 
 MAX_POINTS = 64
 """DT_POINTS of `dt_model.h`."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from drivetwin.driveline import DualClutch, FrictionTable, State
+from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, State
 
 INF = math.inf
 

@@ -6,10 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
-from drivetwin.driveline import DualClutch, State
 from drivetwin.errors import InputError
 from drivetwin.shifts.shift import Shift, ShiftKind
-from drivetwin.twin import Twin
+from drivetwin.simulation.dual_clutch import DualClutch, State
+from drivetwin.twin.twin import Twin
 
 DEFAULT_ENGINE_SPEED = 150.0
 """Engine speed [rad/s] of a start that nothing else tells, where the twin has seen no speeds."""

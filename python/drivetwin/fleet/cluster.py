@@ -16,12 +16,12 @@ from time import monotonic, sleep
 from typing import Any
 from uuid import uuid4
 
+from drivetwin._util.optional_dependencies import require
 from drivetwin.errors import SchedulerError, Where
-from drivetwin.fleet.cell import Cell
 from drivetwin.fleet.events import Listener, Noted
+from drivetwin.fleet.guarded_worker import Cell
 from drivetwin.fleet.pool import AHEAD
 from drivetwin.fleet.task import Lost, Reply, Task, WorkerSpec
-from drivetwin.logs.extras import require
 
 _FIRST_CONTACT = 10.0
 """Time [s] in which a scheduler must answer at the start ..."""

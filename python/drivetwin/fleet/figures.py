@@ -7,12 +7,12 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from drivetwin.display import display_of
-from drivetwin.fleet.joint.mixed import FloatArray
-from drivetwin.fleet.joint.result import Drift, JointEstimate, UnitValue
+from drivetwin._util.display_units import display_of
+from drivetwin.estimation.result.estimate import Z95
+from drivetwin.fleet.mixed_model.mixed import FloatArray
+from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, UnitValue
 from drivetwin.fleet.readings import moment, reading_text
 from drivetwin.fleet.rules import is_date
-from drivetwin.identify.result import Z95
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, axis, layout
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
-from drivetwin.identify.result import FloatArray, FrictionCurve
 
 _POINTS = 40
 _LEAST = 5

@@ -11,28 +11,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, InputError, MissingChannelError, StoreError, Where
-from drivetwin.fleet.free import free_friction
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identify import identify
+from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
+from drivetwin.estimation.result.verdict import judge
+from drivetwin.fleet.mixed_model.remove_priors import free_friction
 from drivetwin.fleet.parts import writing
 from drivetwin.fleet.rows import MU, Found, Row, RowKind
 from drivetwin.fleet.scan import inputs_of
 from drivetwin.fleet.task import Recipe, ShiftRow, Task
-from drivetwin.identify.pipeline import identify
-from drivetwin.identify.result import Z95, Estimate, FrictionCurve, Identification, Verdict
-from drivetwin.identify.uncertainty import judge
-from drivetwin.logs.formats import open_recording
-from drivetwin.logs.profile import read_mapping
-from drivetwin.logs.raw import ReadOptions
+from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.read import read_log
 from drivetwin.parameters import spec_of
-from drivetwin.shifts.find import FoundShifts
-from drivetwin.shifts.usable import usable_shifts
-from drivetwin.twin import Twin
-from drivetwin.validate import validated
+from drivetwin.shifts.detect import FoundShifts, usable_shifts
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import validated
 from drivetwin.vehicle.card import VehicleCard, load_card
 
 if TYPE_CHECKING:
-    from drivetwin.logs.shiftlog import ShiftLog
+    from drivetwin.channels.shiftlog import ShiftLog
 
 _CARDS = 64
 """Cards that a worker keeps at hand."""

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.atomic import write_bytes, write_text
-from drivetwin.identify.result import Identification
-from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin._util.atomic import write_bytes, write_text
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.identification import Identification
 from drivetwin.report.html import render_report, save_library
 
 LIBRARY = "plotly.js"

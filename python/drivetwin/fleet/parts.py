@@ -16,7 +16,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from drivetwin.atomic import write_bytes
+from drivetwin._util.atomic import write_bytes
 from drivetwin.errors import StoreError, Where
 from drivetwin.fleet.rows import Row, RowKind, schema, table
 from drivetwin.fleet.task import GO_ON, Outcome

@@ -8,7 +8,7 @@ import threading
 from queue import Empty, SimpleQueue
 from typing import Protocol
 
-from drivetwin.fleet.cell import Cell
+from drivetwin.fleet.guarded_worker import Cell
 from drivetwin.fleet.task import Reply, Task, WorkerSpec
 
 AHEAD = 2

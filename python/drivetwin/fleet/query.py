@@ -10,13 +10,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from drivetwin._util.optional_dependencies import require
 from drivetwin.errors import QueryError
 from drivetwin.fleet.index import ONE_FILE_EACH, Index
 from drivetwin.fleet.readings import moment
 from drivetwin.fleet.rows import RowKind, schema
 from drivetwin.fleet.rules import FILE_COLUMNS, is_date
 from drivetwin.fleet.store import Store
-from drivetwin.logs.extras import require
 
 _VIEWS = (RowKind.PARAMETER, RowKind.FRICTION, RowKind.FIT, RowKind.QUALITY, RowKind.WARNING)
 _TABLES = ("logs", "shifts", "settings")
@@ -112,7 +112,7 @@ def save_answer(answer: Answer, path: Path) -> None:
     """Write an answer as CSV, or as Parquet where the name ends so."""
     from io import BytesIO, StringIO
 
-    from drivetwin.atomic import write_bytes, write_text
+    from drivetwin._util.atomic import write_bytes, write_text
 
     if path.suffix.casefold() == ".parquet":
         import pyarrow as pa

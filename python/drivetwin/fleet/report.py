@@ -10,18 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.atomic import write_text
-from drivetwin.display import display_of, significant, with_uncertainty
+from drivetwin._util.atomic import write_text
+from drivetwin._util.display_units import display_of, significant, with_uncertainty
+from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fleet.figures import drift_figure, unit_label, units_figure
 from drivetwin.fleet.friction import fleet_friction
-from drivetwin.fleet.joint.estimate import joint_estimates, untold
-from drivetwin.fleet.joint.result import Interval, JointEstimate, Outlier
+from drivetwin.fleet.mixed_model.estimate import joint_estimates, untold
+from drivetwin.fleet.mixed_model.result import Interval, JointEstimate, Outlier
+from drivetwin.fleet.mixed_model.single_unit import MOST_ROWS, cut, single, singles
 from drivetwin.fleet.pages import LIBRARY
 from drivetwin.fleet.readings import drift_unit, span_text
-from drivetwin.fleet.singles import MOST_ROWS, cut, single, singles
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import State
-from drivetwin.identify.result import Z95
 from drivetwin.parameters import spec_of
 from drivetwin.report.figures.friction import friction_figure
 from drivetwin.report.html import render_page

@@ -13,10 +13,10 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from drivetwin._util.toml import StrictModel, raise_faults, read_toml, schema_faults
 from drivetwin.errors import RulesError, Where
 from drivetwin.fleet.rows import ROW_COLUMNS
 from drivetwin.fleet.sources import Source
-from drivetwin.tomlfile import StrictModel, raise_faults, read_toml, schema_faults
 
 UNIT = "unit"
 FILE_COLUMNS = ("path", "log", "rule", UNIT)

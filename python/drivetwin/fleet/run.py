@@ -7,6 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.fleet.coordinator import Coordinator, Wishes
 from drivetwin.fleet.events import Listener, Summary
 from drivetwin.fleet.pool import LocalPool, Pool, usable_cores
@@ -15,7 +16,6 @@ from drivetwin.fleet.scan import Scan
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import WorkerSpec
-from drivetwin.identify.method import DEFAULT_METHOD, Method
 
 
 @dataclass(frozen=True)

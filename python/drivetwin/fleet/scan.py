@@ -12,15 +12,15 @@ from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.errors import DrivetwinError, FileFormatError, Where
+from drivetwin.estimation.result.method import Method
+from drivetwin.files.records import program_version
 from drivetwin.fleet.index import FileRow
 from drivetwin.fleet.rules import RulesFile, rule_for
 from drivetwin.fleet.sources import Source, Sources
 from drivetwin.fleet.task import Outcome, Recipe, State
-from drivetwin.identify.method import Method
-from drivetwin.logs.formats import open_recording
-from drivetwin.logs.profile import read_mapping
-from drivetwin.results.version import program_version
+from drivetwin.logs.formats.detect import open_recording
 
 ROWS_FORMAT = 2
 """Counts up when the same identification leaves other rows."""

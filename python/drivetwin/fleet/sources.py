@@ -12,7 +12,7 @@ from pathlib import Path
 
 from drivetwin.errors import InputError, Where
 from drivetwin.fleet.index import INDEX
-from drivetwin.logs.formats import SUFFIXES
+from drivetwin.logs.formats.detect import SUFFIXES
 
 _PATH = "path"
 

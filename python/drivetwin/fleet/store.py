@@ -11,12 +11,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from drivetwin._util.optional_dependencies import require
 from drivetwin.errors import StoreError, Where
 from drivetwin.fleet import parts
 from drivetwin.fleet.index import INDEX, RUN_COLUMNS, Index
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.task import GO_ON, Outcome, State, Task
-from drivetwin.logs.extras import require
 
 _LOCK = "coordinator.lock"
 REPORTS, TRACES = "reports", "traces"

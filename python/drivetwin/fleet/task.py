@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from drivetwin.identify.method import Method
+from drivetwin.estimation.result.method import Method
 
 GO_ON = (
     "make room or give write permission, then run the same command again: what is done stays done"

@@ -20,10 +20,10 @@ from time import perf_counter
 from typing import Any
 
 from drivetwin.errors import DrivetwinError, StoreError
+from drivetwin.files.records import program_version
 from drivetwin.fleet.parts import write_part, writing
 from drivetwin.fleet.rows import Found
 from drivetwin.fleet.task import Outcome, State, Task, memory_exceeded
-from drivetwin.results.version import program_version
 
 Work = Callable[[Task], Found]
 

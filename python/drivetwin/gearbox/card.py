@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from drivetwin._util.toml import did_you_mean, raise_faults, read_toml
 from drivetwin.errors import CardError
 from drivetwin.gearbox.check import gearbox_faults
 from drivetwin.gearbox.schema import GearboxFile
 from drivetwin.gearbox.spec import Gearbox
-from drivetwin.tomlfile import did_you_mean, raise_faults, read_toml
 
 _CARDS = Path(__file__).parent / "cards"
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from drivetwin._util.toml import Fault, did_you_mean, schema_faults
 from drivetwin.gearbox.schema import GearboxFile
 from drivetwin.gearbox.spec import GROUND
-from drivetwin.tomlfile import Fault, did_you_mean, schema_faults
 
 
 def gearbox_faults(document: Mapping[str, Any]) -> list[Fault]:

@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.driveline import ENGINE_TORQUE, DualClutch, FloatArray, RoadLoad, Signal, State
-from drivetwin.driveline import simulate as simulate_dual_clutch
 from drivetwin.errors import SimulationError
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.gears import gear_statics
@@ -16,8 +14,17 @@ from drivetwin.gearbox.maneuver import Maneuver, plan, signals, time_grid
 from drivetwin.gearbox.network import network_elements
 from drivetwin.gearbox.reduction import Reduction
 from drivetwin.gearbox.traces import CouplingError, Traces
-from drivetwin.network import Element, Start, element
-from drivetwin.network import simulate as simulate_network
+from drivetwin.simulation.dual_clutch import (
+    ENGINE_TORQUE,
+    DualClutch,
+    FloatArray,
+    RoadLoad,
+    Signal,
+    State,
+)
+from drivetwin.simulation.dual_clutch import simulate as simulate_dual_clutch
+from drivetwin.simulation.network import Element, Start, element
+from drivetwin.simulation.network import simulate as simulate_network
 
 AXLE, WHEEL, SHAFT = "axle beyond the shaft", "wheel of the vehicle", "shaft to the axle"
 _COMPLETED = "completed"

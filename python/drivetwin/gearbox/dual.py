@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from drivetwin.driveline import DualClutch, RoadLoad, ShiftElement
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox.drive import Drive
+from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement
 
 if TYPE_CHECKING:
     from drivetwin.gearbox.reduction import ElementRatios, Reduction

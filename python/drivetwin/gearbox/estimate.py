@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray, in_series
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.maneuver import RAMP, Maneuver, plan, time_grid
 from drivetwin.gearbox.reduction import Reduction
 from drivetwin.gearbox.traces import CouplingError, Traces
+from drivetwin.simulation.dual_clutch import FloatArray, in_series
 
 _GROWTH_STEPS = 4
 """Fixed-point steps for the slip left when the first model locks; the growth is moderate."""

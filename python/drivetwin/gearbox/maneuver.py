@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray, Signal
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.reduction import Reduction
 from drivetwin.gearbox.spec import Capacity
+from drivetwin.simulation.dual_clutch import FloatArray, Signal
 
 LEAD_IN = 0.1
 """Time in the old gear before the torque phase, s."""

@@ -7,9 +7,9 @@ import json
 from collections.abc import Collection, Iterator
 from dataclasses import asdict
 
-from drivetwin.driveline import FrictionTable
 from drivetwin.gearbox.spec import Capacity, ElementKind, Gearbox, ShiftMember
-from drivetwin.network import Element
+from drivetwin.simulation.dual_clutch import FrictionTable
+from drivetwin.simulation.network import Element
 
 _NO_CAPACITY = Capacity(gain=0.0, P0=0.0, peak=1.0, friction=FrictionTable((0.0,), (0.0,)))
 

@@ -7,12 +7,12 @@ import math
 from dataclasses import dataclass
 
 from drivetwin import _native
-from drivetwin.driveline import DualClutch
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.dual import dual_clutch
 from drivetwin.gearbox.network import as_json
 from drivetwin.gearbox.spec import Gearbox
+from drivetwin.simulation.dual_clutch import DualClutch
 
 _NO_COUPLING = 1e-9
 """|M12| over √(M11·M22) up to which it is round-off."""

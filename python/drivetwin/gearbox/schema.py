@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from drivetwin.driveline import Stribeck
+from drivetwin._util.toml import StrictModel
+from drivetwin.channels.units import BAR, RPM
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.spec import (
     GROUND,
@@ -18,8 +19,7 @@ from drivetwin.gearbox.spec import (
     PlanetarySet,
     ShiftMember,
 )
-from drivetwin.logs.units import BAR, RPM
-from drivetwin.tomlfile import StrictModel
+from drivetwin.simulation.dual_clutch import Stribeck
 
 Name = Annotated[str, Field(min_length=1)]
 Teeth = Annotated[int, Field(ge=1)]

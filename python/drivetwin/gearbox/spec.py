@@ -9,10 +9,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from drivetwin.driveline import FrictionTable, Stribeck
+from drivetwin._util.toml import did_you_mean
 from drivetwin.errors import CardError, InputError, ReductionError
 from drivetwin.gearbox.drive import Drive
-from drivetwin.tomlfile import did_you_mean
+from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 
 GROUND = "ground"
 """The member that does not turn: the housing."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray
+from drivetwin.simulation.dual_clutch import FloatArray
 
 
 @dataclass(frozen=True)

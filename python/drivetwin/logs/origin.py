@@ -12,8 +12,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from drivetwin.driveline import LATEST
-from drivetwin.logs.shiftlog import FloatArray
+from drivetwin.channels.shiftlog import FloatArray
+from drivetwin.simulation.dual_clutch import LATEST
 
 
 def origin_of(starts: Iterable[float]) -> float:

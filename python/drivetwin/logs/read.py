@@ -8,14 +8,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin.errors import (
-    DamagedChannelError,
-    PlausibilityError,
-    TimeError,
-    UnitError,
-    Where,
-)
-from drivetwin.logs.agreement import (
+from drivetwin._util.progress import tell
+from drivetwin.channels.mapping import ChannelSpec, Mapped, resolve
+from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, quantity_of
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.units import channel_unit, first_spellings, lookup
+from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, UnitError, Where
+from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.quality.channel_checks import Checked, check_channel
+from drivetwin.logs.quality.consistency_checks import (
     check_common_span,
     check_gearing,
     check_torque_signs,
@@ -23,18 +26,10 @@ from drivetwin.logs.agreement import (
     partly_recorded,
     torque_balance,
 )
-from drivetwin.logs.align import clock_warnings
-from drivetwin.logs.formats import open_recording
-from drivetwin.logs.held import find_raster, shown_late
-from drivetwin.logs.mapping import ChannelSpec, Mapped, resolve
-from drivetwin.logs.profile import read_mapping
-from drivetwin.logs.raw import RawChannel, RawLog, ReadOptions, Recording, Window
-from drivetwin.logs.roles import AUXILIARY, FOR_SHIFTS, quantity_of
-from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
-from drivetwin.logs.torque_delay import torque_warnings
-from drivetwin.logs.units import channel_unit, first_spellings, lookup
-from drivetwin.logs.validate import Checked, check_channel
-from drivetwin.progress import tell
+from drivetwin.logs.quality.time_alignment import clock_warnings
+from drivetwin.logs.quality.torque_delay import torque_warnings
+from drivetwin.logs.quality.update_raster import find_raster, shown_late
+from drivetwin.logs.raw import RawChannel, RawLog, Recording, Window
 from drivetwin.vehicle.card import VehicleCard
 
 

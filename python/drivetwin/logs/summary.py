@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin.channels.read_options import Column
+from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.errors import DamagedChannelError
-from drivetwin.logs.held import find_raster
-from drivetwin.logs.raw import Column, RawChannel, Recording, Window
-from drivetwin.logs.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.logs.quality.update_raster import find_raster
+from drivetwin.logs.raw import RawChannel, Recording, Window
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from drivetwin.logs.mapping import ChannelSpec, Mapped, guess, spec_of
-from drivetwin.logs.pressure import pressure_role
-from drivetwin.logs.raw import Column as LogColumn
-from drivetwin.logs.raw import ReadOptions, Recording
-from drivetwin.logs.roles import NEEDED, quantity_of
-from drivetwin.logs.shiftlog import Quantity
+from drivetwin.channels.mapping import ChannelSpec, Mapped, guess, spec_of
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.read_options import Column as LogColumn
+from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.roles import NEEDED, quantity_of
+from drivetwin.channels.shiftlog import Quantity
+from drivetwin.logs.raw import Recording
 from drivetwin.logs.summary import ColumnSummary, summarise
-from drivetwin.vehicle.spec import VehicleCard
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,13 @@ from typing import BinaryIO
 
 import numpy as np
 
-from drivetwin.atomic import replacing
+from drivetwin._util.atomic import replacing
+from drivetwin._util.optional_dependencies import require
+from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.channels.units import channel_unit
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.extras import require
+from drivetwin.logs.quality.channel_checks import check_order
 from drivetwin.logs.raw import RawChannel
-from drivetwin.logs.shiftlog import Channel, FloatArray
-from drivetwin.logs.units import channel_unit
-from drivetwin.logs.validate import check_order
 
 _TIME = "time"
 

@@ -12,16 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.driveline import DualClutch, Signal, State, Trajectory, simulate
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, SimulationError
-from drivetwin.identify.inputs import pressures_of, sampled
-from drivetwin.identify.signals import Sampled
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.observer.observed import Band, FloatArray, Observation, Observer
-from drivetwin.observer.uncertain import uncertain, with_drawn_friction
+from drivetwin.estimation.data.prepare import pressures_of, sampled
+from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.observer.kind import Observer
+from drivetwin.observer.propagate import uncertain, with_drawn_friction
+from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.shifts.shift import Shift
-from drivetwin.twin import Twin
-from drivetwin.validate import validate
+from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory, simulate
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import validate
 
 STEMS = ("eta", "J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
 RUNS = 100

@@ -5,14 +5,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.observer.ensemble import simulate_observed
-from drivetwin.observer.observed import Observation, Observer
+from drivetwin.observer.kind import Observer
+from drivetwin.observer.result import Observation
 from drivetwin.observer.smooth import smooth
-from drivetwin.shifts.converter import behind_converter
-from drivetwin.shifts.recorded import near, recorded
+from drivetwin.shifts.coverage import near, recorded
+from drivetwin.shifts.lockup_clutch import behind_converter
 from drivetwin.shifts.shift import Shift
-from drivetwin.twin import Twin
+from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.spec import PriorValue
 
 FAR = 15.0

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.driveline import DualClutch
-from drivetwin.logs.pressure import pressure_role
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.observer.course import Recorded, course_of, is_driving, recorded, slip_of
-from drivetwin.observer.mechanics import (
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.observer.inputs import Recorded, course_of, is_driving, recorded, slip_of
+from drivetwin.observer.kind import Observer
+from drivetwin.observer.linear_model import (
     CARRIED,
     LOAD,
     SPEEDS,
@@ -29,11 +29,12 @@ from drivetwin.observer.mechanics import (
     answer,
     linear,
 )
-from drivetwin.observer.observed import Band, FloatArray, Observation, Observer
+from drivetwin.observer.propagate import Uncertain, uncertain
+from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.observer.smoother import Measurement, Process, filtered, smoothed
-from drivetwin.observer.uncertain import Uncertain, uncertain
 from drivetwin.shifts.shift import Shift
-from drivetwin.twin import Twin
+from drivetwin.simulation.dual_clutch import DualClutch
+from drivetwin.twin.twin import Twin
 
 STEMS = ("eta", "J_prime", "J_out", "J_vehicle", "k_o", "c_o", "te_delay")
 """Parameters that count as unknown within the twin's covariance; the friction has its own state."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drivetwin.observer.observed import FloatArray
+from drivetwin.observer.result import FloatArray
 
 Measurement = tuple[FloatArray, float, float]
 """Row (n,) of the state, the value read and its variance."""

@@ -6,11 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from drivetwin.atomic import write_text
+from drivetwin._util.atomic import write_text
+from drivetwin._util.progress import tell
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.progress import tell
-from drivetwin.report.candidates import Candidate, Trial
+from drivetwin.estimation.result.validation import Validation
+from drivetwin.files.records import program_version
+from drivetwin.report.find_reports import Candidate, Trial
 from drivetwin.report.html import render_page
 from drivetwin.report.sections.comparison import (
     agreement_section,
@@ -18,10 +20,9 @@ from drivetwin.report.sections.comparison import (
     origin_section,
     trial_sections,
 )
-from drivetwin.results.version import program_version
 from drivetwin.shifts.shift import Shift
-from drivetwin.twin import Twin
-from drivetwin.validate import Validation, validate
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import validate
 
 
 def save_comparison(

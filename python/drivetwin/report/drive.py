@@ -7,8 +7,8 @@ from io import StringIO
 
 import numpy as np
 
+from drivetwin.channels.pressure_roles import pressure_role
 from drivetwin.drive.result import DriveRun
-from drivetwin.logs.pressure import pressure_role
 from drivetwin.report.figures.drive import (
     energy_figure,
     maneuver_panels,

@@ -12,18 +12,18 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from drivetwin.atomic import write_text
-from drivetwin.identify.result import Identification
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.progress import part, tell
-from drivetwin.report.packing import Store, packed
+from drivetwin._util.atomic import write_text
+from drivetwin._util.progress import part, tell
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.identification import Identification
+from drivetwin.report.embedded_data import Store, packed
 from drivetwin.report.sections.blocks import FigureBlock, Section
-from drivetwin.report.sections.evidence import evidence_sections
+from drivetwin.report.sections.identifiability import limits_section
 from drivetwin.report.sections.likelihood import likelihood_sections
-from drivetwin.report.sections.limits import limits_section
+from drivetwin.report.sections.parameters import trust_section
 from drivetwin.report.sections.provenance import provenance_section
-from drivetwin.report.sections.story import friction_section, shift_section, validation_section
-from drivetwin.report.sections.trust import trust_section
+from drivetwin.report.sections.stage_results import evidence_sections
+from drivetwin.report.sections.summary import friction_section, shift_section, validation_section
 
 _BELOW_BUTTONS = 30
 """Room above the panels [px] where the page has the zoom buttons outside the figure."""

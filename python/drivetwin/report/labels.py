@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from drivetwin.logs.pressure import pressed_element
-from drivetwin.logs.roles import quantity_of
+from drivetwin.channels.pressure_roles import pressed_element
+from drivetwin.channels.roles import quantity_of
 from drivetwin.parameters import OVER_ETA, spec_of
 
 

@@ -11,16 +11,17 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import escape
 
-from drivetwin.display import display_of, significant, with_uncertainty
-from drivetwin.identify.result import Z95, Estimate, Identification, SignalFit
-from drivetwin.logs.shiftlog import ShiftLog
+from drivetwin._util.display_units import display_of, significant, with_uncertainty
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit
+from drivetwin.estimation.result.validation import Validation
 from drivetwin.report.figures.comparison import friction_overlay
 from drivetwin.report.figures.parameters import interval_figure
 from drivetwin.report.figures.recording import QUANTITIES, log_figure
 from drivetwin.report.figures.validation import validation_figure
 from drivetwin.report.labels import channel_label, channel_unit
-from drivetwin.twin import Twin
-from drivetwin.validate import Validation
+from drivetwin.twin.twin import Twin
 
 Row = Sequence[str]
 

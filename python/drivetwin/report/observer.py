@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.observer.observed import Observation
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.observer.result import Observation
 from drivetwin.report.figures.observer import observer_panels
 from drivetwin.report.figures.stack import stacked
 from drivetwin.report.html import render_page
 from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, Section
-from drivetwin.validate import phases_of
+from drivetwin.validation.simulate_log import phases_of
 
 
 def render_observations(found: Sequence[Observation], log: ShiftLog) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from drivetwin.identify.result import Verdict
+from drivetwin.estimation.result.estimate import Verdict
 
 MEASURED = "#1A7FC4"
 SIMULATED = "#D55E00"

@@ -6,19 +6,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from drivetwin.atomic import write_text
-from drivetwin.identify.result import Identification
-from drivetwin.identify.several.fit import Several, of_one_log
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.progress import part
+from drivetwin._util.atomic import write_text
+from drivetwin._util.progress import part
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.multi_log.fit import of_one_log
+from drivetwin.estimation.result.multi_log import Several
 from drivetwin.report.html import render_page, report_sections
 from drivetwin.report.sections.blocks import Section
+from drivetwin.report.sections.identifiability import limits_section
 from drivetwin.report.sections.likelihood import likelihood_sections
-from drivetwin.report.sections.limits import limits_section
+from drivetwin.report.sections.parameters import trust_section
 from drivetwin.report.sections.provenance import provenance_section
-from drivetwin.report.sections.story import friction_section, shift_section, validation_section
+from drivetwin.report.sections.summary import friction_section, shift_section, validation_section
 from drivetwin.report.sections.together import held_out_section, of_log, several_section
-from drivetwin.report.sections.trust import trust_section
 
 
 def save_together(path: Path | str, found: Identification, logs: Sequence[ShiftLog]) -> None:

@@ -7,19 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.logs.pressure import pressure_role
-from drivetwin.logs.shiftlog import Channel, ShiftLog, open_ends
-from drivetwin.logs.units import BAR
-from drivetwin.shifts.boundaries import Boundary, break_away, lock_up
-from drivetwin.shifts.flags import flag_before
-from drivetwin.shifts.held import Run
-from drivetwin.shifts.kind import shift_kind
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.shiftlog import Channel, ShiftLog, open_ends
+from drivetwin.channels.units import BAR
+from drivetwin.shifts.breakaway_lockup import Boundary, break_away, lock_up
+from drivetwin.shifts.gear_runs import Run
 from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds
 from drivetwin.shifts.pressures import one_clutch
 from drivetwin.shifts.settings import ShiftSettings
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift, ShiftKind, shift_kind
+from drivetwin.shifts.tcu_flags import flag_before
 from drivetwin.shifts.torque_onset import SMOOTH, pressure_onset, smoothed, torque_dip_onset
-from drivetwin.vehicle.spec import VehicleCard
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _RATIO_DRIFT = 0.002
 """Relative deviation of a held ratio from the card that is worth a warning."""

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError, TimeError, Where
-from drivetwin.logs.damage import staircase
-from drivetwin.logs.held import fresh_samples
-from drivetwin.logs.shiftlog import Channel, ShiftLog
-from drivetwin.vehicle.spec import VehicleCard
+from drivetwin.logs.quality.outliers import staircase
+from drivetwin.logs.quality.update_raster import fresh_samples
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
 FloatArray = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.logs.pressure import pressure_role
-from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.shift import Shift
 
 

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from drivetwin.logs.shiftlog import Channel, ShiftLog, gap_limit
+from drivetwin.channels.shiftlog import Channel, ShiftLog, gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, gear_ratios, gearbox_speeds
 from drivetwin.shifts.shift import Shift, ShiftKind
-from drivetwin.vehicle.spec import VehicleCard, middle_of
+from drivetwin.vehicle.spec import middle_of
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
 FloatArray = NDArray[np.float64]
 

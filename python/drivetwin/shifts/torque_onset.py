@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.logs.shiftlog import Channel
-from drivetwin.shifts.boundaries import Boundary
-from drivetwin.shifts.hinge import Moving, fit_hinge
+from drivetwin.channels.shiftlog import Channel
+from drivetwin.shifts.breakaway_lockup import Boundary
+from drivetwin.shifts.changepoint import Moving, fit_hinge
 
 FloatArray = NDArray[np.float64]
 

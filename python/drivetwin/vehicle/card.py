@@ -6,19 +6,13 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+from drivetwin._util.toml import raise_faults, read_toml
+from drivetwin.channels.pressure_roles import pressure_role
 from drivetwin.errors import CardError
-from drivetwin.logs.pressure import pressure_role
-from drivetwin.tomlfile import raise_faults, read_toml
 from drivetwin.vehicle.check import card_faults
 from drivetwin.vehicle.schema import CardFile, SensorsTable
-from drivetwin.vehicle.spec import (
-    ElementSpec,
-    Gear,
-    PriorValue,
-    SensorTolerance,
-    VehicleCard,
-    brake_ratios,
-)
+from drivetwin.vehicle.spec import ElementSpec, Gear, PriorValue, SensorTolerance, brake_ratios
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
 __all__ = [
     "ElementSpec",

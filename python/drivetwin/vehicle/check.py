@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from drivetwin.tomlfile import Fault, did_you_mean, schema_faults
+from drivetwin._util.toml import Fault, did_you_mean, schema_faults
 from drivetwin.vehicle.schema import CardFile, ElementTable, GearTable
 
 Table = TypeVar("Table", bound=BaseModel)

@@ -8,9 +8,9 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from drivetwin.converter import Converter
-from drivetwin.logs.units import RPM
-from drivetwin.tomlfile import StrictModel
+from drivetwin._util.toml import StrictModel
+from drivetwin.channels.units import RPM
+from drivetwin.simulation.converter_map import Converter
 
 _PER_1000RPM = 1000.0 * RPM
 

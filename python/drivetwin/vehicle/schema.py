@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from drivetwin.driveline import LossLaw
-from drivetwin.logs.profile import ByRole, ChannelTable
-from drivetwin.logs.units import BAR, RPM
-from drivetwin.tomlfile import StrictModel
+from drivetwin._util.toml import StrictModel
+from drivetwin.channels.mapping_file import ByRole, ChannelTable
+from drivetwin.channels.units import BAR, RPM
+from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.spec import ElementSpec, PriorValue, SensorTolerance
 

@@ -4,15 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Literal
-
-from drivetwin.converter import Converter
-from drivetwin.driveline import LossLaw
-from drivetwin.errors import CardError, Where
-from drivetwin.logs.mapping import ChannelSpec
 
 ElementKind = Literal["brake", "clutch"]
 
@@ -79,89 +72,3 @@ def middle_of(limits: tuple[float, float]) -> float:
     """A value in the midst of a design range: its geometric mean, a tenth of one from 0 on."""
     low, high = limits
     return math.sqrt(low * high) if low > 0.0 else 0.1 * high
-
-
-@dataclass(frozen=True)
-class VehicleCard:
-    """A vehicle as known from design; SI.
-
-    `gears` run from low to high. `final_drive` is i_f. `J_prime_range` [kg m^2] is the design
-    range of J' at the engine, `J_vehicle_range` [kg m^2] that of J3 at the wheel; `J_out` [kg m^2]
-    is the inertia of the output side before the shaft (Jo' without drums), None if unknown.
-    `sensors` and `channels` go by channel role. `known` is what else is known, by parameter id (see
-    parameters.py). `converter` is the map of the torque converter, None where the card has none.
-    `source` is the file that it was read from and `sha256` that of its content; both empty where
-    it is from none, the latter also where it was changed since.
-    """
-
-    name: str
-    loss_law: LossLaw
-    i_in: float
-    final_drive: float
-    gears: tuple[Gear, ...]
-    elements: Mapping[str, ElementSpec]
-    J_prime_range: tuple[float, float]
-    J_vehicle_range: tuple[float, float]
-    J_out: PriorValue | None = None
-    sensors: Mapping[str, SensorTolerance] = field(default_factory=dict)
-    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
-    source: str = ""
-    known: Mapping[str, PriorValue] = field(default_factory=dict)
-    converter: Converter | None = None
-    sha256: str = ""
-
-    @property
-    def inputs(self) -> dict[str, str]:
-        """SHA-256 by name of the file that the card was read from; empty without one."""
-        return {Path(self.source).name: self.sha256} if self.sha256 else {}
-
-    def gear(self, name: str) -> Gear:
-        """Return the gear of this name; raises CardError if the card has none."""
-        for gear in self.gears:
-            if gear.name == name:
-                return gear
-        raise self._error(
-            f"the card has no gear {name!r}; it has {', '.join(gear.name for gear in self.gears)}",
-            "add it under [[gears]]",
-        )
-
-    def ratio(self, name: str) -> float:
-        """Return the overall ratio engine to output, i_in·i_c·i_out, of a gear."""
-        return self.i_in * self.gear(name).ratio
-
-    def element(self, name: str) -> ElementSpec:
-        """Return a shift element by name; raises CardError if the card has none."""
-        try:
-            return self.elements[name]
-        except KeyError:
-            raise self._error(
-                f"the card has no element {name!r}; it has {', '.join(self.elements)}",
-                f"add [elements.{name}]",
-            ) from None
-
-    def element_of(self, gear: str) -> str:
-        """Return the one shift element that makes a gear in the dual-clutch picture.
-
-        Raises CardError where several elements hold it.
-        """
-        elements = self.gear(gear).elements
-        if len(elements) != 1:
-            raise self._error(
-                f"gear {gear!r} is held by {', '.join(elements)}",
-                "name only the element that changes in the shift; the others are common to both "
-                "gears",
-            )
-        return elements[0]
-
-    def clutch_ratios(self, element: str) -> tuple[float, float]:
-        """Return (i_c, i_out) of eq. 15: as stated, else of a brake from its gear's ratio."""
-        spec = self.element(element)
-        if spec.i_c is not None and spec.i_out is not None:
-            return spec.i_c, spec.i_out
-        for gear in self.gears:
-            if element in gear.elements:
-                return brake_ratios(gear.ratio)
-        raise self._error(f"element {element!r} holds no gear", "name it under a gear's elements")
-
-    def _error(self, what: str, remedy: str) -> CardError:
-        return CardError(what, remedy, Where(file=self.source or None))

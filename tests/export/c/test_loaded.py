@@ -13,7 +13,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from drivetwin.driveline import (
+from drivetwin.errors import InputError
+from drivetwin.export.c.layout import Precision
+from drivetwin.export.c.loaded import STATUS, CModel, CObserver, CRun
+from drivetwin.export.entries import entries_of, locked_index, start_entries
+from drivetwin.export.fixed_step import InputKind, stepped_run
+from drivetwin.export.subject import steady_start
+from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
     FrictionTable,
@@ -24,13 +30,6 @@ from drivetwin.driveline import (
     Stribeck,
     Trajectory,
 )
-from drivetwin.errors import InputError
-from drivetwin.export.c.layout import Precision
-from drivetwin.export.c.loaded import STATUS, CModel, CObserver, CRun
-from drivetwin.export.entries import entries_of, locked_index, start_entries
-from drivetwin.export.subject import steady_start
-from drivetwin.stepped import stepped_run
-from drivetwin.stepping import InputKind
 from tests.export.cases import CASES, paper_model, paper_subject
 
 FLOAT_ERROR = 2e-4

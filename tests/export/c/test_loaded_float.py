@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.driveline import RoadLoad, State
 from drivetwin.export.c.layout import Precision
 from drivetwin.export.c.loaded import CModel
-from drivetwin.stepped import stepped_run
-from drivetwin.stepping import InputKind
+from drivetwin.export.fixed_step import InputKind, stepped_run
+from drivetwin.simulation.dual_clutch import RoadLoad, State
 from tests.export.c.test_loaded import set_model
 from tests.export.cases import paper_model, paper_subject
 

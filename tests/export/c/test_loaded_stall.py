@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.driveline import State
 from drivetwin.export.c.loaded import CModel
+from drivetwin.simulation.dual_clutch import State
 from tests.export.c.test_loaded import set_model
 from tests.export.cases import paper_model, paper_subject
 

@@ -14,9 +14,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from drivetwin.driveline import FrictionTable
 from drivetwin.errors import InputError
 from drivetwin.export.c.write import c_string, model_sources, twin_source, write_c
+from drivetwin.simulation.dual_clutch import FrictionTable
 from tests.export.cases import CASES, Case, paper_subject
 
 STRICT = (

@@ -18,10 +18,10 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
-from drivetwin.driveline import FloatArray
 from drivetwin.errors import InputError
 from drivetwin.export.compiler import compile_library, native_platform
 from drivetwin.export.entries import entries_of, start_entries
+from drivetwin.export.fixed_step import InputKind, stepped_run
 from drivetwin.export.fmu.build import BuildOptions, build_fmu, identifier
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.fmu.variables import INPUTS as FIRST_INPUT
@@ -29,8 +29,7 @@ from drivetwin.export.fmu.variables import LOCKED, MODES, OUTPUTS, PARAMETERS, S
 from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.files import read_parameters
 from drivetwin.export.platforms import Platform
-from drivetwin.stepped import stepped_run
-from drivetwin.stepping import InputKind
+from drivetwin.simulation.dual_clutch import FloatArray
 from tests.export.cases import CASES, STEP, Case, paper_subject
 
 pytestmark = pytest.mark.skipif(

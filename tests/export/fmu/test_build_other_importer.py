@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from drivetwin.export.compiler import native_platform
+from drivetwin.export.fixed_step import InputKind, stepped_run
 from drivetwin.export.fmu.build import build_fmu
-from drivetwin.stepped import stepped_run
-from drivetwin.stepping import InputKind
 from tests.export.cases import CASES, STEP
 
 pytestmark = pytest.mark.skipif(

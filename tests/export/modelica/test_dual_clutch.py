@@ -9,7 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.driveline import (
+from drivetwin.errors import InputError
+from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.modelica.dual_clutch import modelica_text, write_modelica
+from drivetwin.export.subject import Subject
+from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
     FrictionTable,
@@ -20,10 +24,6 @@ from drivetwin.driveline import (
     Stribeck,
     simulate,
 )
-from drivetwin.errors import InputError
-from drivetwin.export.fmu.experiment import Experiment
-from drivetwin.export.modelica.dual_clutch import modelica_text, write_modelica
-from drivetwin.export.subject import Subject
 from tests.export.modelica.compiled import run
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT

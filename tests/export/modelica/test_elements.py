@@ -9,7 +9,7 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.export.modelica.model import package_text
-from drivetwin.network import Element
+from drivetwin.simulation.network import Element
 
 _TABLE = {"speed_ratio": [0.0, 1.0], "capacity": [0.03, 0.0], "torque_ratio": [1.9, 1.0]}
 _MAP = {"throttle": [0.0, 1.0], "speed": [50.0, 200.0], "torque": [[0.0, -9.0], [5.0, 6.0]]}

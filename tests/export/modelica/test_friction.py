@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.driveline import FloatArray, FrictionTable, Stribeck
 from drivetwin.export.modelica.friction import friction_rows
+from drivetwin.simulation.dual_clutch import FloatArray, FrictionTable, Stribeck
 
 SLIP = np.linspace(0.0, 500.0, 5001)
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.driveline import Signal
 from drivetwin.export.modelica.model import Run, package_text
 from drivetwin.export.modelica.text import identifier
 from drivetwin.gearbox import load_gearbox, network_elements
-from drivetwin.network import Element, Start, simulate
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import Element, Start, simulate
 from tests.export.modelica.compiled import run
 
 TIME = np.linspace(0.0, 0.05, 51)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from drivetwin.export.modelica.start import initial_equations
-from drivetwin.network import Element, Start
+from drivetwin.simulation.network import Element, Start
 
 ELEMENTS: list[Element] = [
     {"type": "gear", "name": "g", "a": "in", "b": "mid", "ratio": 2.0},

@@ -6,7 +6,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.twin import Twin
+from drivetwin.twin.twin import Twin
 from tests.report.sample import card, identification
 
 

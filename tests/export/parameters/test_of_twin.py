@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.converter import Converter
-from drivetwin.driveline import Stribeck
+from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.export.parameters.content import Curve, Scalar
 from drivetwin.export.parameters.of_twin import converter_curves, parameters_of
-from drivetwin.identify.result import Estimate, Verdict
 from drivetwin.parameters import OVER_ETA
+from drivetwin.simulation.converter_map import Converter
+from drivetwin.simulation.dual_clutch import Stribeck
 from tests.export.parameters.sample import twin
 from tests.report.sample import STRIBECK
 

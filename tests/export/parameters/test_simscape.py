@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.converter import Converter
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.of_twin import parameters_of
+from drivetwin.simulation.converter_map import Converter
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT
 

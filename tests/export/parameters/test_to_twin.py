@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.errors import InputError
+from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
 from drivetwin.export.parameters.of_twin import parameters_of
 from drivetwin.export.parameters.to_twin import updated
-from drivetwin.identify.result import Estimate, LoadLaw, Verdict
+from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT
 

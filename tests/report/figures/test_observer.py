@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.display import NM
-from drivetwin.identify.result import Z95
-from drivetwin.observer.observed import Band
+from drivetwin._util.display_units import NM
+from drivetwin.estimation.result.estimate import Z95
+from drivetwin.observer.result import Band
 from drivetwin.report.figures.observer import _curves
 from drivetwin.report.figures.stack import Panel, over_time
 

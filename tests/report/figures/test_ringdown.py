@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.identify.ringdown import RingDown
+from drivetwin.estimation.linear.ringdown import RingDown
+from drivetwin.report.embedded_data import Store
 from drivetwin.report.figures.ringdown import ringdown_figure, ringdown_panels
 from drivetwin.report.html import figure_json
-from drivetwin.report.packing import Store
 from drivetwin.report.sections.blocks import FigureBlock
 
 

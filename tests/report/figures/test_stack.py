@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from drivetwin.display import BAR, NM, RPM
+from drivetwin._util.display_units import BAR, NM, RPM
 from drivetwin.report.figures.shift_phases import shift_phases, shift_spans
 from drivetwin.report.figures.stack import Curve, Panel, over_time, stacked, y_ranges
 from drivetwin.report.figures.validation import validation_figure

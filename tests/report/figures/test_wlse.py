@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.identify.wlse import GridFit, GridRow
+from drivetwin.estimation.paper.wlse import GridFit, GridRow
 from drivetwin.report.figures.wlse import wlse_figure
-from drivetwin.report.sections.evidence import INERTIA_LABELS, grid_table
+from drivetwin.report.sections.stage_results import INERTIA_LABELS, grid_table
 
 
 def _fit() -> GridFit:

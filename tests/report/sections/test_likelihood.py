@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.identify.evidence import Evidence
-from drivetwin.identify.likelihood.curves import curves_of
-from drivetwin.identify.result import Identification
+from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.uncertainty.friction_bands import curves_of
 from drivetwin.report.html import render_report
 from drivetwin.report.sections.blocks import FigureBlock, TableBlock, TilesBlock, Tone
 from drivetwin.report.sections.likelihood import likelihood_sections
-from drivetwin.report.sections.trust import residual_score, trust_section
-from tests.identify.likelihood.made import bench, fitted
+from drivetwin.report.sections.parameters import residual_score, trust_section
+from tests.estimation.likelihood.fixtures import bench, fitted
 from tests.report.sample import identification, log
 from tests.support.shared_results import shared
 

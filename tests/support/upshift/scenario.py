@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from drivetwin.driveline import (
+from drivetwin.export.modelica.dual_clutch import SHAFT, network_of, network_start
+from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
     FloatArray,
@@ -18,8 +19,7 @@ from drivetwin.driveline import (
     State,
     Stribeck,
 )
-from drivetwin.export.modelica.dual_clutch import SHAFT, network_of, network_start
-from drivetwin.network import Element, Output, Sine, Start
+from drivetwin.simulation.network import Element, Output, Sine, Start
 from tests.support.upshift.statement import Inputs, Problem, start
 
 _CLUTCHES = ("2", "3")

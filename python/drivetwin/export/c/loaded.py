@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray
 from drivetwin.errors import InputError
 from drivetwin.export.c.layout import Precision, layout_of
 from drivetwin.export.c.write import write_c
 from drivetwin.export.compiler import compile_library
 from drivetwin.export.subject import Subject
+from drivetwin.simulation.dual_clutch import FloatArray
 
 STATUS = (
     "completed",

@@ -6,7 +6,7 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
-from drivetwin.atomic import write_bytes
+from drivetwin._util.atomic import write_bytes
 from drivetwin.export.checks import check_exportable
 from drivetwin.export.entries import Entry, entries_of, locked_index, start_entries
 from drivetwin.export.subject import Subject

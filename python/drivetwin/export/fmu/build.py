@@ -15,11 +15,12 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from drivetwin.atomic import write_bytes
+from drivetwin._util.atomic import write_bytes
 from drivetwin.errors import InputError
 from drivetwin.export.c.write import model_sources, twin_source
 from drivetwin.export.compiler import compile_library, native_platform
 from drivetwin.export.entries import entries_of
+from drivetwin.export.fixed_step import DEFAULT_STEP
 from drivetwin.export.fmu.describe import Header, description
 from drivetwin.export.fmu.experiment import Experiment, reference_files
 from drivetwin.export.fmu.variables import variables_of
@@ -27,7 +28,6 @@ from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.xml_text import document
 from drivetwin.export.platforms import Platform
 from drivetwin.export.subject import Subject
-from drivetwin.stepping import DEFAULT_STEP
 
 _FOLDERS = {
     FmiVersion.FMI2: {

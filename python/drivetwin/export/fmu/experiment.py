@@ -14,15 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray
+from drivetwin.export.fixed_step import InputKind, stepped_run
 from drivetwin.export.fmu.variables import Role, Variable, variables_of
 from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.content import ParameterSet, Scalar
 from drivetwin.export.parameters.ssv import ssv_text
 from drivetwin.export.parameters.xml_text import document
 from drivetwin.export.subject import Subject
-from drivetwin.stepped import stepped_run
-from drivetwin.stepping import InputKind
+from drivetwin.simulation.dual_clutch import FloatArray
 
 _FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 _PARAMETERS = "../../resources/parameters.ssv"

@@ -5,15 +5,14 @@ from __future__ import annotations
 
 from pathlib import PurePath
 
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
+from drivetwin.export.fixed_step import DEFAULT_STEP, Stepping, start_of, stepped_inputs
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.subject import Subject
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.shifts.usable import usable_shifts
-from drivetwin.stepped import Stepping, start_of, stepped_inputs
-from drivetwin.stepping import DEFAULT_STEP
-from drivetwin.twin import Twin
-from drivetwin.validate import validate
+from drivetwin.shifts.detect import usable_shifts
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import validate
 
 
 def measured_subject(

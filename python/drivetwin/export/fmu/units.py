@@ -7,8 +7,8 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
+from drivetwin.channels.units import BAR, RPM
 from drivetwin.export.parameters.units import base_units
-from drivetwin.logs.units import BAR, RPM
 
 _DISPLAY = {"rad/s": ("rpm", 1.0 / RPM), "Pa": ("bar", 1.0 / BAR), "rad": ("deg", 180.0 / math.pi)}
 """SI unit -> display unit and its factor: displayed = factor · value."""

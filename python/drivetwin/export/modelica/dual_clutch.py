@@ -8,11 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin.atomic import write_text
-from drivetwin.driveline import ENGINE_TORQUE, DualClutch, ShiftElement, Signal, State
+from drivetwin._util.atomic import write_text
 from drivetwin.export.modelica.model import Run, package_text
 from drivetwin.export.subject import Subject
-from drivetwin.network import Element, Start
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, ShiftElement, Signal, State
+from drivetwin.simulation.network import Element, Start
 
 if TYPE_CHECKING:
     from drivetwin.export.fmu.experiment import Experiment

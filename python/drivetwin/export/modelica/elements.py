@@ -15,7 +15,7 @@ from drivetwin.export.modelica.component import (
 from drivetwin.export.modelica.friction import bearing, clutch, one_way_clutch
 from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR
 from drivetwin.export.modelica.text import matrix
-from drivetwin.network import Element
+from drivetwin.simulation.network import Element
 
 _COMPONENTS = f"{ROTATIONAL}.Components"
 _SOURCES = f"{ROTATIONAL}.Sources"

@@ -13,19 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.driveline import Stribeck
-from drivetwin.export.modelica.component import (
-    ROTATIONAL,
-    Component,
-    Flanges,
-    Names,
-    Part,
-    values,
-)
+from drivetwin.export.modelica.component import ROTATIONAL, Component, Flanges, Names, Part, values
 from drivetwin.export.modelica.helpers import SLIP_INERTIA
 from drivetwin.export.modelica.text import matrix
 from drivetwin.export.parameters.content import number
-from drivetwin.network import Element
+from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.simulation.network import Element
 
 GROUND = "ground"
 _FULL_PRESSURE = 1e6

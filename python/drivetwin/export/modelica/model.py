@@ -10,7 +10,6 @@ from itertools import chain
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray, Signal
 from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import ROTATIONAL, Component, Names, Part
 from drivetwin.export.modelica.elements import part_of
@@ -19,7 +18,8 @@ from drivetwin.export.modelica.helpers import HELPERS
 from drivetwin.export.modelica.start import initial_equations
 from drivetwin.export.modelica.text import identifier, identifiers, matrix, string
 from drivetwin.export.parameters.content import number
-from drivetwin.network import Element, Start
+from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.network import Element, Start
 
 MSL_VERSION = "4.0.0"
 _FLANGE = f"{ROTATIONAL}.Interfaces.Flange_a"

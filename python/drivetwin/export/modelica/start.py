@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from drivetwin.driveline import FloatArray
 from drivetwin.export.modelica.friction import GROUND
 from drivetwin.export.parameters.content import number
-from drivetwin.network import Element, Start
+from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.network import Element, Start
 
 _COMPLIANT = ("spring_damper", "backlash")
 

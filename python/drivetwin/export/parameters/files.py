@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from drivetwin.atomic import write_text
+from drivetwin._util.atomic import write_text
 from drivetwin.errors import FileFormatError, InputError, Where
 from drivetwin.export.parameters.cdfx import cdfx_text, legal_for_cdfx, parse_cdfx
 from drivetwin.export.parameters.content import ParameterSet

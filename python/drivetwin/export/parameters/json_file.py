@@ -8,16 +8,10 @@ from dataclasses import asdict
 
 from pydantic import Field, FiniteFloat, ValidationError
 
+from drivetwin._util.toml import StrictModel
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.export.parameters.content import (
-    Axis,
-    ParameterSet,
-    Scalar,
-    curve_of,
-    legal,
-)
+from drivetwin.export.parameters.content import Axis, ParameterSet, Scalar, curve_of, legal
 from drivetwin.export.parameters.spelling import free_name, one_line
-from drivetwin.tomlfile import StrictModel
 
 SCHEMA = "drivetwin/parameters-1"
 

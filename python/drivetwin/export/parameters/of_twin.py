@@ -12,13 +12,13 @@ from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scala
 from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.spelling import one_line
 from drivetwin.parameters import OVER_ETA, spec_of
-from drivetwin.twin import friction_law
+from drivetwin.twin.twin import friction_law
 
 if TYPE_CHECKING:
-    from drivetwin.converter import Converter
-    from drivetwin.driveline import FloatArray, FrictionTable, Stribeck
-    from drivetwin.identify.result import Estimate
-    from drivetwin.twin import Twin, TwinElement
+    from drivetwin.estimation.result.estimate import Estimate
+    from drivetwin.simulation.converter_map import Converter
+    from drivetwin.simulation.dual_clutch import FloatArray, FrictionTable, Stribeck
+    from drivetwin.twin.twin import Twin, TwinElement
 
 POINTS = 33
 """Points of a curve drawn from a law, denser towards zero slip where it bends: linear interpolation

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drivetwin.errors import InputError
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, parameters_of
 from drivetwin.export.parameters.spelling import dotted_name, flat_name
 from drivetwin.export.parameters.units import is_same_unit
-from drivetwin.identify.result import Estimate, FrictionCurve, Verdict
 from drivetwin.parameters import spec_of
-from drivetwin.twin import SIMULATED
+from drivetwin.twin.twin import SIMULATED
 
 if TYPE_CHECKING:
-    from drivetwin.twin import Twin
+    from drivetwin.twin.twin import Twin
 
 METHOD = "parameter file"
 _DIVISORS = ("k_o", "i_in", "i_f", "i_c", "i_out")

@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.identify.result import Z95, FrictionCurve
-from drivetwin.report.candidates import Agreement, Trial
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.report.figures.friction import band
 from drivetwin.report.figures.stack import Curve, Panel, stacked
 from drivetwin.report.figures.validation import OUTPUTS
+from drivetwin.report.find_reports import Agreement, Trial
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.style import MEASURED, axis, candidate_style, layout
 

@@ -8,9 +8,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.display import BAR, NM, RPM, Display
+from drivetwin._util.display_units import BAR, NM, RPM, Display
 from drivetwin.drive.result import DriveRun, Maneuver
-from drivetwin.driveline import FloatArray
 from drivetwin.report.figures.stack import Curve, Panel, over_time, whole
 from drivetwin.report.style import (
     ACCENT,
@@ -22,6 +21,7 @@ from drivetwin.report.style import (
     axis,
     layout,
 )
+from drivetwin.simulation.dual_clutch import FloatArray
 
 _COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 _RATIO = Display("–")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.identify.result import FrictionCurve
+from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.report.decimate import MAX_POINTS
 from drivetwin.report.style import COMPARED, FITTED, MEASURED, axis, layout
 

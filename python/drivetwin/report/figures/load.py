@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.identify.load import LoadFit
+from drivetwin.estimation.linear.load_balance import LoadFit
 from drivetwin.report.style import FITTED, MEASURED, axis, layout
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from drivetwin.identify.momentum import MomentumFit
+from drivetwin.estimation.linear.momentum_balance import MomentumFit
 from drivetwin.report.style import COMPARED, FITTED, MEASURED, SECOND, axis, layout
 
 _STRETCHES = {

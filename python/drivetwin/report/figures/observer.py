@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from drivetwin.display import NM
-from drivetwin.logs.shiftlog import ShiftLog
-from drivetwin.observer.observed import Band, FloatArray, Observation
+from drivetwin._util.display_units import NM
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.report.figures.stack import Curve, Panel
 from drivetwin.report.style import MEASURED, SIMULATED
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.identify.result import Estimate, FloatArray, Verdict
+from drivetwin.estimation.result.estimate import Estimate, FloatArray, Verdict
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.style import DIVERGING, MUTED, VERDICT_COLOURS, axis, layout
 

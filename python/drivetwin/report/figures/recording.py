@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import plotly.graph_objects as go
 
-from drivetwin.display import BAR, NM, RPM, Display
-from drivetwin.logs.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin._util.display_units import BAR, NM, RPM, Display
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.report.figures.shift_phases import shift_spans
 from drivetwin.report.figures.stack import (
     Curve,

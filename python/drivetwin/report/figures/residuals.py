@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.display import Display
-from drivetwin.identify.likelihood.slow import block_means
-from drivetwin.identify.result import Z95, FloatArray
+from drivetwin._util.display_units import Display
+from drivetwin.estimation.likelihood.coloured_noise import block_means
+from drivetwin.estimation.result.estimate import Z95, FloatArray
 from drivetwin.report.figures.stack import Curve, Panel, Phases, stacked
 from drivetwin.report.labels import channel_label
 from drivetwin.report.style import FITTED, MEASURED

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from drivetwin.display import NM
-from drivetwin.identify.ringdown import RingDown
+from drivetwin._util.display_units import NM
+from drivetwin.estimation.linear.ringdown import RingDown
 from drivetwin.report.figures.stack import Curve, Panel, over_time, whole
 from drivetwin.report.style import FITTED, MEASURED, MUTED
 

@@ -7,9 +7,14 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from drivetwin.display import display_of, significant
-from drivetwin.identify.likelihood.tolerance import AGE, FRICTION, SIZE, Sensitivity
-from drivetwin.identify.result import FloatArray
+from drivetwin._util.display_units import display_of, significant
+from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
+    AGE,
+    FRICTION,
+    SIZE,
+    Sensitivity,
+)
+from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.parameters import spec_of
 from drivetwin.report.labels import channel_symbol, channel_unit, parameter_label
 from drivetwin.report.style import DIVERGING, axis, layout

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from drivetwin.display import BAR, NM, RPM
-from drivetwin.logs.shiftlog import Channel, ShiftLog
+from drivetwin._util.display_units import BAR, NM, RPM
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.report.figures.stack import Curve, Panel, stacked
 from drivetwin.report.style import ACCENT, COMPARED, MEASURED, SECOND
 from drivetwin.shifts.shift import Shift

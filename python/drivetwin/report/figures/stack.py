@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from drivetwin.display import Display
-from drivetwin.identify.result import FloatArray
+from drivetwin._util.display_units import Display
+from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.report.decimate import focused
 from drivetwin.report.style import PHASE_FILL, PHASE_NUMBER, axis, layout
 

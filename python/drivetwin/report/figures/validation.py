@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 import plotly.graph_objects as go
 
-from drivetwin.display import BAR, NM, RPM, Display
+from drivetwin._util.display_units import BAR, NM, RPM, Display
+from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.report.figures.stack import Curve, Panel, stacked
 from drivetwin.report.style import COMPARED, MEASURED, MUTED, SECOND, SIMULATED
-from drivetwin.validate import SignalTrace, Validation
 
 OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
     "output_torque": ("output torque", NM, 1.6),

@@ -9,8 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from drivetwin.identify.result import FloatArray
-from drivetwin.identify.wlse import GridFit
+from drivetwin.estimation.paper.wlse import GridFit
+from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.report.style import COMPARED, FITTED, MEASURED, MUTED, axis, layout
 
 

@@ -6,9 +6,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from drivetwin.display import Display, display_of, significant, with_uncertainty
-from drivetwin.identify.result import Z95, Estimate
-from drivetwin.report.candidates import DIFFER, Agreement, Candidate, Trial, agreements
+from drivetwin._util.display_units import Display, display_of, significant, with_uncertainty
+from drivetwin.estimation.result.estimate import Z95, Estimate
 from drivetwin.report.figures.comparison import (
     agreement_figure,
     fit_matrix,
@@ -16,6 +15,7 @@ from drivetwin.report.figures.comparison import (
     trial_figure,
     trial_panels,
 )
+from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, agreements
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
@@ -29,7 +29,7 @@ from drivetwin.report.sections.blocks import (
     Tone,
     cells,
 )
-from drivetwin.report.sections.trust import PHASES, SIGNALS, fit_cell
+from drivetwin.report.sections.parameters import PHASES, SIGNALS, fit_cell
 from drivetwin.shifts.shift import Shift
 
 

@@ -6,19 +6,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
-from drivetwin.display import significant
-from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.residuals import (
+from drivetwin._util.display_units import significant
+from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.coloured_noise import BLOCK
+from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     EXCESS,
     SIGNIFICANT,
     ResidualTest,
     residual_tests,
     white_residuals,
 )
-from drivetwin.identify.likelihood.slow import BLOCK
-from drivetwin.identify.likelihood.tolerance import sensitivity
-from drivetwin.identify.result import Identification
-from drivetwin.identify.signals import ShiftSignals
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import sensitivity
 from drivetwin.report.figures.residuals import residual_figure, residual_panels
 from drivetwin.report.figures.sensitivity import sensitivity_figure
 from drivetwin.report.figures.shift_phases import shift_spans
@@ -32,7 +32,7 @@ from drivetwin.report.sections.blocks import (
     Tone,
     link_of,
 )
-from drivetwin.shifts.labels import shift_labels
+from drivetwin.shifts.shift import shift_labels
 
 
 def likelihood_sections(found: Identification) -> list[Section]:

@@ -7,15 +7,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin.display import display_of, significant
-from drivetwin.held_out import HeldOut, Outcome
-from drivetwin.identify.result import Estimate, Identification
-from drivetwin.identify.several.consistency import FAR, Consistency
-from drivetwin.identify.several.fit import LogShare, Several
+from drivetwin._util.display_units import display_of, significant
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import Estimate
+from drivetwin.estimation.result.multi_log import FAR, Consistency, LogShare, Several
+from drivetwin.estimation.result.validation import HeldOut, Outcome, Validation
 from drivetwin.parameters import log_of
-from drivetwin.report.candidates import Candidate, agreements
 from drivetwin.report.figures.comparison import agreement_figure
 from drivetwin.report.figures.validation import validation_figure, validation_panels
+from drivetwin.report.find_reports import Candidate, agreements
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
@@ -31,8 +31,7 @@ from drivetwin.report.sections.blocks import (
     link_of,
 )
 from drivetwin.report.sections.comparison import value_cell
-from drivetwin.report.sections.trust import PHASES, SIGNALS, fit_cell
-from drivetwin.validate import Validation
+from drivetwin.report.sections.parameters import PHASES, SIGNALS, fit_cell
 
 _TONES = {
     Outcome.ALLOWED: Tone.GOOD,

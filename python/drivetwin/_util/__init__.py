@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Helpers outside the domain: atomic writes, progress, display units, TOML."""

@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: MIT
+"""Array types."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+Span = tuple[float, float]

@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: MIT
+"""Which column of a file is which role: as stated by the user, else guessed from its name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from drivetwin._util.toml import did_you_mean
+from drivetwin.channels.pressure_roles import pressed_element, pressure_role
+from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.roles import MEASURED, ROLES, STAND_INS
+from drivetwin.errors import MappingError, MissingChannelError, Where
+
+
+@dataclass(frozen=True)
+class ChannelSpec:
+    """How a role is read: value = sign·(scale·column + offset) in `unit`, then in SI.
+
+    `unit` asserts the unit against the file (None: as the file says). `time_shift` [s] is added to
+    the time stamps. `group` chooses among columns of one name (None: the name is unique).
+    """
+
+    source: str
+    unit: str | None = None
+    sign: int = 1
+    scale: float = 1.0
+    offset: float = 0.0
+    time_shift: float = 0.0
+    group: str | None = None
+
+    def picks(self, column: Column) -> bool:
+        """Tell whether this is the column meant."""
+        return column.name == self.source and self.group in (None, column.group)
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Channel specs by role, how to read the file, and what was left out on purpose."""
+
+    channels: Mapping[str, ChannelSpec]
+    options: ReadOptions = field(default_factory=ReadOptions)
+    warnings: tuple[str, ...] = field(default=())
+
+
+_ENGINE = "mot|motor|eng|engine|verbrennungsmotor|vm"
+_TORQUE = "m|md|mom|moment|t|tq|trq|torque|drehmoment"
+_SPEED = "n|w|om|omega|spd|speed|drehzahl|drz|rpm"
+_INPUT = (
+    "inputshaft|inshaft|in|inp|input|ein|eing|eingang|eingangs|getrein|gearboxin|trb|turb|turbine|"
+    "turbinen|trnsinp|transinput"
+)
+_OUTPUT = (
+    "out|outp|output|ab|abtr|abtrieb|abtriebs|aus|ausgang|ausgangs|outshaft|outputshaft|"
+    "abtriebswelle|kard|kardan|cardan|prop|propshaft|gelenkwelle|gelenkwellen|tailshaft"
+)
+_GEARBOX = "(getr|getriebe|gbx|gearbox|trans|transmission|at)?"
+_WHEEL = (
+    "whl|wheel|wheels|rad|raeder|rd|hinterrad|antriebsrad|drivenwheel|drivenwheels|rearwheel|"
+    "rearwheels|rearaxle"
+)
+_BESIDE = "(can|bus|xcp|ecu|tcu|mess|meas)*"
+_SIDE = "(h|v|f|r)(l|r)|left|right|links|rechts"
+_AFTER = "(ist|act|actual|can|bus|xcp|mess|meas|value|val|mean|avg|mittel|ha|rear|nm|rpm|bar)*"
+_STATE = "(ist|act|actual|mess|meas|val|c|avg|mw)*"
+
+
+def _either_order(thing: str, measure: str) -> str:
+    return f"{_GEARBOX}(({thing})({measure})|({measure}){_GEARBOX}({thing})){_STATE}"
+
+
+_NAMES: dict[str, str] = {
+    "engine_torque": f"{_either_order(_ENGINE, _TORQUE)}|te|me|engnettorque",
+    "output_torque": f"{_either_order(_OUTPUT, _TORQUE)}|to",
+    "input_speed": _either_order(_INPUT, _SPEED),
+    "engine_speed": f"{_either_order(_ENGINE, _SPEED)}|we|ne|omegae",
+    "output_speed": _either_order(_OUTPUT, _SPEED),
+    "wheel_speed": f"({_either_order(_WHEEL, _SPEED)}|ww)({_SIDE})?",
+    "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|pwg)((pos1?)|stellung|wert)?" + _STATE,
+    "gear": "(trans)?(current|act|actual|ist|n)?(gear|gang)(engaged)?" + _STATE,
+    "shift_in_process": "(trans|getr)?(shift|schaltung)(inprocess|active|flag|aktiv)" + _STATE,
+    "lockup_engaged": "(trans)?(torqueconverter|tc|wandler)?(lockup|luc|wk)(engaged|closed|zu)?"
+    + _STATE,
+}
+"""Names of each role, in the form of `plain`: without case, separators, umlauts. Where no column
+has one, names with a source before them or more words after them count."""
+
+_PRESSURE_WORD = "p|prs|pres|press|pressure|druck"
+_KIND_WORD = {
+    "brake": "b|br|brk|brake|bremse|brems",
+    "clutch": "c|k|cl|clu|clt|clutch|kup|kuppl|kupplung|kupplungs",
+}
+
+
+def plain(name: str) -> str:
+    """Reduce a column name to letters and digits for comparison: `n_Ab [1/min]` -> `nab`."""
+    text = re.sub(r"\\.*$|\[[^\]]*\]", "", name.casefold())
+    for umlaut, letters in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("ß", "ss"), ("ω", "w")):
+        text = text.replace(umlaut, letters)
+    return re.sub(r"[^a-z0-9]", "", text)
+
+
+def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, list[Column]]:
+    """Return the candidate columns of each role; `elements` gives the kind of each by name.
+
+    A column without any number, or from a strange sender, is a candidate only where no other is, a
+    silent one never.
+    """
+    columns = [column for column in columns if not column.silent]
+    found = {
+        role: _first(columns, (pattern, f"{_BESIDE}({pattern}){_AFTER}"))
+        for role, pattern in _NAMES.items()
+    }
+    for element, kind in elements.items():
+        found[pressure_role(element)] = _pressure_candidates(columns, element, kind)
+    return {
+        role: _foremost(_with_numbers(candidates))
+        for role, candidates in found.items()
+        if candidates
+    }
+
+
+def _first(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
+    """Columns whose name has the first of the `forms` that any has.
+
+    The last part of a name like `log.EngTrq` counts only where no whole name has any.
+    """
+    forms = tuple(forms)
+    for part in (plain, lambda name: plain(re.split(r"[./]", name)[-1])):
+        for form in forms:
+            if found := [column for column in columns if re.fullmatch(form, part(column.name))]:
+                return found
+    return []
+
+
+def _foremost(candidates: list[Column]) -> list[Column]:
+    return [column for column in candidates if not column.aside] or candidates
+
+
+def _with_numbers(candidates: list[Column]) -> list[Column]:
+    return [column for column in candidates if not column.empty] or candidates
+
+
+def _whole(words: str) -> str:
+    """Those of the alternatives that are more than an abbreviation."""
+    return "|".join(word for word in words.split("|") if len(word) > 2)
+
+
+def _pressure_candidates(columns: Sequence[Column], element: str, kind: str) -> list[Column]:
+    """Columns for an element: its full name or kind and number first, its bare number last."""
+    label = plain(element)
+    digits = re.sub(r"\D", "", label)
+    forms = [f"({_PRESSURE_WORD})({label}){_STATE}|({label})({_PRESSURE_WORD}){_STATE}"]
+    if digits:
+        numbered = f"({_KIND_WORD[kind]})0*{digits}"
+        forms.append(
+            f"({_PRESSURE_WORD})({numbered}){_STATE}|({numbered})({_PRESSURE_WORD}){_STATE}"
+        )
+        # Compounds name kind and pressure before number or label, in whole words: no `Kp2`.
+        compound = f"({_whole(_KIND_WORD[kind])})({_whole(_PRESSURE_WORD)})"
+        forms.append(f"{compound}({label}|0*{digits}){_STATE}")
+        forms.append(f"({_PRESSURE_WORD})({_KIND_WORD[kind]})({label}){_STATE}")
+        forms.append(f"({_PRESSURE_WORD})0*{digits}{_STATE}")
+    return _first(columns, forms)
+
+
+def resolve(
+    columns: Sequence[Column],
+    stated: Mapping[str, ChannelSpec],
+    elements: Mapping[str, str],
+    needed: Iterable[str],
+    file: str,
+) -> Mapped:
+    """Decide the column of every role from the `columns` of a file.
+
+    What is `stated` holds; the rest is guessed. Raises MappingError where a stated column does not
+    exist or a role has several candidates (a warning for throttle, gear and flags that nobody
+    needs), MissingChannelError where a needed role and its stand-in have none.
+    """
+    needed = frozenset(needed)
+    _refuse_unknown_elements(stated, elements, file)
+    channels = {role: _existing(role, spec, columns, file) for role, spec in stated.items()}
+    free = [one for one in columns if not any(spec.picks(one) for spec in stated.values())]
+    warnings: list[str] = []
+    for role, candidates in guess(free, elements).items():
+        if role in channels:
+            continue
+        if len(candidates) == 1:
+            channels[role] = spec_of(candidates[0], columns)
+            warnings += _others(candidates[0], columns)
+            continue
+        what = f"{role!r} may be any of the columns {', '.join(map(str, candidates))}"
+        if role in needed or role in MEASURED or pressed_element(role) is not None:
+            raise MappingError(what, _choice(role, candidates), Where(file=file))
+        warnings.append(f"{what}; none is used, name one in a channel mapping")
+    _refuse_shared(channels, stated, file)
+    _refuse_absent(needed, channels, columns, file)
+    order = [*ROLES, *(pressure_role(element) for element in elements)]
+    without = [element for element in elements if pressure_role(element) not in channels]
+    if without:
+        warnings.append(f"no pressure of {', '.join(without)}: nothing that needs it can be told")
+    return Mapped(
+        {role: channels[role] for role in order if role in channels}, warnings=tuple(warnings)
+    )
+
+
+def _choice(role: str, candidates: Sequence[Column]) -> str:
+    """How to choose among the candidates of a role: by name, or by group where that is one."""
+    if len(set(candidates)) < len(candidates):
+        return "rename the repeated column in the file"
+    if len({one.name for one in candidates}) > 1:
+        return _remedy(role)
+    first = candidates[0]
+    return (
+        f"choose one in a channel mapping (--channels): channels.{role} = "
+        f'{{ source = "{first.name}", group = "{first.group}" }}'
+    )
+
+
+def _others(chosen: Column, columns: Sequence[Column]) -> list[str]:
+    """Words for the strange senders of a signal."""
+    others = [one for one in columns if one.aside and not one.silent and one.name == chosen.name]
+    if not others:
+        return []
+    return [f"{chosen} is used; left aside: {', '.join(map(str, others))}"]
+
+
+def spec_of(column: Column, columns: Sequence[Column]) -> ChannelSpec:
+    """Return the spec that picks a column: with its group where the name alone would not."""
+    alike = sum(other.name == column.name for other in columns)
+    return ChannelSpec(column.name, group=column.group if alike > 1 else None)
+
+
+def _refuse_absent(
+    needed: Iterable[str],
+    channels: Mapping[str, ChannelSpec],
+    columns: Sequence[Column],
+    file: str,
+) -> None:
+    order = [*ROLES, *sorted(role for role in needed if role not in ROLES)]
+    absent = [
+        role
+        for role in order
+        if role in needed and role not in channels and STAND_INS.get(role) not in channels
+    ]
+    if absent:
+        silent = ", ".join(dict.fromkeys(column.name for column in columns if column.silent))
+        raise MissingChannelError(
+            f"no column for {' nor '.join(map(repr, absent))} among "
+            f"{', '.join(dict.fromkeys(one.name for one in columns if not one.silent))}"
+            + (f"; without a value throughout: {silent}" if silent else ""),
+            _remedy(absent[0]),
+            Where(file=file),
+        )
+
+
+def _refuse_unknown_elements(
+    stated: Mapping[str, ChannelSpec], elements: Mapping[str, str], file: str
+) -> None:
+    for role in stated:
+        element = pressed_element(role)
+        if element is not None and element not in elements:
+            raise MappingError(
+                f"the mapping has a pressure of {element!r}, which is no element of the vehicle "
+                f"card{did_you_mean(element, elements)}",
+                "use the element names of the card: [channels.pressure.<element>]",
+                Where(file=file),
+            )
+
+
+def _existing(role: str, spec: ChannelSpec, columns: Sequence[Column], file: str) -> ChannelSpec:
+    found = _with_numbers([column for column in columns if spec.picks(column)])
+    if len(found) == 1:
+        return spec
+    where = Where(file=file)
+    if found:
+        groups = list(dict.fromkeys(column.group for column in found))
+        if len(groups) == len(found):
+            what = f"the file has {spec.source!r} in {', '.join(map(repr, groups))}"
+            remedy = f'choose one in the channel mapping: channels.{role}.group = "{groups[0]}"'
+            raise MappingError(what, remedy, where)
+        what = f"the file has {len(found)} columns {spec.source!r}"
+        raise MappingError(what, "rename the repeated column in the file", where)
+    groups = [column.group for column in columns if column.name == spec.source]
+    if groups:
+        what = (
+            f"the mapping names {spec.source!r} in {spec.group!r} for {role!r}; the file has it in "
+            f"{', '.join(map(repr, groups))}"
+        )
+        raise MappingError(what, "correct `group`", where)
+    names = [column.name for column in columns]
+    what = (
+        f"the mapping names column {spec.source!r} for {role!r}, which the file does not have"
+        f"{did_you_mean(spec.source, names)}"
+    )
+    raise MappingError(what, "correct `source`, or rename the column in the file", where)
+
+
+def _refuse_shared(
+    channels: Mapping[str, ChannelSpec], stated: Mapping[str, ChannelSpec], file: str
+) -> None:
+    """A guessed column must not serve two roles, as with two elements of one number."""
+    roles_of: dict[tuple[str, str | None], list[str]] = {}
+    for role, spec in channels.items():
+        if role not in stated:
+            roles_of.setdefault((spec.source, spec.group), []).append(role)
+    for (source, _), roles in roles_of.items():
+        if len(roles) > 1:
+            raise MappingError(
+                f"column {source!r} may be {' or '.join(roles)}",
+                _remedy(roles[0]),
+                Where(file=file),
+            )
+
+
+def _remedy(role: str) -> str:
+    return (
+        f"name its column in a channel mapping (--channels): channels.{role} = "
+        '{ source = "..." }; `drivetwin inspect` lists the columns'
+    )

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: MIT
+"""Channel mapping files: TOML tables `[channels.<role>]`, as in the vehicle card, and `[time]`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Generic, Literal, TypeVar
+
+import tomlkit
+from pydantic import Field
+
+from drivetwin._util.toml import StrictModel, raise_faults, read_toml, schema_faults
+from drivetwin.channels.mapping import ChannelSpec, Mapped
+from drivetwin.channels.pressure_roles import pressed_element, pressure_role
+from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
+from drivetwin.channels.roles import ROLES, quantity_of
+from drivetwin.channels.units import first_spellings
+from drivetwin.errors import MappingError
+
+Entry = TypeVar("Entry")
+
+
+class ByRole(StrictModel, Generic[Entry]):
+    """A table with one entry for each channel role; pressures stand under `pressure.<element>`."""
+
+    engine_torque: Entry | None = None
+    output_torque: Entry | None = None
+    input_speed: Entry | None = None
+    engine_speed: Entry | None = None
+    output_speed: Entry | None = None
+    wheel_speed: Entry | None = None
+    throttle: Entry | None = None
+    gear: Entry | None = None
+    shift_in_process: Entry | None = None
+    lockup_engaged: Entry | None = None
+    pressure: dict[str, Entry] = Field(default_factory=dict)
+
+    def items(self) -> Iterator[tuple[str, Entry]]:
+        """Yield role and entry of all that are given."""
+        for role in ROLES:
+            entry = getattr(self, role)
+            if entry is not None:
+                yield role, entry
+        for element, entry in self.pressure.items():
+            yield pressure_role(element), entry
+
+
+class ChannelTable(StrictModel):
+    """`[channels.<role>]`: see ChannelSpec for the meaning of each key."""
+
+    source: str = Field(min_length=1)
+    group: str | None = None
+    unit: str | None = None
+    sign: Literal[1, -1] = 1
+    scale: float = Field(default=1.0, gt=0)
+    offset: float = 0.0
+    time_shift_s: float = 0.0
+
+    def spec(self) -> ChannelSpec:
+        """Return the table as the mapping uses it."""
+        return ChannelSpec(
+            source=self.source,
+            unit=self.unit,
+            sign=self.sign,
+            scale=self.scale,
+            offset=self.offset,
+            time_shift=self.time_shift_s,
+            group=self.group,
+        )
+
+
+class TimeTable(StrictModel):
+    """`[time]`: what cannot be found in the file about its time column and its rows."""
+
+    source: str | None = None
+    unit: str | None = None
+    simultaneous: bool = False
+
+
+class BusTable(StrictModel):
+    """`[bus]`: DBC files of a bus log (paths from the mapping file) and its reference torque."""
+
+    dbc: list[str] = Field(default_factory=list)
+    reference_torque_Nm: float | None = Field(default=None, gt=0)
+
+
+class MappingFile(StrictModel):
+    """A channel mapping file."""
+
+    time: TimeTable = TimeTable()
+    bus: BusTable = BusTable()
+    channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
+
+
+def read_mapping(path: Path) -> Mapped:
+    """Read a channel mapping file; raises MappingError naming every fault by its key."""
+    document = read_toml(path, MappingError)
+    raise_faults(
+        schema_faults(document, MappingFile),
+        MappingError,
+        str(path),
+        "correct the channel mapping file; `drivetwin inspect --write-mapping` writes a valid one",
+    )
+    file = MappingFile.model_validate(document)
+    channels = {role: table.spec() for role, table in file.channels.items()}
+    bus = BusOptions(
+        tuple(path.parent / name for name in file.bus.dbc), file.bus.reference_torque_Nm
+    )
+    time = TimeColumn(file.time.source, file.time.unit, file.time.simultaneous)
+    return Mapped(channels, ReadOptions(time, bus))
+
+
+def mapping_text(
+    channels: Mapping[str, ChannelSpec],
+    options: ReadOptions | None = None,
+    unitless: Collection[str] = (),
+) -> str:
+    """Return `channels` (by role) as a mapping file to edit.
+
+    `options` for the file as a whole stand before them, DBC files with their full path. Roles that
+    are `unitless` in the log get a line for their unit to be filled in.
+    """
+    document = tomlkit.document()
+    document.add(tomlkit.comment("Channel mapping: which column is what to the driveline."))
+    document.add(tomlkit.comment("value = sign * (scale * column + offset), in `unit`;"))
+    document.add(tomlkit.comment("time_shift_s is added to the time stamps of the channel."))
+    for name, entries in _options(options or ReadOptions()).items():
+        if entries:
+            document.add(name, tomlkit.item(entries))
+    tables = tomlkit.table(is_super_table=True)
+    pressures = tomlkit.table(is_super_table=True)
+    for role, spec in channels.items():
+        table = _table(spec, role if role in unitless else None)
+        element = pressed_element(role)
+        if element is None:
+            tables.add(role, table)
+        else:
+            pressures.add(element, table)
+    if pressures:
+        tables.add("pressure", pressures)
+    document.add("channels", tables)
+    return tomlkit.dumps(document)
+
+
+def _options(options: ReadOptions) -> dict[str, dict[str, object]]:
+    """The tables `[time]` and `[bus]`, without what is not stated."""
+    time = {
+        "source": options.time.source,
+        "unit": options.time.unit,
+        "simultaneous": options.time.simultaneous or None,
+    }
+    bus = {
+        "dbc": [str(path.resolve()) for path in options.bus.databases] or None,
+        "reference_torque_Nm": options.bus.reference_torque,
+    }
+    return {
+        name: {key: value for key, value in table.items() if value is not None}
+        for name, table in (("time", time), ("bus", bus))
+    }
+
+
+def _table(spec: ChannelSpec, unitless: str | None) -> tomlkit.items.Table:
+    """The table of a spec; with a line to fill in where `unitless` is the role it plays."""
+    table = tomlkit.table()
+    table.add("source", spec.source)
+    if spec.group is not None:
+        table.add("group", spec.group)
+    if spec.unit is not None:
+        table.add("unit", spec.unit)
+    elif unitless is not None:
+        usual = ", ".join(map(repr, first_spellings(quantity_of(unitless))))
+        table.add(tomlkit.comment(f'unit = "..."  # the log names none; one of {usual}'))
+    table.add("sign", spec.sign)
+    table.add("scale", spec.scale)
+    table.add("offset", spec.offset)
+    table.add("time_shift_s", spec.time_shift)
+    return table

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""What the name of a column tells beside its name: a unit in brackets, that it is time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from drivetwin._util.toml import did_you_mean
+from drivetwin.channels.read_options import TimeColumn
+from drivetwin.channels.units import is_time_unit, is_unit, lookup
+from drivetwin.errors import MappingError, MissingChannelError, Where
+
+_TIME_NAMES = frozenset(
+    (
+        *("t", "time", "times", "timestamp", "timestamps", "tout"),
+        *("zeit", "zeitstempel", "messzeit", "uhrzeit"),
+    )
+)
+
+
+def name_and_unit(cell: str) -> tuple[str, str | None]:
+    """`EngTrq [Nm]` -> name and unit; round brackets count where they hold a unit.
+
+    `x[1]` without a blank is an index, part of the name.
+    """
+    if match := re.fullmatch(r"(.+?)(\s*)\[([^\[\]]*)\]", cell):
+        name, blank, inside = match.groups()
+        if blank or not inside.isdigit():
+            return name, inside.strip() or None
+    if (match := re.fullmatch(r"(.+?)\s*\(([^()]*)\)", cell)) and is_unit(match[2]):
+        return match[1], match[2].strip()
+    return cell, None
+
+
+def is_time_name(name: str) -> bool:
+    """Tell whether a column of this name is taken for time."""
+    return re.sub(r"[^a-z]", "", name.casefold()) in _TIME_NAMES
+
+
+def may_be_time(unit: str | None) -> bool:
+    """Tell whether a column of this unit may hold time: none is stated, or none of another kind."""
+    return unit is None or is_time_unit(unit) or lookup(unit) is None
+
+
+def time_indices(names: Sequence[str], units: Sequence[str | None], time: TimeColumn) -> list[int]:
+    """Return the indices of all time columns: as stated, else those with a name for time.
+
+    A column of another unit, such as a temperature `T1`, is none.
+    """
+    if time.source is not None:
+        return [index for index, name in enumerate(names) if name == time.source]
+    return [
+        index
+        for index, (name, unit) in enumerate(zip(names, units, strict=True))
+        if is_time_name(name) and may_be_time(unit)
+    ]
+
+
+def time_index(
+    names: Sequence[str], units: Sequence[str | None], time: TimeColumn, file: str
+) -> int:
+    """Return the index of the one time column, see `time_indices`.
+
+    Raises MappingError where there are several, MissingChannelError where there is none.
+    """
+    found = time_indices(names, units, time)
+    if len(found) == 1:
+        return found[0]
+    where = Where(file=file)
+    remedy = 'name the time column in a channel mapping: time = { source = "...", unit = "s" }'
+    if found:
+        listed = ", ".join(names[index] for index in found)
+        raise MappingError(f"several time columns: {listed}", remedy, where)
+    if time.source is not None:
+        what = f"no column {time.source!r} for time{did_you_mean(time.source, names)}"
+    else:
+        what = f"no time column among {', '.join(names)}{_in_another_unit(names, units)}"
+    raise MissingChannelError(what, remedy, where)
+
+
+def _in_another_unit(names: Sequence[str], units: Sequence[str | None]) -> str:
+    """What to say of columns that have a name for time and a unit that is none of time."""
+    told = [
+        f"{name!r} is in {unit!r}"
+        for name, unit in zip(names, units, strict=True)
+        if is_time_name(name) and not may_be_time(unit)
+    ]
+    return f"; {', '.join(told)}, no unit of time" if told else ""

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""A log in memory: named channels, each on its own time base, SI inside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin._util.rich_display import Shown
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.errors import MissingChannelError, TimeError, Where
+from drivetwin.simulation.dual_clutch import LATEST
+
+FloatArray = NDArray[np.float64]
+
+GAP_STEPS = 5.0
+"""A pause of more than this many median steps is a gap: nothing is interpolated across it."""
+
+
+def gap_limit(time: FloatArray) -> float:
+    """Return the longest pause [s] between samples at `time` (n,) that is not a gap."""
+    if time.size < 2:
+        return np.inf
+    return GAP_STEPS * float(np.median(np.diff(time)))
+
+
+def open_ends(time: FloatArray, span: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    """What of `span` [s] lies before the first or after the last sample, where more than a gap."""
+    limit = gap_limit(time)
+    first, last = float(time[0]), float(time[-1])
+    ends = ((span[0], min(first, span[1])), (max(last, span[0]), span[1]))
+    return tuple((low, high) for low, high in ends if high - low > limit)
+
+
+def pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Gaps between samples at `time` (n,): from the last sample before to the first one after."""
+    wide = np.flatnonzero(np.diff(time) > gap_limit(time))
+    return tuple((float(time[i]), float(time[i + 1])) for i in wide)
+
+
+class Quantity(StrEnum):
+    """What a channel measures; decides its SI unit and how it may be interpolated."""
+
+    TORQUE = "torque"
+    PRESSURE = "pressure"
+    SPEED = "speed"
+    FRACTION = "fraction"  # pedal, percent torque
+    TEMPERATURE = "temperature"
+    STATE = "state"  # integers: gear, flags; held, never interpolated
+
+    @property
+    def unit(self) -> str:
+        """SI unit in ASCII, as parameters have it."""
+        return _SI.get(self, "1")
+
+
+_SI = {
+    Quantity.TORQUE: "N*m",
+    Quantity.PRESSURE: "Pa",
+    Quantity.SPEED: "rad/s",
+    Quantity.TEMPERATURE: "K",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One measured signal.
+
+    `role` is what it is to the driveline: `engine_torque`, `output_torque`, `input_speed`,
+    `engine_speed`, `output_speed`, `wheel_speed`, `pressure.<element>`, `throttle`, `gear`, ...
+    `time` (n,) in s strictly increasing; `values` (n,) in SI. `source_name` and `source_unit`
+    are as in the file. `held` marks a slow signal that the logger repeated on a faster time base.
+    `late` [s] is how much older than its stamp a value may be, as a row of a coarse table.
+    """
+
+    role: str
+    quantity: Quantity
+    time: FloatArray
+    values: FloatArray
+    source_name: str
+    source_unit: str
+    held: bool = False
+    late: float = 0.0
+
+    @property
+    def step(self) -> float:
+        """Median sample interval [s]."""
+        return float(np.median(np.diff(self.time)))
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Values at `time` (m,): linear between samples, held for states.
+
+        NaN outside the span, and for all but states inside a gap (more than GAP_STEPS median steps
+        without a sample); a state that is sent on change only is known between its messages.
+        """
+        before = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)
+        unknown = (time < self.time[0]) | (time > self.time[-1])
+        if self.quantity is Quantity.STATE:
+            values = self.values[before]
+        else:
+            values = np.interp(time, self.time, self.values)
+            after = np.clip(before + 1, None, self.time.size - 1)
+            pause = self.time[after] - self.time[before]
+            unknown |= (pause > gap_limit(self.time)) & (time > self.time[before])
+        return np.where(unknown, np.nan, values)
+
+    @property
+    def gaps(self) -> tuple[tuple[float, float], ...]:
+        """Spans [s] in which `at` knows nothing, from the sample before to the one after."""
+        return () if self.quantity is Quantity.STATE else pauses(self.time)
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftLog(Shown):
+    """All mapped channels of one recording, by role.
+
+    `source` is its file and `sha256` that of the content, `mappings` the SHA-256 by name of the
+    mapping file that it was read with.
+    Raises TimeError where the time of a channel reaches beyond LATEST, as stamps from 1970 do.
+    """
+
+    channels: Mapping[str, Channel]
+    source: str
+    sha256: str
+    warnings: tuple[str, ...] = field(default=())
+    mappings: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def inputs(self) -> dict[str, str]:
+        """SHA-256 by name of all files that the channels come from."""
+        return {Path(self.source).name: self.sha256, **self.mappings}
+
+    def __post_init__(self) -> None:
+        for channel in self.channels.values():
+            ends = channel.time[[0, -1]] if channel.time.size else channel.time
+            if (np.abs(ends) > LATEST).any():
+                raise TimeError(
+                    f"time stamps from {ends[0]:.6g} s to {ends[1]:.6g} s, too far from zero",
+                    f"let time count from the start of the log, or lie within {LATEST:g} s",
+                    Where(file=self.source, channel=channel.source_name),
+                )
+
+    def __contains__(self, role: object) -> bool:
+        return role in self.channels
+
+    def __getitem__(self, role: str) -> Channel:
+        try:
+            return self.channels[role]
+        except KeyError:
+            raise MissingChannelError(
+                f"no channel for {role!r}; the log maps {', '.join(sorted(self.channels))}",
+                "name it in a channel mapping file (--channels) or in [channels] of the card",
+                Where(file=self.source),
+            ) from None
+
+    def pressure(self, element: str) -> Channel:
+        """Pressure of a clutch or brake by its name on the card."""
+        return self[pressure_role(element)]

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: MIT
+"""The closed table of unit spellings found in shift logs, and nothing else.
+
+A general unit parser reads `Nm` as a textile unit and `1/min` without its 2π, so every spelling
+is listed. On speed channels `rpm`, `1/min`, `U/min`, `min-1` mean revolutions per minute.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.channels.shiftlog import FloatArray, Quantity
+from drivetwin.errors import UnitError, Where
+
+BAR = 1e5
+"""One bar [Pa]."""
+RPM = math.pi / 30.0
+"""One revolution per minute [rad/s]."""
+_REV = 2.0 * math.pi
+_DEG = math.pi / 180.0
+_PSI = 6894.757293168361
+_FT_LB = 1.3558179483314004
+_KGF = 9.80665
+_INCH = 0.0254
+_LBF = 0.45359237 * _KGF
+
+
+@dataclass(frozen=True)
+class Unit:
+    """SI value = `factor`·value + `offset`; `quantity` is what it measures."""
+
+    factor: float
+    offset: float
+    quantity: Quantity
+
+    def to_si(self, values: FloatArray) -> FloatArray:
+        """Return `values` (n,) in SI."""
+        with np.errstate(over="ignore"):  # a damaged number may become infinite: no number then
+            return self.factor * values + self.offset
+
+    def from_si(self, values: FloatArray) -> FloatArray:
+        """Return `values` (n,), in SI, in this unit."""
+        return (values - self.offset) / self.factor
+
+
+_SPELLINGS: dict[Quantity, dict[float, str]] = {
+    Quantity.TORQUE: {
+        1.0: "Nm N·m N.m N*m N-m N_m Newtonmeter newton-meter",
+        1e3: "kNm kN·m kN.m kN*m kN-m",
+        1e-2: "Ncm N·cm N.cm N*cm",
+        1e-3: "Nmm N·mm N.mm N*mm",
+        10.0: "daNm daN·m daN.m daN*m",
+        _FT_LB: "ft·lb ft.lb ft*lb ft-lb ftlb lb·ft lb.ft lb*ft lb-ft lbft lbf·ft lbf*ft lbf-ft "
+        "ft·lbs ft.lbs ft*lbs ft-lbs ftlbs lbs·ft lbs-ft ft·lbf ft.lbf ft*lbf ft-lbf ftlbf lbf.ft",
+        _INCH * _LBF: "in·lb in.lb in*lb in-lb inlb lb·in lb.in lb*in lb-in lbin in·lbs in.lbs "
+        "in*lbs in-lbs inlbs in·lbf in.lbf in*lbf in-lbf inlbf lbf·in lbf.in lbf*in lbf-in lbfin",
+        _KGF: "kgf·m kgf.m kgf*m kgfm kp·m kpm",
+    },
+    Quantity.SPEED: {
+        1.0: "rad/s rad·s-1 rad.s-1 rad*s-1 rads-1 rad/sec",
+        RPM: "rpm 1/min /min U/min min-1 min^-1 r/min rev/min Upm r.p.m. rot/min U·min-1 tr/min",
+        1e3 * RPM: "krpm",
+        _REV: "U/s rev/s r/s rps",
+        _DEG: "deg/s °/s deg/sec grad/s",
+    },
+    Quantity.PRESSURE: {
+        1.0: "Pa Pascal N/m2 N/m^2",
+        1e2: "hPa mbar",
+        1e3: "kPa kN/m2 kN/m^2",
+        BAR: "bar barg bar(g) bar_g",
+        1e6: "MPa N/mm2 N/mm^2",
+        _PSI: "psi psig lbf/in2 lbf/in^2",
+        98066.5: "kgf/cm2 kgf/cm^2 kp/cm2 kp/cm^2",
+    },
+    Quantity.FRACTION: {1.0: "- 1 [] p.u. pu", 1e-2: "% pct percent Prozent", 1e-3: "‰"},
+    Quantity.TEMPERATURE: {1.0: "K Kelvin"},
+}
+
+_CELSIUS = "°C degC deg_C Celsius C"
+_FAHRENHEIT = "°F degF deg_F Fahrenheit"
+
+_REFUSED = {
+    "revolutions or radians may be meant": "1/s /s s-1 s^-1 Hz",
+    "a vehicle speed needs the tyre radius to become a wheel speed: give scale = 1/r_w for m/s, "
+    "1/(3.6·r_w) for km/h and unit = 'rad/s'": "km/h kmh kph m/s mph",
+    "milli- or megapascal may be meant": "mPa mpa MPA",
+    "bar absolute holds the ambient pressure: give unit = 'bar' and offset = -1.013": "bara "
+    "bar(a) bar_a",
+    "psi absolute holds the ambient pressure: give unit = 'psi' and offset = -14.7": "psia",
+}
+"""Spellings that are known but cannot be taken as they stand, by the reason."""
+
+_TIME = {
+    "s": 1.0,
+    "sec": 1.0,
+    "second": 1.0,
+    "seconds": 1.0,
+    "sek": 1.0,
+    "ms": 1e-3,
+    "msec": 1e-3,
+    "milliseconds": 1e-3,
+    "us": 1e-6,
+    "μs": 1e-6,
+    "microseconds": 1e-6,
+    "ns": 1e-9,
+    "nanoseconds": 1e-9,
+    "ps": 1e-12,
+    "min": 60.0,
+    "minutes": 60.0,
+    "h": 3600.0,
+    "hours": 3600.0,
+    "d": 86400.0,
+    "day": 86400.0,
+    "days": 86400.0,
+}
+"""Seconds of each unit of time; days are what Excel and MATLAB count dates in."""
+
+
+def _normal(spelling: str) -> str:
+    """One form for blanks, superscripts, multiplication signs, minus signs and brackets."""
+    text = unicodedata.normalize("NFKC", spelling).strip()
+    if re.fullmatch(r"\[.+\]|\(.+\)", text):
+        text = text[1:-1]
+    text = re.sub(r"[\u2212\u2010-\u2014]", "-", re.sub(r"\s+", "", text))
+    return re.sub(r"[\u2219\u22c5\u2022\u00d7\u2217]", "·", text)
+
+
+def _table() -> dict[str, Unit]:
+    table = {
+        _normal(spelling): Unit(factor, 0.0, quantity)
+        for quantity, by_factor in _SPELLINGS.items()
+        for factor, spellings in by_factor.items()
+        for spelling in spellings.split()
+    }
+    for spelling in _CELSIUS.split():
+        table[_normal(spelling)] = Unit(1.0, 273.15, Quantity.TEMPERATURE)
+    for spelling in _FAHRENHEIT.split():
+        table[_normal(spelling)] = Unit(5.0 / 9.0, 459.67 * 5.0 / 9.0, Quantity.TEMPERATURE)
+    return table
+
+
+UNITS: dict[str, Unit] = _table()
+"""Every accepted spelling in its normal form."""
+
+_REASONS = {_normal(each): why for why, all_of in _REFUSED.items() for each in all_of.split()}
+_BY_FOLDED = {spelling.casefold(): unit for spelling, unit in UNITS.items()}
+_REASONS_FOLDED = {spelling.casefold(): why for spelling, why in _REASONS.items()}
+
+
+def lookup(spelling: str) -> Unit | None:
+    """Return the unit of a spelling, or None. Upper and lower case differ only for mPa and MPa."""
+    text = _normal(spelling)
+    if text in UNITS:
+        return UNITS[text]
+    return None if text.casefold() in _REASONS_FOLDED else _BY_FOLDED.get(text.casefold())
+
+
+def is_unit(spelling: str) -> bool:
+    """Tell whether a text is a spelling of any unit, time and refused ones included."""
+    refused = _normal(spelling).casefold() in _REASONS_FOLDED
+    return lookup(spelling) is not None or refused or is_time_unit(spelling)
+
+
+def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit:
+    """Return the unit of a channel that measures `quantity`.
+
+    A state (gear, flag) needs no unit. Raises UnitError where the unit is missing, unknown,
+    ambiguous or of another quantity; the text says how to assert it.
+    """
+    if quantity is Quantity.STATE:
+        return Unit(1.0, 0.0, Quantity.STATE)
+    usual = ", ".join(map(repr, first_spellings(quantity)))
+    source = where.channel or "..."
+    remedy = (
+        f'assert it in the channel mapping: channels.<role> = {{ source = "{source}", '
+        f'unit = "..." }}, for a {quantity} one of {usual}'
+    )
+    if spelling is None or not spelling.strip():
+        raise UnitError("the file names no unit for this channel", remedy, where)
+    unit = lookup(spelling)
+    if unit is None:
+        reason = _REASONS_FOLDED.get(_normal(spelling).casefold())
+        what = f"unit {spelling!r} cannot stand as it is: {reason}" if reason else None
+        raise UnitError(what or f"unknown unit {spelling!r}", remedy, where)
+    if unit.quantity is not quantity:
+        percent = unit.quantity is Quantity.FRACTION and quantity is Quantity.TORQUE
+        hint = "; percent torque needs scale = reference torque/100" if percent else ""
+        raise UnitError(
+            f"unit {spelling!r} is a {unit.quantity}, the channel is a {quantity}", remedy + hint,
+            where,
+        )  # fmt: skip
+    return unit
+
+
+def is_time_unit(spelling: str) -> bool:
+    """Tell whether a text is a spelling of a unit of time."""
+    return _normal(spelling).casefold() in _TIME
+
+
+def time_factor(spelling: str | None, where: Where) -> float:
+    """Return the factor to seconds of a time unit; raises UnitError if missing or unknown."""
+    remedy = 'assert it in the channel mapping: time = { unit = "s" } (or "ms", "us", "min")'
+    if spelling is None or not spelling.strip():
+        raise UnitError("the file names no unit for its time column", remedy, where)
+    try:
+        return _TIME[_normal(spelling).casefold()]
+    except KeyError:
+        raise UnitError(f"unknown time unit {spelling!r}", remedy, where) from None
+
+
+def first_spellings(quantity: Quantity) -> list[str]:
+    """Return the first spelling of each size of unit of a quantity, SI among them."""
+    return [spellings.split()[0] for spellings in _SPELLINGS[quantity].values()]
+
+
+def usual_units(quantity: Quantity, without: str) -> list[tuple[str, float]]:
+    """Return the first spelling of each size of unit with its factor relative to `without`.
+
+    Used to propose the unit that numbers would fit; `without` is the present unit and left out.
+    """
+    present = lookup(without)
+    size = present.factor if present is not None else 1.0
+    return [
+        (spellings.split()[0], factor / size)
+        for factor, spellings in _SPELLINGS[quantity].items()
+        if factor != size
+    ]

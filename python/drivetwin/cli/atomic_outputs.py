@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""Several output files that appear together or not at all."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from drivetwin._util.atomic import check_kept
+from drivetwin.errors import DrivetwinError, InputError
+
+
+def refuse_alike(files: Sequence[Path], remedy: str) -> None:
+    """Raise InputError where two files have one stem: what is made of them would share a name."""
+    twice = [stem for stem, count in Counter(file.stem for file in files).items() if count > 1]
+    if twice:
+        raise InputError(
+            f"several logs are called {', '.join(twice)}: their results would share one name",
+            remedy,
+        )
+
+
+@contextmanager
+def staged(folder: Path) -> Iterator[Path]:
+    """Yield an empty folder to write into; its files move to `folder` when the block succeeds.
+
+    When the block fails or is interrupted, `folder` is as it was: not made, nothing added or
+    replaced. An error about a file in the empty folder names it in `folder`. Raises OSError, and
+    InputError where a file would take the place of one to be kept.
+    """
+    existing = next(path for path in (folder, *folder.parents) if path.exists())
+    try:
+        beside = Path(tempfile.mkdtemp(dir=existing, prefix=".drivetwin-"))
+    except OSError as error:
+        error.filename = str(existing)
+        raise
+    try:
+        yield beside
+        folder.mkdir(parents=True, exist_ok=True)
+        files = sorted(beside.iterdir())
+        for file in files:
+            check_kept(folder / file.name)
+        for file in files:
+            file.replace(folder / file.name)
+    except DrivetwinError as error:
+        error.where = replace(error.where, file=_told(error.where.file, beside, folder))
+        raise
+    except OSError as error:
+        error.filename = _told(error.filename, beside, folder)
+        raise
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+def _told(file: object, beside: Path, folder: Path) -> str | None:
+    """The path of a file in `beside` as it will be in `folder`; any other as it is."""
+    if file is None:
+        return None
+    path = Path(str(file))
+    return str(folder / path.relative_to(beside) if path.is_relative_to(beside) else file)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""From a log and a card to an identification with its twin, validation and files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from drivetwin.cli.arguments import load
+from drivetwin.cli.atomic_outputs import staged
+from drivetwin.cli.output import step
+
+if TYPE_CHECKING:
+    from drivetwin.channels.shiftlog import ShiftLog
+    from drivetwin.estimation.identification import Identification
+    from drivetwin.estimation.result.method import Method
+    from drivetwin.twin.twin import Twin
+    from drivetwin.vehicle.card import VehicleCard
+
+RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What one log gave: the log and card themselves, the identification, its twin."""
+
+    log: ShiftLog
+    card: VehicleCard
+    found: Identification
+    twin: Twin
+
+
+def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outcome:
+    """Read, find shifts, identify, and validate by simulation.
+
+    Raises the typed errors of each stage; NoShiftError lists what was refused and why.
+    """
+    from drivetwin.estimation.analysis.experiment_design import examined
+    from drivetwin.estimation.identify import identify
+    from drivetwin.shifts.detect import usable_shifts
+    from drivetwin.twin.twin import Twin
+    from drivetwin.validation.simulate_log import validated
+
+    with step(f"reading {log.name}"):
+        recording, card = load(log, vehicle, channels)
+        shifts = usable_shifts(recording, card)
+    with step(f"identifying by the {method} method"):
+        found = identify(recording, card, shifts, method)
+        twin = Twin.from_identification(found, card)
+    with step("simulating the shifts"):
+        found = validated(found, twin, recording)
+    with step("comparing experiments"):
+        found = examined(found)
+    return Outcome(recording, card, found, twin)
+
+
+def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
+    """Write result, twin and report into `folder`, all or none; returns their paths."""
+    from drivetwin.files.result_file import save_result
+    from drivetwin.report.html import save_report
+
+    with step("writing the report"), staged(folder) as beside:
+        save_result(beside / RESULT, outcome.found)
+        outcome.twin.save(beside / TWIN)
+        save_report(beside / REPORT, outcome.found, outcome.log)
+    return tuple(folder / name for name in (RESULT, TWIN, REPORT))

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: MIT
+"""Deviations from the friction law: drag of open clutches, dependence on pressure or temperature.
+
+    T_drag = d·s whatever the pressure        μ(s)·(1 + p·(P - P̄) + h·(θ - θ̄)) while slipping
+
+All are small, so that they act linearly about the minimum of the fit; with columns Z of what each
+does to the outputs and residuals r,
+
+    δ = S⁻¹ Zᵀ Σ⁻¹ r,   S = Zᵀ Σ⁻¹ Z - Zᵀ Σ⁻¹ J F⁻¹ Jᵀ Σ⁻¹ Z + prior
+
+which is the step of Gauss and Newton in all unknowns together. What is found is put back and the
+fit made again, until no more is found. Several shifts count together; within one, pressure and slip
+move together and tell little. Drag differs from contact friction by acting where the pressure is
+none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.diagnostics.misspecification import score_of
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, spread_of
+from drivetwin.estimation.likelihood.objective import Part
+from drivetwin.estimation.likelihood.slip_contact import Contact, contact_of
+from drivetwin.estimation.optimize.gauss_newton import minimise, step_of
+
+
+@dataclass(frozen=True)
+class FrictionDependenceSettings:
+    """Settings of the deviations from the friction law."""
+
+    drag_share: float = 0.1
+    """Plausible drag of an open clutch at the largest slip, over the largest engine torque [-]."""
+    level_share: float = 0.3
+    """Plausible change of μ over the observed pressures or temperatures [-]."""
+    significant_sigma: float = 3.0
+    """Distance from zero, in standard deviations, above which a deviation is significant [-]."""
+    rounds: int = 2
+    """Number of refits with the deviations taken off the residuals [-]."""
+    max_relative_std: float = 0.5
+    """Largest standard deviation of an informative value, over the plausible value [-]."""
+
+
+DEPENDENCE = FrictionDependenceSettings()
+
+
+class Kind(StrEnum):
+    """Kinds of deviations from the friction law."""
+
+    DRAG = "drag"
+    PRESSURE = "pressure"
+    TEMPERATURE = "temperature"
+
+
+UNITS: Mapping[Kind, str] = {Kind.DRAG: "N*m*s/rad", Kind.PRESSURE: "1/Pa", Kind.TEMPERATURE: "1/K"}
+
+
+@dataclass(frozen=True)
+class Departure:
+    """One departure of one element: `value` and `std` in UNITS, `plausible` its prior's spread."""
+
+    kind: Kind
+    element: str
+    value: float
+    std: float
+    plausible: float
+
+    @property
+    def text(self) -> str:
+        """Verdict of the log on it."""
+        if self.std > DEPENDENCE.max_relative_std * self.plausible:
+            return "not told by this log"
+        if abs(self.value) > DEPENDENCE.significant_sigma * self.std:
+            return "seen"
+        return "none seen"
+
+
+@dataclass(frozen=True, eq=False)
+class _Effect:
+    """A departure's torque over the steps (N-1,) by part, per unit."""
+
+    kind: Kind
+    element: str
+    torques: tuple[FloatArray, ...]
+    plausible: float
+
+
+def departures(found: Identification, temperature: Sampled | None = None) -> tuple[Departure, ...]:
+    """Estimate the deviations of all elements of a likelihood identification.
+
+    `temperature` [K] is that of the oil over the log, which changes so slowly that it is also told
+    across a gap. Raises IdentificationError where the
+    identification is by another method.
+    """
+    fit, signals = likelihood_of(found)
+    largest = max(float(np.max(np.abs(s.engine_torque.values))) for s in signals)
+    total, step = np.zeros(0), _step(fit, largest, temperature)
+    for _ in range(DEPENDENCE.rounds):
+        total = step.values if total.size == 0 else total + step.values
+        again = _put_back(fit, step, total)
+        if again is None:
+            break
+        step = _step(again, largest, temperature, total)
+    std = np.sqrt(np.diag(step.covariance))
+    return tuple(
+        Departure(e.kind, e.element, float(value), float(error), e.plausible)
+        for e, value, error in zip(step.effects, total, std, strict=True)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Result of one step: `values` (q,) of the effects, and `columns` (n, q) of each part."""
+
+    effects: list[_Effect]
+    columns: list[FloatArray]
+    values: FloatArray
+    covariance: FloatArray
+
+
+def _step(
+    fit: LikelihoodFit,
+    largest: float,
+    temperature: Sampled | None,
+    known: FloatArray | None = None,
+) -> _Step:
+    """Compute one step from the minimum; `known` (q,) is already in the residuals."""
+    effects = [e for e in _effects(fit, largest, temperature) if e.plausible > 0.0]
+    columns = [_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
+    precision = np.array([e.plausible for e in effects]) ** -2.0
+    score = score_of(fit.problem, fit.normal, columns)
+    normal = score.beside(fit.normal, precision, 0.0 if known is None else known)
+    mine = slice(fit.point.values.size, None)
+    covariance = spread_of(fit.problem, normal, fit.chi2)[mine, mine]
+    return _Step(effects, columns, step_of(normal.information, normal.gradient)[mine], covariance)
+
+
+def _put_back(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodFit | None:
+    """Refit with the effects subtracted from the residuals; None if the fit fails."""
+    parts = tuple(
+        replace(part, returned=part.returned + z @ total)
+        for part, z in zip(fit.problem.parts, step.columns, strict=True)
+    )
+    found = minimise(replace(fit.problem, parts=parts), fit.point)
+    if found is None or not found.converged:
+        return None
+    return replace(fit, problem=found.problem, point=found.point, normal=found.normal)
+
+
+def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) -> Iterator[_Effect]:
+    """Yield every deviation of every element."""
+    runs = [part.run(fit.point) for part in fit.problem.parts]
+    names = dict.fromkeys(e.name for part in fit.problem.parts for e in part.structure.elements)
+    for name in names:
+        seen = [
+            contact_of(part, fit.point, run, name)
+            for part, run in zip(fit.problem.parts, runs, strict=True)
+            if run is not None
+        ]
+        slip = tuple(one.slip for one in seen)
+        reach = max(float(np.max(np.abs(s))) for s in slip)
+        yield _Effect(Kind.DRAG, name, slip, DEPENDENCE.drag_share * largest / reach)
+        yield _level(Kind.PRESSURE, name, seen, [one.above for one in seen])
+        if temperature is not None:
+            known = temperature.time, temperature.values
+            courses = [np.interp(one.middle, *known) for one in seen]
+            yield _level(Kind.TEMPERATURE, name, seen, courses)
+
+
+def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray]) -> _Effect:
+    """Build the change of μ in proportion to a quantity, about its mean while the element slips."""
+    contact = [one.friction * one.per_mu for one in seen]
+    weights = np.abs(np.concatenate(contact))
+    values = np.concatenate(quantity)
+    slipping = weights > 0.0
+    if not slipping.any() or np.ptp(values[slipping]) == 0.0:
+        return _Effect(kind, name, (), 0.0)
+    mean = float(np.average(values, weights=weights))
+    torques = tuple(one * (part - mean) for one, part in zip(contact, quantity, strict=True))
+    return _Effect(kind, name, torques, DEPENDENCE.level_share / float(np.ptp(values[slipping])))
+
+
+def _columns(part: Part, fit: LikelihoodFit, effects: list[_Effect], place: int) -> FloatArray:
+    """Compute the change (n, q) of the outputs of one part by a unit of each effect."""
+    run = part.run(fit.point)
+    assert run is not None
+    columns = []
+    for effect in effects:
+        contact = contact_of(part, fit.point, run, effect.element)
+        force = contact.forces(effect.torques[place])
+        columns.append(part.answer_to_force(fit.point, run, force))
+    return np.column_stack(columns)

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: MIT
+"""Fit of μ of any shape: the likelihood's fit once more, with knots in place of the Stribeck law.
+
+How smooth the curve is, the log decides: of several standard deviations of the second differences
+of μ between knots the one of largest evidence is taken (Q and the log-determinants of information
+and prior, MacKay 1992).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from drivetwin._util.arrays import FloatArray, Span
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.analysis.friction_shape_prior import Shape
+from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.data.shift_data import Coupling, ShiftSignals
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.data.shift_record import Record, record_of
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.objective import Part, Problem
+from drivetwin.estimation.likelihood.optimize.multistart import nearest
+from drivetwin.estimation.likelihood.parametrization import LAW, Structure
+from drivetwin.estimation.likelihood.priors import spans
+from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
+from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import sensor_shifts
+from drivetwin.estimation.optimize.gauss_newton import step_of
+from drivetwin.estimation.optimize.objective import Normal, Point
+from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.simulation.dual_clutch import FrictionTable, ShiftElement, Stribeck
+from drivetwin.vehicle.spec import SensorTolerance
+
+KNOTS = 12
+BENDS = (3e-4, 1e-3, 3e-3, 1e-2)
+"""Standard deviations of second differences of μ that are tried."""
+LEAST = 1e-3
+"""Least μ at a knot."""
+LEVEL = (0.12, 0.2)
+"""Wide prior of μ at every knot."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Knots (K,) of |slip| [rad/s], the first 0, between which μ is linear."""
+
+    knots: FloatArray
+
+    def names(self, element: str) -> tuple[str, ...]:
+        """Unknowns of an element: its μ at the knots."""
+        return tuple(f"{element}.mu.{k}" for k in range(self.knots.size))
+
+
+@dataclass(frozen=True, eq=False)
+class Shaped(Structure):
+    """A structure whose `tables` take the place of laws, by element."""
+
+    tables: Mapping[str, Table] = field(default_factory=dict)
+
+    def _element(self, point: Point, one: Coupling) -> ShiftElement:
+        element = super()._element(point, one)
+        if one.name not in self.tables:
+            return element
+        table = self.tables[one.name]
+        mu = tuple(point[name] for name in table.names(one.name))
+        return replace(element, friction=FrictionTable(tuple(table.knots.tolist()), mu))
+
+    def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
+        yield from super()._entries(point, name)
+        element, _, key = name.partition(".")
+        if element in self.tables and key.startswith("mu."):
+            yield name, name, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class ShapedFriction:
+    """Curves of friction by element with 95 % bands, sensors included.
+
+    `gain` is by how much Q of the free shape falls below that of the Stribeck law, `bend` the
+    smoothness that the log chose, `fit` what stands behind: the free shape, which a monotone one
+    changes in the curves alone.
+    """
+
+    shape: Shape
+    curves: Mapping[str, FrictionCurve]
+    gain: float
+    bend: float
+    fit: LikelihoodFit
+
+
+def shaped_friction(
+    found: Identification, shape: Shape, tolerances: Mapping[str, SensorTolerance]
+) -> ShapedFriction:
+    """Fit μ over slip as a curve of `shape` for every element that has a friction curve.
+
+    Raises IdentificationError where the identification is by another method or no fit converges.
+    """
+    base, signals = likelihood_of(found)
+    tables = {name: Table(_knots(curve)) for name, curve in found.friction.items()}
+    problem, start = _problem(base, signals, tables)
+    normal = problem.weighted_by(start).normal(start)
+    priors = {bend: _prior(problem.prior, start, tables, bend) for bend in BENDS}
+    best: LikelihoodFit | None = None
+    if normal is not None:
+        bend = min(BENDS, key=lambda one: _evidence(normal, problem.prior, priors[one], start))
+        best = nearest(replace(problem, prior=priors[bend]), start)
+    if best is None:
+        raise IdentificationError(
+            "the fit with friction of free shape does not converge",
+            "use the Stribeck law, which the identification has",
+        )
+    systematic = sum(
+        (np.outer(s, s) for s in sensor_shifts(best, tolerances).values()),
+        np.zeros_like(best.covariance),
+    )
+    gain = base.chi2 * base.problem.size - best.chi2 * best.problem.size
+    return ShapedFriction(
+        shape,
+        {
+            name: _curve(best, (name, table, shape), found.friction[name], systematic)
+            for name, table in tables.items()
+        },
+        gain,
+        bend,
+        best,
+    )
+
+
+def _knots(curve: FrictionCurve) -> FloatArray:
+    """Place knots from zero slip to the largest observed, even in the root of slip: denser where
+    μ changes."""
+    return np.asarray(np.linspace(0.0, np.sqrt(curve.slip[-1]), KNOTS) ** 2, dtype=np.float64)
+
+
+def _problem(
+    base: LikelihoodFit,
+    signals: Sequence[ShiftSignals],
+    tables: Mapping[str, Table],
+) -> tuple[Problem, Point]:
+    """Build the problem with knots in place of laws, and its initial point."""
+    laws = {f"{name}.{key}" for name in tables for key in LAW}
+    kept = [k for k, name in enumerate(base.point.names) if name not in laws]
+    names = [base.point.names[k] for k in kept]
+    values = [float(base.point.values[k]) for k in kept]
+    for name, table in tables.items():
+        law = _law_of(base, name)
+        names += table.names(name)
+        values += law.at(table.knots).tolist()
+    point = Point(tuple(names), np.array(values))
+    parts = tuple(
+        _part(replace(part, record=_measured(part, s, span)), base, tables)
+        for part, s, span in zip(base.problem.parts, signals, spans(signals), strict=True)
+    )
+    size = point.values.size
+    lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
+    lower[: len(kept)], upper[: len(kept)] = base.problem.lower[kept], base.problem.upper[kept]
+    for name, table in tables.items():
+        first = names.index(table.names(name)[0])
+        lower[first : first + table.knots.size] = LEAST
+    mean, precision = np.zeros(size), np.zeros((size, size))
+    mean[: len(kept)] = base.problem.prior.mean[kept]
+    precision[: len(kept), : len(kept)] = base.problem.prior.precision[np.ix_(kept, kept)]
+    return Problem(parts, Prior(mean, precision), lower, upper), point
+
+
+def _law_of(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
+    """Return the friction law of an element at the minimum."""
+    for part in base.problem.parts:
+        for one in part.structure.model(base.point).elements:
+            if one.name == name:
+                return one.friction
+    raise IdentificationError(
+        f"no shift of the fit has an element {name}", "identify the log again"
+    )
+
+
+def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
+    """Replace the laws of a part by tables."""
+    old = part.structure
+    laws = {f"{e.name}.{key}" for e in old.elements for key in LAW}
+    fixed = {**old.fixed, **{name: old.value(base.point, name) for name in laws}}
+    mine = {one.name: tables[one.name] for one in old.elements if one.name in tables}
+    structure = Shaped(**{**vars(old), "fixed": fixed, "tables": mine})
+    return Part.unweighted(structure, part.record)
+
+
+def _measured(part: Part, signals: ShiftSignals, span: Span) -> Record:
+    """Restore the inputs as measured: those of a fit are the expected ones."""
+    return record_of(signals, span, part.record.fills).of_kinds(part.record.kinds)
+
+
+def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) -> Prior:
+    """Add the priors on level and smoothness of every μ to `base`."""
+    level, spread = LEVEL
+    mean, precision = base.mean.copy(), base.precision.copy()
+    for name, table in tables.items():
+        first = point.names.index(table.names(name)[0])
+        part = slice(first, first + table.knots.size)
+        second = np.diff(np.eye(table.knots.size), 2, axis=0) / bend
+        on_mu = second.T @ second + np.eye(table.knots.size) / spread**2
+        precision[part, part], mean[part] = on_mu, level
+    return Prior(mean, precision)
+
+
+def _evidence(normal: Normal, without: Prior, prior: Prior, point: Point) -> float:
+    """Compute -2·log-evidence of a prior, up to a constant, with Q expanded at `point`."""
+    gradient = normal.gradient - without.pull(point.values) + prior.pull(point.values)
+    information = normal.data + prior.precision
+    scale = np.sqrt(np.diag(information))
+    unit = information / np.outer(scale, scale)
+    step = step_of(information, gradient)
+    fall = float(2.0 * step @ gradient + step @ information @ step)
+    known = np.flatnonzero(np.diag(prior.precision))
+    block = prior.precision[np.ix_(known, known)]
+    power = np.linalg.slogdet(unit)[1] + 2.0 * np.sum(np.log(scale))
+    return prior.cost(point.values) + fall + float(power - np.linalg.slogdet(block)[1])
+
+
+def _curve(
+    best: LikelihoodFit,
+    one: tuple[str, Table, Shape],
+    seen: FrictionCurve,
+    systematic: FloatArray,
+) -> FrictionCurve:
+    """Interpolate μ between the knots over the observed slips, with the band of noise and
+    sensors."""
+    name, table, shape = one
+    first = best.point.names.index(table.names(name)[0])
+    part = slice(first, first + table.knots.size)
+    slip = np.linspace(float(seen.slip[0]), float(seen.slip[-1]), POINTS)
+    between = np.array([np.interp(slip, table.knots, row) for row in np.eye(table.knots.size)]).T
+    total = (best.covariance + systematic)[part, part]
+    at_knots, spread = shaped(shape, best.point.values[part], total)
+    mu = between @ at_knots
+    half = Z95 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))
+    return replace(
+        seen,
+        slip=slip,
+        mu=mu,
+        mu_lo=mu - half,
+        mu_hi=mu + half,
+        stribeck=None,
+        stribeck_covariance=None,
+        method=f"likelihood, {shape} shape",
+    )
+
+
+def shaped(shape: Shape, mu: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Project μ (K,) at the knots, and its covariance (K, K), onto curves of `shape`."""
+    if shape is Shape.FREE:
+        return mu, covariance
+    matrix = np.tril(np.ones((mu.size, mu.size)))
+    if shape is Shape.FALLING:
+        matrix = matrix[::-1]
+    scale = np.sqrt(np.diag(covariance))
+    root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale)))
+    weighted = root @ (matrix / scale[:, None])
+    lower = np.concatenate([[-np.inf], np.zeros(mu.size - 1)])
+    found = lsq_linear(weighted, root @ (mu / scale), bounds=(lower, np.inf), tol=1e-12)
+    moving = np.flatnonzero(found.active_mask == 0)
+    inverse = np.linalg.inv(weighted[:, moving].T @ weighted[:, moving])
+    within = matrix[:, moving] @ inverse @ matrix[:, moving].T
+    return np.asarray(matrix @ found.x), np.asarray(within)

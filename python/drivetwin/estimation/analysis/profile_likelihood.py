@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: MIT
+"""Profile likelihood of one parameter: minimum of Q over all others while it is fixed.
+
+    Q_p(v) = min over θ with q(θ) = v of Q(θ)
+
+The interval from Q_p - Q_min = 3.84 needs no linearity, unlike the one from the covariance; where
+the two differ, the profile is right. Between neighbouring values the search goes on from the last
+point; its steps obey q(θ) = v by a Lagrange multiplier.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin._util.progress import tell
+from drivetwin.errors import IdentificationError, InputError
+from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.budget import REMEDY
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, noise_power
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import parameters, slopes
+from drivetwin.estimation.optimize.gauss_newton import minimise, minimise_constrained
+from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.result.estimate import Z95
+
+
+@dataclass(frozen=True)
+class ProfileSettings:
+    """Settings of the profile likelihood."""
+
+    min_reach: float = 3.0
+    """Distance to either side that is always covered, in standard deviations [-]."""
+    spacing: float = 0.5
+    """Distance of neighbouring values, in standard deviations [-]."""
+    max_reach: float = 10.0
+    """Distance at which a side that does not close is given up, in standard deviations [-]."""
+    rise: float = 3.841
+    """Rise of Q at the ends of a 95 % interval: chi-squared of one degree of freedom [-]."""
+    tolerance: float = 1e-3
+    """Largest error of the fixed parameter, in standard deviations [-]."""
+
+
+PROFILE = ProfileSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """`rise` (n,) of Q, over the noise found in the log, slow errors counted, at `values` (n,) of a
+    parameter, SI.
+
+    `interval` is the 95 % interval by the profile, an end infinite where Q does not rise enough;
+    `linear` the one by the covariance, from noise alone like the other.
+    """
+
+    parameter: str
+    values: FloatArray
+    rise: FloatArray
+    estimate: float
+    interval: tuple[float, float]
+    linear: tuple[float, float]
+
+
+def profile(found: Identification, parameter: str) -> Profile:
+    """Compute the profile of a parameter of a likelihood identification.
+
+    Raises InputError for a parameter that the fit does not have or that is known from design, and
+    IdentificationError where the identification is by another method.
+    """
+    fit, signals = likelihood_of(found)
+    told = parameters(fit.problem, fit.point, signals)
+    if parameter not in told:
+        raise InputError(
+            f"the fit has no parameter {parameter!r}", f"choose one of {', '.join(told)}"
+        )
+    held = _Held(fit, signals, list(told).index(parameter), parameter)
+    if held.std == 0.0:
+        raise InputError(
+            f"{parameter} is known from design and does not move",
+            "give it a standard deviation on the vehicle card, or choose another",
+        )
+    tell(0.0)
+    below = _side(held, -1.0)
+    tell(0.5)
+    above = _side(held, 1.0)
+    sides = np.array([*below[::-1], (0.0, 0.0), *above], dtype=np.float64)
+    distance, rise = sides[:, 0], sides[:, 1]
+    values = held.estimate + held.std * distance
+    ends = (_crossing(values[::-1], rise[::-1]), _crossing(values, rise))
+    half = Z95 * held.std
+    linear = (held.estimate - half, held.estimate + half)
+    return Profile(parameter, values, rise, held.estimate, ends, linear)
+
+
+def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftSignals]]:
+    """Return the fit behind an identification and its signals.
+
+    Raises IdentificationError where it is by another method, or the likelihood method gave up.
+    """
+    fit, gave_up = found.evidence.likelihood, found.evidence.gave_up
+    if fit is None and gave_up:
+        raise IdentificationError(
+            f"the likelihood method gave up on this log, so there is no fit to work on: {gave_up}",
+            REMEDY,
+        )
+    if fit is None:
+        raise IdentificationError(
+            f"the {found.method} method has no likelihood to work on",
+            "identify with --method likelihood",
+        )
+    return fit, found.evidence.signals
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """Fit with one parameter to be fixed, by its index among the reported ones and its name."""
+
+    fit: LikelihoodFit
+    signals: Sequence[ShiftSignals]
+    place: int
+    parameter: str
+
+    def value(self, point: Point) -> float:
+        """Compute the parameter at `point`."""
+        return list(parameters(self.fit.problem, point, self.signals).values())[self.place]
+
+    def row(self, point: Point) -> FloatArray:
+        """Compute its derivative (p,) by the unknowns."""
+        std = np.sqrt(np.diag(self.fit.covariance))
+        return np.asarray(slopes(self.fit.problem, point, std, self.signals)[self.place])
+
+    @property
+    def estimate(self) -> float:
+        """Its value at the minimum."""
+        return self.value(self.fit.point)
+
+    @property
+    def std(self) -> float:
+        """Its standard deviation by the covariance."""
+        row = self.row(self.fit.point)
+        return float(np.sqrt(max(float(row @ self.fit.covariance @ row), 0.0)))
+
+    @property
+    def unit(self) -> float:
+        """Rise of Q that counts as one: noise that is louder or slower than the sensors' shows the
+        parameter less."""
+        return noise_power(self.fit, self.row(self.fit.point)[None, :])
+
+
+def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
+    """Compute (distance in standard deviations, rise of Q) from the minimum outwards."""
+    fit = held.fit
+    lowest, unit = fit.normal.cost, held.unit
+    estimate, std, point = held.estimate, held.std, fit.point
+    found: list[tuple[float, float]] = []
+    distance = 0.0
+    while distance < PROFILE.max_reach and (
+        distance < PROFILE.min_reach or found[-1][1] < PROFILE.rise
+    ):
+        distance += PROFILE.spacing
+        value = estimate + sign * distance * std
+        reached = _minimise_at(held, point, value)
+        if reached is None:
+            break
+        point, cost = reached
+        found.append((sign * distance, (cost - lowest) / unit))
+    return found
+
+
+def _minimise_at(held: _Held, start: Point, value: float) -> tuple[Point, float] | None:
+    """Minimise Q with the parameter fixed at `value`; None if the simulation fails.
+
+    If the parameter is itself an unknown of the fit, the damped search goes on from the constrained
+    one, which may stop early at a kink of Q.
+    """
+    problem = held.fit.problem
+    reached = minimise_constrained(
+        problem,
+        start,
+        lambda point: value - held.value(point),
+        held.row,
+        PROFILE.tolerance * held.std,
+    )
+    if reached is None or held.parameter not in held.fit.point.names:
+        return reached
+    place = held.fit.point.names.index(held.parameter)
+    prior = problem.prior.held(place, value)
+    found = minimise(replace(problem, prior=prior), reached[0])
+    if found is None:
+        return reached
+    point = found.point
+    cost = found.normal.cost - prior.cost(point.values) + problem.prior.cost(point.values)
+    return (point, cost) if cost < reached[1] else reached
+
+
+def _crossing(values: FloatArray, rise: FloatArray) -> float:
+    """Find the value at which the rise passes `PROFILE.rise` outwards; infinite if it does not."""
+    outwards = float(np.sign(float(values[-1]) - float(values[0])))
+    start = int(np.argmin(np.abs(rise)))
+    for k in range(start, values.size - 1):
+        if rise[k] < PROFILE.rise <= rise[k + 1]:
+            share = (np.sqrt(PROFILE.rise) - np.sqrt(max(rise[k], 0.0))) / (
+                np.sqrt(rise[k + 1]) - np.sqrt(max(rise[k], 0.0))
+            )
+            return float(values[k] + share * (values[k + 1] - values[k]))
+    return outwards * float("inf")

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""What stands behind an identification, stage by stage.
+
+Names of types only are imported here: the stages themselves know the Identification that holds
+their results.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from drivetwin.estimation.data.shift_data import ShiftSignals
+    from drivetwin.estimation.likelihood.fit import LikelihoodFit
+    from drivetwin.estimation.linear.pipeline import IntegralShift
+    from drivetwin.estimation.paper.pipeline import PaperShift
+    from drivetwin.estimation.result.multi_log import Several
+    from drivetwin.estimation.result.suggestion import Suggestion
+    from drivetwin.estimation.result.validation import HeldOut, Validation
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Evidence:
+    """Results of the stages, each with its own units and shapes (SI); empty where none ran.
+
+    What goes by shift is in the order of `Identification.shifts`; of several logs fitted as one,
+    the shifts of the first come first.
+    """
+
+    signals: tuple[ShiftSignals, ...] = ()
+    """What the log showed of each shift; by every method."""
+    paper: tuple[PaperShift, ...] = ()
+    """The paper's stages on each shift: beside the other methods for comparison, where it can be
+    computed and the log has an output torque."""
+    integral: tuple[IntegralShift, ...] = ()
+    """The integral method on each shift, from which the likelihood method starts; empty by the
+    paper's method and without an output torque."""
+    likelihood: LikelihoodFit | None = None
+    """The fit of all shifts together; None by another method, and where it did not converge."""
+    gave_up: str = ""
+    """Why the likelihood method gave up, in words; empty where it did not or was not asked for."""
+    loads: tuple[float, ...] = ()
+    """Load of each shift at the output shaft [N m] where they differ, as on hills, T_v/i_f is then
+    their mean; empty where the shifts of a log share one."""
+    several: Several | None = None
+    """The logs behind a fit of several, from `identify_several`; None of one log."""
+    suggestions: tuple[Suggestion, ...] = ()
+    """Experiments that would tell what is left open, from `examined`; likelihood method only."""
+    validation: tuple[Validation, ...] = ()
+    """Each shift simulated and compared, from `validated`; by every method."""
+    held_out: tuple[HeldOut, ...] = ()
+    """Each shift that was predicted and not fitted, by log and time, from `identify_together`."""

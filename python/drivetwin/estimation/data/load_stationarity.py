@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""Whether the load is constant over a shift: eq. 11 over it, with the vehicle of all shifts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._util.arrays import Span
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.vehicle_balance import (
+    GROWTH,
+    INERTIA,
+    WIDTH,
+    VehicleBalance,
+    recorded_windows,
+)
+from drivetwin.estimation.regression.errors_in_variables import Prior
+
+UNKNOWNS = 3
+"""Load, inertia and the part of the load that grows with speed."""
+AGREEING = 3
+"""Fewest shifts of which most can be right."""
+
+
+@dataclass(frozen=True)
+class OwnLoad:
+    """What eq. 11 says over one span: `left`, the noise power (1: noise alone) that the best load
+    leaves; J3 [kg m^2] and the part of the load that grows with the square of the speed, at the
+    output shaft [N m s^2/rad^2], with their standard deviations."""
+
+    left: float
+    J_vehicle: tuple[float, float]
+    growth: tuple[float, float]
+
+
+def own_load(
+    torque: Sampled,
+    wheel: Sampled,
+    i_f: float,
+    span: Span,
+    vehicle: tuple[float, float] | None = None,
+) -> OwnLoad | None:
+    """Fit a load that is constant over `span` [s], but for what grows with the speed `wheel`.
+
+    J3 and that growth too, unless the `vehicle` gives both: much more than noise is then left
+    where something else moves it, a brake or a change of grade. By itself a shift would take a
+    part of that for inertia. None where the span holds nothing to tell it from.
+    """
+    windows = recorded_windows(torque, wheel, (span,), WIDTH / 4.0)
+    if windows.count <= UNKNOWNS:
+        return None
+    balance = VehicleBalance.over(torque, wheel, (1.0, i_f), windows)
+    square = balance.square
+    width = max(float(np.ptp(square)), np.finfo(float).tiny)
+    grown = (square - square.mean()) / width
+    start, prior = np.zeros(UNKNOWNS), Prior.independent(UNKNOWNS, {})
+    if vehicle is not None:
+        start[1:] = vehicle[0], vehicle[1] * width
+        prior = prior.held(INERTIA, start[INERTIA]).held(GROWTH, start[GROWTH])
+    try:
+        fit = balance.fit(grown, start, prior)
+    except IdentificationError:
+        return None
+    std = fit.std
+    growth = float(fit.theta[GROWTH]) / width, float(std[GROWTH]) / width
+    return OwnLoad(fit.chi2, (float(fit.theta[INERTIA]), float(std[INERTIA])), growth)
+
+
+def vehicle_of(loads: Sequence[OwnLoad]) -> tuple[float, float] | None:
+    """J3 [kg m^2] and growth of the load [N m s^2/rad^2] that most of the shifts agree on.
+
+    Medians weighted by information: a shift over which the load changes takes that for inertia or
+    for growth, be it never so steady else. None where they are too few to say which of them does.
+    """
+    told = [one for one in loads if min(one.J_vehicle[1], one.growth[1]) > 0.0]
+    if len(told) < AGREEING:
+        return None
+    return _median([one.J_vehicle for one in told]), _median([one.growth for one in told])
+
+
+def _median(told: Sequence[tuple[float, float]]) -> float:
+    """Median of values weighted by the inverse of their standard deviations."""
+    value, std = np.array(sorted(told)).T
+    share = np.cumsum(1.0 / std)
+    return float(value[np.searchsorted(share, 0.5 * share[-1])])

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""Noise level of a channel, from the log itself.
+
+A driveline signal is smooth over a few samples at the logger's rate, so its third difference is
+nearly all noise. Blocks in which the signal itself bends sharply stand out and are left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+
+_THIRD_DIFFERENCE_GAIN = np.sqrt(20.0)
+"""Standard deviation of the third difference of unit white noise: sqrt(1 + 9 + 9 + 1)."""
+_CLIP = 3.0
+"""Deviates beyond so many sigma are corners of the signal, not noise."""
+_INNER_POWER = 0.97334
+"""Variance of unit normal deviates cut at 3 sigma."""
+_PASSES = 10
+
+
+def white_noise(values: FloatArray, block: int = 25, spread: float = 3.0) -> float:
+    """Standard deviation of the sample-to-sample noise of `values` (n,), in their unit.
+
+    The mean square of the third difference is averaged over the blocks of `block` samples whose
+    own mean square is at most `spread` times the median's, without the single corners that stand
+    out of it. Rounding counts as noise.
+    """
+    third = np.diff(values, 3) / _THIRD_DIFFERENCE_GAIN
+    count = third.size // block
+    if count < 2:
+        return float(np.sqrt(np.mean(third**2)))
+    blocks = third[: count * block].reshape(count, block) ** 2
+    power = np.mean(blocks, axis=1)
+    return _without_corners(blocks[power <= spread * np.median(power)].ravel())
+
+
+def _without_corners(squares: FloatArray) -> float:
+    """Root mean of squares (n,) of normal deviates, those beyond `_CLIP` sigma left out."""
+    level = float(np.mean(squares))
+    for _ in range(_PASSES):
+        inner = squares[squares <= _CLIP**2 * level]
+        level = float(np.mean(inner)) / _INNER_POWER
+    return float(np.sqrt(level))
+
+
+def resolution(values: FloatArray) -> float:
+    """Rounding step of a channel: the least distance of two of its numbers, of which all distances
+    are multiples; 0 where there is none, or the channel moves too seldom to show it.
+
+    Samples in a row need not show it: along a ramp all of them may be many steps apart.
+    """
+    least = 1e-9 * max(float(np.max(np.abs(values))), 1e-9)
+    gaps = np.diff(np.unique(values))
+    gaps = gaps[gaps > least]
+    if not gaps.size or np.count_nonzero(np.abs(np.diff(values)) > least) < 10:
+        return 0.0
+    step = float(np.min(gaps))
+    multiples = gaps / step
+    return step if float(np.max(np.abs(multiples - np.round(multiples)))) < 1e-3 else 0.0

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""Segments of a shift used by the momentum balance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drivetwin._util.arrays import Span
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
+from drivetwin.estimation.regression.modulating_functions import Windows, windows_in
+from drivetwin.shifts.coverage import parts_between
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import PriorValue
+
+
+@dataclass(frozen=True)
+class MomentumSettings:
+    """Windows and priors of the momentum form; times in s.
+
+    `width`, `step` of the Hann windows; in a phase shorter than two widths the window is
+    `share` of the phase. `margin` keeps clear of lock and break-away. `delay_prior` is the
+    plausible age of an engine torque value on a CAN bus; `delay_grid` the ages scanned.
+    """
+
+    width: float = 0.4
+    step: float = 0.025
+    share: float = 0.4
+    margin: float = 0.01
+    delay_prior: PriorValue = field(default_factory=lambda: PriorValue(0.02, 0.03))
+    delay_grid: tuple[float, ...] = tuple(np.linspace(-0.02, 0.08, 21).tolist())
+
+    def guard(self, boundary: str, shift: Shift) -> float:
+        """Distance kept from a phase boundary [s]: the margin and three standard deviations."""
+        return self.margin + 3.0 * shift.sigma.get(boundary, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A stretch of the log where one momentum equation holds.
+
+    `ratio` is i_g or i_h; `tied` says that the gear is locked, so ω_e = ratio·ω_out.
+    """
+
+    name: str
+    span: Span
+    ratio: float
+    tied: bool
+    windows: Windows
+
+
+SMOOTH = 5
+"""Samples over which a pressure is averaged before it is held against a limit."""
+
+
+VENTED = 0.5
+"""Share of P0 below which a pressure that is left after lock-up means an empty element."""
+
+
+LEAST_SPAN = 0.05
+"""A shorter stretch [s] holds no window that says anything."""
+
+
+LEAST_BESIDE = 0.25
+"""A gear held for less [s] beside a gap has windows that a torque as late as it may be leaves."""
+
+
+def off_going_free(
+    signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
+) -> float:
+    """First instant of the inertia phase at which the off-going element carries nothing [s].
+
+    Its pressure must have fallen for good below P0, less two standard deviations of P0. Where P0
+    is so little known, or so low, that no pressure is below that, it must have fallen to what is
+    left of it after lock-up.
+    """
+    shift = signals.shift
+    start = shift.inertia_phase[0] + settings.guard("inertia_start", shift)
+    element = driveline.offgoing
+    pressure = signals.pressures[element.name]
+    limit = element.P0.value - 2.0 * element.P0.std
+    rest, margin = _vented(pressure, shift)
+    if limit < rest + margin and rest < max(VENTED * element.P0.value, margin):
+        limit = rest + margin
+    smooth = np.convolve(pressure.values, np.ones(SMOOTH) / SMOOTH, mode="same")
+    inside = (pressure.time >= start) & (pressure.time < shift.lockup_time)
+    held = pressure.time[inside & (smooth >= limit)]
+    return float(held[-1]) if held.size else start
+
+
+def _vented(pressure: Sampled, shift: Shift) -> tuple[float, float]:
+    """What is left of an off-going pressure after lock-up [Pa], and how near is as good as there:
+    what noise makes of a mean of so many samples, and a hundredth of the whole fall."""
+    spans = (np.linspace(*span, 100) for span in (shift.before, shift.after))
+    before, rest = (float(np.median(pressure.at(time))) for time in spans)
+    return rest, 5.0 * pressure.sigma / float(np.sqrt(SMOOTH)) + 0.01 * abs(before - rest)
+
+
+def _driving(torque: Sampled, windows: Windows) -> Windows:
+    """The windows in which torque flows from engine to wheels throughout.
+
+    Elsewhere the dissipative loss law has another efficiency (THEORY section 3). The output
+    torque, averaged over 21 samples, must stay four standard errors above zero.
+    """
+    mean = np.convolve(torque.values, np.ones(21) / 21.0, mode="same")
+    reversed_at = torque.time[mean < 4.0 * torque.sigma / np.sqrt(21.0)]
+    first = np.searchsorted(reversed_at, windows.start)
+    last = np.searchsorted(reversed_at, windows.start + windows.width)
+    keep = first == last
+    return Windows(windows.start[keep], windows.width[keep])
+
+
+def stretches(
+    signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
+) -> tuple[Stretch, ...]:
+    """The stretches of a shift that carry an equation, with their windows."""
+    shift = signals.shift
+    lockup = settings.guard("lockup", shift)
+    free = off_going_free(signals, driveline, settings)
+    spans = (
+        (
+            "before",
+            (shift.before[0], shift.before[1] - settings.guard("torque_start", shift)),
+            True,
+        ),
+        ("inertia", (free, shift.lockup_time - lockup), False),
+        ("after", (shift.lockup_time + lockup, shift.after[1]), True),
+    )
+    found, backwards = [], False
+    for name, span, tied in spans:
+        ratio = driveline.i_before if name == "before" else driveline.i_after
+        for part in parts_between(span, signals.output_gaps):
+            if tied and part != span and part[1] - part[0] < LEAST_BESIDE:
+                continue
+            windows = _windows(part, settings)
+            if driveline.loss_law == "dissipative" and windows.count:
+                windows = _driving(signals.output_torque, windows)
+                backwards = backwards or not windows.count
+            if windows.count:
+                found.append(Stretch(name, part, ratio, tied, windows))
+    if backwards and not found:
+        raise IdentificationError(
+            "nowhere does torque flow from the engine to the wheels throughout, which the momentum "
+            "balance by the dissipative loss law needs",
+            "use the likelihood method, or record a second with the pedal down beside the shift",
+        )
+    if not found:
+        raise IdentificationError(
+            "no stretch of the log is long enough for the momentum balance",
+            "record at least 0.5 s before and after the shift",
+        )
+    return tuple(found)
+
+
+def _windows(span: Span, settings: MomentumSettings) -> Windows:
+    """Windows over a span, narrower ones where it is short; none below LEAST_SPAN."""
+    length = span[1] - span[0]
+    if length < LEAST_SPAN:
+        return windows_in(span, np.inf, settings.step)
+    short = length < 2.0 * settings.width
+    width = settings.share * length if short else settings.width
+    return windows_in(span, width, settings.step * width / settings.width)

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""What the estimators see: sampled signals with their noise, and the ratios of one shift."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray, Span
+from drivetwin.channels.shiftlog import pauses
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import PriorValue
+
+NO_DRUM = PriorValue(0.0)
+"""Inertia of the drum of an element that has none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """One signal: `time` (n,) s increasing, `values` (n,) SI, `sigma` white noise of a sample."""
+
+    time: FloatArray
+    values: FloatArray
+    sigma: float = 0.0
+
+    @cached_property
+    def gaps(self) -> tuple[Span, ...]:
+        """Spans [s] between samples across which nothing is interpolated."""
+        return pauses(self.time)
+
+    @property
+    def unrecorded(self) -> tuple[Span, ...]:
+        """All spans [s] of which nothing is known: the gaps, before the first sample and after the
+        last."""
+        if not self.time.size:
+            return ((-np.inf, np.inf),)
+        first, last = float(self.time[0]), float(self.time[-1])
+        return ((-np.inf, first), *self.gaps, (last, np.inf))
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Values at `time` (m,), linear between samples; NaN inside a gap."""
+        values = np.interp(time, self.time, self.values)
+        for start, end in self.gaps:
+            values[(time > start) & (time < end)] = np.nan
+        return values
+
+    def within(self, span: Span) -> Sampled:
+        """The samples inside `span` [s], both ends included."""
+        keep = (self.time >= span[0]) & (self.time <= span[1])
+        return Sampled(self.time[keep], self.values[keep], self.sigma)
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueOfSpeeds:
+    """How an engine torque that is a map of speeds hangs on the noise of the compared one.
+
+    `slope` (n,) [N m s/rad] is its derivative by ω_e at `time` (n,) [s], `rest` (n,) [N m] the
+    noise of its samples that is not from ω_e.
+    """
+
+    time: FloatArray
+    slope: FloatArray
+    rest: FloatArray
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A shift element in the dual-clutch form: slip = a·ω_e - b·ω_out (eq. 15).
+
+    `a` = 1/(i_in·i_c), `b` = i_out; its torque acts as -a·T on the engine and b·T on the output
+    side. `gain` N·D·A·r [m^3]; `drum` [kg m^2] is the inertia that turns with the slip; `peak` is
+    the static over the kinetic capacity at zero slip.
+    """
+
+    name: str
+    a: float
+    b: float
+    gain: float
+    P0: PriorValue
+    drum: PriorValue = NO_DRUM
+    peak: float = 1.0
+
+    @property
+    def ratio(self) -> float:
+        """Overall ratio ω_e/ω_out with this element locked."""
+        return self.b / self.a
+
+
+@dataclass(frozen=True)
+class Driveline:
+    """Known structure during one shift. `couplings` holds every shift element by name.
+
+    `known` is what is known beforehand, by parameter id, beside Jo′, P0 and drums.
+    """
+
+    i_f: float
+    offgoing: Coupling
+    oncoming: Coupling
+    couplings: Mapping[str, Coupling]
+    J_out: PriorValue | None
+    loss_law: str = "paper"
+    known: Mapping[str, PriorValue] = field(default_factory=dict)
+
+    @property
+    def i_before(self) -> float:
+        """Overall ratio of the gear that is left."""
+        return self.offgoing.ratio
+
+    @property
+    def i_after(self) -> float:
+        """Overall ratio of the gear that is entered."""
+        return self.oncoming.ratio
+
+    @property
+    def drums(self) -> tuple[Coupling, ...]:
+        """Elements whose drum inertia is not zero."""
+        return tuple(c for c in self.couplings.values() if c.drum.value > 0 or c.drum.std > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftSignals:
+    """The measured signals of a log, engine side referred to ω_e, and the shift they show.
+
+    `engine_torque` holds fresh values only, at their own raster. `wheel_speed` is None where the
+    log has none; `output_torque` is empty where it has none. Positive directions as in THEORY
+    section 3.
+    """
+
+    engine_torque: Sampled
+    output_torque: Sampled
+    engine_speed: Sampled
+    output_speed: Sampled
+    wheel_speed: Sampled | None
+    pressures: Mapping[str, Sampled]
+    shift: Shift
+    torque_resolution: float = field(default=0.0)
+    """Rounding step of the engine torque [N m]; 0 where none shows."""
+    log: int = 0
+    """Number of the log, from 1, where several are fitted together; 0: there is one only."""
+    torque_of_speeds: TorqueOfSpeeds | None = None
+    """Where the engine torque is that of a converter's turbine, computed from speeds."""
+
+    @property
+    def output_gaps(self) -> tuple[Span, ...]:
+        """Where something compared with the equations is unrecorded: output torque, a speed of the
+        gearbox."""
+        compared = (self.output_torque, self.engine_speed, self.output_speed)
+        return tuple(gap for signal in compared for gap in signal.unrecorded)
+
+    @property
+    def scale_known(self) -> bool:
+        """Whether an output torque gives all torque-like quantities their common scale."""
+        return self.output_torque.time.size > 0

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: MIT
+"""What an identification returns: estimates with intervals, curves, fits, evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from drivetwin._util.rich_display import Shown
+from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.result.estimate import (
+    Estimate,
+    FloatArray,
+    FrictionCurve,
+    LoadLaw,
+    SignalFit,
+)
+from drivetwin.estimation.result.method import Method
+from drivetwin.shifts.shift import RejectedShift, Shift
+
+
+@dataclass(frozen=True, eq=False)
+class Identification(Shown):
+    """Everything one `identify` run found. Immutable; the twin, report and exports read it.
+
+    `fit[signal][phase]` with signals `output_torque`, `input_speed`, `output_speed` and phases
+    `all`, `before`, `torque`, `inertia`, `after`. `evidence` holds the results of each stage; the
+    report draws from it. `correlation` is over `correlation_ids`. `load` is None where the load
+    torque is constant.
+    """
+
+    estimates: dict[str, Estimate]
+    friction: dict[str, FrictionCurve]
+    shifts: tuple[Shift, ...]
+    rejected: tuple[RejectedShift, ...]
+    fit: dict[str, dict[str, SignalFit]]
+    method: Method
+    loss_law: str
+    validity: dict[str, tuple[float, float]]
+    inputs: dict[str, str]
+    """File name -> SHA-256 of every input."""
+    settings: dict[str, Any]
+    evidence: Evidence = field(default_factory=Evidence)
+    warnings: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    correlation_ids: tuple[str, ...] = ()
+    correlation: FloatArray | None = None
+    load: LoadLaw | None = None

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""Slow errors: what a residual keeps over times in which white noise averages out.
+
+A filter before the logger, or an effect that the model lacks, leaves a residual whose neighbours
+go together. Sample by sample it may be no larger than the noise; over a quarter of a period of the
+driveline it is, and that is what moves parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.data.shift_record import Output
+from drivetwin.estimation.likelihood.objective import Part, Problem
+from drivetwin.estimation.optimize.objective import Normal
+
+BLOCK = 0.02
+"""Length of a block [s]: a quarter of a period of a driveline oscillation."""
+PROBES = 8
+"""Probes of a weighting, which is told to a few per cent by so many."""
+SURE = 5.0
+"""Power of block means above that of white noise, in standard deviations of what white noise
+shows, from which it is no chance."""
+
+
+def white_of(part: Part, residual: FloatArray) -> Iterator[tuple[Output, slice, FloatArray]]:
+    """Each output of a part, its rows among the samples (n,), and there the `residual` (n,) over
+    the sensor's noise, input noise taken out. Of a right model that is white, of variance 1, or
+    less at frequencies at which input noise explains a part of it.
+    """
+    white = (residual - part.weighting.driven(residual)) / part.record.sigma
+    first = 0
+    for out in part.record.outputs:
+        rows = slice(first, first + out.values.size)
+        first = rows.stop
+        yield out, rows, white[rows]
+
+
+def block_means(time: FloatArray, white: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Middle times and means over blocks of `BLOCK`, scaled: white noise gives variance one."""
+    size = _block(time)
+    count = white.size // size
+    means = white[: count * size].reshape(count, size).mean(axis=1)
+    return time[: count * size].reshape(count, size).mean(axis=1), np.sqrt(size) * means
+
+
+def _block(time: FloatArray) -> int:
+    """Samples in a block."""
+    return max(2, round(BLOCK / float(np.median(np.diff(time)))))
+
+
+def beyond_white(problem: Problem, normal: Normal, counted: float) -> FloatArray:
+    """Variance (p, p) of the gradient of Q/2 that slow errors of the outputs add to that of noise.
+
+    Noise is `counted` so many times the sensors' power already. Errors as slow as the driveline
+    act through their power per frequency there.
+    """
+    found = np.zeros_like(normal.information)
+    for part, residual, regressors in zip(
+        problem.parts, normal.residuals, normal.regressors, strict=True
+    ):
+        for out, rows, white in white_of(part, residual):
+            columns = out.sigma * regressors[rows]
+            excess = slow_power(part, out, rows, white) - counted
+            found += max(excess, 0.0) * columns.T @ columns
+    return found
+
+
+def slow_power(part: Part, out: Output, rows: slice, white: FloatArray) -> float:
+    """Power of a sensor's noise where the driveline is slow, over that stated; 1 where the block
+    means of its residual `white` (n,) may as well be those of white noise.
+
+    Input noise that explains a part of any residual takes it from slow errors too. How much is
+    told by probes: one of random sign for each block, weighted as the residual was. What is slower
+    than a block, as a drift, counts with its power over a block, which is less than it does.
+    """
+    _, means = block_means(part.record.time[out.place], white)
+    if means.size == 0:
+        return 1.0
+    power = float(np.mean(means**2))
+    usual, own = _by_probes(part, rows, _block(part.record.time[out.place]))
+    if power < usual * (1.0 + SURE * np.sqrt(2.0 / means.size)):
+        return 1.0
+    return 1.0 + (power - usual) / own
+
+
+def _by_probes(part: Part, rows: slice, size: int) -> tuple[float, float]:
+    """Power of means over `size` samples that noise of inputs and sensors leaves of the output at
+    `rows`, and how much of it is this sensor's."""
+    count = (rows.stop - rows.start) // size
+    held = slice(rows.start, rows.start + count * size)
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(count, PROBES))
+    probes = np.zeros((part.record.size, PROBES))
+    probes[held] = np.repeat(signs, size, axis=0) / np.sqrt(size)
+    sigma = part.record.sigma[:, None]
+    left = (probes - part.weighting.driven(sigma * probes) / sigma)[held]
+    means = left.reshape(count, size, PROBES).sum(axis=1) / np.sqrt(size)
+    return float(np.mean(signs * means)), float(np.mean(means**2))

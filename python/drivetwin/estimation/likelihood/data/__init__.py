@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Shift records of the likelihood: samples, input smoothing, quantisation."""

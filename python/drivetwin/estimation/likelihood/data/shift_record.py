@@ -1,0 +1,402 @@
+# SPDX-License-Identifier: MIT
+"""Data of one shift for the fit: simulation inputs and the compared outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from drivetwin._util.arrays import FloatArray, Span
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.data.noise import resolution
+from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals, TorqueOfSpeeds
+from drivetwin.estimation.likelihood.data.input_smoothing import (
+    bend_of,
+    local_cubic,
+    local_mean,
+    smooth_pressure,
+)
+from drivetwin.estimation.likelihood.data.quantization import Rounding, rounding_of
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal, Trajectory
+from drivetwin.vehicle.spec import PriorValue
+
+IndexArray = NDArray[np.intp]
+
+TORQUE = ENGINE_TORQUE
+"""Name of the engine torque among the inputs; the others are pressures by element."""
+OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
+"""Compared signals, in the order in which residuals are stacked."""
+ESSENTIAL = ("engine_speed", "output_speed")
+"""Outputs without which no shift can be fitted."""
+LATEST = 0.06
+"""Greatest age of an engine torque value [s]: so much of the end of a log has no input."""
+GRID = 1e-3
+"""Step of the simulation's grid [s] where outputs are sampled more slowly."""
+SLOW = 1.5 * GRID
+"""Distance of outputs' stamps [s] above which there are points of the grid between them."""
+SHORTEST = 0.1
+"""Time [s] that an output must cover of a shift's span to be compared there."""
+FLOOR = 2e-5
+"""Least noise of a compared signal as a share of its range, and of an input as a share of its
+largest value: what an ideal sensor is given. With none at all the weighting loses its digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """A compared signal: `values` (n,) stamped at the points `place` (n,) of the record's grid.
+
+    With a `window` [s] a sample is the mean over that time before its stamp, as encoders on a bus
+    send it. `centre` (n,) are the points in the middle of what a sample shows.
+    """
+
+    name: str
+    place: IndexArray
+    values: FloatArray
+    sigma: float
+    window: float = 0.0
+    centre: IndexArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+
+    def __post_init__(self) -> None:
+        """Without a window the middle is the stamp."""
+        if self.window == 0.0:
+            object.__setattr__(self, "centre", self.place)
+
+    def cut(self, count: int) -> Output:
+        """Keep the samples stamped within the first `count` points of the grid."""
+        keep = int(np.searchsorted(self.place, count))
+        return replace(
+            self, place=self.place[:keep], values=self.values[:keep], centre=self.centre[:keep]
+        )
+
+    def period(self, time: FloatArray) -> float:
+        """Return the sampling time [s]."""
+        return float(np.median(np.diff(time[self.place])))
+
+    def after_period(self, time: FloatArray) -> Output:
+        """Keep the samples stamped a period or more after the grid `time` (N,) starts: point
+        samples and means are then both defined on it."""
+        first = int(np.searchsorted(time[self.place], time[0] + self.period(time)))
+        return replace(
+            self, place=self.place[first:], values=self.values[first:], centre=self.centre[first:]
+        )
+
+    def averaged(self, time: FloatArray) -> Output:
+        """Interpret the samples as means over the time since the previous one."""
+        window = self.period(time)
+        centre = np.searchsorted(time, time[self.place] - 0.5 * window)
+        return replace(self, window=window, centre=centre)
+
+    def seen(self, time: FloatArray, column: FloatArray) -> FloatArray:
+        """Sample a quantity (N,) on the grid `time` (N,) as this sensor does; shape (n,)."""
+        if self.window == 0.0:
+            return column[self.place]
+        return self._mean(time, column, self.window)
+
+    def otherwise(self, time: FloatArray, column: FloatArray) -> FloatArray:
+        """Sample a quantity in the other mode (n,): means instead of point samples, or the
+        reverse."""
+        if self.window > 0.0:
+            return column[self.place]
+        return self._mean(time, column, self.period(time))
+
+    def _mean(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
+        """Compute means (n,) over the `window` [s] before each stamp."""
+        total = np.concatenate([[0.0], np.cumsum(0.5 * (column[1:] + column[:-1]) * np.diff(time))])
+        before = np.interp(time[self.place] - window, time, total)
+        return np.asarray((total[self.place] - before) / window)
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One shift's span of a log.
+
+    `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
+    `engine_torque` are fresh values at their stamps, held at both ends; `pressures` by element.
+    Both are what drives a run, which is what was read less what is `held_back`.
+    """
+
+    time: FloatArray
+    engine_torque: Signal
+    pressures: Mapping[str, Signal]
+    outputs: tuple[Output, ...]
+    steady_torque: Signal
+    """Engine torque without its noise: what its rate of change is taken from."""
+    bend: FloatArray
+    """What to add to the samples of the engine torque where it is a curve between them."""
+    input_sigma: Mapping[str, float]
+    """White noise of an input sample by name; the engine torque is `engine torque`, of one that is
+    computed from speeds the part that is not from the compared one, in the mean."""
+    held_back: Mapping[str, FloatArray] = field(default_factory=dict)
+    """What was taken off the samples of an input before it drives a run, by name: read less
+    driving. An input without an entry drives as it was read."""
+    fills: Mapping[str, PriorValue] = field(default_factory=dict)
+    """P0 [Pa] of the elements as the card has it: about it more noise is taken off a pressure."""
+    curved: bool = False
+    of_speeds: TorqueOfSpeeds | None = None
+    """Where the engine torque is computed from speeds: the noise of the compared one is in both."""
+    rounding: Mapping[str, Rounding] = field(default_factory=dict)
+    """What rounding leaves of the samples of an input, by name; no entry where noise dithers it."""
+
+    @property
+    def size(self) -> int:
+        """Number of compared samples."""
+        return sum(out.values.size for out in self.outputs)
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviation of each compared sample (size,)."""
+        return np.concatenate([np.full(out.values.size, out.sigma) for out in self.outputs])
+
+    @property
+    def measured(self) -> FloatArray:
+        """All compared samples, stacked (size,)."""
+        return np.concatenate([out.values for out in self.outputs])
+
+    def stacked(self, run: Trajectory) -> FloatArray:
+        """Sample a trajectory (or a sensitivity) at the measured stamps; shape (size,)."""
+        columns = columns_of(run)
+        return np.concatenate([out.seen(run.time, columns[out.name]) for out in self.outputs])
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Names of the outputs interpreted as means over their period, and `TORQUE` if the
+        engine torque is a curve between its samples instead of a straight line."""
+        means = frozenset(out.name for out in self.outputs if out.window > 0.0)
+        return means | {TORQUE} if self.curved else means
+
+    def of_kinds(self, names: Collection[str]) -> Record:
+        """Set the sampling modes of `names` in a record of point samples and straight lines."""
+        outputs = [out.averaged(self.time) if out.name in names else out for out in self.outputs]
+        found = replace(self, outputs=tuple(outputs))
+        if TORQUE not in names:
+            return found
+        torque = self.engine_torque
+        return replace(
+            found, engine_torque=replace(torque, values=torque.values + self.bend), curved=True
+        )
+
+    def bend_over(self, age: float) -> FloatArray:
+        """Compute the difference (N-1,) of a curved engine torque from a straight one over each
+        step."""
+        middle = 0.5 * (self.time[1:] + self.time[:-1])
+        return np.interp(middle, self.engine_torque.time - age, self.bend)
+
+    def less(self, noise: Mapping[str, FloatArray], age: float) -> Record:
+        """Subtract the expected `noise` (N-1,) per step of the grid from the inputs.
+
+        Of a pressure's noise only the part that passes the local cubic still drives the run.
+        """
+        torque = self.engine_torque
+        held = {TORQUE: _at_samples(self.time, noise[TORQUE], torque.time - age)}
+        pressures = {}
+        for name, p in self.pressures.items():
+            held[name] = local_cubic(p.time, _at_samples(self.time, noise[name], p.time))
+            pressures[name] = Signal(p.time, p.values - held[name])
+        torque = Signal(torque.time, torque.values - held[TORQUE])
+        held = {name: self.held_back.get(name, 0.0) + values for name, values in held.items()}
+        return replace(self, engine_torque=torque, pressures=pressures, held_back=held)
+
+    def held_back_over(self, age: float) -> dict[str, FloatArray]:
+        """Compute the held-back part of each input (N-1,) in the middle of each step of the
+        grid."""
+        middle = 0.5 * (self.time[1:] + self.time[:-1])
+        stamps = {name: p.time for name, p in self.pressures.items()}
+        stamps[TORQUE] = self.engine_torque.time - age
+        return {name: np.interp(middle, stamps[name], v) for name, v in self.held_back.items()}
+
+    @property
+    def torque_sigma(self) -> FloatArray:
+        """Standard deviation (m,) of the white noise of the engine torque samples that is
+        independent of the compared signals."""
+        time, sigma = self.engine_torque.time, self.input_sigma[TORQUE]
+        if self.of_speeds is None:
+            return np.full(time.size, sigma)
+        least = FLOOR * float(np.max(np.abs(self.engine_torque.values)))
+        return np.maximum(np.interp(time, self.of_speeds.time, self.of_speeds.rest), least)
+
+    def variance_of(self, name: str) -> FloatArray:
+        """Compute the variance (m,) of white samples with the power of an input's own noise and
+        rounding."""
+        if name == TORQUE:
+            noise = self.torque_sigma**2
+        else:
+            noise = np.full(self.pressures[name].time.size, self.input_sigma[name] ** 2)
+        if name in self.rounding:
+            noise = noise + self.rounding[name].sigma ** 2
+        return noise
+
+    def torque_share(self) -> csr_array | None:
+        """Compute the noise of the engine torque over each step per that of a compared sample (N-1,
+        size).
+
+        None where the torque has a sensor of its own. One that is computed from speeds has no age.
+        """
+        if self.of_speeds is None:
+            return None
+        middle = 0.5 * (self.time[1:] + self.time[:-1])
+        torque = self.engine_torque.time
+        by_step = _interpolation(torque, middle, (0, torque.size))
+        return csr_array(by_step @ self._torque_by_sample(self.of_speeds))
+
+    def torque_noise(self, noise: FloatArray) -> FloatArray:
+        """Map `noise` (size,) of the compared samples to noise of the engine torque samples
+        (m,)."""
+        if self.of_speeds is None:
+            return np.zeros(self.engine_torque.time.size)
+        return np.asarray(self._torque_by_sample(self.of_speeds) @ noise)
+
+    def _torque_by_sample(self, of_speeds: TorqueOfSpeeds) -> csr_array:
+        """Compute the noise of engine torque samples per that of a compared sample (m, size)."""
+        torque = self.engine_torque.time
+        slope = np.interp(torque, of_speeds.time, of_speeds.slope)
+        first = 0
+        for out in self.outputs:
+            if out.name == "engine_speed":
+                break
+            first += out.values.size
+        of_speed = _interpolation(self.time[out.place], torque, (first, self.size))
+        return csr_array(of_speed * slope[:, None])
+
+    def torque_rate(self, age: float) -> FloatArray:
+        """Compute the rate of the engine torque [N m/s] as it acts over each step of the grid
+        (N-1,)."""
+        signal = self.steady_torque
+        ends = np.interp(self.time + age, signal.time, signal.values)
+        return np.asarray(np.diff(ends) / np.diff(self.time))
+
+    def until(self, end: float) -> Record:
+        """Cut the record at `end` [s]."""
+        count = int(np.searchsorted(self.time, end, side="right"))
+        outputs = tuple(out.cut(count) for out in self.outputs)
+        return replace(self, time=self.time[:count], outputs=outputs)
+
+
+def columns_of(run: Trajectory) -> dict[str, FloatArray]:
+    """Return the comparable quantities (N,) of a run, by name of the output."""
+    return {
+        "output_torque": run.shaft_torque,
+        "engine_speed": run.engine_speed,
+        "output_speed": run.output_speed,
+        "wheel_speed": run.wheel_speed,
+    }
+
+
+def record_of(
+    signals: ShiftSignals, span: Span, fills: Mapping[str, PriorValue] | None = None
+) -> Record:
+    """Build the record of one shift over `span` [s]; `fills` is P0 [Pa] by element from the card.
+
+    An output that stops before the span, or starts at its end, is not compared. The first sample of
+    each output is left out, because as a mean it covers time before the span: sampling modes are
+    compared on the same samples. Raises IdentificationError if the span holds too little to
+    compare.
+    """
+    channels = {
+        "output_torque": signals.output_torque,
+        "engine_speed": signals.engine_speed,
+        "output_speed": signals.output_speed,
+        "wheel_speed": signals.wheel_speed,
+    }
+    inputs = (signals.engine_torque, *signals.pressures.values())
+    start = max(span[0], *(s.time[0] for s in inputs))
+    end = min(span[1], *(s.time[-1] for s in inputs)) - LATEST
+    inside = {n: s.within((start, end)) for n, s in channels.items() if s is not None}
+    parts = {name: s for name, s in inside.items() if s.time.size and np.ptp(s.time) >= SHORTEST}
+    if missing := [name for name in ESSENTIAL if name not in parts]:
+        raise IdentificationError(
+            f"{' and '.join(missing).replace('_', ' ')} hardly recorded between {start:.3f} s and "
+            f"{end:.3f} s",
+            "record engine and output speed throughout the shift",
+        )
+    time = _filled(np.unique(np.concatenate([part.time for part in parts.values()])))
+    if time.size < 100:
+        raise IdentificationError(
+            f"only {time.size} samples between {start:.3f} s and {end:.3f} s to fit a model to",
+            "record from a second before the torque phase to a second after lock-up",
+        )
+    outputs = tuple(
+        Output(
+            name,
+            np.searchsorted(time, part.time),
+            part.values,
+            max(part.sigma, FLOOR * float(np.ptp(part.values))),
+        ).after_period(time)
+        for name, part in parts.items()
+    )
+    torque, of_speeds = signals.engine_torque, signals.torque_of_speeds
+    sigma = torque.sigma if of_speeds is None else float(np.sqrt(np.mean(of_speeds.rest**2)))
+    noise = replace(torque, sigma=sigma)
+    fills = fills or {}
+    smooth = {n: smooth_pressure(p, fills.get(n)) for n, p in signals.pressures.items()}
+    return Record(
+        time,
+        _held(torque),
+        {name: Signal(p.time, smooth[name]) for name, p in signals.pressures.items()},
+        outputs,
+        _held(replace(torque, values=local_mean(torque))),
+        np.pad(bend_of(torque.time, torque.values), 1),
+        {TORQUE: _noise(noise)} | {n: _noise(p) for n, p in signals.pressures.items()},
+        {name: p.values - smooth[name] for name, p in signals.pressures.items()},
+        fills,
+        of_speeds=of_speeds,
+        rounding=_rounding(signals),
+    )
+
+
+def _rounding(signals: ShiftSignals) -> dict[str, Rounding]:
+    """Compute the quantization errors of the inputs by name; those of the torque as extended by
+    `_held`."""
+    found = {n: rounding_of(p, resolution(p.values)) for n, p in signals.pressures.items()}
+    torque = rounding_of(signals.engine_torque, signals.torque_resolution)
+    if torque is not None:
+        found[TORQUE] = replace(torque, stay=np.pad(torque.stay, 1, mode="edge"))
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def _noise(of_input: Sampled) -> float:
+    """Return the noise of an input's samples, at least that of an ideal sensor."""
+    return max(of_input.sigma, FLOOR * float(np.max(np.abs(of_input.values))))
+
+
+def _filled(time: FloatArray) -> FloatArray:
+    """Insert grid points between output stamps that are further apart than SLOW."""
+    wide = np.flatnonzero(np.diff(time) > SLOW)
+    steps = [np.arange(time[k] + GRID, time[k + 1] - 0.5 * GRID, GRID) for k in wide]
+    return np.sort(np.concatenate([time, *steps]))
+
+
+def _at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:
+    """Compute the noise of samples at `stamps` (m,) from that over each step of `grid` (N-1,).
+
+    A sample acts on the steps about it as interpolation has it; its expected noise is their mean
+    with the same weights, the transpose of interpolation.
+    """
+    middle, width = 0.5 * (grid[1:] + grid[:-1]), np.diff(grid)
+    total = _interpolation(stamps, middle, (0, stamps.size)).T @ (width * steps)
+    return np.asarray(total / float(np.median(np.diff(stamps))))
+
+
+def _interpolation(stamps: FloatArray, at: FloatArray, columns: tuple[int, int]) -> csr_array:
+    """Build the matrix (m, count) that interpolates linearly from `stamps` (n,) to `at` (m,).
+
+    Held beyond both ends. `columns` are the first of the stamps' columns and the count of all.
+    """
+    first, count = columns
+    after = np.clip(np.searchsorted(stamps, at), 1, stamps.size - 1)
+    share = (at - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
+    share = np.clip(share, 0.0, 1.0)
+    data = np.column_stack([1.0 - share, share]).ravel()
+    index = first + np.column_stack([after - 1, after]).ravel()
+    return csr_array((data, index, 2 * np.arange(at.size + 1)), shape=(at.size, count))
+
+
+def _held(signal: Sampled) -> Signal:
+    """Extend a signal by its end values over any plausible delay."""
+    beyond = 2.0 * LATEST
+    time = np.concatenate([[signal.time[0] - beyond], signal.time, [signal.time[-1] + beyond]])
+    values = np.concatenate([signal.values[:1], signal.values, signal.values[-1:]])
+    return Signal(time, values)

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Misspecification tests, residual tests, identifiability."""

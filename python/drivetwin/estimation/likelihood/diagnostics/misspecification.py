@@ -1,0 +1,323 @@
+# SPDX-License-Identifier: MIT
+"""Effects that the fit leaves out, each by the columns of what it does to the outputs.
+
+A torque sensor's filter delays it by some milliseconds, a pressure sensor may be as late, and
+friction need not follow a Stribeck law. All of them move parameters by several standard deviations
+and hardly show in Q. What each would be if it were free, and where the unknowns would follow, is
+one step of Gauss and Newton from the minimum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import in_units
+from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.likelihood.data.input_smoothing import local_mean
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of, spread_of
+from drivetwin.estimation.likelihood.objective import Part, Problem
+from drivetwin.estimation.likelihood.parametrization import LAW
+from drivetwin.estimation.likelihood.slip_contact import carried_slip, contact_of
+from drivetwin.estimation.linear.friction_points import stribeck
+from drivetwin.estimation.optimize.gauss_newton import step_of
+from drivetwin.estimation.optimize.objective import Normal
+from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
+from drivetwin.estimation.result.estimate_set import with_systematic_band
+from drivetwin.estimation.result.verdict import doubted
+from drivetwin.simulation.dual_clutch import Trajectory
+
+OUTPUT_TORQUE = "output_torque"
+SIGNIFICANT = 5.0
+"""Size of an effect in its standard deviations from which it is told; of several columns together
+what is as rare."""
+LATEST = 0.05
+"""Plausible delay of a sensor [s]."""
+WAVES = 6
+"""Shapes of friction over slip: so many halves of a cosine over the root of slip."""
+PLAUSIBLE_MU = 0.02
+"""Plausible size of each of them."""
+GRID = 200
+"""Slips at which shapes are held against what a Stribeck law can do."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Estimate of q effects if they were free: `amounts` (q,) with their `covariance` (q, q).
+
+    `moves` (p,) is where the unknowns of the fit would follow, `fall` how much Q would fall.
+    """
+
+    amounts: FloatArray
+    covariance: FloatArray
+    moves: FloatArray
+    fall: float
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviation (q,) of the amounts."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def significant(self) -> bool:
+        """True if noise and slow errors of the sensors do not explain the amounts."""
+        size = float(self.amounts @ np.linalg.pinv(self.covariance, hermitian=True) @ self.amounts)
+        return size > chi2.isf(2.0 * norm.sf(SIGNIFICANT), self.amounts.size)
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Friction over slip that no Stribeck law near `law` (4,) has: cosines over the root of slip up
+    to `largest` [rad/s], less what such a law can do of each."""
+
+    law: FloatArray
+    largest: float
+
+    def at(self, slip: FloatArray) -> FloatArray:
+        """Each shape (n, WAVES) over |slip| (n,)."""
+        grid = self.largest * np.linspace(0.0, 1.0, GRID) ** 2
+        by_law = np.linalg.lstsq(stribeck(self.law, grid)[1].T, self._waves(grid), rcond=None)[0]
+        return np.asarray(self._waves(slip) - stribeck(self.law, slip)[1].T @ by_law)
+
+    def _waves(self, slip: FloatArray) -> FloatArray:
+        place = np.sqrt(np.clip(slip / self.largest, 0.0, 1.0))
+        return np.cos(np.pi * np.outer(place, np.arange(1, WAVES + 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """An effect that the log shows and the fit leaves out.
+
+    `text` says what it is, `corrected` what the fit would have to be given. `moves` (p,) is where
+    the unknowns would follow, and `beside` what μ of one element gains beside that of its law.
+    """
+
+    text: str
+    corrected: str
+    moves: FloatArray
+    element: str = ""
+    beside: Callable[[FloatArray], FloatArray] = np.zeros_like
+
+    def held_against(
+        self, estimates: Mapping[str, Estimate], ids: tuple[str, ...], slopes: FloatArray
+    ) -> dict[str, Estimate]:
+        """The estimates, none of them identified that would leave its interval with the effect.
+
+        `slopes` (q, p) are the derivatives of the parameters `ids` by the unknowns.
+        """
+        told = dict(estimates)
+        for name, move in zip(ids, slopes @ self.moves, strict=True):
+            one = told[name]
+            if one.value is None or one.std_total is None or abs(move) <= Z95 * one.std_total:
+                continue
+            value = in_units(one.value + move, one.unit, digits=5)
+            told[name] = doubted(one, f"with {self.corrected} the log gives {value}")
+        return told
+
+    def widened(self, fit: LikelihoodFit, name: str, curve: FrictionCurve) -> FrictionCurve:
+        """The curve of an element, its band widened by how far μ would move with the effect."""
+        index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
+        change = self.moves[index] @ stribeck(fit.point.values[index], curve.slip)[1]
+        if name == self.element:
+            change = change + self.beside(curve.slip)
+        return with_systematic_band(curve, np.abs(change))
+
+
+def left_out(fit: LikelihoodFit) -> Iterator[LeftOut]:
+    """All that the log shows of effects the fit leaves out: an output torque or a pressure that is
+    late, friction of another shape than Stribeck's."""
+    yield from _torque_told(late_torque(fit))
+    ending = f".{LAW[-1]}"
+    for name in (n.removesuffix(ending) for n in fit.point.names if n.endswith(ending)):
+        yield from _pressure_told(late_pressure(fit, name), name)
+        shapes = _shapes(fit, name)
+        yield from _shape_told(other_shape(fit, name, shapes), name, shapes)
+
+
+def late_torque(fit: LikelihoodFit) -> Step:
+    """Estimate the delay of the output torque against the speeds [s]; empty without a sensor."""
+
+    def columns(part: Part, run: Trajectory) -> FloatArray:
+        rate = np.gradient(run.shaft_torque, run.time)
+        shown = [
+            -out.seen(run.time, rate) if out.name == OUTPUT_TORQUE else np.zeros(out.values.size)
+            for out in part.record.outputs
+        ]
+        return np.concatenate(shown)[:, None]
+
+    return _step(fit, columns, LATEST)
+
+
+def late_pressure(fit: LikelihoodFit, name: str) -> Step:
+    """Estimate the delay of the measured pressure of an element against its torque [s]."""
+
+    def columns(part: Part, run: Trajectory) -> FloatArray:
+        response, record = part.response(fit.point, run), part.record
+        if name not in response.drive:
+            return np.zeros((record.size, 1))
+        seen = record.pressures[name]
+        steady = local_mean(Sampled(seen.time, seen.values, record.input_sigma[name]))
+        rate = np.diff(np.interp(run.time, seen.time, steady)) / np.diff(run.time)
+        return part.seen(fit.point, response.to({name: rate}))[:, None]
+
+    return _step(fit, columns, LATEST)
+
+
+def other_shape(fit: LikelihoodFit, name: str, shapes: Shapes) -> Step:
+    """Estimate the amount of each of `shapes` in the friction of an element."""
+
+    def columns(part: Part, run: Trajectory) -> FloatArray:
+        response = part.response(fit.point, run)
+        contact = contact_of(part, fit.point, run, name)
+        torques = shapes.at(np.abs(contact.slip)) * contact.per_mu[:, None]
+        answers = [response.forced(contact.forces(one)) for one in torques.T]
+        return np.column_stack([part.seen(fit.point, one) for one in answers])
+
+    return _step(fit, columns, PLAUSIBLE_MU)
+
+
+def _shapes(fit: LikelihoodFit, name: str) -> Shapes:
+    """Shapes beside the law of an element, over the slips at which it carries torque."""
+    slips = [carried_slip(part, fit.point, name) for part in fit.problem.parts]
+    largest = float(np.max(np.concatenate(slips), initial=0.0))
+    law = np.array([fit.point[f"{name}.{key}"] for key in LAW])
+    return Shapes(law, max(largest, 1.0))
+
+
+def _run(fit: LikelihoodFit, part: Part) -> Trajectory:
+    run = part.run(fit.point)
+    assert run is not None, "a fit can be simulated"
+    return run
+
+
+def _step(
+    fit: LikelihoodFit, columns: Callable[[Part, Trajectory], FloatArray], plausible: float
+) -> Step:
+    """The step in all unknowns and the amounts of `columns`, about zero by what is `plausible`.
+
+    Columns of an unstable run, which has no finite response, tell nothing.
+    """
+    every = [columns(part, _run(fit, part)) for part in fit.problem.parts]
+    every = [one if np.all(np.isfinite(one)) else np.zeros_like(one) for one in every]
+    score = score_of(fit.problem, fit.normal, every)
+    normal = score.beside(fit.normal, np.full(score.pull.size, plausible**-2.0))
+    step = step_of(normal.information, normal.gradient)
+    effects = slice(fit.point.values.size, None)
+    amounts, moves = step[effects], step[: effects.start]
+    fall = float(score.pull @ amounts)
+    noise = max(fit.chi2, 1.0) * covariance_of(normal.information)
+    alone = Step(amounts, noise[effects, effects], moves, fall)
+    if not alone.significant:
+        return alone
+    spread = spread_of(fit.problem, normal, fit.chi2)
+    return Step(amounts, spread[effects, effects], moves, fall)
+
+
+def _delay(found: Step) -> str:
+    """A delay with its interval, and to which side."""
+    side = "late" if found.amounts[0] > 0.0 else "early"
+    half = Z95 * found.std[0]
+    return f"{1e3 * abs(found.amounts[0]):.1f} ± {1e3 * half:.1f} ms {side}"
+
+
+def _shift(found: Step, channel: str) -> str:
+    """The line of the mapping that takes a delay away."""
+    line = f"channels.{channel}.time_shift_s = {-found.amounts[0]:.4f}"
+    return f"set {line} in the channel mapping and compare"
+
+
+def _torque_told(found: Step) -> Iterator[LeftOut]:
+    if not found.significant:
+        return
+    text = (
+        f"the output torque is {_delay(found)} against the speeds, if the model of the shaft "
+        f"holds: c_o, ζ and the age of the engine torque hang on it; {_shift(found, OUTPUT_TORQUE)}"
+    )
+    yield LeftOut(text, "the output torque in time", found.moves)
+
+
+def _pressure_told(found: Step, name: str) -> Iterator[LeftOut]:
+    if not found.significant:
+        return
+    text = (
+        f"the pressure of {name} is {_delay(found)} against the torque that it makes, if its "
+        f"friction follows a Stribeck law (Q falls by {found.fall:.0f}): μ and P0 hang on it; "
+        f"{_shift(found, f'pressure.{name}')}"
+    )
+    yield LeftOut(text, f"the pressure of {name} in time", found.moves)
+
+
+def _shape_told(found: Step, name: str, shapes: Shapes) -> Iterator[LeftOut]:
+    if not found.significant:
+        return
+    grid = shapes.largest * np.linspace(0.0, 1.0, GRID)
+    departs = float(np.max(np.abs(shapes.at(grid) @ found.amounts)))
+    text = (
+        f"the friction of {name} departs from a Stribeck law over slip by up to {departs:.2g}, if "
+        f"its pressure is in time and μ goes with nothing else (Q falls by {found.fall:.0f}): μ "
+        "and P0 hang on it; compare with friction of free shape (examine --friction free), and "
+        "check the sensor of that pressure"
+    )
+    yield LeftOut(
+        text,
+        f"friction of {name} of free shape",
+        found.moves,
+        name,
+        lambda slip: np.asarray(shapes.at(slip) @ found.amounts),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """Sums over all parts for q columns Z of the outputs, with J and r those of the fit.
+
+    `own` (q, q) is ZᵀΣ⁻¹Z, `cross` (p, q) JᵀΣ⁻¹Z and `pull` (q,) ZᵀΣ⁻¹r; `weighted` (n, q) is
+    Σ⁻¹Z of each part. With an amount s (q,) of the effects the residual is r - Z·s, and Q changes
+    by sᵀ·own·s - 2·pull·s before the unknowns follow.
+    """
+
+    own: FloatArray
+    cross: FloatArray
+    pull: FloatArray
+    weighted: tuple[FloatArray, ...]
+
+    def beside(
+        self, minimum: Normal, precision: FloatArray, known: FloatArray | float = 0.0
+    ) -> Normal:
+        """The expansion at a `minimum` with the effects as q more unknowns, behind its own.
+
+        Of these `precision` (q,) is known beforehand, about zero, from which they are `known` (q,)
+        away already.
+        """
+        information = np.block(
+            [[minimum.information, self.cross], [self.cross.T, self.own + np.diag(precision)]]
+        )
+        data = np.block([[minimum.data, self.cross], [self.cross.T, self.own]])
+        pairs = zip(minimum.regressors, self.weighted, strict=True)
+        return replace(
+            minimum,
+            gradient=np.concatenate([np.zeros(len(self.cross)), precision * known - self.pull]),
+            information=information,
+            data=data,
+            regressors=tuple(np.column_stack(both) for both in pairs),
+        )
+
+
+def score_of(problem: Problem, normal: Normal, columns: Sequence[FloatArray]) -> Score:
+    """Score of `columns` (n, q) of each part at the point of the expansion `normal`."""
+    size = columns[0].shape[1]
+    own, cross = np.zeros((size, size)), np.zeros((normal.gradient.size, size))
+    pull, every = np.zeros(size), []
+    for part, z, residual, regressors in zip(
+        problem.parts, columns, normal.residuals, normal.regressors, strict=True
+    ):
+        weighted = part.weighting.weighted(z)
+        own += z.T @ weighted
+        cross += regressors.T @ z
+        pull += weighted.T @ residual
+        every.append(weighted)
+    return Score(own, cross, pull, tuple(every))

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""Residual tests: whiteness, and correlation with the inputs.
+
+Q per sample hardly notices a wrong model (docs/accuracy.md, faults that nobody states), since the
+error is slow and the noise is not. Averages over blocks show it: white noise leaves 1/m of
+its power in means over m samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.coloured_noise import BLOCK, block_means, white_of
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.simulation.dual_clutch import Signal
+
+EXCESS = 1.6
+"""Power of block means over that of white noise above which a warning is due."""
+SIGNIFICANT = 5.0
+"""Correlation with an input, in standard deviations of that of noise, from which it is no chance:
+a warning is due, and the model does not hold."""
+
+
+@dataclass(frozen=True)
+class ResidualTest:
+    """Residual of one output: `excess` power of its block means over white noise's, and its
+    correlation with each input in units of the standard deviation that noise of that power would
+    give."""
+
+    output: str
+    excess: float
+    correlation: dict[str, float]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings of the test, as sentences."""
+        name = self.output.replace("_", " ")
+        texts = []
+        if self.excess > EXCESS:
+            texts.append(
+                f"the residual of the {name} is not white: over {1e3 * BLOCK:.0f} ms it has "
+                f"{self.excess:.1f} times the power of noise, which widens intervals; the noise of "
+                "the sensor is slow, as behind a filter, or some effect is not in the model"
+            )
+        texts += [
+            f"the residual of the {name} goes with the {source} ({size:+.0f} standard deviations)"
+            for source, size in self.correlation.items()
+            if abs(size) > SIGNIFICANT
+        ]
+        return tuple(texts)
+
+
+def white_residuals(fit: LikelihoodFit) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
+    """Return times (n,) and normalised residuals (n,), input noise removed, by shift and output.
+
+    Of a right model they are white with variance one, or less where input noise explains a part.
+    """
+    return {
+        part.structure.label: {
+            out.name: (part.record.time[out.place], white)
+            for out, _, white in white_of(part, residual)
+        }
+        for part, residual in zip(fit.problem.parts, fit.normal.residuals, strict=True)
+    }
+
+
+def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
+    """Test every output by label of the shift."""
+    found = {}
+    for part, outputs in zip(fit.problem.parts, white_residuals(fit).values(), strict=True):
+        inputs = {TORQUE: part.record.engine_torque} | {
+            f"pressure of {name}": signal for name, signal in part.record.pressures.items()
+        }
+        found[part.structure.label] = tuple(
+            _test(name, time, white, inputs) for name, (time, white) in outputs.items()
+        )
+    return found
+
+
+def against(fit: LikelihoodFit) -> str:
+    """Return why the residuals contradict every value of the fit; empty if they do not.
+
+    Noise is correlated with no input, unless it is as slow as the log is long. A correlated
+    residual shows a missing effect or a drift, whose influence on the parameters no interval
+    covers.
+    """
+    found = {
+        (test.output, source): abs(size)
+        for tests in residual_tests(fit).values()
+        for test in tests
+        for source, size in test.correlation.items()
+    }
+    (output, source), size = max(found.items(), key=lambda one: one[1])
+    if size <= SIGNIFICANT:
+        return ""
+    name = output.replace("_", " ")
+    return (
+        f"the residual of the {name} goes with the {source}: some effect is not in the model, or a "
+        "sensor drifts"
+    )
+
+
+def unweighted(fit: LikelihoodFit, labels: Sequence[str]) -> str:
+    """Return a warning if the weighting of a part omits the noise of the inputs; else empty.
+
+    That is the case if a run has no finite response to the noise. `labels` are those of the shifts.
+    """
+    left = [
+        label
+        for part, label in zip(fit.problem.parts, labels, strict=True)
+        if part.weighting.path is None
+    ]
+    if not left:
+        return ""
+    return (
+        f"{', '.join(left)}: the noise of engine torque and pressures is not counted, for the "
+        "simulation has no finite response to it: intervals are too narrow"
+    )
+
+
+def _test(
+    name: str, time: FloatArray, white: FloatArray, inputs: dict[str, Signal]
+) -> ResidualTest:
+    _, means = block_means(time, white)
+    excess = float(np.mean(means**2) / np.mean(white**2))
+    correlation = {}
+    for source, signal in inputs.items():
+        x = np.interp(time, signal.time, signal.values)
+        x = x - x.mean()
+        norm = float(np.linalg.norm(x) * np.sqrt(np.mean(white**2) * max(excess, 1.0)))
+        correlation[source] = float(x @ white) / norm if norm > 0.0 else 0.0
+    return ResidualTest(name, excess, correlation)

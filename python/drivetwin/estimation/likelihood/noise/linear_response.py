@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: MIT
+"""Linear response of a run to small disturbances of its inputs (THEORY section 3, linearised).
+
+State z = (ω_e, ω_out, ω_w, twist). In one friction mode
+
+    z' = A·z + Σ B_u·δu,   u: engine torque and pressures
+
+A locked element takes the motion along its slip out of the accelerations. When an element locks,
+the disturbance jumps so that its slip ends (saltation), and with it what pushed during that step:
+a slip left over would stay and seem to be seen. At break-away it goes on unchanged.
+Only the spread of the residuals is built on this: the run itself and its derivatives are the
+core's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_banded
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Record
+from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, Trajectory
+
+BoolArray = NDArray[np.bool_]
+
+STATES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Discrete linear response on a time grid of N points.
+
+    `transition` (N-1, 4, 4) takes z from one point to the next; `drive` (N-1, 4) by input name is
+    the effect over a step of that input's disturbance; `step` (N-1,) [s]. `effect` (N-1, 4, 4) is
+    that of forces on the speeds, whatever makes them.
+    """
+
+    step: FloatArray
+    transition: FloatArray
+    drive: dict[str, FloatArray]
+    effect: FloatArray
+
+    def to(self, disturbance: dict[str, FloatArray]) -> FloatArray:
+        """Compute z (N, 4) for disturbances (N-1,) of inputs by name, from z = 0.
+
+        Not finite where the run itself is unstable, as with a law that falls steeply with slip.
+        """
+        if not self.finite:
+            return np.full((len(self.transition) + 1, STATES), np.nan)
+        push = np.zeros_like(next(iter(self.drive.values())))
+        for name, values in disturbance.items():
+            push += self.drive[name] * values[:, None]
+        return self.pushed(push)
+
+    def forced(self, force: FloatArray) -> FloatArray:
+        """Compute z (N, 4) for forces (N-1, 4) on the speeds, the last column 0."""
+        return self.pushed(np.einsum("kij,kj->ki", self.effect, force))
+
+    def pushed(self, push: FloatArray) -> FloatArray:
+        """Compute z (N, 4) for changes `push` (N-1, 4) over the steps, from z = 0."""
+        return self.pushed_each(push[:, :, None])[:, :, 0]
+
+    def pushed_each(self, push: FloatArray) -> FloatArray:
+        """Compute z (N, 4, q) for q changes `push` (N-1, 4, q) over the steps, from z = 0."""
+        start = np.zeros((1, *push.shape[1:]))
+        pushed = np.concatenate([start, push])
+        columns = pushed.reshape(-1, push.shape[-1])
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                z = solve_banded((2 * STATES - 1, 0), self._banded, columns, check_finite=False)
+        except np.linalg.LinAlgError:
+            return np.full_like(pushed, np.inf)
+        return np.asarray(z.reshape(pushed.shape))
+
+    def pulled_each(self, pull: FloatArray) -> FloatArray:
+        """Apply the transpose of `pushed_each`: (N-1, 4, q) from weights `pull` (N, 4, q) on z."""
+        lower, count = self._banded, len(pull) * STATES
+        upper = np.zeros_like(lower)
+        for below, diagonal in enumerate(lower):
+            upper[-1 - below, below:] = diagonal[: count - below]
+        columns = pull.reshape(count, -1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            back = solve_banded((0, 2 * STATES - 1), upper, columns, check_finite=False)
+        return np.asarray(back.reshape(pull.shape)[1:])
+
+    def fed_back(self, slope: FloatArray) -> Response:
+        """The response where the engine torque follows the engine speed by `slope` (N-1,)
+        [N m s/rad], over each step by the mean of the speed at both its ends."""
+        half = 0.5 * slope[:, None] * self.drive[TORQUE]
+        transition = self.transition.copy()
+        transition[:, :, 0] += half
+        ahead = np.zeros_like(transition) + np.eye(STATES)
+        ahead[:, :, 0] += half / (1.0 - half[:, :1])  # the inverse of 1 less the half at the end
+        drive = {name: np.einsum("kij,kj->ki", ahead, one) for name, one in self.drive.items()}
+        return replace(self, transition=ahead @ transition, drive=drive, effect=ahead @ self.effect)
+
+    @cached_property
+    def _banded(self) -> FloatArray:
+        """z_{k+1} - transition_k·z_k as a banded matrix (8, 4N) of unit diagonal."""
+        count = len(self.transition) + 1
+        banded = np.zeros((2 * STATES, STATES * count))
+        banded[0] = 1.0
+        for i in range(STATES):
+            for j in range(STATES):
+                banded[STATES + i - j, j : STATES * (count - 1) : STATES] = -self.transition[
+                    :, i, j
+                ]
+        return banded
+
+    @property
+    def finite(self) -> bool:
+        """True if all transitions are finite numbers."""
+        return bool(np.all(np.isfinite(self.transition)))
+
+
+def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
+    """Linearise around `run`, simulated on the record's grid."""
+    time = run.time
+    step = np.diff(time)
+    middle = 0.5 * (time[1:] + time[:-1])
+    locked = {one.name: _locked(run, one.name, middle) for one in model.elements}
+    driving = _driving(model, run)
+    free = np.zeros((step.size, STATES, STATES))
+    free += _shaft(model)
+    torque = np.zeros((step.size, STATES))
+    for way, inside in _ways(driving):
+        torque[inside, 0] = model.efficiency(driving=way)
+    force = {TORQUE: torque}
+    for one in model.elements:
+        if one.name not in record.pressures:
+            continue
+        signal = record.pressures[one.name]
+        pressure = np.interp(middle, signal.time, signal.values)
+        slip = 0.5 * (run.slip[one.name][1:] + run.slip[one.name][:-1])
+        stiffness, gain = _friction(one, slip, pressure)
+        sliding = ~locked[one.name]
+        g = direction(model, one)
+        free -= (stiffness * sliding)[:, None, None] * np.outer(g, g)
+        force[one.name] = -(gain * sliding)[:, None] * g
+    inverse = _accelerating(model, locked, driving)
+    rate = inverse @ free
+    rate[:, 3] = (0.0, 1.0, -model.i_f, 0.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        transition, mean = exponential(rate * step[:, None, None])
+    effect = mean @ inverse * step[:, None, None]
+    for k, jump in _jumps(model, run, driving):
+        transition[k], effect[k] = jump @ transition[k], jump @ effect[k]
+    drive = {name: np.einsum("kij,kj->ki", effect, f) for name, f in force.items()}
+    return Response(step, transition, drive, effect)
+
+
+def observed(model: DualClutch, name: str) -> FloatArray:
+    """Row (4,) that gives a compared signal from the state."""
+    rows = {
+        "output_torque": (0.0, model.c_o, -model.c_o * model.i_f, model.k_o),
+        "engine_speed": (1.0, 0.0, 0.0, 0.0),
+        "output_speed": (0.0, 1.0, 0.0, 0.0),
+        "wheel_speed": (0.0, 0.0, 1.0, 0.0),
+    }
+    return np.array(rows[name])
+
+
+def exponential(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, m, m).
+
+    Taylor's series of an eighth, doubled three times.
+    """
+    eighth = matrix / 8.0
+    identity = np.eye(matrix.shape[-1])
+    result, mean, power = identity + eighth, identity + eighth / 2.0, eighth
+    for order in (2, 3, 4):
+        power = power @ eighth / order
+        result = result + power
+        mean = mean + power / (order + 1.0)
+    for _ in range(3):
+        mean = 0.5 * (result + identity) @ mean
+        result = result @ result
+    return np.asarray(result), np.asarray(mean)
+
+
+def direction(model: DualClutch, one: ShiftElement) -> FloatArray:
+    """Slip of an element as a row (4,) of the state: ω_in/i_c - i_out·ω_out (eq. 15)."""
+    return np.array([1.0 / (model.i_in * one.i_c), -one.i_out, 0.0, 0.0])
+
+
+def _shaft(model: DualClutch) -> FloatArray:
+    """Forces (4, 4) of the shaft on (ω_e, ω_out, ω_w): -T_o on the output, i_f·T_o at the wheel."""
+    return np.outer([0.0, -1.0, model.i_f, 0.0], observed(model, "output_torque"))
+
+
+def _friction(
+    one: ShiftElement, slip: FloatArray, pressure: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of the sliding torque by slip and by pressure, (n,) each."""
+    above = np.maximum(pressure - one.P0, 0.0) * one.gain
+    mu = one.friction.at(slip)
+    small = 1e-3
+    bend = (one.friction.at(np.abs(slip) + small) - mu) / small
+    return bend * above, mu * one.gain * np.sign(slip) * (above > 0.0)
+
+
+def _locked(run: Trajectory, name: str, middle: FloatArray) -> BoolArray:
+    """Return a mask (n,) of the instants `middle` (n,) at which the element is locked."""
+    state = np.abs(run.slip[name][0]) < 1e-9
+    result = np.full(middle.size, state)
+    for event in run.events:
+        if event.element == name and event.kind in ("lock", "break_away"):
+            result[middle > event.time] = event.kind == "lock"
+    return result
+
+
+def _driving(model: DualClutch, run: Trajectory) -> BoolArray:
+    """Return a mask (N-1,) of the steps in which power flows from the engine (two-sided loss law).
+
+    φ(T_g) is what the input side and the elements take; its sign is that of T_g.
+    """
+    step = np.diff(run.time)
+    taken = model.J2e * np.diff(run.engine_speed) / step
+    for one in model.elements:
+        torque, slip = run.clutch_torque[one.name], run.slip[one.name]
+        carried = 0.5 * (torque[1:] + torque[:-1]) + one.drum_inertia * np.diff(slip) / step
+        taken += direction(model, one)[0] * carried
+    return np.asarray(taken >= 0.0)
+
+
+def _ways(driving: BoolArray) -> tuple[tuple[bool, BoolArray], tuple[bool, BoolArray]]:
+    """Both ways of the power, and where (n,) it flows so."""
+    return (True, driving), (False, ~driving)
+
+
+def _inverse_mass(model: DualClutch, driving: bool) -> FloatArray:
+    """Accelerations per force (4, 4) with no element locked."""
+    engine = model.J1 * model.efficiency(driving=driving) + model.J2e
+    mass = np.diag([engine, model.J_out, model.J_v, 1.0])
+    for one in model.elements:
+        g = direction(model, one)
+        mass += one.drum_inertia * np.outer(g, g)
+    inverse = np.asarray(np.linalg.inv(mass), dtype=np.float64)
+    inverse[3] = 0.0
+    return inverse
+
+
+def _accelerating(
+    model: DualClutch, locked: dict[str, BoolArray], driving: BoolArray
+) -> FloatArray:
+    """Accelerations per force (n, 4, 4), without those along the slip of locked elements."""
+    result = np.empty((driving.size, STATES, STATES))
+    for way, inside in _ways(driving):
+        inverse = _inverse_mass(model, way)
+        result[inside] = inverse
+        for one in model.elements:
+            g = direction(model, one)
+            along = inverse @ g
+            result[inside & locked[one.name]] -= np.outer(along, along) / (g @ along)
+    return result
+
+
+def _jumps(
+    model: DualClutch, run: Trajectory, driving: BoolArray
+) -> Iterator[tuple[int, FloatArray]]:
+    """(step, saltation (4, 4)) of every lock: z moves by the change of acceleration times δt."""
+    for event in run.events:
+        if event.kind != "lock":
+            continue
+        one = next(e for e in model.elements if e.name == event.element)
+        g = direction(model, one)
+        k = int(np.searchsorted(run.time, event.time)) - 1
+        if 0 <= k < run.time.size - 1:
+            along = _inverse_mass(model, bool(driving[k])) @ g
+            yield k, np.eye(STATES) - np.outer(along, g) / (g @ along)

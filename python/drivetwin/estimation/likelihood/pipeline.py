@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""Likelihood method over all shifts of a log, started from the linear method."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin._util.display_units import in_units
+from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
+from drivetwin.estimation.likelihood.estimates import conclude
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.optimize.initial_guess import guess_of
+from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque import (
+    guess_without_torque,
+)
+from drivetwin.estimation.likelihood.parametrization import DEPARTURE, departures_of
+from drivetwin.estimation.likelihood.selection.select_model import choose
+from drivetwin.estimation.linear.load_balance import AERO
+from drivetwin.estimation.linear.pipeline import IntegralShift
+from drivetwin.estimation.result.estimate_set import Conclusions
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+DISAGREE = 5.0
+"""Difference of the two methods in its standard deviations from which a warning is due."""
+
+OUTSIDE = 10.0
+"""Factor beside the design range of J3 from which the linear method's value is no start."""
+BEHIND_GEARBOX = ("J_vehicle", "Tv_over_if", "k_o", "c_o")
+"""Unknowns whose initial value depends on the linear method's J3."""
+OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
+"""What a method reads off a load that it takes as constant."""
+
+
+def likelihood_alone(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
+) -> tuple[Conclusions, LikelihoodFit]:
+    """Fit without the linear method.
+
+    For a log without an output torque, which gives ratios over η and no absolute values, and for a
+    log without an equation for the linear method. Raises IdentificationError if the fit does not
+    reach a plausible minimum.
+    """
+    guess = _own_guess(signals, drivelines, card)
+    best, notes = choose(signals, drivelines, card.loss_law, guess)
+    told = conclude(best, signals, drivelines, {}, card.sensors)
+    return replace(told, warnings=(*told.warnings, *notes)), best
+
+
+def _own_guess(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
+) -> dict[str, float]:
+    """Compute an initial value of every unknown without the linear method."""
+    guess: dict[str, float] = {}
+    loads = []
+    for s, d in zip(signals, drivelines, strict=True):
+        found = guess_without_torque(s, d, card)
+        loads.append(found["Tv_over_if"])
+        guess = found | guess
+    return guess | departures_of(loads)
+
+
+def _guess(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    shifts: Sequence[IntegralShift],
+    card: VehicleCard,
+) -> dict[str, float]:
+    """Compute an initial value of every unknown from the linear method, unless its J3 is
+    impossible.
+
+    Without a wheel speed that method takes the output speed for it, and where the shaft is soft
+    its swing hides how little the vehicle's speed changes.
+    """
+    found = guess_of(shifts, drivelines)
+    low, high = card.J_vehicle_range
+    if low / OUTSIDE < found["J_vehicle"] < high * OUTSIDE:
+        return found
+    own = _own_guess(signals, drivelines, card)
+    behind = {n: own[n] for n in own if n in BEHIND_GEARBOX or n.endswith(f".{DEPARTURE}")}
+    return {name: value for name, value in found.items() if name != AERO} | behind
+
+
+def likelihood(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    linear: tuple[Conclusions, Sequence[IntegralShift]],
+    card: VehicleCard,
+) -> tuple[Conclusions, LikelihoodFit]:
+    """Fit all shifts together and assess the result; `linear` is the result of the linear method.
+
+    Raises IdentificationError where the fit does not reach a plausible minimum.
+    """
+    found, shifts = linear
+    guess = _guess(signals, drivelines, shifts, card)
+    best, notes = choose(signals, drivelines, card.loss_law, guess)
+    told = conclude(best, signals, drivelines, found.friction, card.sensors)
+    warnings = (*told.warnings, *notes, *_disagreements(told, found))
+    return replace(told, warnings=warnings), best
+
+
+def _disagreements(told: Conclusions, linear: Conclusions) -> list[str]:
+    """Return a warning for each parameter on which both methods differ by more than their noise.
+
+    Where one of them alone has a load that grows with speed, which is told, the other must differ
+    on what it reads off a constant one.
+    """
+    alike = (told.load is None) == (linear.load is None)
+    explained = frozenset() if alike else OF_A_CONSTANT_LOAD
+    texts = []
+    for name, estimate in told.estimates.items():
+        other = linear.estimates.get(name)
+        if other is None or other.value is None or estimate.value is None or name in explained:
+            continue
+        spread = float(np.hypot(estimate.std_noise or 0.0, other.std_noise or 0.0))
+        if spread > 0.0 and abs(estimate.value - other.value) > DISAGREE * spread:
+            a, b = (in_units(value, estimate.unit) for value in (estimate.value, other.value))
+            texts.append(
+                f"{name}: the likelihood gives {a}, the linear method {b}; "
+                "their noise does not explain the difference"
+            )
+    return texts

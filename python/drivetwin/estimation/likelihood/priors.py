@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: MIT
+"""Free unknowns of the fit, their bounds and their priors.
+
+A design value with a standard deviation is a prior, one without is fixed. The laws' priors are
+those of the linear friction fit. Most parameters are unknowns themselves. J′_g = Je + Jo′/i_g² is
+not: a known J′ with a standard deviation is a prior on that sum, one without ties Je to Jo′.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray, Span
+from drivetwin.errors import InputError
+from drivetwin.estimation.data.segments import MomentumSettings
+from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
+from drivetwin.estimation.likelihood.data.input_smoothing import local_mean
+from drivetwin.estimation.likelihood.data.shift_record import LATEST, record_of
+from drivetwin.estimation.likelihood.data.slipping_elements import all_carriers
+from drivetwin.estimation.likelihood.objective import Part, Problem
+from drivetwin.estimation.likelihood.parametrization import (
+    COMMON,
+    DEPARTURE,
+    LAW,
+    START,
+    TE_OFFSET,
+    Structure,
+    Tie,
+    own_of,
+)
+from drivetwin.estimation.linear.friction_points import LAW_PRIOR
+from drivetwin.estimation.linear.load_balance import AERO, AERO_SPREAD, mean_speed_of
+from drivetwin.estimation.linear.momentum_balance import DELAY_STD_MAX, rounding_error
+from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.parameters import OVER_ETA, SPECS
+from drivetwin.shifts.split_gears import divided
+from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.vehicle.spec import PriorValue
+
+BOUNDS: Mapping[str, tuple[float, float]] = {
+    "te_delay": (-0.5 * LATEST, LATEST),
+    "J_e": (1e-3, SPECS["J_prime"].upper),
+    "J_out": (1e-3, SPECS["J_out"].upper),
+    "J_vehicle": (1.0, SPECS["J_vehicle"].upper),
+    "k_o": (1.0, SPECS["k_o"].upper),
+    "mu_c": (1e-3, 1.0),
+    "mu_drop": (-0.3, 0.5),
+    "mu_v": (-5e-3, 5e-3),
+    "ln_v_s": (float(np.log(1.0)), float(np.log(60.0))),
+    AERO: (0.0, 1e4),
+    "drum": (0.0, SPECS["J_out"].upper),
+}
+"""Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
+PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
+"""Efficiency of a gearbox where no output torque shows it."""
+_GEAR_INERTIA = "J_prime_"
+OFF_DESIGN = 10.0
+"""Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
+small that, with the shaft's damping, one run takes as long as a whole fit."""
+OFF_GOING = {"mu_c": 0.03, "mu_drop": 0.02}
+"""Prior standard deviation of the friction of an element that only disengages, about that of the
+engaging one: the log shows the break-away pressure and the decrease of its torque with slip."""
+
+
+def problem_of(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[Driveline],
+    loss_law: LossLaw,
+    guess: Mapping[str, float],
+    hilly: bool = False,
+) -> tuple[Problem, Point]:
+    """Build the fit of all shifts of one or several logs, and its initial point.
+
+    `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
+    start of each shift's run is read from the first samples. The age of the engine torque is held
+    where no torque step shows it. Shifts of one log stand together; on a `hilly` road each has a
+    load of its own, unless the load is known beforehand. Raises IdentificationError where a shift
+    holds too little.
+    """
+    logs = tuple(dict.fromkeys(s.log for s in signals))
+    guess = _with_own(guess, logs)
+    priors = _priors(signals, drivelines, guess)
+    every = (*_of_each(COMMON, logs), *_laws(signals, drivelines), *_fills(drivelines))
+    names = [n for n in every if not _is_known(priors.get(n))]
+    inertias = gear_inertias(signals, drivelines)
+    tie = tie_of(inertias)
+    still = [s for s in signals if not shows_age(s.engine_torque)]
+    ages = {own_of(s.log).get("te_delay", "te_delay") for s in still}
+    untold = {"eta": not signals[0].scale_known, "J_e": tie is not None}
+    names = [n for n in names if not untold.get(n, n in ages)]
+    names += [n for n in _of_each((TE_OFFSET, AERO), logs) if n in priors]
+    fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_known(p)}
+    departures = _departures(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
+    parts, start = [], {n: guess.get(n, 0.0) for n in names}
+    for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
+        label = f"start{k}"
+        record = record_of(s, span, {e.name: e.P0 for e in (d.offgoing, d.oncoming)})
+        same = [one for one in signals if one.log == s.log]
+        own = {name: fixed[n] for name, n in own_of(s.log).items() if n in fixed}
+        speed = mean_speed_of(same, d.i_f)
+        departure = departures.get(k, {})
+        structure = Structure(d, loss_law, label, fixed | own, speed, tie, s.log, departure)
+        parts.append(Part.unweighted(structure, record))
+        first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
+        wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
+        torque = first.get("output_torque", guess["Tv_over_if"])
+        values = (first["output_speed"], wheel, torque / guess["k_o"])
+        start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
+    start |= {n: guess.get(n, 0.0) for each in departures.values() for n in each}
+    lower, upper = _about_design(bounds_of(tuple(start)), tuple(start), priors)
+    point = Point(tuple(start), np.clip(list(start.values()), lower, upper))
+    entries = {
+        k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
+    }
+    prior = Prior.independent(len(point.names), entries)
+    prior = with_gear_inertias(prior, point, fixed, inertias)
+    return Problem(tuple(parts), prior, lower, upper), point
+
+
+def _of_each(names: Sequence[str], logs: Sequence[int]) -> list[str]:
+    """Expand the names: those that each log has of its own once for each log."""
+    return list(dict.fromkeys(own_of(log).get(name, name) for name in names for log in logs))
+
+
+def _with_own(guess: Mapping[str, float], logs: Sequence[int]) -> dict[str, float]:
+    """Add values for the log-specific unknowns to the guess; given ones stay."""
+    own = {n: guess[name] for log in logs for name, n in own_of(log).items() if name in guess}
+    return own | dict(guess)
+
+
+def _departures(signals: Sequence[ShiftSignals]) -> dict[int, dict[str, float]]:
+    """Compute by shift number the deviation of its load from the log's mean: factors of unknowns.
+
+    Nothing of a shift that is the only one of its log.
+    """
+    found: dict[int, dict[str, float]] = {}
+    for log in dict.fromkeys(s.log for s in signals):
+        first, *others = [k for k, s in enumerate(signals) if s.log == log]
+        own = {k: f"start{k}.{DEPARTURE}" for k in others}
+        if others:
+            found[first] = dict.fromkeys(own.values(), -1.0)
+            found |= {k: {name: 1.0} for k, name in own.items()}
+    return found
+
+
+def over_eta(quantity: PriorValue, driveline: Driveline) -> PriorValue:
+    """Divide a torque-like design value by the efficiency, known from design or typical."""
+    eta = driveline.known.get("eta", PLAUSIBLE_ETA)
+    value = quantity.value / eta.value
+    spread = value * eta.std / eta.value
+    return PriorValue(value, float(np.hypot(quantity.std / eta.value, spread)))
+
+
+def shows_age(torque: Sampled) -> bool:
+    """Return whether the engine torque varies enough, relative to its noise, to identify its
+    delay."""
+    if torque.sigma == 0.0:
+        return bool(np.ptp(torque.values) > 0.0)
+    rate = np.diff(local_mean(torque)) / np.diff(torque.time)
+    return bool(np.sum((rate / torque.sigma) ** 2) > DELAY_STD_MAX**-2)
+
+
+def spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
+    """Divide the log into one span [s] per shift; no sample is counted twice.
+
+    A gear between two shifts is divided in its middle. Each log stands by itself.
+    """
+    groups = groupby(signals, key=lambda s: s.log)
+    return tuple(span for _, group in groups for span in divided([s.shift for s in group]))
+
+
+def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper bounds (p,) of unknowns."""
+    pairs = []
+    for name in names:
+        stem = name.split(".")[-1]
+        if stem in BOUNDS:
+            pairs.append(BOUNDS[stem])
+        elif stem in SPECS:
+            pairs.append((SPECS[stem].lower, SPECS[stem].upper))
+        else:
+            pairs.append((-np.inf, np.inf))
+    lower, upper = np.array(pairs, dtype=float).T
+    return lower, upper
+
+
+def _about_design(
+    bounds: tuple[FloatArray, FloatArray], names: Sequence[str], priors: Mapping[str, PriorValue]
+) -> tuple[FloatArray, FloatArray]:
+    """Restrict the bounds of Jo′ to a factor about its design value, if the card has one."""
+    lower, upper = bounds
+    if "J_out" in names and "J_out" in priors:
+        k, design = names.index("J_out"), priors["J_out"].value
+        lower[k] = max(lower[k], design / OFF_DESIGN)
+        upper[k] = min(upper[k], design * OFF_DESIGN)
+    return lower, upper
+
+
+def _laws(signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]) -> list[str]:
+    """Return the free coefficients of the friction laws."""
+    shown = all_carriers(signals, drivelines)
+    leaving = [d.offgoing.name for d in drivelines if d.offgoing.name not in shown]
+    free = [f"{e}.{key}" for e in shown for key in LAW]
+    return free + [f"{e}.{key}" for e in leaving for key in OFF_GOING]
+
+
+def _fills(drivelines: Sequence[Driveline]) -> list[str]:
+    """Return P0 of the elements of the shifts, and the drums of all elements that have one."""
+    elements = dict.fromkeys(e.name for d in drivelines for e in (d.oncoming, d.offgoing))
+    drums = dict.fromkeys((*elements, *(e.name for d in drivelines for e in d.drums)))
+    return [*(f"{e}.P0" for e in elements), *(f"{e}.drum" for e in drums)]
+
+
+def _priors(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], guess: Mapping[str, float]
+) -> dict[str, PriorValue]:
+    """Collect the priors by unknown."""
+    found = {"te_delay": MomentumSettings().delay_prior}
+    if drivelines[0].J_out is not None:
+        known = drivelines[0].J_out
+        found["J_out"] = known if signals[0].scale_known else over_eta(known, drivelines[0])
+    found |= known_unknowns(drivelines[0], signals[0].scale_known)
+    for s in signals:
+        own = own_of(s.log)
+        found |= {own[name]: found[name] for name in own if name in found}
+        rounding = rounding_error(s.engine_torque, s.torque_resolution)
+        if rounding > 0.0:
+            found.setdefault(own.get(TE_OFFSET, TE_OFFSET), PriorValue(0.0, rounding))
+    if AERO in guess:
+        found[AERO] = PriorValue(0.0, AERO_SPREAD)
+    law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)}
+    for name in _laws(signals, drivelines):
+        found[name] = law[name.split(".")[-1]]
+    shown = all_carriers(signals, drivelines)
+    for d in drivelines:
+        for e in (d.offgoing, d.oncoming):
+            found[f"{e.name}.P0"] = e.P0
+        for e in d.couplings.values():
+            drum = e.drum if signals[0].scale_known else over_eta(e.drum, d)
+            found[f"{e.name}.drum"] = drum
+        if d.offgoing.name not in shown:
+            names = {f"{d.offgoing.name}.{key}": std for key, std in OFF_GOING.items()}
+            found |= {name: PriorValue(guess[name], std) for name, std in names.items()}
+    return found
+
+
+def _is_known(prior: PriorValue | None) -> bool:
+    return prior is not None and prior.std == 0.0
+
+
+def known_unknowns(driveline: Driveline, scale_known: bool) -> dict[str, PriorValue]:
+    """Collect the priors of unknowns that are parameters themselves; `std` 0: fixed.
+
+    Without an output torque the unknowns are the quantities over η, and only what is known of
+    those counts.
+    """
+    found = {}
+    for name, prior in driveline.known.items():
+        unknown = name.removesuffix(OVER_ETA)
+        told = scale_known if unknown == name else not scale_known
+        if unknown in COMMON and (told or unknown == "te_delay"):
+            found[unknown] = prior
+    return found
+
+
+def gear_inertias(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]
+) -> list[tuple[float, PriorValue]]:
+    """Return the overall ratio of each gear whose J′ is known, with the prior [kg m^2]."""
+    ending = "" if signals[0].scale_known else OVER_ETA
+    ratios: dict[str, float] = {}
+    for s, d in zip(signals, drivelines, strict=True):
+        ratios |= {s.shift.start_gear: d.i_before, s.shift.end_gear: d.i_after}
+    known = drivelines[0].known
+    return [
+        (ratio, known[name])
+        for gear, ratio in ratios.items()
+        if (name := f"{_GEAR_INERTIA}{gear}{ending}") in known
+    ]
+
+
+def tie_of(inertias: Sequence[tuple[float, PriorValue]]) -> Tie | None:
+    """Build the tie of Je to Jo′ by a J′ that is exactly known; None without one.
+
+    Raises InputError for two: between them Jo′ would follow, which has an entry of its own.
+    """
+    exact = [Tie(prior.value, ratio) for ratio, prior in inertias if prior.std == 0.0]
+    if len(exact) > 1:
+        raise InputError(
+            f"J′ of {len(exact)} gears are fixed, and all follow from one inertia and J_out",
+            "fix J′ of one gear, and J_out if it is known",
+        )
+    return exact[0] if exact else None
+
+
+def with_gear_inertias(
+    prior: Prior,
+    point: Point,
+    fixed: Mapping[str, float],
+    inertias: Sequence[tuple[float, PriorValue]],
+) -> Prior:
+    """Add the priors on J′ as priors on sums of Je and Jo′."""
+    soft = [(ratio, known) for ratio, known in inertias if known.std > 0.0]
+    if not soft or "J_e" not in point.names:
+        return prior
+    place = [point.names.index(name) for name in ("J_e", "J_out") if name in point.names]
+    precision, mean = prior.precision.copy(), prior.mean.copy()
+    inner = precision[np.ix_(place, place)]
+    pull = inner @ mean[place]
+    for ratio, known in soft:
+        row: FloatArray = np.array([1.0, ratio**-2][: len(place)])
+        rest = 0.0 if len(place) == 2 else fixed["J_out"] / ratio**2
+        inner = inner + np.outer(row, row) / known.std**2
+        pull = pull + row * (known.value - rest) / known.std**2
+    precision[np.ix_(place, place)] = inner
+    mean[place] = np.linalg.lstsq(inner, pull, rcond=None)[0]
+    return Prior(mean, precision)

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Selection among model variants by the likelihood."""

@@ -1,0 +1,350 @@
+# SPDX-License-Identifier: MIT
+"""Sampling modes of the signals: samples or means, engine torque linear or curved.
+
+An output may be the mean over the time since the sample before, as encoders on a bus send it. That
+is half a sample late, and half a millisecond between torque and speed moves k_o and c_o by several
+standard deviations. Between its samples an engine torque may be straight or a curve (`bend_of`).
+Which kind may fit better is told by the expansion of Q for one of them: what the others would show
+differs by a known column each. Where that hardly tells, what is told of the unknowns is averaged.
+
+Where all outputs are of the other kind, which is nearly an age of the inputs, fits compare by their
+deviance and not by Q: with θ the unknowns, y the samples and δ the noise of the inputs u, of
+covariance C, the likelihood is
+
+    L(θ) = ∫ p(y | θ, u - δ)·p(δ) dδ,   -2·log L = Q + log|Σ| + n·log 2π,   Σ = R + G·C·Gᵀ
+
+where Q is the least over δ (Laplace's approximation; exact where the outputs are linear in δ, by
+|R + G·C·Gᵀ| = |R|·|1 + C·GᵀR⁻¹G|). G is that of the run at the minimum, so Σ hangs on the kind
+through the unknowns that go with it: when elements slip, and at what pressures. An age of the
+inputs moves these so far that log|Σ| differs by up to 40, mostly against the difference of Q: what
+gives pressure noise more room leaves less. It is no sure judge either: noise about P0 moves both
+terms by several. Other kinds move P0 and friction so little that Q decides between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.budget import OutOfWork
+from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, columns_of
+from drivetwin.estimation.likelihood.diagnostics.misspecification import score_of
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.objective import Part, Problem
+from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, nearest
+from drivetwin.estimation.likelihood.optimize.staged_start import in_lower_gear
+from drivetwin.estimation.optimize.gauss_newton import step_of
+from drivetwin.estimation.optimize.objective import Normal, Point
+from drivetwin.estimation.result.estimate import Z95
+from drivetwin.shifts.shift import Shift
+
+SIGNALS = (*OUTPUTS, TORQUE)
+SPEEDS = tuple(name for name in OUTPUTS if name.endswith("speed"))
+COMMON_PRICE = 4.0
+"""Fall of Q, or of the deviance, from which on all speeds count as means, or the engine torque as
+a curve: encoders that send means are common, at odds of e² against them."""
+RARE_PRICE = 8.0
+"""The same for means of the output torque alone, and for each speed of another kind than the rest:
+rare, at odds of e⁴. Half a millisecond of the torque is six standard deviations of its age."""
+TIE = 6.0
+"""Rise of the same below which the 95 % interval reaches the minimum of the other kind,
+whatever its weight: odds of 20."""
+EITHER_KIND = 20.0
+"""Rise of the deviance below which outputs that lie `_far_apart` may be of the other kind. Half
+their period is nearly an age of the engine torque; noise about P0, and how the values of
+a torque are joined, which no model has quite, have been seen to speak for the wrong kind by 10, and
+Q alone by 17."""
+UNLIKELY = 0.01
+"""Weight of a kind below which it is not fitted."""
+MATTERS = 0.5
+"""Spread of an unknown over the kinds of a signal, in its standard deviations, worth a word."""
+UNSURE = (
+    "the log hardly tells whether samples show an instant or the time since the sample before, "
+    "values and intervals allow for both: {}"
+)
+WORSE = 1.1
+"""Q per sample, as a factor, from which on other kinds are surely no better."""
+SLOW = 4e-3
+"""Period of outputs [s] from which on half of it is too far away for an expansion."""
+ROUNDS = 3
+"""Most changes of kind: far off, the expansion promises the way, not the end of it."""
+
+
+def likely_kinds(
+    problem: Problem, start: Point, shifts: Sequence[Shift]
+) -> tuple[Problem, Problem]:
+    """The problem, which has signals as read, with the kinds that promise least from `start`, and
+    with the speeds, or all slow outputs, of the other kind.
+
+    From far off an expansion promises anything: at ten times the noise, where logs without an
+    output torque start, a mixture of kinds by a thousand of Q. From there the lower gear alone is
+    brought onto the measurement first: in a pedal step means that are taken for samples may leave
+    so much that no search with them ends at a plausible minimum. Where that fails too the signals
+    are taken as read.
+    """
+    kinds = _told_near(problem, start)
+    if kinds is None and (gear := in_lower_gear(problem, start, shifts)) is not None:
+        kinds = _told_near(gear.problem, gear.point)
+    kinds = kinds or frozenset()
+    other = kinds ^ (_far_apart(problem) or frozenset(SPEEDS))
+    return problem.of_kinds(kinds), problem.of_kinds(other)
+
+
+def _far_apart(problem: Problem) -> frozenset[str]:
+    """The outputs of which half a period is nearly an age of the inputs and too far away for an
+    expansion: the speeds of a log without an output torque, and all outputs where they are slow.
+
+    That moves P0 and the age of the engine torque by many standard deviations.
+    """
+    if not problem.parts[0].scale_known:
+        return frozenset(SPEEDS)
+    periods = [out.period(one.record.time) for one in problem.parts for out in one.record.outputs]
+    return _shown(problem) if min(periods) > SLOW else frozenset()
+
+
+def _told_near(problem: Problem, point: Point) -> frozenset[str] | None:
+    """The kinds that promise least from `point`; None where it is far from the measurement."""
+    weighted = problem.weighted_by(point)
+    normal = weighted.normal(point)
+    if normal is None or normal.cost > MULTI_START.far_chi2 * problem.size:
+        return None
+    return _promising(weighted, point, normal)
+
+
+def with_best_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
+    """The fit with every signal of the likeliest kind.
+
+    `problem` has signals as read, `best` is its fit with some kinds. Without an output torque half
+    a period of all speeds is an age of the engine torque, too far away for an expansion to tell
+    which it is: there the other kind of speeds is tried.
+    """
+
+    tried = {best.problem.kinds}
+
+    def better_of(one: LikelihoodFit, kinds: frozenset[str], start: Point) -> LikelihoodFit:
+        if kinds in tried:
+            return one
+        tried.add(kinds)
+        other = _nearby(problem.of_kinds(kinds), one, start)
+        return one if other is None or _rise(problem, one, other) >= 0.0 else other
+
+    for _ in range(ROUNDS):
+        promising = _promising(best.problem, best.point, best.normal)
+        known, best = best, better_of(best, promising, best.point)
+        if best is known:
+            break
+    if problem.parts[0].scale_known:
+        return best
+    return better_of(best, best.problem.kinds ^ frozenset(SPEEDS), _start_of_other_outputs(best))
+
+
+def with_slow_outputs(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
+    """The fit, or where the outputs of a log with an output torque are slow that with all of them
+    of the other kind, if it is likelier. `problem` has signals as read."""
+    outputs = _far_apart(problem)
+    if not outputs or not problem.parts[0].scale_known:
+        return best
+    kinds = best.problem.kinds ^ outputs
+    other = _nearby(problem.of_kinds(kinds), best, _start_of_other_outputs(best))
+    if other is None or _rise(problem, best, other) >= 0.0:
+        return best
+    try:
+        return with_best_kinds(problem, other)
+    except OutOfWork:
+        return other
+
+
+def averaged_over_kinds(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
+    """The fit with mean and covariance over all kinds, weighted by their likelihood, and which
+    kinds the log hardly tells, in words.
+
+    The minima of two kinds may lie six standard deviations apart and one sample in twenty thousand
+    decide between them; an interval about one of them would be wrong as often as that is the wrong
+    one (Burnham and Anderson 2002). `problem` has signals as read. By the expansion none gets more
+    weight than the kinds of the fit; those that would matter are fitted.
+    """
+    choices = _fitted(problem, best, _choices(best.problem, best.point, best.normal))
+    weight = _weights(choices, best)
+    step = weight @ choices.steps
+    apart = choices.steps - step
+    reached = np.where(choices.left < np.min(choices.left) + TIE, Z95**-2, 0.0)
+    values = np.clip(best.point.values + step, best.problem.lower, best.problem.upper)
+    covariance = best.covariance + apart.T @ (np.maximum(weight, reached)[:, None] * apart)
+    told = replace(best, mean=best.point.moved(values), covariance=covariance)
+    return told, _doubts(choices, weight, np.sqrt(np.diag(best.covariance)))
+
+
+def with_either_kind(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
+    """The fit with its covariance widened up to the minimum that has the outputs which lie
+    `_far_apart` of the other kind, and that in words; as it is where the deviance rises much to
+    there."""
+    outputs = _far_apart(problem) & _shown(problem)
+    if not outputs:
+        return best, []
+    kinds, start = best.problem.kinds ^ outputs, _start_of_other_outputs(best)
+    try:
+        other = nearest(problem.of_kinds(kinds), start, WORSE * best.normal.cost / problem.size)
+    except OutOfWork:  # nobody knows: what shows the same may be as good
+        far = start.values - best.point.values
+    else:
+        if other is None or _rise(problem, best, other) > EITHER_KIND:
+            return best, []
+        far = other.point.values - best.point.values
+    names = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in outputs)
+    widened = replace(best, covariance=best.covariance + np.outer(far, far) / Z95**2)
+    return widened, [UNSURE.format(names)]
+
+
+def _start_of_other_outputs(best: LikelihoodFit) -> Point:
+    """Build the initial point for the other sampling mode of the outputs: the minimum of `best`,
+    with torque delays by which both modes give nearly the same samples."""
+    values = best.point.values.copy()
+    ages = {part.structure.unknown("te_delay"): part.record for part in best.problem.parts}
+    for name, record in ages.items():
+        if name in best.point.names:
+            speed = next(out for out in record.outputs if out.name in SPEEDS)
+            half = 0.5 * speed.period(record.time)
+            values[best.point.names.index(name)] += half if speed.window == 0.0 else -half
+    return best.point.moved(np.clip(values, best.problem.lower, best.problem.upper))
+
+
+def _weights(choices: _Choices, best: LikelihoodFit) -> FloatArray:
+    """Likelihood (q,) of each choice, all together 1."""
+    weight = np.exp(-0.5 * (choices.left - np.min(choices.left)) / max(best.chi2, 1.0))
+    return np.asarray(weight / np.sum(weight))
+
+
+def _fitted(problem: Problem, best: LikelihoodFit, choices: _Choices) -> _Choices:
+    """The choices as seen from the minimum of the first, those fitted that would matter: what an
+    expansion says of a minimum far away is too rough to weigh it by.
+
+    Of its many kinks Q may end some lower by another search alone, so the first kinds are searched
+    again from where those went that seem as likely.
+    """
+    left = np.maximum(choices.left - choices.left[0], 0.0)
+    steps = choices.steps - choices.steps[0]
+    seen = replace(choices, left=left, steps=steps)
+    far = np.max(np.abs(steps) / np.sqrt(np.diag(best.covariance)), axis=1) > MATTERS
+    for k in np.flatnonzero(far & (_weights(seen, best) > UNLIKELY)):
+        kinds = _flipped(best.problem.kinds, choices.flips[k])
+        other = _nearby(problem.of_kinds(kinds), best, best.point)
+        if other is None:
+            left[k] = np.inf
+            continue
+        left[k] = _rise(problem, best, other)
+        steps[k] = other.point.values - best.point.values
+        first = problem.of_kinds(best.problem.kinds)
+        if left[k] < TIE and (back := _nearby(first, other, other.point)):
+            left[0] = min(left[0], _rise(problem, best, back))
+    return seen
+
+
+def _nearby(problem: Problem, best: LikelihoodFit, start: Point) -> LikelihoodFit | None:
+    """The minimum from `start`; None where it is surely no better than `best`, of other kinds, or
+    not found with the work that is left."""
+    try:
+        return nearest(problem, start, WORSE * best.normal.cost / problem.size)
+    except OutOfWork:
+        return None
+
+
+def _rise(problem: Problem, one: LikelihoodFit, other: LikelihoodFit) -> float:
+    """Rise from `one` to the `other` of what kinds compare by, with their prices: the deviance
+    where all outputs are of the other kind, Q where not."""
+    kinds, others = one.problem.kinds, other.problem.kinds
+    prices = _price(problem, others) - _price(problem, kinds)
+    if _shown(problem) <= kinds ^ others:
+        return other.deviance - one.deviance + prices
+    return other.normal.cost - one.normal.cost + prices
+
+
+def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[str]:
+    """Return warnings for signals whose mode is uncertain and moves an unknown against its `std`
+    (p,); `weight` (q,) is that of each choice."""
+    single = np.sum(choices.flips, axis=1) == 1.0
+    moves = choices.flips[single].T @ np.abs(choices.steps[single]) / std
+    share = weight @ choices.flips
+    spread = np.sqrt(share * (1.0 - share)) * np.max(moves, axis=1)
+    names = [n.replace("_", " ") for n, k in zip(SIGNALS, spread, strict=True) if k > MATTERS]
+    return [UNSURE.format(", ".join(names))] if names else []
+
+
+def in_words(kinds: frozenset[str]) -> list[str]:
+    """Describe the signals that are not as read."""
+    means = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in kinds)
+    return [f"samples are means over their period, which fits better: {means}"] if means else []
+
+
+def _promising(problem: Problem, point: Point, normal: Normal) -> frozenset[str]:
+    """Names of the signals that are better taken for something else than read."""
+    choices = _choices(problem, point, normal)
+    return _flipped(problem.kinds, choices.flips[int(np.argmin(choices.left))])
+
+
+def _flipped(kinds: frozenset[str], flips: FloatArray) -> frozenset[str]:
+    """The kinds with those of `SIGNALS` changed whose flip (m,) is 1."""
+    return kinds ^ {name for name, flip in zip(SIGNALS, flips, strict=True) if flip}
+
+
+def _price(problem: Problem, kinds: frozenset[str]) -> float:
+    """Compute the penalty of modes other than read: twice the logarithm of the odds against
+    them."""
+    speeds = _shown(problem).intersection(SPEEDS)
+    means = len(kinds & speeds)
+    common = int(means > 0) + int(TORQUE in kinds)
+    rare = min(means, len(speeds) - means) + int("output_torque" in kinds)
+    return COMMON_PRICE * common + RARE_PRICE * rare
+
+
+def _shown(problem: Problem) -> frozenset[str]:
+    """Names of the outputs that the log holds."""
+    return frozenset(out.name for part in problem.parts for out in part.record.outputs)
+
+
+@dataclass(frozen=True, eq=False)
+class _Choices:
+    """Every way to take the signals, the one at hand first: `flips` (q, m) of `SIGNALS` are 1 where
+    one is of the other kind than now, `left` (q,) is what kinds compare by with their price,
+    less a constant, and `steps` (q, p) is how the unknowns follow."""
+
+    flips: FloatArray
+    left: FloatArray
+    steps: FloatArray
+
+
+def _choices(problem: Problem, point: Point, normal: Normal) -> _Choices:
+    """All choices by the expansion `normal` at `point`: with the weighting there, so by Q alone."""
+    score = score_of(problem, normal, [_changes(part, point) for part in problem.parts])
+    shown = {*_shown(problem), TORQUE}
+    flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
+    gradients = normal.gradient + flips @ score.cross.T
+    steps = np.array([step_of(normal.information, gradient) for gradient in gradients])
+    price = np.array([_price(problem, _flipped(problem.kinds, row)) for row in flips])
+    followed = np.sum(gradients * steps, axis=1)
+    before = np.sum((flips @ score.own) * flips, axis=1) - 2.0 * flips @ score.pull
+    return _Choices(flips, before + followed + price, steps)
+
+
+def _changes(part: Part, point: Point) -> FloatArray:
+    """Compute the change (n, m) of a run by the other mode of each of `SIGNALS`, one column
+    each."""
+    run = part.run(point)
+    assert run is not None, "a fit can be simulated"
+    record = part.record
+    columns, found, first = columns_of(run), np.zeros((record.size, len(SIGNALS))), 0
+    for out in record.outputs:
+        rows = slice(first, first + out.values.size)
+        first = rows.stop
+        column = columns[out.name]
+        change = out.otherwise(run.time, column) - out.seen(run.time, column)
+        found[rows, SIGNALS.index(out.name)] = change
+    bend = record.bend_over(part.structure.value(point, "te_delay"))
+    sign = -1.0 if record.curved else 1.0
+    answer = part.answer_to(point, run, {TORQUE: sign * bend})
+    if np.all(np.isfinite(answer)):  # an unstable run has no finite response
+        found[:, -1] = answer
+    return found

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""Pressure, slip and friction torque of one element in a simulated shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.noise.linear_response import direction
+from drivetwin.estimation.likelihood.objective import Part
+from drivetwin.estimation.optimize.objective import Point
+from drivetwin.simulation.dual_clutch import Trajectory
+
+SLIPPING = 1e-6
+"""Slip [rad/s] above which a simulated element is not locked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """One element in one part, over the steps (N-1,) of a run with their `middle` [s].
+
+    `slip` [rad/s], pressure `above` P0 [Pa], `friction` of its law, and the torque `per_mu` [N m]
+    that friction of 1 makes, with the sign of slip, 0 where the element is locked. `row` (4,) is
+    its slip as a row of the state. Of an element that the part does not have all are 0.
+    """
+
+    middle: FloatArray
+    slip: FloatArray
+    above: FloatArray
+    friction: FloatArray
+    per_mu: FloatArray
+    row: FloatArray
+
+    def forces(self, torques: FloatArray) -> FloatArray:
+        """Forces (N-1, 4) on the speeds by torques (N-1,) that act against slip."""
+        return -torques[:, None] * self.row
+
+
+def contact_of(part: Part, point: Point, run: Trajectory, name: str) -> Contact:
+    """Evaluate element `name` along `run`, the simulation of the part at `point`."""
+    middle = 0.5 * (run.time[1:] + run.time[:-1])
+    model = part.structure.model(point)
+    one = next((e for e in model.elements if e.name == name), None)
+    if one is None or name not in part.record.pressures:
+        nothing = np.zeros(middle.size)
+        return Contact(middle, nothing, nothing, nothing, nothing, np.zeros(4))
+    slips = run.slip[name]
+    slip = 0.5 * (slips[1:] + slips[:-1])
+    signal = part.record.pressures[name]
+    above = np.maximum(np.interp(middle, signal.time, signal.values) - one.P0, 0.0)
+    slipping = np.minimum(np.abs(slips[1:]), np.abs(slips[:-1])) > SLIPPING
+    per_mu = np.where(slipping, np.sign(slip) * one.gain * above, 0.0)
+    return Contact(middle, slip, above, one.friction.at(slip), per_mu, direction(model, one))
+
+
+def carried_slip(part: Part, point: Point, name: str) -> FloatArray:
+    """Sizes of the slip (n,) [rad/s] over the steps in which element `name` slips under pressure.
+
+    Empty where the part does not have it. `point` is one that can be simulated.
+    """
+    run = part.run(point)
+    assert run is not None, "a fit can be simulated"
+    contact = contact_of(part, point, run, name)
+    return np.asarray(np.abs(contact.slip[contact.per_mu != 0.0]))

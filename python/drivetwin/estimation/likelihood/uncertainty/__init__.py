@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Sensor tolerances, derived parameters, bands of friction curves."""

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Weighted linear estimators of the integral method."""

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""Total inertia at the output shaft over η, from engine torque and speed in a gear held.
+
+    i·T_e = (J_total/η)·ω_out' + T_load/η + (c/η)·(ω_out² - mean)
+
+J_total is all that turns, engine to vehicle. The balance is formed over windows longer than a
+period of the driveline's oscillation, in which engine and vehicle move as one. The road's grade is
+in what is left over, and is no white noise, so the interval comes from leaving out one part of
+the record after the other (block jackknife) and from whether the load may grow with speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from drivetwin._util.arrays import FloatArray, Span
+from drivetwin._util.display_units import in_units
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.data.prepare import sampled
+from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.regression.modulating_functions import (
+    Windows,
+    hann_kernels,
+    join,
+    windows_in,
+)
+from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.shifts.coverage import parts_between
+from drivetwin.shifts.detect import held_spans
+from drivetwin.shifts.lockup_clutch import CLOSED, converter_slip, lock_ups
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+WIDTH = 1.6
+"""Width of a window [s]: a Hann window so long passes a millionth of a 4 Hz oscillation's power."""
+STEPS = 8
+"""Windows per width."""
+LEAST_FREEDOM = 6.0
+"""Fewest independent windows beyond the three unknowns."""
+IDENTIFIED, WEAK = 0.25, 0.6
+"""Half width of the 95 % interval over the value up to which it is identified, or weak."""
+SETTLED = 0.3
+"""Left out after a lock-up [s]."""
+BLOCKS = 8
+"""Parts of the record that are left out in turn."""
+
+
+@dataclass(frozen=True)
+class HeldGear:
+    """What one gear held over `span` [s] tells; `value` [kg m^2] ± `half` (95 %), or None and why.
+
+    `load` [N m] is T_load/η at the output shaft at the mean speed; `explained` the share of the
+    torque's variance that the balance explains.
+    """
+
+    gear: str
+    span: Span
+    verdict: Verdict
+    value: float | None = None
+    half: float | None = None
+    load: float | None = None
+    explained: float | None = None
+    reason: str = ""
+
+
+def held_gears(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> tuple[HeldGear, ...]:
+    """What the gears before and between the shifts of a log tell, while the converter is closed.
+
+    Of a log without shifts the gears that it holds. Empty without an engine torque or an output
+    speed.
+    """
+    if not {"engine_torque", "output_speed"} <= log.channels.keys():
+        return ()
+    torque, speed = sampled(log["engine_torque"]), sampled(log["output_speed"])
+    if shifts:
+        spans = [(shifts[0].start_gear, shifts[0].before)]
+        spans += [(s.end_gear, (s.lockup_time + SETTLED, s.after[1])) for s in shifts]
+    else:
+        spans = held_spans(log, card)
+    return tuple(
+        held_gear(gear, card.ratio(gear), _closed(log, card, span), torque, speed)
+        for gear, span in spans
+    )
+
+
+def _closed(log: ShiftLog, card: VehicleCard, span: Span) -> Span:
+    """The last part of `span` with the converter's lock-up clutch closed, empty if there is none.
+
+    Where nothing tells of the clutch, the gearbox is taken to have none.
+    """
+    closings = lock_ups(log, card)
+    for closing in reversed(closings):
+        start, end = max(span[0], closing.time + SETTLED), min(span[1], closing.end)
+        if end > start:
+            return start, end
+    slip = converter_slip(log, card, span)
+    open_all_along = bool(closings) or (slip is not None and abs(slip) > CLOSED)
+    return (span[1], span[1]) if open_all_along else span
+
+
+def held_gear(gear: str, ratio: float, span: Span, torque: Sampled, speed: Sampled) -> HeldGear:
+    """Balance of the gear of overall `ratio` held over `span`; `torque` is the engine's [N m].
+
+    `speed` is that of the output shaft [rad/s]. Its verdict says what the value is worth.
+    """
+    parts = parts_between(span, (*torque.unrecorded, *speed.unrecorded))
+    windows = join([windows_in(part, WIDTH, WIDTH / STEPS) for part in parts])
+    recorded = sum(high - low for low, high in parts if high - low >= WIDTH)
+    freedom = 2.0 * recorded / WIDTH - 3.0
+    if freedom < LEAST_FREEDOM:
+        return _refused(gear, span, f"only {recorded:.1f} s of the gear are recorded without a gap")
+    drive, rate, growth = _means(windows, ratio, torque, speed)
+    one = np.ones_like(rate)
+    columns = np.column_stack([rate, one, growth])
+    grown: FloatArray = np.linalg.lstsq(columns, drive, rcond=None)[0].astype(np.float64)
+    plain = np.linalg.lstsq(columns[:, :2], drive, rcond=None)[0]
+    value = float(grown[0])
+    spread = float(np.hypot(_jackknife(columns, drive), 0.5 * (plain[0] - value)))
+    half = float(student.ppf(0.975, BLOCKS - 1)) * spread
+    if value <= 0.0 or half > WEAK * value:
+        return _refused(
+            gear,
+            span,
+            f"{in_units(value, 'kg*m^2', half)} (95 %) says nothing: the vehicle's "
+            f"acceleration varies by {in_units(float(rate.std()), 'rad/s^2', digits=2)} only",
+        )
+    verdict = Verdict.IDENTIFIED if half < IDENTIFIED * value else Verdict.WEAK
+    left = drive - columns @ grown
+    explained = 1.0 - float(left @ left) / float(np.sum((drive - drive.mean()) ** 2))
+    return HeldGear(gear, span, verdict, value, half, float(grown[1]), explained)
+
+
+def _refused(gear: str, span: Span, why: str) -> HeldGear:
+    text = f"{why}; hold the gear for ten seconds while the vehicle speeds up and slows down"
+    return HeldGear(gear, span, Verdict.NOT_IDENTIFIABLE, reason=text)
+
+
+def _means(
+    windows: Windows, ratio: float, torque: Sampled, speed: Sampled
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """i·T_e, ω_out' and ω_out² less its mean, each the mean over every window (m,)."""
+    area = 0.5 * windows.width
+    drive = ratio * (hann_kernels(torque.time, windows).psi.matrix @ torque.values) / area
+    kernels = hann_kernels(speed.time, windows)
+    rate = (kernels.slope.matrix @ speed.values) / area
+    square = (kernels.psi.matrix @ speed.values**2) / area
+    return drive, rate, square - square.mean()
+
+
+def _jackknife(columns: FloatArray, target: FloatArray) -> float:
+    """Standard deviation of the first coefficient, by leaving out one of BLOCKS blocks in turn."""
+    blocks = np.array_split(np.arange(len(target)), BLOCKS)
+    values = []
+    for block in blocks:
+        # Windows overlap: those beside the block hold part of it.
+        near = slice(max(block[0] - STEPS // 2, 0), block[-1] + 1 + STEPS // 2)
+        keep = np.ones(len(target), dtype=np.bool_)
+        keep[near] = False
+        values.append(float(np.linalg.lstsq(columns[keep], target[keep], rcond=None)[0][0]))
+    spread = np.array(values) - np.mean(values)
+    return float(np.sqrt((BLOCKS - 1) / BLOCKS * (spread @ spread)))

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: MIT
+"""Load torque T_v/i_f and vehicle inertia J3 (eq. 11), the paper's way and in momentum form.
+
+T_o - T_v/i_f = (J3/i_f)·ω_w'
+
+Where the load grows with the square of the speed, T_v/i_f holds at the mean speed of the log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from drivetwin._util.arrays import FloatArray, Span
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.data.vehicle_balance import (
+    GROWTH,
+    INERTIA,
+    LOAD,
+    WIDTH,
+    VehicleBalance,
+    recorded_windows,
+)
+from drivetwin.estimation.regression.errors_in_variables import Fit, Prior
+
+ONE_LOAD = 0.05
+"""Probability under one load below which the shifts of a log have a load each. High: a load too
+many costs a little width, one too few puts what hills do into J3 and η."""
+AERO = "aero"
+"""The part of the load that grows with the square of the speed, at the wheel [N m s^2/rad^2]."""
+AERO_SPREAD = 10.0
+"""Plausible air drag at the wheel [N m s^2/rad^2]: of a lorry 1 to 3, of a car 0.1."""
+SIGNIFICANT = 3.0
+"""Size of the growing part of the load, in its standard deviations, from which it is kept."""
+SETTLING = 0.5
+"""Time after lock-up [s] in which the output speed cannot stand in for the wheel speed."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadFit:
+    """Regression of eq. 11: θ = (T_v/i_f, J3) in `fit`, and AERO where the load may grow.
+
+    Evidence, one entry per window: `time` [s], `torque` = mean T_o less the load [N m],
+    `acceleration` = mean ω_w' [rad/s^2]. `mean_speed` is that of the wheel [rad/s];
+    `speed_trend` the t value of a residual proportional to the speed's deviation from it.
+    `holds_at` is the speed [rad/s] at which T_v/i_f holds, None where the load does not grow.
+    """
+
+    fit: Fit
+    time: FloatArray
+    torque: FloatArray
+    acceleration: FloatArray
+    mean_speed: float
+    speed_trend: float
+    holds_at: float | None = None
+
+    @property
+    def load(self) -> float:
+        """T_v/i_f [N m]."""
+        return float(self.fit.theta[LOAD])
+
+    @property
+    def J_vehicle(self) -> float:
+        """J3 at the wheel [kg m^2]."""
+        return float(self.fit.theta[INERTIA])
+
+
+def are_one(differences: FloatArray, covariance: FloatArray) -> bool:
+    """Whether loads may be one that differ by `differences` (m,) with `covariance` (m, m)."""
+    scale = np.sqrt(np.diag(covariance))
+    inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
+    unit = differences / scale
+    return bool(unit @ inverse @ unit < chi2.isf(ONE_LOAD, differences.size))
+
+
+def different_loads(loads: Sequence[float]) -> list[str]:
+    """What is said of the loads of the shifts [N m]; nothing of one load, which is empty."""
+    if not loads:
+        return []
+    return [
+        "the load differs from shift to shift, as on hills: each has its own, "
+        f"{min(loads):.0f} to {max(loads):.0f} N·m; T_v/i_f is their mean"
+    ]
+
+
+def load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
+    """Where eq. 11 is used: throughout with a wheel speed, else away from the shift."""
+    shift = signals.shift
+    if signals.wheel_speed is not None:
+        return ((shift.before[0], shift.after[1]),)
+    return (shift.before, (shift.lockup_time + SETTLING, shift.after[1]))
+
+
+def growing_from(signals: Sequence[ShiftSignals], i_f: float) -> float | None:
+    """Mean wheel speed of the log [rad/s] where the load of its shifts grows with speed, else None.
+
+    Each shift tells by itself, so that hills between them say nothing. Raises IdentificationError
+    where torque and speed of a shift do not determine its load.
+    """
+    speed = mean_speed_of(signals, i_f)
+    fits = [momentum_load(s, i_f, load_spans(s), speed).fit for s in signals]
+    growth = np.array([fit.theta[GROWTH] for fit in fits])
+    weight = np.array([fit.std[GROWTH] ** -2 for fit in fits])
+    return speed if growth @ weight > SIGNIFICANT * np.sqrt(np.sum(weight)) else None
+
+
+def mean_speed_of(signals: Sequence[ShiftSignals], i_f: float) -> float:
+    """Mean wheel speed over the log [rad/s]."""
+    means = [
+        float(np.mean(s.output_speed.values)) / i_f
+        if s.wheel_speed is None
+        else float(np.mean(s.wheel_speed.values))
+        for s in signals
+    ]
+    return float(np.mean(means))
+
+
+def momentum_load(
+    signals: ShiftSignals,
+    i_f: float,
+    spans: tuple[Span, ...],
+    holds_at: float | None = None,
+    width: float = WIDTH,
+) -> LoadFit:
+    """Estimate (T_v/i_f, J3) from the balance of the vehicle over all windows.
+
+    Eq. 11 knows no gear, so `spans` may cover the whole log where the wheel speed is measured. With
+    `holds_at` [rad/s] the load may grow with speed, and T_v/i_f is that at this speed.
+    Raises IdentificationError where torque and speed do not determine both.
+    """
+    wheel = signals.wheel_speed
+    speed, ratio = (signals.output_speed, 1.0 / i_f) if wheel is None else (wheel, 1.0)
+    torque, step = signals.output_torque, width / 16.0
+    windows = recorded_windows(torque, speed, spans, step, width)
+    if not windows.count:
+        raise IdentificationError(
+            f"no {width:g} s of held gear without a gap for the balance of the vehicle",
+            "record at least a second before and after the shift",
+        )
+    balance = VehicleBalance.over(torque, speed, (ratio, i_f), windows)
+    start = np.array([float(np.mean(torque.values)), 1.0])
+    if holds_at is None:
+        fit = balance.fit(None, start, Prior.independent(2, {}))
+        load = np.full(windows.count, fit.theta[LOAD])
+    else:
+        grown = (balance.square - holds_at**2) / i_f
+        prior = Prior.independent(3, {GROWTH: (0.0, AERO_SPREAD)})
+        fit = balance.fit(grown, np.append(start, 0.0), prior)
+        load = fit.theta[LOAD] + fit.theta[GROWTH] * grown
+    local = speed.at(windows.centre) * ratio
+    centred = local - local.mean()
+    z = fit.residual / fit.residual_std
+    spread = float(np.sqrt(np.sum(centred**2)))
+    overlap = np.sqrt(width / step * 0.375)
+    return LoadFit(
+        fit,
+        windows.centre,
+        balance.mean_torque - load,
+        balance.acceleration,
+        float(local.mean()),
+        float(z @ centred) / (spread * overlap) if spread > 0.0 else 0.0,
+        holds_at,
+    )

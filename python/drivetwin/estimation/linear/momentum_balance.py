@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: MIT
+"""η, Je and Jo′ from the momentum balance through gear, inertia phase and next gear.
+
+In gear g (eq. 10) and, with the output side's torque put in for the slipping element, in the
+inertia phase of the shift to h:
+
+    η·T_e - T_o/i_g = (Je + Jo′/i_g²)·ω_e'
+    η·T_e - T_o/i_h = Je·ω_e' + (Jo′/i_h)·ω_out'
+
+The equations are linear in (η, Je, Jo′) and hold as long as one element alone carries torque, so
+the shift's own speed change excites Je even where the engine torque stands still. The torque
+phase is left out: there two unknown torques act. Windows never straddle a phase boundary.
+Drum inertias of the shift elements (THEORY section 2) enter as further linear parameters with
+their design priors; Jo′ has one too. The age of the engine torque is estimated with the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.data.segments import MomentumSettings, Stretch, stretches
+from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
+from drivetwin.estimation.regression.errors_in_variables import (
+    Fit,
+    Prior,
+    Term,
+    regressors,
+    solve,
+    whitening,
+)
+from drivetwin.estimation.regression.modulating_functions import (
+    Kernels,
+    Quadrature,
+    hann_kernels,
+    join,
+)
+from drivetwin.vehicle.spec import PriorValue
+
+DELAY_STD_MAX = 0.005
+"""Standard error [s] above which the age of the engine torque is taken as not shown."""
+NO_ROUNDING = 1e-3
+"""Mean error of rounding over the noise of a sample that counts as none: a thousand samples leave
+thirty times as much in their mean."""
+DELAY_Q_MIN = 30.0
+"""Least rise of Q over the scanned ages for the minimum to mean anything."""
+
+
+@dataclass(frozen=True, eq=False)
+class DelayScan:
+    """Q of the regression over the assumed age of the engine torque: `delay` [s], `q`, (n,).
+
+    `best` is the age at the minimum, None where the engine torque moves too little to show it.
+    """
+
+    delay: FloatArray
+    q: FloatArray
+    best: float | None
+
+    def tells(self, std: float) -> bool:
+        """Whether the engine torque moves enough to show its age, to `std` [s]."""
+        return std < DELAY_STD_MAX and float(np.ptp(self.q)) > DELAY_Q_MIN
+
+
+@dataclass(frozen=True, eq=False)
+class MomentumFit:
+    """Result of the joint regression. `names` are the parameters of `fit.theta`, in order,
+    `priors` what was known of them beforehand, by name.
+
+    Evidence for the report, one entry per window: `time` [s], `stretch` name, `drive` = mean
+    η·T_e - T_o/i [N m] and `acceleration` [rad/s^2] over the window, `inertia_torque` the fitted
+    right-hand side [N m].
+    """
+
+    names: tuple[str, ...]
+    priors: Mapping[str, PriorValue]
+    fit: Fit
+    scan: DelayScan
+    time: FloatArray
+    stretch: tuple[str, ...]
+    drive: FloatArray
+    acceleration: FloatArray
+    inertia_torque: FloatArray
+
+    def index(self, name: str) -> int:
+        """Position of a parameter in `fit.theta`."""
+        return self.names.index(name)
+
+    def value(self, name: str) -> float:
+        """Estimate of one parameter."""
+        return float(self.fit.theta[self.index(name)])
+
+    def std(self, name: str) -> float:
+        """Standard error of one parameter."""
+        return float(self.fit.std[self.index(name)])
+
+
+def momentum_names(driveline: Driveline) -> tuple[str, ...]:
+    """Parameters of the regression: η, Je, Jo′, age and mean rounding error of T_e, drums."""
+    return (
+        "eta",
+        "J_e",
+        "J_out",
+        "te_delay",
+        "te_rounding",
+        *(f"drum.{c.name}" for c in driveline.drums),
+    )
+
+
+ROUNDING = 4
+"""Index of the mean rounding error of the engine torque [N m] among the parameters."""
+FIRST_DRUM = 5
+"""Index of the first drum inertia among the parameters."""
+
+
+class _Equations:
+    """All rows of the momentum balance: one window each, with per-row coefficients.
+
+    `u[p]`, `v[p]` (m,) are the coefficients of inertia parameter p on ω_e' and ω_out'. Where the
+    gear is locked both sensors show the same motion: they share it by inverse variance.
+    """
+
+    def __init__(
+        self, signals: ShiftSignals, driveline: Driveline, found: tuple[Stretch, ...]
+    ) -> None:
+        self.signals = signals
+        self.windows = join([s.windows for s in found])
+        counts = [s.windows.count for s in found]
+        self.ratio = np.repeat([s.ratio for s in found], counts)
+        self.stretch = tuple(np.repeat([s.name for s in found], counts).tolist())
+        tied = np.repeat([s.tied for s in found], counts)
+        self.constant = Quadrature(csr_array(0.5 * self.windows.width[:, None]))
+        self.torque = hann_kernels(signals.output_torque.time, self.windows).psi
+        self.engine = hann_kernels(signals.engine_speed.time, self.windows).slope
+        self.output = hann_kernels(signals.output_speed.time, self.windows).slope
+        one, zero = np.ones_like(self.ratio), np.zeros_like(self.ratio)
+        raw = {1: (one, zero), 2: (zero, 1.0 / self.ratio)}
+        for k, c in enumerate(driveline.drums):
+            net = c.a - c.b / self.ratio
+            raw[FIRST_DRUM + k] = (c.a * net, -c.b * net)
+        variance_e = signals.engine_speed.sigma**2
+        variance_o = (self.ratio * signals.output_speed.sigma) ** 2
+        share = variance_o / (variance_e + variance_o)
+        self.u = {p: np.where(tied, share * (u + v / self.ratio), u) for p, (u, v) in raw.items()}
+        self.v = {
+            p: np.where(tied, (1.0 - share) * (self.ratio * u + v), v) for p, (u, v) in raw.items()
+        }
+
+    def engine_torque(self, theta: FloatArray, kernels: Kernels | None = None) -> Term:
+        """The part η·T_e, its stamps taken θ[3] seconds after the instant they show."""
+        torque = self.signals.engine_torque
+        kernels = kernels or hann_kernels(torque.time, self.windows, theta[3])
+        factor = np.full_like(self.ratio, theta[0])
+        slopes = {0: (np.ones_like(self.ratio), kernels.psi), 3: (factor, kernels.slope)}
+        return Term(torque.values, torque.sigma, kernels.psi, factor, slopes)
+
+    def others(self, theta: FloatArray) -> list[Term]:
+        """The parts -T_o/i, -u·ω_e' and -v·ω_out'."""
+        terms = [
+            Term(
+                self.signals.output_torque.values,
+                self.signals.output_torque.sigma,
+                self.torque,
+                -1.0 / self.ratio,
+                {},
+            )
+        ]
+        for signal, quadrature, coefficients in (
+            (self.signals.engine_speed, self.engine, self.u),
+            (self.signals.output_speed, self.output, self.v),
+        ):
+            factor = np.zeros_like(self.ratio)
+            for p, c in coefficients.items():
+                factor = factor - theta[p] * c
+            slopes = {p: (-c, quadrature) for p, c in coefficients.items()}
+            terms.append(Term(signal.values, signal.sigma, quadrature, factor, slopes))
+        return terms
+
+    def rounding(self, theta: FloatArray) -> Term:
+        """The part of the engine torque's mean rounding error, -η·θ[4]."""
+        area, factor = self.constant, np.full_like(self.ratio, -theta[0] * theta[ROUNDING])
+        slopes = {
+            0: (np.full_like(self.ratio, -theta[ROUNDING]), area),
+            ROUNDING: (np.full_like(self.ratio, -theta[0]), area),
+        }
+        return Term(np.ones(1), 0.0, area, factor, slopes)
+
+    def terms(self, theta: FloatArray) -> list[Term]:
+        """All parts of the equations at θ, the engine torque first."""
+        return [self.engine_torque(theta), *self.others(theta), self.rounding(theta)]
+
+
+def rounding_error(torque: Sampled, step: float) -> float:
+    """Standard deviation [N m] of the mean error that rounding to `step` leaves.
+
+    Noise of standard deviation σ dithers the rounding; what stays of its mean error is periodic
+    in the level with amplitude (step/π)·exp(-2π²σ²/step²) (Widrow and Kollár 2008). `torque.sigma`
+    holds noise and rounding together. 0 where it is lost in the noise.
+    """
+    if step == 0.0:
+        return 0.0
+    square = max(torque.sigma**2 - step**2 / 12.0, 0.0)
+    left = float(step / np.pi * np.exp(-2.0 * np.pi**2 * square / step**2) / np.sqrt(2.0))
+    return left if left > NO_ROUNDING * torque.sigma else 0.0
+
+
+def _priors(
+    signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
+) -> dict[str, PriorValue]:
+    """What is known of the parameters beforehand, by name."""
+    rounding = rounding_error(signals.engine_torque, signals.torque_resolution)
+    found = {"te_delay": settings.delay_prior, "te_rounding": PriorValue(0.0, rounding)}
+    if driveline.J_out is not None:
+        found["J_out"] = driveline.J_out
+    return found | {f"drum.{one.name}": one.drum for one in driveline.drums}
+
+
+def known(prior: PriorValue) -> float:
+    """Standard deviation of a prior; a known value gets one too small to matter."""
+    return prior.std if prior.std > 0.0 else 1e-6 * max(abs(prior.value), 1e-6)
+
+
+def _scan(
+    equations: _Equations, theta: FloatArray, prior: Prior, delays: tuple[float, ...]
+) -> DelayScan:
+    """Q over the age of the engine torque, the other parameters fitted at each age.
+
+    The weighting is that at `theta`; the equations are then linear in the rest.
+    """
+    terms = equations.terms(theta)
+    whiten = whitening(terms)
+    free = [p for p in range(theta.size) if p not in (0, 3)]
+    fixed = terms[1].factor * (terms[1].quadrature.matrix @ terms[1].values)
+    rest = whiten(np.column_stack([fixed, regressors(terms[1:], theta.size)[:, free]]))
+    torque = equations.signals.engine_torque
+    drives = [
+        hann_kernels(torque.time, equations.windows, delay).psi.matrix @ torque.values
+        for delay in delays
+    ]
+    weight = np.sqrt(np.diag(prior.precision))[free]
+    ties = np.column_stack([-weight * prior.mean[free], np.diag(weight)])
+    rows = np.vstack([rest, ties])
+    pad = np.zeros(weight.size)
+    q = []
+    for drive in whiten(np.column_stack(drives)).T:
+        design = np.column_stack([np.concatenate([drive, pad]), rows[:, 1:]])
+        solution = np.linalg.lstsq(design, -rows[:, 0], rcond=None)[0]
+        q.append(float(np.sum((design @ solution + rows[:, 0]) ** 2)))
+    ages, values = np.asarray(delays), np.asarray(q)
+    return DelayScan(ages, values, parabola_minimum(ages, values))
+
+
+def parabola_minimum(x: FloatArray, y: FloatArray) -> float:
+    """Abscissa of the minimum of y (n,) over equidistant x (n,), by a parabola through three."""
+    k = int(np.argmin(y))
+    if k in (0, x.size - 1):
+        return float(x[k])
+    left, middle, right = y[k - 1 : k + 2]
+    bend = left - 2.0 * middle + right
+    return float(x[k] + 0.5 * (x[k + 1] - x[k]) * (left - right) / bend)
+
+
+def momentum_inertia(
+    signals: ShiftSignals,
+    driveline: Driveline,
+    settings: MomentumSettings,
+    start_inertia: float,
+) -> MomentumFit:
+    """Estimate η, Je, Jo′, age of T_e and drums over the whole shift, with their covariance.
+
+    `start_inertia` [kg m^2] is any value within the plausible range of J′.
+    """
+    found = stretches(signals, driveline, settings)
+    equations = _Equations(signals, driveline, found)
+    names = momentum_names(driveline)
+    priors = _priors(signals, driveline, settings)
+    entries = {names.index(name): (one.value, known(one)) for name, one in priors.items()}
+    prior = Prior.independent(len(names), entries)
+    start = prior.mean.copy()
+    start[:2] = 0.9, start_inertia
+    first = solve(equations.terms, start, prior.held(3, start[3]), tolerance=0.1)
+    scan = _scan(equations, first.theta, prior, settings.delay_grid)
+    theta = first.theta.copy()
+    theta[3] = scan.best
+    fit = solve(equations.terms, theta, prior)
+    if not scan.tells(fit.std[3]):
+        fit = solve(equations.terms, first.theta, prior.held(3, start[3]))
+        scan = replace(scan, best=None)
+    return _with_evidence(equations, names, priors, fit, scan)
+
+
+def _with_evidence(
+    equations: _Equations,
+    names: tuple[str, ...],
+    priors: Mapping[str, PriorValue],
+    fit: Fit,
+    scan: DelayScan,
+) -> MomentumFit:
+    area = 0.5 * equations.windows.width
+    drive, load, engine, output, _ = (
+        t.factor * (t.quadrature.matrix @ t.values) / area for t in equations.terms(fit.theta)
+    )
+    speed = equations.signals.engine_speed
+    return MomentumFit(
+        names,
+        priors,
+        fit,
+        scan,
+        equations.windows.centre,
+        equations.stretch,
+        drive + load,
+        (equations.engine.matrix @ speed.values) / area,
+        -(engine + output),
+    )

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: MIT
+"""The integral method on one shift: all stages in momentum form, and what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.data.segments import MomentumSettings, off_going_free
+from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
+from drivetwin.estimation.linear.friction_points import (
+    FrictionFit,
+    FrictionSettings,
+    momentum_friction,
+)
+from drivetwin.estimation.linear.load_balance import (
+    AERO,
+    AERO_SPREAD,
+    LoadFit,
+    load_spans,
+    momentum_load,
+)
+from drivetwin.estimation.linear.momentum_balance import MomentumFit, momentum_inertia
+from drivetwin.estimation.linear.ringdown import (
+    START_AFTER_LOCKUP,
+    Drive,
+    RingDown,
+    fit_ringdown,
+    stiffness_and_damping,
+)
+from drivetwin.estimation.result.verdict import independent, propagate
+from drivetwin.vehicle.spec import PriorValue
+
+NUISANCES = ("te_rounding", "drum")
+"""Stems of what acts on the parameters, is the same in all shifts of a log and is not reported."""
+
+
+@dataclass(frozen=True, eq=False)
+class IntegralShift:
+    """All stages for one shift; a stage the data could not carry is None, and `refusals` says why.
+
+    `ids`, `values` (q,), `covariance` (q, q): the parameters that follow, in SI, and those of the
+    `NUISANCES` that are uncertain, AERO where the load grows. `priors` by id: what was known
+    beforehand, which is in them.
+    """
+
+    momentum: MomentumFit
+    load: LoadFit
+    ring: RingDown | None
+    friction: FrictionFit | None
+    ids: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    priors: Mapping[str, PriorValue]
+    refusals: dict[str, str]
+
+
+def _gear_inertia(driveline: Driveline, momentum: MomentumFit, ratio: float) -> FloatArray:
+    """Row (p,) that gives the inertia at the engine with all couplings locked at `ratio`.
+
+    Drums of open elements included: they swing with the rest.
+    """
+    row = np.zeros(len(momentum.names))
+    row[momentum.index("J_e")] = 1.0
+    row[momentum.index("J_out")] = ratio**-2
+    for element in driveline.drums:
+        row[momentum.index(f"drum.{element.name}")] = (element.a - element.b / ratio) ** 2
+    return row
+
+
+def _ring(
+    signals: ShiftSignals, driveline: Driveline, momentum: MomentumFit, load: LoadFit
+) -> RingDown:
+    """Ring-down fit, with the engine torque's own motion put in."""
+    ratio = driveline.i_after
+    J4 = float(_gear_inertia(driveline, momentum, ratio) @ momentum.fit.theta) * ratio**2
+    J5 = load.J_vehicle / driveline.i_f**2
+    gain = momentum.value("eta") * ratio * J5 / (J4 + J5)
+    shift, measured, age = signals.shift, signals.engine_torque, momentum.value("te_delay")
+    after = min(START_AFTER_LOCKUP, MomentumSettings().guard("lockup", shift))
+    acting = Sampled(measured.time - age, measured.values, measured.sigma)
+    return fit_ringdown(
+        signals.output_torque,
+        shift.lockup_time,
+        shift.after[1],
+        Drive(acting, gain),
+        after,
+    )
+
+
+def _derived(
+    driveline: Driveline, momentum: MomentumFit, load: LoadFit, ring: RingDown | None, gear: str
+) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+    """Shaft parameters, nuisances and AERO with all that they share: ids, values, covariance.
+
+    Raises IdentificationError where the inertias beside the shaft are hardly told: none of it then.
+    """
+    size = len(momentum.names)
+    unknown = [name for name, one in momentum.priors.items() if one.std > 0.0]
+    nuisances = tuple(name for name in unknown if name.split(".")[0] in NUISANCES)
+    kept = [momentum.index(name) for name in nuisances]
+    after = _gear_inertia(driveline, momentum, driveline.i_after) * driveline.i_after**2
+    parts = [momentum.fit.theta, load.fit.theta]
+    blocks = [momentum.fit.covariance, load.fit.covariance]
+    ids: tuple[str, ...] = ()
+    if ring is not None:
+        parts.append(np.array([ring.decay_rate, ring.omega_d]))
+        blocks.append(ring.covariance)
+        ids = ("k_o", "c_o", f"f_d_{gear}", f"zeta_{gear}")
+    end = size + load.fit.theta.size
+
+    def values(x: FloatArray) -> FloatArray:
+        theta, (tv, J3, *aero) = x[:size], x[size:end]
+        before, then = (theta[1] + theta[2] / i**2 for i in (driveline.i_before, driveline.i_after))
+        common = [theta[0], before, then, theta[2], theta[3], J3, tv]
+        if ring is None:
+            return np.array([*common, *theta[kept], *aero])
+        rate, omega = x[end:]
+        shaft = stiffness_and_damping(rate, omega, float(after @ theta), J3 / driveline.i_f**2)
+        zeta = rate / np.hypot(rate, omega)
+        return np.array([*common, *shaft, omega / (2.0 * np.pi), zeta, *theta[kept], *aero])
+
+    found, covariance = propagate(values, np.concatenate(parts), independent(*blocks))
+    grown = () if load.holds_at is None else (AERO,)
+    return (*ids, *nuisances, *grown), found, covariance
+
+
+def identify_shift(
+    signals: ShiftSignals,
+    driveline: Driveline,
+    start_inertia: float,
+    load_at: float | None = None,
+) -> IntegralShift:
+    """Run all stages on one shift. `start_inertia` [kg m^2]: any plausible J′. The load grows with
+    speed where T_v/i_f is to hold at one, `load_at` [rad/s].
+
+    Raises IdentificationError where inertia or load cannot be told; a missing oscillation or too
+    short an inertia phase only costs its own parameters.
+    """
+    settings = MomentumSettings()
+    shift = signals.shift
+    momentum = momentum_inertia(signals, driveline, settings, start_inertia)
+    load = momentum_load(signals, driveline.i_f, load_spans(signals), load_at)
+    refusals: dict[str, str] = {}
+    ring: RingDown | None = None
+    friction: FrictionFit | None = None
+    try:
+        ring = _ring(signals, driveline, momentum, load)
+    except IdentificationError as error:
+        refusals["shaft"] = error.what
+    try:
+        free = off_going_free(signals, driveline, settings)
+        friction = momentum_friction(signals, driveline, momentum, free, FrictionSettings())
+    except IdentificationError as error:
+        refusals["friction"] = error.what
+    try:
+        further, values, covariance = _derived(driveline, momentum, load, ring, shift.end_gear)
+    except IdentificationError as error:
+        ring, refusals["shaft"] = None, error.what
+        further, values, covariance = _derived(driveline, momentum, load, None, shift.end_gear)
+    gears = (f"J_prime_{shift.start_gear}", f"J_prime_{shift.end_gear}")
+    ids: tuple[str, ...] = ("eta", *gears, "J_out", "te_delay", "J_vehicle", "Tv_over_if")
+    ids = (*ids, *further)
+    if momentum.scan.best is None:
+        keep = [k for k, name in enumerate(ids) if name != "te_delay"]
+        ids = tuple(ids[k] for k in keep)
+        values, covariance = values[keep], covariance[np.ix_(keep, keep)]
+        refusals["te_delay"] = "the engine torque moves too little for its age to show"
+    priors = {name: one for name, one in momentum.priors.items() if name in ids}
+    if AERO in ids:
+        priors[AERO] = PriorValue(0.0, AERO_SPREAD)
+    if friction is not None:
+        ids = (*ids, f"P0.{friction.element}")
+        priors[ids[-1]] = driveline.oncoming.P0
+        values = np.append(values, friction.P0)
+        covariance = independent(covariance, np.array([[friction.P0_std**2]]))
+    return IntegralShift(momentum, load, ring, friction, ids, values, covariance, priors, refusals)

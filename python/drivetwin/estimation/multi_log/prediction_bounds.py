@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: MIT
+"""Prediction bounds for a shift that the fit has not used.
+
+What the shift's log has of its own (load, age of the torque, state at the start) is unknown to
+the fit. It is estimated from the gear held before the shift, the shared parameters θ staying as
+they are; so their errors move it along, dξ = -H_ξξ⁻¹ H_ξθ dθ with H the information of that
+stretch. Simulated from the measured inputs, the shift is then missed by
+
+    e = (J_θ - J_ξ H_ξξ⁻¹ H_ξθ) dθ + J_ξ dξ + G u + v
+
+J the core's derivatives, G the linear response to the inputs' noise u, v the sensors' noise. Draws
+of all of these, with the covariances of the fit, give the size that e may have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.data.prepare import driveline_behind
+from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of
+from drivetwin.estimation.likelihood.objective import Part, Problem
+from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW
+from drivetwin.estimation.likelihood.optimize.staged_start import STAGED_START
+from drivetwin.estimation.likelihood.parametrization import LAW, OWN, START, own_of
+from drivetwin.estimation.likelihood.priors import problem_of
+from drivetwin.estimation.linear.load_balance import AERO
+from drivetwin.estimation.optimize.gauss_newton import minimise
+from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.estimation.result.validation import Bound
+from drivetwin.estimation.result.verdict import root_of
+from drivetwin.simulation.dual_clutch import State
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+
+@dataclass(frozen=True)
+class PredictionSettings:
+    """Settings of the prediction bounds."""
+
+    draws: int = 120
+    """Draws of noise and parameters: the bound is the third largest [-]."""
+    upper_quantile: float = 0.975
+    """Share of the draws below the upper bound [-]."""
+
+
+PREDICTION = PredictionSettings()
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Prediction for one shift held out.
+
+    `own` are values and standard deviations of the log-specific unknowns by plain name, if the log
+    was not part of the fit; T_v/i_f holds at `mean_speed` of the wheel [rad/s]. `start` is the
+    state at `time` [s], estimated from the whole stretch before the shift. `bounds` are by compared
+    signal; empty if the law of the on-coming element is that of another element, whose deviation is
+    unknown.
+    """
+
+    own: Mapping[str, tuple[float, float]]
+    mean_speed: float
+    time: float
+    start: State
+    bounds: Mapping[str, Bound]
+
+
+def expected(
+    fit: LikelihoodFit, held: Sequence[ShiftSignals], card: VehicleCard, seed: int = 0
+) -> tuple[Expected, ...]:
+    """Predict each shift `held` out of one log from `fit`.
+
+    The signals' `log` is their number in the fit, or one that it does not have. Raises
+    IdentificationError where the stretch before the shift cannot be simulated.
+    """
+    drivelines = [driveline_behind(card, s) for s in held]
+    problem, point = problem_of(held, drivelines, card.loss_law, _known(fit, drivelines))
+    problem = problem.of_kinds(fit.problem.kinds)
+    unseen = _unseen(fit, problem, point)
+    before = _before(
+        problem, point, unseen, [s.shift.before[1] - STAGED_START.clearance for s in held]
+    )
+    point, own = before.point, own_of(held[0].log)
+    std = np.sqrt(np.diag(before.own))
+    told = {
+        name: (point[own[name]], float(std[unseen.index(k)]))
+        for name in OWN
+        if name in own and own[name] in point.names
+        for k in (point.names.index(own[name]),)
+        if k in unseen
+    }
+    moved = _moved(fit, problem, before, unseen)
+    rng = np.random.default_rng(seed)
+    return tuple(
+        Expected(
+            told,
+            part.structure.mean_speed,
+            float(part.record.time[0]),
+            part.structure.start(point),
+            _bounds(part, point, moved, rng) if _has_law(fit, part) else {},
+        )
+        for part in problem.parts
+    )
+
+
+def _has_law(fit: LikelihoodFit, part: Part) -> bool:
+    """Return whether the fit identifies the friction of the on-coming element."""
+    return f"{part.structure.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
+
+
+def _known(fit: LikelihoodFit, drivelines: Sequence[Driveline]) -> dict[str, float]:
+    """Collect a value for every unknown from the fit; an unknown element takes its partner's law.
+
+    Where neither has one, that of a usual facing.
+    """
+    known: dict[str, float] = {}
+    for part in fit.problem.parts:
+        known |= part.structure.fixed
+    known |= dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
+    if AERO not in fit.point.names:
+        known.pop(AERO, None)
+    for d in drivelines:
+        for one, partner in ((d.oncoming, d.offgoing), (d.offgoing, d.oncoming)):
+            for key in LAW:
+                stand_in = known.get(f"{partner.name}.{key}", TYPICAL_LAW[key])
+                known.setdefault(f"{one.name}.{key}", stand_in)
+            known.setdefault(f"{one.name}.P0", one.P0.value)
+        for one in d.couplings.values():
+            known.setdefault(f"{one.name}.drum", one.drum.value)
+    return known
+
+
+def _unseen(fit: LikelihoodFit, problem: Problem, point: Point) -> list[int]:
+    """Return the indices of the unknowns that belong to the log or the run and are not in the
+    fit."""
+    structures = [part.structure for part in problem.parts]
+    starts = {f"{one.label}.{key}" for one in structures for key in START}
+    own = {name for one in structures for name in own_of(one.log).values()}
+    mine = starts | (own - set(fit.point.names))
+    return [k for k, name in enumerate(point.names) if name in mine]
+
+
+@dataclass(frozen=True, eq=False)
+class _Before:
+    """Fit to the gear before the shifts: `point`, covariance `own` (u, u) of the new unknowns,
+    and their response `along` (u, k) to a change of the known ones."""
+
+    point: Point
+    own: FloatArray
+    along: FloatArray
+
+
+def _before(problem: Problem, point: Point, unseen: list[int], ends: Sequence[float]) -> _Before:
+    """Fit the new unknowns to the stretches before the shifts, all others fixed."""
+    known = [k for k in range(len(point.names)) if k not in unseen]
+    prior = problem.prior
+    precision = np.zeros_like(prior.precision)
+    precision[np.ix_(unseen, unseen)] = prior.precision[np.ix_(unseen, unseen)]
+    free = Prior(prior.mean, precision)
+    held = free
+    for k in known:
+        held = held.held(k, float(point.values[k]))
+    cut = replace(problem.until(ends), prior=held)
+    found = minimise(cut, point, lambda _, at: cut.weighted_by(at))
+    if found is None:
+        raise IdentificationError(
+            "the gear held before the shift cannot be simulated with the parameters of the fit",
+            "hold out a shift of the same vehicle, with a second of gear before it",
+        )
+    information = found.normal.data + precision
+    inner = covariance_of(information[np.ix_(unseen, unseen)])
+    return _Before(found.point, inner, -inner @ information[np.ix_(unseen, known)])
+
+
+def _moved(fit: LikelihoodFit, problem: Problem, before: _Before, unseen: list[int]) -> FloatArray:
+    """Compute a root (p, d) of the covariance of all unknowns of the held-out shifts."""
+    names = before.point.names
+    known = [k for k in range(len(names)) if k not in unseen]
+    spread = np.zeros((len(known), len(known)))
+    both = [i for i, k in enumerate(known) if names[k] in fit.point.names]
+    place = [fit.point.names.index(names[known[i]]) for i in both]
+    spread[np.ix_(both, both)] = fit.covariance[np.ix_(place, place)]
+    for i, k in enumerate(known):
+        if i not in both:
+            spread[i, i] = _inverse(float(problem.prior.precision[k, k]))
+    root = root_of(spread)
+    whole = np.zeros((len(names), len(known) + len(unseen)))
+    whole[known, : len(known)] = root
+    whole[unseen, : len(known)] = before.along @ root
+    whole[unseen, len(known) :] = root_of(before.own)
+    return whole
+
+
+def _inverse(precision: float) -> float:
+    """Return the variance of a prior alone; 0 without one, which fixes the value."""
+    return 1.0 / precision if precision > 0.0 else 0.0
+
+
+def _bounds(
+    part: Part, point: Point, moved: FloatArray, rng: np.random.Generator
+) -> dict[str, Bound]:
+    """Compute the error of each output over draws; empty if the shift cannot be simulated."""
+    part = part.weighted_by(point)
+    linear, run, path = part.linearised(point), part.run(point), part.weighting.path
+    if linear is None or run is None or path is None:
+        return {}
+    columns, response = linear[1] @ moved, part.response(point, run)
+    rms: dict[str, list[float]] = {out.name: [] for out in part.record.outputs}
+    for _ in range(PREDICTION.draws):
+        noise = {name: np.sqrt(p) * rng.standard_normal(p.size) for name, p in path.power.items()}
+        error = part.seen(point, response.to(noise)) + columns @ rng.standard_normal(
+            columns.shape[1]
+        )
+        error = error + part.record.sigma * rng.standard_normal(error.size)
+        first = 0
+        for out in part.record.outputs:
+            piece = error[first : first + out.values.size]
+            first += out.values.size
+            rms[out.name].append(float(np.sqrt(np.mean(piece**2))))
+    return {
+        name: Bound(float(np.median(one)), float(np.quantile(one, PREDICTION.upper_quantile)))
+        for name, one in rms.items()
+    }

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: MIT
+"""Weighted least squares of the paper: weights from the plausible range of each sample's quotient.
+
+The paper does not say how it differentiates speeds. Here signals are averaged over windows of 10 ms
+and speeds differenced centrally between the neighbouring windows (THEORY section 4). The method is
+kept as the reference; section 5 and the modulating functions show how to do without a derivative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray, Span
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.data.shift_data import Sampled
+
+WINDOW = 0.01
+"""Averaging window of speeds and torques in the paper's procedure [s]."""
+
+
+@dataclass(frozen=True)
+class GridRow:
+    """One row of the paper's Table 1: grid value, inertia [kg m^2], RMS error [N m]."""
+
+    value: float
+    inertia: float
+    rmse: float
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """Plausible inertia range [kg m^2]; samples inside it weigh 1, others `outside`."""
+
+    low: float
+    high: float
+    outside: float = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class GridFit:
+    """A grid search by weighted least squares.
+
+    `rows` as tabulated, `best` the row of least RMS error. `acceleration` (n,) [rad/s^2] and
+    `torque` (n,) [N m] are the scatter at the best grid value, `torque_start` (n,) that at the
+    first grid value (the paper's comparison), `weights` (n,) those of the best row.
+    """
+
+    rows: tuple[GridRow, ...]
+    best: GridRow
+    acceleration: FloatArray
+    torque: FloatArray
+    torque_start: FloatArray
+    weights: FloatArray
+
+
+def window_means(signal: Sampled, edges: FloatArray) -> FloatArray:
+    """Mean of the samples in each half-open window between `edges` (m+1,); shape (m,).
+
+    A window without a sample takes the value interpolated at its start, NaN inside a gap.
+    """
+    index = np.searchsorted(edges, signal.time + 1e-9, side="right") - 1
+    inside = (index >= 0) & (index < edges.size - 1)
+    count = np.bincount(index[inside], minlength=edges.size - 1)
+    total = np.bincount(index[inside], weights=signal.values[inside], minlength=edges.size - 1)
+    return np.where(count > 0, total / np.maximum(count, 1), signal.at(edges[:-1]))
+
+
+def whole(*columns: FloatArray) -> tuple[FloatArray, ...]:
+    """The columns (n,) without the rows in which one of them is NaN; shape (m,) each.
+
+    Raises IdentificationError where fewer than three rows remain.
+    """
+    known = np.isfinite(np.vstack(columns)).all(axis=0)
+    if np.count_nonzero(known) < 3:
+        raise IdentificationError(
+            "the signals share next to no time of the held gear: their gaps cover it",
+            "record the shift again, or map another sensor to the channel that drops out",
+        )
+    return tuple(column[known] for column in columns)
+
+
+def window_edges(span: Span, width: float = WINDOW) -> FloatArray:
+    """Edges of the averaging windows that fit into `span` [s].
+
+    Raises IdentificationError where fewer than five windows fit.
+    """
+    count = int((span[1] - span[0]) / width + 1e-6)
+    if count < 5:
+        raise IdentificationError(
+            f"only {span[1] - span[0]:.3f} s of held gear: a slope over {width:g} s windows "
+            "cannot be formed",
+            "start the recording earlier before the shift, or stop it later",
+        )
+    return np.asarray(span[0] + width * np.arange(count + 1), dtype=float)
+
+
+def central_difference(values: FloatArray, width: float = WINDOW) -> FloatArray:
+    """Slope of window means (n,) from the neighbours of each inner window; shape (n-2,)."""
+    return (values[2:] - values[:-2]) / (2.0 * width)
+
+
+def weighted_inertia(
+    torque: FloatArray, acceleration: FloatArray, weighting: Weighting, scale: float = 1.0
+) -> tuple[float, FloatArray]:
+    """Slope J of torque = J·acceleration by weighted least squares, and the weights (n,).
+
+    `scale`·torque/acceleration of a sample is compared with the range of `weighting`.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        quotient = scale * torque / acceleration
+    plausible = (quotient >= weighting.low) & (quotient <= weighting.high)
+    weights = np.where(plausible, 1.0, weighting.outside)
+    normal = float(weights @ acceleration**2)
+    if normal == 0.0:
+        raise IdentificationError(
+            "the speed is constant throughout the held gear, so no inertia shows",
+            "record a run in which the vehicle accelerates in gear",
+        )
+    return float(weights @ (acceleration * torque)) / normal, weights

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Errors-in-variables regression and modulating functions."""

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""Values of a result: estimates, verdicts, friction curves, load law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.parameters import spec_of
+from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck
+
+FloatArray = NDArray[np.float64]
+
+
+OF_RATIO = ", μ over η"
+"""What follows the method in words of a curve that is μ/η."""
+
+
+Z95 = 1.959963984540054
+"""Half width of a 95 % interval in standard deviations, of a normal distribution."""
+
+
+class Verdict(StrEnum):
+    """What may be concluded about a parameter; DESIGN: the value is the card's, not the log's."""
+
+    IDENTIFIED = "identified"
+    WEAK = "weak"
+    NOT_IDENTIFIABLE = "not identifiable"
+    DESIGN = "design value"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter's value and uncertainty, SI.
+
+    `std_noise` comes from the sensors' noise; `std_systematic` from the tolerances on the card, of
+    gain, offset and age, and from rows of the log that show values late. `value` is None exactly
+    when the verdict is `not identifiable`. `reason` says why a verdict is not `identified` and what
+    to record.
+    """
+
+    id: str
+    value: float | None
+    std_noise: float | None
+    verdict: Verdict
+    method: str
+    std_systematic: float | None = None
+    reason: str = ""
+
+    @property
+    def unit(self) -> str:
+        """SI unit from the parameter table."""
+        return spec_of(self.id).unit
+
+    @property
+    def std_total(self) -> float | None:
+        """Noise and systematic part together; None if the noise part is unknown."""
+        if self.std_noise is None:
+            return None
+        return float(np.hypot(self.std_noise, self.std_systematic or 0.0))
+
+    def _interval(self, std: float | None) -> tuple[float, float] | None:
+        if self.value is None or std is None:
+            return None
+        return (self.value - Z95 * std, self.value + Z95 * std)
+
+    @property
+    def ci95(self) -> tuple[float, float] | None:
+        """95 % interval from noise alone."""
+        return self._interval(self.std_noise)
+
+    @property
+    def ci95_total(self) -> tuple[float, float] | None:
+        """95 % interval with sensor tolerances included; the one to show first."""
+        return self._interval(self.std_total)
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionCurve:
+    """μ over |slip| of one element, over the slip range seen; arrays (n,), slip in rad/s.
+
+    `mu_lo`, `mu_hi` bound the 95 % band (total). `points_slip`, `points_mu` are the raw points
+    behind it. `stribeck` is the fitted law, or None; `stribeck_covariance` (4, 4) is over its
+    fields, from noise. `over_eta` marks a curve that is μ/η: no output torque gave μ its scale.
+    """
+
+    slip: FloatArray
+    mu: FloatArray
+    mu_lo: FloatArray
+    mu_hi: FloatArray
+    points_slip: FloatArray
+    points_mu: FloatArray
+    stribeck: Stribeck | None
+    method: str
+    stribeck_covariance: FloatArray | None = None
+    over_eta: bool = False
+
+    @property
+    def method_text(self) -> str:
+        """The method as files and the report name it: with what the curve is over."""
+        return self.method + OF_RATIO if self.over_eta else self.method
+
+    @property
+    def symbol(self) -> str:
+        """What the curve is, in a formula."""
+        return "μ/η" if self.over_eta else "μ"
+
+    def times(self, eta: float, std: float = 0.0) -> FrictionCurve:
+        """μ of a curve that is μ/η, from η and its standard deviation, which widens the band."""
+        mu, law = eta * self.mu, self.stribeck
+        ends = (self.mu_lo, self.mu_hi)
+        below, above = (np.hypot(eta * (end - self.mu), Z95 * std * self.mu) for end in ends)
+        scale = np.array([eta, eta, 1.0, eta])
+        covariance = self.stribeck_covariance
+        if law is not None and covariance is not None:
+            by_eta = np.array([law.mu_c, law.mu_s, 0.0, law.mu_v])
+            covariance = np.outer(scale, scale) * covariance + std**2 * np.outer(by_eta, by_eta)
+        return replace(
+            self,
+            mu=mu,
+            mu_lo=mu - below,
+            mu_hi=mu + above,
+            points_mu=eta * self.points_mu,
+            stribeck=law and Stribeck(eta * law.mu_c, eta * law.mu_s, law.v_s, eta * law.mu_v),
+            stribeck_covariance=covariance,
+            over_eta=False,
+        )
+
+
+@dataclass(frozen=True)
+class LoadLaw:
+    """How the load torque at the wheel grows with the wheel's speed ω:
+
+        T_v(ω) = i_f·(T_v/i_f) + aero·(ω·|ω| - mean_speed²)
+
+    `aero` [N m s^2/rad^2] with its standard deviation (total); T_v/i_f, a parameter of its own,
+    holds at `mean_speed` [rad/s], the wheel's mean over the fit. `over_eta` marks a log without an
+    output torque: `aero` is then divided by η, as T_v/i_f is.
+    """
+
+    aero: float
+    std: float
+    mean_speed: float
+    over_eta: bool = False
+
+    def times(self, eta: float, std: float = 0.0) -> LoadLaw:
+        """The law of a log without an output torque, from η and its standard deviation."""
+        spread = float(np.hypot(eta * self.std, std * self.aero))
+        return replace(self, aero=eta * self.aero, std=spread, over_eta=False)
+
+    def road_load(self, Tv_over_if: float, i_f: float) -> RoadLoad:
+        """The same law in the model's terms."""
+        constant = i_f * Tv_over_if - self.aero * self.mean_speed**2
+        return RoadLoad(constant=constant, aero=self.aero)
+
+
+@dataclass(frozen=True)
+class SignalFit:
+    """Agreement of simulation and measurement in one phase of one signal (THEORY section 4)."""
+
+    rmse: float
+    fit_percent: float

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Estimates of one identification, shared by all methods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import in_units
+from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw
+from drivetwin.shifts.shift import shift_labels
+
+
+@dataclass(frozen=True, eq=False)
+class Conclusions:
+    """What the pipeline puts into the Identification.
+
+    `loads` are those of the shifts at the output shaft [N m] where they differ; else empty.
+    """
+
+    estimates: dict[str, Estimate]
+    friction: dict[str, FrictionCurve]
+    correlation_ids: tuple[str, ...]
+    correlation: FloatArray
+    warnings: tuple[str, ...]
+    load: LoadLaw | None = None
+    loads: tuple[float, ...] = ()
+
+
+def _low_gear_note(signals: ShiftSignals, gear: str) -> str:
+    """What to say where the engine torque stands still in the lower gear; empty otherwise."""
+    torque = signals.engine_torque.within(signals.shift.before).values
+    moving, level = float(np.std(torque)), abs(float(np.mean(torque)))
+    if moving > 0.03 * level:
+        return ""
+    return (
+        f"gear {gear} alone determines η and J′ poorly: the engine torque moves by "
+        f"{100 * moving / max(level, 1e-9):.1f} % only while it is held, which cannot tell η from "
+        "J′; the values rest on the inertia phase of the shift"
+    )
+
+
+def growth_told(aero: float, std: float, mean_speed: float) -> str:
+    """What is said of a load that grows with speed, by AERO and its standard deviation."""
+    return (
+        "the load grows with the square of the speed "
+        f"({in_units(aero, 'N*m*s^2/rad^2', Z95 * std)} at the wheel); "
+        f"T_v/i_f holds at {mean_speed:.3g} rad/s of the wheel"
+    )
+
+
+def labels_of(signals: Sequence[ShiftSignals]) -> list[str]:
+    """What the shifts are called: by gears, and by lock-up where a log has the same shift twice."""
+    labels: list[str] = []
+    for log, group in groupby(signals, key=lambda one: one.log):
+        names = shift_labels([one.shift for one in group], to="-")
+        labels += [f"log {log}, shift {name}" if log else f"shift {name}" for name in names]
+    return labels
+
+
+def low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
+    """By parameter id what a still engine torque in the lower gear costs it.
+
+    A gear in which the torque moves before any of the shifts is told by that one.
+    """
+    notes: dict[str, str] = {}
+    found = [(s, _low_gear_note(s, s.shift.start_gear)) for s in signals]
+    moved = {s.shift.start_gear for s, note in found if not note}
+    for s, note in found:
+        if note and s.shift.start_gear not in moved:
+            notes |= {"eta": note}
+            notes |= {f"J_prime_{g}": note for g in (s.shift.start_gear, s.shift.end_gear)}
+    return notes
+
+
+def with_systematic_band(curve: FrictionCurve, std: FloatArray) -> FrictionCurve:
+    """`curve` with its band widened by the sensors' systematic errors `std` (n,) of μ."""
+    noise = (curve.mu_hi - curve.mu_lo) / (2.0 * Z95)
+    half = Z95 * np.hypot(noise, std)
+    return replace(curve, mu_lo=curve.mu - half, mu_hi=curve.mu + half)

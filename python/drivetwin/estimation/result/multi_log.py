@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""Values of a joint identification of several logs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from drivetwin.estimation.result.estimate import Estimate, SignalFit
+from drivetwin.shifts.shift import Shift
+
+
+@dataclass(frozen=True)
+class LogShare:
+    """One log of a fit of several: `number` from 1, as in parameter ids such as `te_delay.1`.
+
+    `alone` are the estimates from the log by itself, by parameter id without the number. T_v/i_f of
+    the log holds at `mean_speed` of the wheel [rad/s].
+    """
+
+    number: int
+    source: str
+    sha256: str
+    shifts: tuple[Shift, ...]
+    alone: Mapping[str, Estimate]
+    mean_speed: float
+    fit: Mapping[str, Mapping[str, SignalFit]] = field(default_factory=dict)
+    """Agreement of the common model with this log, by signal and phase; empty until simulated."""
+
+
+@dataclass(frozen=True)
+class Several:
+    """The logs of a fit of several, and whether they agree on what they share."""
+
+    logs: tuple[LogShare, ...]
+    consistency: Consistency
+
+
+SIGNIFICANT = 0.01
+"""Probability of χ² under agreeing logs below which they are said to disagree."""
+
+
+FAR = 3.0
+"""Move of a parameter without one log, in standard deviations of it, from which it is named."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """Discrepancy between one log and the others on a parameter, in its standard deviations."""
+
+    parameter: str
+    log: int
+    z: float
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """Homogeneity of the logs: χ² on `freedom` degrees, `p` its probability if they agree.
+
+    `moves` has the largest move of every shared parameter, by id; `mu.<element>` stands for the
+    friction in the middle of the slip range seen. A log that does not tell one moves it by 0.
+    """
+
+    chi2: float
+    freedom: int
+    p: float
+    moves: tuple[Move, ...]
+
+    @property
+    def agree(self) -> bool:
+        """True if the logs are consistent with one vehicle in one state."""
+        return self.p >= SIGNIFICANT
+
+    @property
+    def doubtful(self) -> dict[str, Move]:
+        """Parameters on which the logs disagree; empty if they agree."""
+        far = {one.parameter: one for one in self.moves if abs(one.z) > FAR}
+        return {} if self.agree else far
+
+    @property
+    def text(self) -> str:
+        """Outcome as a sentence."""
+        figures = f"χ² {self.chi2:.1f} on {self.freedom}, p = {self.p:.2g}"
+        if self.agree:
+            return f"the logs agree on what they share ({figures})"
+        far = sorted(self.doubtful.values(), key=lambda one: -abs(one.z))
+        named = ", ".join(f"{one.parameter} (log {one.log}, {one.z:+.1f} σ)" for one in far)
+        tail = f"; most apart: {named}" if named else ""
+        return f"the logs do not agree on what they share ({figures}){tail}"

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: MIT
+"""Design values and ranges of the card, held against what the log tells.
+
+A design value is one measurement more. Where the log speaks against it the estimate lies between
+the two and may be neither: that is told, and what rests on it does not count as identified. A
+design range binds no estimate; one outside it is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import in_units
+from drivetwin.estimation.data.shift_data import Driveline
+from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
+from drivetwin.estimation.result.prior_update import CONTRADICTS, without_prior
+from drivetwin.estimation.result.verdict import doubted
+from drivetwin.parameters import OVER_ETA, spec_of
+from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+
+def design_of(name: str, driveline: Driveline) -> PriorValue | None:
+    """The card's Jo′, or P0 or drum of an element in the shift, by id; None for others."""
+    if name == "J_out":
+        return driveline.J_out
+    stem, _, element = name.partition(".")
+    coupling = driveline.couplings.get(element)
+    return None if coupling is None else {"P0": coupling.P0, "drum": coupling.drum}.get(stem)
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """A design value of parameter `id` that the log speaks against.
+
+    `log` is what it tells without it, `apart` the difference in standard deviations, `without` by
+    id what every parameter would be; empty where the log is too weak for that.
+    """
+
+    id: str
+    design: PriorValue
+    log: PriorValue
+    apart: float
+    without: Mapping[str, float]
+
+    @property
+    def text(self) -> str:
+        """The same in words."""
+        unit = spec_of(self.id).unit
+        card, log = (in_units(one.value, unit, one.std) for one in (self.design, self.log))
+        return (
+            f"{self.id}: the vehicle card says {card}, the log {log} (1 sigma), "
+            f"{self.apart:.1f} standard deviations apart: correct the card, or find what the "
+            "model or a sensor lacks"
+        )
+
+
+def contradictions(
+    ids: Sequence[str],
+    values: FloatArray,
+    covariance: FloatArray,
+    designs: Mapping[str, PriorValue],
+    systematic: Mapping[str, float],
+) -> tuple[Contradiction, ...]:
+    """The `designs` by id that the estimates `values` (q,) with `covariance` (q, q) contradict.
+
+    Each takes part in the estimates; `systematic` are the standard deviations of these from the
+    sensors' tolerances. Exact design values contradict nothing here.
+    """
+    found = []
+    for name, design in designs.items():
+        k, sensors = ids.index(name), systematic.get(name, 0.0)
+        moved, spec = abs(float(values[k]) - design.value), spec_of(name)
+        if design.std == 0.0 or not spec.lower <= values[k] <= spec.upper:
+            continue
+        if moved <= design.std:  # no further off than the card allows, however sure the log is
+            continue
+        freed = without_prior(values, covariance, k, design)
+        log = PriorValue(float(values[k]), float(np.sqrt(covariance[k, k])))
+        without: dict[str, float] = {}
+        spread = float(np.hypot(design.std, sensors))
+        if freed is not None:
+            log = PriorValue(float(freed[0][k]), float(np.sqrt(freed[1][k, k])))
+            without = dict(zip(ids, freed[0].tolist(), strict=True))
+            alone = sensors * abs(log.value - design.value) / moved
+            spread = float(np.linalg.norm([design.std, log.std, alone]))
+        apart = abs(log.value - design.value) / spread
+        if apart > CONTRADICTS:
+            found.append(Contradiction(name, design, log, apart, without))
+    return tuple(found)
+
+
+def held_against(
+    estimates: Mapping[str, Estimate], found: Sequence[Contradiction], method: str
+) -> dict[str, Estimate]:
+    """The estimates, none of them identified that a contradicted design value decides.
+
+    Such are its own, by `method`, and those that would leave their interval without it.
+    """
+    told = dict(estimates)
+    for one in found:
+        told[one.id] = replace(
+            told[one.id], verdict=Verdict.WEAK, method=method, reason="the log contradicts the card"
+        )
+        for name, free in one.without.items():
+            other = told[name]
+            if name == one.id or other.value is None or other.std_total is None:
+                continue
+            if abs(free - other.value) > Z95 * other.std_total:
+                value = in_units(free, other.unit, digits=5)
+                why = f"without the card's {one.id} the log gives {value}"
+                told[name] = doubted(other, why)
+    return told
+
+
+def outside_ranges(estimates: Mapping[str, Estimate], card: VehicleCard) -> tuple[str, ...]:
+    """What is said of inertias whose whole interval lies outside the card's design range."""
+    ranges = {"J_prime": card.J_prime_range, "J_vehicle": card.J_vehicle_range}
+    texts = []
+    for name, one in estimates.items():
+        design = None if name.endswith(OVER_ETA) else ranges.get(spec_of(name).stem)
+        if design is None or one.value is None or one.verdict is Verdict.DESIGN:
+            continue
+        low, high = one.ci95_total or (one.value, one.value)
+        if high < design[0] or low > design[1]:
+            text = outside(name, one.value, design)
+            texts.append(f"{text}: correct the range, or check ratios, gains and units of the log")
+    return tuple(texts)
+
+
+def without_gain(
+    estimates: Mapping[str, Estimate], law: LossLaw
+) -> tuple[dict[str, Estimate], tuple[str, ...]]:
+    """The estimates, an η whose whole interval lies above 1 doubted, and what is said of it.
+
+    More power would leave the gears than enters, however well the simulation follows the log. In
+    overrun the law `paper` has such an η rightly: it is that of the power's other way.
+    """
+    one = estimates.get("eta")
+    if one is None or one.value is None or one.verdict is Verdict.DESIGN:
+        return dict(estimates), ()
+    low, _ = one.ci95_total or (one.value, one.value)
+    if low <= 1.0:
+        return dict(estimates), ()
+    text = (
+        f"η = {in_units(one.value, one.unit)}: more power would leave the gears than enters; the "
+        "engine torque, or the map of an open converter, gives too little, or the output torque "
+        "reads too much"
+    )
+    if law == "paper":
+        text += '; of a shift in overrun loss_law = "dissipative" tells η'
+    return {**estimates, "eta": doubted(one, "an efficiency above 1")}, (text,)
+
+
+def outside(symbol: str, value: float, design: tuple[float, float]) -> str:
+    """What is said of an inertia [kg m^2] outside its design range; empty where it lies within."""
+    if design[0] <= value <= design[1]:
+        return ""
+    return (
+        f"{symbol} = {in_units(value, 'kg*m^2')} lies outside its design range "
+        f"{design[0]:g} to {design[1]:g} kg·m²"
+    )

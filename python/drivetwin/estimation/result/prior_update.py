@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""What is known of a parameter beforehand, brought into a linear estimate or taken out of one.
+
+The estimates and their covariance are a normal distribution; a known value ± σ is one more
+measurement of one of them, σ = 0 an exact one. The others follow by their correlation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.vehicle.spec import PriorValue
+
+CONTRADICTS = 3.0
+"""Difference of log and known value in its standard deviations from which a warning is due."""
+LEAST = 0.02
+"""Share of the information on a parameter below which nothing of it is the log's own."""
+
+
+def with_known(
+    ids: Sequence[str],
+    values: FloatArray,
+    covariance: FloatArray,
+    known: Mapping[str, PriorValue],
+) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
+    """Values (q,) and covariance (q, q) with the known ones brought in, and which of those that are
+    known exactly the log contradicts; of the others design.py tells.
+
+    Known values of parameters that are not among `ids` change nothing.
+    """
+    values, covariance = values.copy(), covariance.copy()
+    warnings: list[str] = []
+    for name, prior in known.items():
+        if name not in ids:
+            continue
+        k = ids.index(name)
+        column, spread = covariance[:, k].copy(), covariance[k, k] + prior.std**2
+        if spread <= 0.0:
+            continue
+        miss = prior.value - values[k]
+        if prior.std == 0.0 and abs(miss) > CONTRADICTS * np.sqrt(spread):
+            warnings.append(
+                f"{name}: known beforehand as {prior.value:.4g}, the log tells {values[k]:.4g}; "
+                "the noise does not explain the difference"
+            )
+        values = values + column * (miss / spread)
+        covariance -= np.outer(column, column) / spread
+        covariance[np.diag_indices_from(covariance)] = np.maximum(np.diag(covariance), 0.0)
+    return values, covariance, tuple(warnings)
+
+
+def without_prior(
+    values: FloatArray, covariance: FloatArray, k: int, prior: PriorValue
+) -> tuple[FloatArray, FloatArray] | None:
+    """Values (q,) and covariance (q, q) with the normal `prior` of number k taken out.
+
+    None where the prior is exact or what is left would be next to nothing.
+    """
+    column, variance = covariance[:, k], float(covariance[k, k])
+    if prior.std <= 0.0 or not np.isfinite(covariance).all() or variance <= 0.0:
+        return None
+    left = prior.std**2 - variance
+    if left < LEAST * prior.std**2:
+        return None
+    freed = covariance + np.outer(column, column) / left
+    return values + column * ((values[k] - prior.value) / left), freed

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""Values of an experiment ranking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivetwin.estimation.result.estimate import Verdict
+
+NARROWER = 0.9
+"""Share of the present interval to which an experiment must narrow it to be worth recording."""
+
+
+NONE_HELPS = "none of the known experiments narrows it by a tenth or more"
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """Precision expected from an experiment: half width of the 95 % interval of a parameter, SI.
+
+    `shift` says by its gears on which shift of the log the experiment is built; empty where the log
+    has shifts between the same gears only.
+    """
+
+    experiment: Experiment
+    repeats: int
+    half_width: float
+    verdict: Verdict
+    shift: str = ""
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """Experiments for one parameter, in order of worth, helpful or not.
+
+    `half_width` is that of the present 95 % interval (noise and sensors), infinite without one.
+    `limit` names what no experiment mends; empty where there is no such thing.
+    """
+
+    parameter: str
+    verdict: Verdict
+    half_width: float
+    prospects: tuple[Prospect, ...]
+    limit: str = ""
+
+    @property
+    def best(self) -> Prospect | None:
+        """First experiment that narrows the interval to `NARROWER` of its present width or less."""
+        for one in self.prospects:
+            told = one.verdict is not Verdict.NOT_IDENTIFIABLE
+            if told and one.half_width <= NARROWER * self.half_width:
+                return one
+        return None
+
+    @property
+    def text(self) -> str:
+        """Suggestion as a sentence, without units (those of the parameter)."""
+        best = self.best
+        if best is None:
+            return self.limit or NONE_HELPS
+        of = f" (shift {best.shift})" if best.shift else ""
+        times = "" if best.repeats == 1 else f", {best.repeats} times"
+        return f"{best.experiment}{of}{times}"
+
+
+TORQUE_LEVEL = 0.6
+"""Second torque level of a shift, in shares of the first."""
+
+
+FIRMER, SOFTER = 1.3, 0.85
+"""Pressures above P0 of the on-coming element, in shares of those of the log."""
+
+
+class Experiment(StrEnum):
+    """Kinds of recordings that can follow a log."""
+
+    AGAIN = "the same shift again"
+    THROTTLE_STEPS = "throttle steps in the lower gear"
+    TORQUE_LEVEL = "a shift at 60 % of the engine torque"
+    COAST_DOWN = "a coast-down of 6 s in gear"
+    FIRMER = "the shift with 30 % more pressure"
+    SOFTER = "the shift with 15 % less pressure, so that it slips longer"
+    STILL_PEDAL = "the shift with the engine torque held still after lock-up"

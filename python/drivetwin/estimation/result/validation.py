@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Values of a validation: simulated and measured signals, held-out logs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from drivetwin._util.rich_display import Shown
+from drivetwin.estimation.result.estimate import Estimate, FloatArray, SignalFit
+from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class SignalTrace:
+    """One compared signal on its own measured time base; arrays (n,), SI."""
+
+    time: FloatArray
+    measured: FloatArray
+    simulated: FloatArray
+    log_mean: float
+    """Mean of the measurement over the whole log, the reference of fit %."""
+
+
+@dataclass(frozen=True, eq=False)
+class Validation(Shown):
+    """One shift simulated from its measured inputs.
+
+    `phases` maps `before`, `torque`, `inertia`, `after` to their intervals [s]; `fit` is by signal
+    and phase, with `all` for the whole window. `status` is the simulation's.
+    """
+
+    shift: Shift
+    model: DualClutch
+    phases: Mapping[str, tuple[float, float]]
+    engine_torque: Signal
+    pressures: Mapping[str, Signal]
+    trajectory: Trajectory
+    traces: Mapping[str, SignalTrace]
+    fit: Mapping[str, Mapping[str, SignalFit]]
+    status: str
+    warnings: tuple[str, ...]
+
+
+ALLOWED = 1.1
+"""Error over the bound of the draws from which a prediction is worse than its noise allows: the
+noise levels are estimates themselves, and an effect of a tenth of the noise is none."""
+
+
+class Outcome(StrEnum):
+    """What may be said of a prediction."""
+
+    ALLOWED = "as noise allows"
+    WORSE = "worse than noise"
+    NOT_JUDGED = "not judged"
+    NOT_PREDICTED = "not predicted"
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """One shift that was predicted.
+
+    `own` are the estimates of what its log has of its own, where the fit has not seen the log;
+    `bounds` go by compared signal, empty where no likelihood gave them. `validation` is None where
+    the shift could not be predicted; `notes` say why, and what stood in for what the fit lacks.
+    """
+
+    source: str
+    shift: Shift
+    validation: Validation | None
+    own: Mapping[str, Estimate] = field(default_factory=dict)
+    bounds: Mapping[str, Bound] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def outcome_of(self, signal: str) -> Outcome:
+        """Verdict on one compared signal."""
+        if self.validation is None or self.validation.status != "completed":
+            return Outcome.NOT_PREDICTED
+        if signal not in self.bounds:
+            return Outcome.NOT_JUDGED
+        rmse = self.validation.fit[signal]["all"].rmse
+        return Outcome.ALLOWED if rmse <= ALLOWED * self.bounds[signal].largest else Outcome.WORSE
+
+    @property
+    def outcome(self) -> Outcome:
+        """The worst verdict on any signal."""
+        if self.validation is None:
+            return Outcome.NOT_PREDICTED
+        found = {self.outcome_of(signal) for signal in self.validation.fit}
+        order = (Outcome.NOT_PREDICTED, Outcome.WORSE, Outcome.NOT_JUDGED, Outcome.ALLOWED)
+        return next(one for one in order if one in found)
+
+    @property
+    def name(self) -> str:
+        """The shift and its log in words."""
+        return f"{Path(self.source).name}, shift {self.shift.start_gear}→{self.shift.end_gear}"
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Root mean square error of one compared signal that a right model has, SI.
+
+    `usual` in the median, `largest` in 97.5 % of all cases.
+    """
+
+    usual: float
+    largest: float

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: MIT
+"""From values and covariances to estimates with a verdict in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import in_units
+from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
+from drivetwin.parameters import spec_of
+from drivetwin.vehicle.spec import PriorValue
+
+DELAY_IDENTIFIED = 0.005
+"""Half width of the 95 % interval of a delay [s] below which it counts as identified."""
+PRIOR_SHARE = 0.8
+"""A posterior standard deviation above this share of the prior's says the prior decided."""
+SENSORS = 0.8
+"""Share of the total standard deviation from which the sensors' tolerances decide an interval."""
+CALIBRATE = (
+    "the sensors' tolerances, or values shown late, decide its interval: calibrate them and state "
+    "less on the card, or record each message with its own stamp"
+)
+KNOWN = "known from design, as the card says"
+ADDS_LITTLE = "design value of the card, to which the log adds little"
+SENSORS_TELL_LESS = "design value of the card; the sensors' tolerances leave the log less certain"
+
+_EXPERIMENT = {
+    "eta": "step the pedal in the lower gear: engine torque must change while the gear is held",
+    "J_prime": "step the pedal in the lower gear, or record a shift with a longer inertia phase",
+    "J_out": "state J_out on the vehicle card from design, or add a shift at another torque",
+    "J_vehicle": "let the vehicle speed up and slow down in gear, or add a coast-down",
+    "Tv_over_if": "record a longer stretch in gear, or add a coast-down",
+    "k_o": "hold the pedal still for a second after a firm lock-up",
+    "c_o": "hold the pedal still for a second after a firm lock-up",
+    "f_d": "hold the pedal still for a second after a firm lock-up",
+    "zeta": "hold the pedal still for a second after a firm lock-up",
+    "P0": "record a shift with a slower pressure ramp, or shifts at two torque levels",
+    "mu": "record shifts whose inertia phase passes the slip asked for",
+    "drum": "state the drum inertias on the vehicle card more narrowly, from design",
+    "te_delay": "step the pedal in gear: a constant torque has no visible age",
+}
+
+
+def experiment_for(parameter_id: str) -> str:
+    """What to record so that a parameter becomes known better."""
+    return _EXPERIMENT[spec_of(parameter_id).stem]
+
+
+def sensors_decide(std_noise: float, std_systematic: float | None) -> bool:
+    """Whether an interval comes from the sensors' tolerances, so that no experiment narrows it."""
+    systematic = std_systematic or 0.0
+    return systematic > SENSORS * float(np.hypot(std_noise, systematic))
+
+
+def advice_for(parameter_id: str, std_noise: float, std_systematic: float | None) -> str:
+    """What would narrow the interval of a parameter: an experiment, or better sensors."""
+    if sensors_decide(std_noise, std_systematic):
+        return CALIBRATE
+    return experiment_for(parameter_id)
+
+
+def judge(
+    parameter_id: str,
+    value: float,
+    std_noise: float,
+    method: str,
+    std_systematic: float | None = None,
+    note: str = "",
+) -> Estimate:
+    """Estimate with its verdict from the width of the total 95 % interval.
+
+    Up to `weak_above` of the value: identified; up to the value itself: weak; wider, or a value
+    outside the parameter's bounds: not identifiable, and no value is given. Delays are judged by
+    absolute width, since zero is a sound value for them.
+    """
+    spec = spec_of(parameter_id)
+    half = Z95 * float(np.hypot(std_noise, std_systematic or 0.0))
+    if spec.stem == "te_delay":
+        width, limit, end = half, DELAY_IDENTIFIED, 4.0 * DELAY_IDENTIFIED
+    else:
+        width, limit, end = half / max(abs(value), 1e-300), spec.weak_above, 1.0
+    inside = spec.lower <= value <= spec.upper
+    advice = advice_for(parameter_id, std_noise, std_systematic)
+    if not np.isfinite(width) or width > end or not inside:
+        shown = f"the 95 % interval {in_units(value, spec.unit, half)} says nothing"
+        return Estimate(
+            parameter_id,
+            None,
+            None,
+            Verdict.NOT_IDENTIFIABLE,
+            method,
+            reason=f"{shown}; {advice}",
+        )
+    if width > limit:
+        reason = f"the 95 % interval is ± {in_units(half, spec.unit, digits=2)}; {advice}"
+        verdict = Verdict.WEAK
+    else:
+        reason, verdict = "", Verdict.IDENTIFIED
+    text = "; ".join(part for part in (note, reason) if part)
+    return Estimate(parameter_id, value, std_noise, verdict, method, std_systematic, text)
+
+
+def judge_with_design(
+    told: tuple[str, float, float],
+    design: PriorValue,
+    method: str,
+    std_systematic: float | None = None,
+    note: str = "",
+) -> Estimate:
+    """Estimate of (id, value, standard deviation from noise) in which its own design value took
+    part, with its verdict.
+
+    The card's where the log adds little. Never withheld for its width: without the log there would
+    be the card's value, which is known less.
+    """
+    name, value, std = told
+    if design.std == 0.0:
+        return designed(name, value, 0.0, KNOWN)
+    if std >= PRIOR_SHARE * design.std:
+        return designed(name, value, std, ADDS_LITTLE, std_systematic)
+    one, spec = judge(name, value, std, method, std_systematic, note), spec_of(name)
+    if one.value is not None or not spec.lower <= value <= spec.upper:
+        return one
+    half = Z95 * float(np.hypot(std, std_systematic or 0.0))
+    width = in_units(half, spec.unit, digits=2)
+    wide = f"the 95 % interval is ± {width}, with the card's design value in it"
+    text = "; ".join(part for part in (note, wide, advice_for(name, std, std_systematic)) if part)
+    return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, text)
+
+
+def designed(
+    parameter_id: str, value: float, std: float, note: str, std_systematic: float | None = None
+) -> Estimate:
+    """A value that the vehicle card states and the log adds little to; `std` 0: known.
+
+    What the log adds is as wrong as its sensors: `std_systematic`, where their tolerances are
+    stated.
+    """
+    return Estimate(parameter_id, value, std, Verdict.DESIGN, "card", std_systematic, note)
+
+
+def refused(parameter_id: str, method: str, why: str) -> Estimate:
+    """A parameter that the log cannot tell, with the reason and the experiment that would."""
+    reason = f"{why}; {experiment_for(parameter_id)}"
+    return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
+
+
+def doubted(one: Estimate, why: str) -> Estimate:
+    """The estimate with what speaks against it: however narrow, it is not identified.
+
+    One that is refused, or the card's, stays as it is.
+    """
+    if one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
+        return one
+    reason = "; ".join(part for part in (why, one.reason) if part)
+    return replace(one, verdict=Verdict.WEAK, reason=reason)
+
+
+def propagate(
+    function: Callable[[FloatArray], FloatArray], mean: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Values (q,) of `function` at `mean` (p,) and their covariance (q, q), to first order.
+
+    Derivatives are central differences over a hundredth of a standard deviation.
+    """
+    std = np.sqrt(np.diag(covariance))
+    columns = []
+    for k, step in enumerate(0.01 * std):
+        shift = np.zeros_like(mean)
+        shift[k] = max(step, 1e-9 * abs(mean[k]), 1e-300)
+        columns.append((function(mean + shift) - function(mean - shift)) / (2.0 * shift[k]))
+    slopes = np.column_stack(columns)
+    return function(mean), slopes @ covariance @ slopes.T
+
+
+def independent(*blocks: FloatArray) -> FloatArray:
+    """Covariance of estimates whose errors are independent between the blocks."""
+    return np.asarray(block_diag(*blocks), dtype=float)
+
+
+def root_of(covariance: FloatArray) -> FloatArray:
+    """L (p, p) with L·Lᵀ the covariance, formed on its correlation; what has no spread has none."""
+    scale = np.sqrt(np.diag(covariance))
+    divisor = np.where(scale > 0.0, scale, 1.0)
+    power, directions = np.linalg.eigh(covariance / np.outer(divisor, divisor))
+    return np.asarray(scale[:, None] * directions * np.sqrt(np.maximum(power, 0.0)))
+
+
+def correlation(covariance: FloatArray) -> FloatArray:
+    """Correlation matrix; a parameter without uncertainty correlates with nothing."""
+    std = np.sqrt(np.diag(covariance))
+    scale = np.where(std > 0.0, std, np.inf)
+    matrix = covariance / np.outer(scale, scale)
+    matrix[np.diag_indices_from(matrix)] = 1.0
+    return np.asarray(np.clip(matrix, -1.0, 1.0), dtype=float)

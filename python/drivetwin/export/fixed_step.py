@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""Runs as a fixed-step importer sees them: inputs known at its communication points only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import InputError
+from drivetwin.estimation.result.validation import Validation
+from drivetwin.simulation.dual_clutch import (
+    Accuracy,
+    DualClutch,
+    FloatArray,
+    Signal,
+    State,
+    Trajectory,
+    simulate,
+)
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import compared
+
+DEFAULT_STEP = 1e-3
+"""Communication step [s] where nobody asks for another: the rate of pressure signals."""
+
+
+class InputKind(StrEnum):
+    """What inputs do between two communication points."""
+
+    LINEAR = "linear"
+    HOLD = "hold"
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """Communication step [s] and the inputs between its points."""
+
+    step: float
+    kind: InputKind = InputKind.LINEAR
+
+    def grid(self, start: float, end: float) -> FloatArray:
+        """Communication points from `start` as far as whole steps reach. Raises InputError."""
+        if not 1e-5 <= self.step <= 0.1:
+            raise InputError(f"a step of {self.step:g} s", "choose one from 1e-5 s to 0.1 s")
+        count = int((end - start) / self.step + 1e-6)
+        if count < 1:
+            raise InputError(
+                f"one step of {self.step:g} s is longer than the {end - start:g} s to simulate",
+                "choose a shorter step",
+            )
+        return np.asarray(start + self.step * np.arange(count + 1), dtype=np.float64)
+
+
+def sampled(signals: Sequence[Signal], time: FloatArray) -> FloatArray:
+    """Values (n, signals) of inputs at `time` (n,) [s], linear between their own samples."""
+    columns = [np.interp(time, one.arrival, one.values) for one in signals]
+    return np.column_stack(columns)
+
+
+def stepped_run(
+    model: DualClutch, start: State, time: FloatArray, inputs: FloatArray, kind: InputKind
+) -> Trajectory:
+    """Run with `inputs` (n, 3) given at `time` (n,): engine torque, then pressures in the order of
+    the elements; integrated to round-off. Where inputs jump, torques are those from there on.
+
+    Raises InputError for an inconsistent description; a run that fails returns its status.
+    """
+    torque, *pressures = (_signal(time, column, kind) for column in inputs.T)
+    names = [element.name for element in model.elements]
+    given = dict(zip(names, pressures, strict=True))
+    return simulate(model, torque, given, start, time, accuracy=Accuracy(exact=True))
+
+
+def _signal(time: FloatArray, values: FloatArray, kind: InputKind) -> Signal:
+    if kind is InputKind.LINEAR:
+        return Signal(time, np.ascontiguousarray(values))
+    # A repeated time stamp is a jump: every value lasts until the next point.
+    return Signal(np.repeat(time, 2)[1:-1], np.repeat(values[:-1], 2))
+
+
+def stepped_inputs(shift: Validation, stepping: Stepping) -> tuple[FloatArray, FloatArray]:
+    """Communication points (n,) over the window of a shift and its measured inputs (n, 3) there."""
+    time = stepping.grid(float(shift.trajectory.time[0]), float(shift.trajectory.time[-1]))
+    pressures = (shift.pressures[element.name] for element in shift.model.elements)
+    return time, sampled((shift.engine_torque, *pressures), time)
+
+
+def start_of(shift: Validation) -> State:
+    """State that the simulation of a shift starts from."""
+    run = shift.trajectory
+    return State(
+        engine_speed=float(run.engine_speed[0]),
+        output_speed=float(run.output_speed[0]),
+        wheel_speed=float(run.wheel_speed[0]),
+        twist=float(run.twist[0]),
+        locked=(shift.shift.offgoing,),
+    )
+
+
+def stepped_again(shift: Validation, twin: Twin, log: ShiftLog, stepping: Stepping) -> Validation:
+    """A simulated shift as a fixed-step importer of the twin would have it."""
+    time, inputs = stepped_inputs(shift, stepping)
+    run = stepped_run(shift.model, start_of(shift), time, inputs, stepping.kind)
+    return compared(shift, twin, log, run)

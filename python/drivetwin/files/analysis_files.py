@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""Files of what was asked about an identification: experiments, profiles and the like; SI."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from drivetwin.estimation.analysis.bootstrap import Bootstrap
+from drivetwin.estimation.analysis.friction_dependence import UNITS, Departure
+from drivetwin.estimation.analysis.friction_shape import ShapedFriction
+from drivetwin.estimation.analysis.profile_likelihood import Profile
+from drivetwin.estimation.result.suggestion import Suggestion
+from drivetwin.files.records import FrictionRecord, SuggestionRecord
+from drivetwin.files.result_file import plain
+from drivetwin.parameters import spec_of
+
+
+def suggestions_text(found: tuple[Suggestion, ...]) -> str:
+    """`suggestions.json`: by parameter the experiments in order of worth; infinite widths null."""
+    rows = [SuggestionRecord.of(one).model_dump(mode="json") for one in found]
+    return _text({"suggestions": rows})
+
+
+def profile_text(one: Profile) -> str:
+    """`profile.<parameter>.json`: rise of Q over the parameter, and both intervals."""
+    return _text(
+        {
+            "parameter": one.parameter,
+            "unit": spec_of(one.parameter).unit,
+            "estimate": one.estimate,
+            "ci95_profile": one.interval,
+            "ci95_linear": one.linear,
+            "values": one.values,
+            "rise": one.rise,
+        }
+    )
+
+
+def bootstrap_text(one: Bootstrap) -> str:
+    """`bootstrap.json`: every refit by parameter, and its spread."""
+    low, high = one.interval
+    std, bias = one.std, one.bias
+    parameters = {
+        name: {
+            "unit": spec_of(name).unit,
+            "estimate": one.estimate[k],
+            "std": std[k],
+            "bias": bias[k],
+            "ci95": (low[k], high[k]),
+            "refits": one.values[:, k],
+        }
+        for k, name in enumerate(one.ids)
+    }
+    return _text({"seed": one.seed, "failed": one.failed, "parameters": parameters})
+
+
+def friction_text(one: ShapedFriction) -> str:
+    """`friction.json`: μ over slip of the shape asked for, by element, with its 95 % band."""
+    curves = {
+        name: FrictionRecord.of(curve).model_dump(mode="json") for name, curve in one.curves.items()
+    }
+    return _text({"shape": one.shape, "gain": one.gain, "bend": one.bend, "friction": curves})
+
+
+def departures_text(found: tuple[Departure, ...]) -> str:
+    """`departures.json`: drag of open clutches, and μ that goes with pressure or temperature."""
+    rows = [
+        {
+            "kind": one.kind,
+            "element": one.element,
+            "unit": UNITS[one.kind],
+            "value": one.value,
+            "std": one.std,
+            "plausible": one.plausible,
+            "text": one.text,
+        }
+        for one in found
+    ]
+    return _text({"departures": rows})
+
+
+def _text(content: dict[str, Any]) -> str:
+    return json.dumps(plain(content), allow_nan=False, ensure_ascii=False, indent=2) + "\n"

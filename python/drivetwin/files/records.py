@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: MIT
+"""Records shared by `result.json` and `twin.toml`: parameters, friction curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
+
+from drivetwin.estimation.result.estimate import (
+    OF_RATIO,
+    Estimate,
+    FloatArray,
+    FrictionCurve,
+    LoadLaw,
+    SignalFit,
+    Verdict,
+)
+from drivetwin.estimation.result.suggestion import Experiment, Suggestion
+from drivetwin.parameters import spec_of
+from drivetwin.simulation.dual_clutch import Stribeck
+
+
+def finite_or_none(value: object) -> object:
+    """Turn NaN and infinities into None: neither exists in JSON."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(finite_or_none)]
+Interval = tuple[FiniteFloat, FiniteFloat]
+
+
+class Record(BaseModel):
+    """Base of all records: closed key set, immutable."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class StribeckRecord(Record):
+    """μ(s) = mu_c + (mu_s - mu_c)·exp(-|s|/v_s) + mu_v·|s|; v_s in rad/s, mu_v in s/rad."""
+
+    mu_c: FiniteFloat
+    mu_s: FiniteFloat
+    v_s: FiniteFloat
+    mu_v: FiniteFloat
+
+
+class LoadRecord(Record):
+    """T_v(ω) = i_f·(T_v/i_f) + aero·(ω·|ω| - mean_speed²) at the wheel; `std` of aero, total.
+
+    aero in N·m·s²/rad², mean_speed in rad/s; `over_eta`: aero is divided by η, as T_v/i_f is.
+    """
+
+    aero: FiniteFloat
+    std: FiniteFloat
+    mean_speed: FiniteFloat
+    over_eta: bool = False
+
+    @classmethod
+    def of(cls, law: LoadLaw | None) -> LoadRecord | None:
+        """Record of a law; None where the load is constant."""
+        return None if law is None else cls(**vars(law))
+
+    def law(self) -> LoadLaw:
+        """Back to the law."""
+        return LoadLaw(**self.model_dump())
+
+
+class FrictionRecord(Record):
+    """μ over |slip| [rad/s] of one element with its 95 % band, over the slip range seen."""
+
+    slip: list[FiniteFloat]
+    mu: list[FiniteFloat]
+    mu_lo: list[OptionalFloat]
+    mu_hi: list[OptionalFloat]
+    stribeck: StribeckRecord | None = None
+    stribeck_covariance: list[list[FiniteFloat]] | None = None
+    method: str
+
+    @model_validator(mode="after")
+    def _arrays_agree(self) -> Self:
+        lengths = {len(self.slip), len(self.mu), len(self.mu_lo), len(self.mu_hi)}
+        if len(lengths) != 1 or not self.slip:
+            raise ValueError("slip, mu, mu_lo and mu_hi must be of one length, at least 1")
+        return self
+
+    @classmethod
+    def of(cls, curve: FrictionCurve) -> FrictionRecord:
+        """Record of a curve; its raw points stay in the report."""
+        return cls(
+            slip=curve.slip.tolist(),
+            mu=curve.mu.tolist(),
+            mu_lo=curve.mu_lo.tolist(),
+            mu_hi=curve.mu_hi.tolist(),
+            stribeck=None if curve.stribeck is None else StribeckRecord(**vars(curve.stribeck)),
+            stribeck_covariance=_rows(curve.stribeck_covariance),
+            method=curve.method_text,
+        )
+
+    def curve(self) -> FrictionCurve:
+        """Back to the curve, without raw points."""
+        return FrictionCurve(
+            slip=np.asarray(self.slip),
+            mu=np.asarray(self.mu),
+            mu_lo=_array(self.mu_lo),
+            mu_hi=_array(self.mu_hi),
+            points_slip=np.empty(0),
+            points_mu=np.empty(0),
+            stribeck=None if self.stribeck is None else Stribeck(**self.stribeck.model_dump()),
+            method=self.method.removesuffix(OF_RATIO),
+            stribeck_covariance=None
+            if self.stribeck_covariance is None
+            else np.asarray(self.stribeck_covariance),
+            over_eta=self.method.endswith(OF_RATIO),
+        )
+
+
+def _rows(matrix: FloatArray | None) -> list[list[float]] | None:
+    """Nested lists of a finite matrix; None where it is unknown."""
+    if matrix is None or not np.isfinite(matrix).all():
+        return None
+    return [[float(item) for item in row] for row in matrix]
+
+
+def _array(values: list[OptionalFloat]) -> FloatArray:
+    return np.array([np.nan if value is None else value for value in values])
+
+
+class ParameterRecord(Record):
+    """One parameter, SI. `value` is null exactly where the verdict is `not identifiable`."""
+
+    value: OptionalFloat
+    unit: str
+    std_noise: OptionalFloat = None
+    ci95: Interval | None = None
+    std_total: OptionalFloat = None
+    ci95_total: Interval | None = None
+    verdict: Verdict
+    method: str
+    reason: str = ""
+
+    @model_validator(mode="after")
+    def _bare_numbers_only_where_told(self) -> Self:
+        if (self.value is None) != (self.verdict is Verdict.NOT_IDENTIFIABLE):
+            raise ValueError("value must be null exactly where the verdict is 'not identifiable'")
+        return self
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> Self:
+        """Record of an estimate."""
+        return cls(
+            value=estimate.value,
+            unit=estimate.unit,
+            std_noise=estimate.std_noise,
+            ci95=_finite_interval(estimate.ci95),
+            std_total=estimate.std_total,
+            ci95_total=_finite_interval(estimate.ci95_total),
+            verdict=estimate.verdict,
+            method=estimate.method,
+            reason=estimate.reason,
+        )
+
+    def estimate(self, parameter_id: str) -> Estimate:
+        """Back to the estimate of that id."""
+        systematic = None
+        if self.std_total is not None and self.std_noise is not None:
+            systematic = math.sqrt(max(0.0, self.std_total**2 - self.std_noise**2))
+        return Estimate(
+            id=parameter_id,
+            value=self.value,
+            std_noise=self.std_noise,
+            verdict=self.verdict,
+            method=self.method,
+            std_systematic=systematic,
+            reason=self.reason,
+        )
+
+
+class FitRecord(Record):
+    """Agreement of simulation and measurement; null where the phase has no samples."""
+
+    rmse: OptionalFloat
+    fit_percent: OptionalFloat
+
+
+def fit_records(
+    fit: Mapping[str, Mapping[str, SignalFit]],
+) -> dict[str, dict[str, FitRecord]]:
+    """Records of fits by signal and phase."""
+    return {
+        signal: {phase: FitRecord(**vars(one)) for phase, one in phases.items()}
+        for signal, phases in fit.items()
+    }
+
+
+def _finite_interval(interval: tuple[float, float] | None) -> tuple[float, float] | None:
+    if interval is None or not all(map(math.isfinite, interval)):
+        return None
+    return interval
+
+
+SchemaName = Annotated[str, Field(alias="schema")]
+
+
+class ProspectRecord(Record):
+    """What an experiment, so many times repeated, would make of the 95 % half width.
+
+    `shift` is the shift of the log that it is built on, by its gears; empty where all are alike.
+    """
+
+    experiment: Experiment
+    repeats: int
+    half_width: OptionalFloat
+    verdict: Verdict
+    shift: str = ""
+
+
+class SuggestionRecord(Record):
+    """A parameter, its 95 % half width now (null where open), and all experiments by their worth.
+
+    `text` names the best one, or says that none helps or why.
+    """
+
+    parameter: str
+    unit: str
+    verdict: Verdict
+    half_width: OptionalFloat
+    text: str
+    experiments: list[ProspectRecord]
+
+    @classmethod
+    def of(cls, one: Suggestion) -> SuggestionRecord:
+        """Record of a suggestion."""
+        return cls(
+            parameter=one.parameter,
+            unit=spec_of(one.parameter).unit,
+            verdict=one.verdict,
+            half_width=one.half_width,
+            text=one.text,
+            experiments=[ProspectRecord(**vars(each)) for each in one.prospects],
+        )
+
+
+@cache
+def program_version() -> str:
+    """Version of the installed distribution; `unknown` when run from a source tree."""
+    try:
+        return metadata.version("drivetwin")
+    except metadata.PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: MIT
+"""`twin.toml`: the records of an identified model on disk."""
+
+from __future__ import annotations
+
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import tomlkit
+from pydantic import Field, FiniteFloat, field_validator, model_validator
+
+from drivetwin._util.atomic import write_text
+from drivetwin._util.toml import Fault, did_you_mean, raise_faults
+from drivetwin.errors import InputError, ResultFileError
+from drivetwin.estimation.result.method import Method
+from drivetwin.files.read import read_record
+from drivetwin.files.records import (
+    FrictionRecord,
+    Interval,
+    LoadRecord,
+    OptionalFloat,
+    ParameterRecord,
+    Record,
+    SchemaName,
+)
+from drivetwin.parameters import spec_of
+from drivetwin.simulation.converter_map import Converter
+from drivetwin.vehicle.check import RATIO_TOLERANCE
+from drivetwin.vehicle.spec import ElementKind
+
+TWIN_SCHEMA = "drivetwin/twin-2"
+_HEADER = (
+    "An identified driveline model; written by drivetwin. All values in SI units:",
+    "rad, s, N*m, kg*m^2, Pa. A parameter without `value` could not be told from the log.",
+)
+
+
+class GearRecord(Record):
+    """One gear: overall ratio (input gear included) and the shift element that holds it."""
+
+    ratio: FiniteFloat = Field(gt=0)
+    element: str
+
+
+class ElementRecord(Record):
+    """Design data of one shift element (THEORY sections 1 and 2)."""
+
+    kind: ElementKind
+    i_c: FiniteFloat
+    i_out: FiniteFloat
+    gain_m3: FiniteFloat = Field(gt=0)
+    P0_Pa: FiniteFloat
+    peak: FiniteFloat = Field(ge=1)
+    drum_inertia_kgm2: FiniteFloat = Field(ge=0)
+
+    @field_validator("i_c", "i_out")
+    @classmethod
+    def _not_zero(cls, ratio: float) -> float:
+        if ratio == 0.0:
+            raise ValueError("a ratio must not be 0")
+        return ratio
+
+
+class ChannelRecord(Record):
+    """How a role is read from a log: sign*(scale*column + offset) in `unit`, shifted in time."""
+
+    source: str
+    unit: str | None = None
+    sign: int = 1
+    scale: FiniteFloat = 1.0
+    offset: FiniteFloat = 0.0
+    time_shift: FiniteFloat = 0.0
+    group: str | None = None
+
+
+class ConverterRecord(Record):
+    """Map of the torque converter: capacity [N m s^2/rad^2] and torque ratio over speed ratio."""
+
+    speed_ratio: list[FiniteFloat]
+    capacity: list[FiniteFloat]
+    torque_ratio: list[FiniteFloat]
+
+    @classmethod
+    def of(cls, converter: Converter | None) -> ConverterRecord | None:
+        """Record of a map; None stays None."""
+        if converter is None:
+            return None
+        return cls(
+            speed_ratio=list(converter.speed_ratio),
+            capacity=list(converter.capacity),
+            torque_ratio=list(converter.torque_ratio),
+        )
+
+    def converter(self) -> Converter:
+        """Return the map."""
+        return Converter(tuple(self.speed_ratio), tuple(self.capacity), tuple(self.torque_ratio))
+
+
+class TransmissionRecord(Record):
+    """What the vehicle card knew from design."""
+
+    i_in: FiniteFloat = Field(gt=0)
+    final_drive: FiniteFloat = Field(gt=0)
+    J_prime_range_kgm2: Interval
+    J_vehicle_range_kgm2: Interval
+    gears: dict[str, GearRecord]
+    elements: dict[str, ElementRecord]
+    channels: dict[str, ChannelRecord] = Field(default_factory=dict)
+    converter: ConverterRecord | None = None
+
+
+class TwinParameterRecord(ParameterRecord):
+    """A parameter in TOML, which knows no null: without `value` where the log could not tell it."""
+
+    value: OptionalFloat = None
+
+
+class CovarianceRecord(Record):
+    """Covariance of the parameters `ids` (total), row by row, in products of their SI units."""
+
+    ids: list[str]
+    matrix: list[list[FiniteFloat]]
+
+    @model_validator(mode="after")
+    def _square(self) -> Self:
+        size = len(self.ids)
+        if len(self.matrix) != size or any(len(row) != size for row in self.matrix):
+            raise ValueError(f"matrix must be {size} by {size}, as ids")
+        return self
+
+
+class TwinFile(Record):
+    """The whole of `twin.toml`."""
+
+    schema_name: SchemaName
+    version: str
+    name: str
+    method: Method
+    loss_law: Literal["paper", "dissipative"]
+    transmission: TransmissionRecord
+    parameters: dict[str, TwinParameterRecord]
+    friction: dict[str, FrictionRecord]
+    load: LoadRecord | None = None
+    covariance: CovarianceRecord | None = None
+    validity: dict[str, Interval]
+    inputs: dict[str, str]
+    settings: dict[str, Any]
+    assumptions: list[str]
+
+
+def write_twin_file(path: Path | str, content: TwinFile) -> None:
+    """Write the records as TOML; the file appears whole or not at all."""
+    document = tomlkit.document()
+    for line in _HEADER:
+        document.add(tomlkit.comment(line))
+    for key, value in _without_null(content.model_dump(mode="json", by_alias=True)).items():
+        document.add(key, tomlkit.item(value))
+    write_text(path, tomlkit.dumps(document))
+
+
+def read_twin_file(path: Path | str) -> TwinFile:
+    """Read and check `twin.toml`.
+
+    Raises ResultFileError where the file is missing, damaged or of a newer schema, or where its
+    tables contradict each other.
+    """
+    content = read_record(path, tomllib.loads, TWIN_SCHEMA, TwinFile)
+    raise_faults(
+        twin_faults(content),
+        ResultFileError,
+        str(path),
+        "correct these entries, or write the file again with `drivetwin identify`",
+    )
+    return content
+
+
+def _without_null(value: Any) -> Any:
+    """Drop null table entries, which TOML does not know; null in an array becomes NaN."""
+    if isinstance(value, dict):
+        return {k: _without_null(item) for k, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [float("nan") if item is None else _without_null(item) for item in value]
+    return value
+
+
+_ABOVE_ZERO = ("eta", "k_o")
+"""Stems of what models and their starts divide by."""
+
+
+def twin_faults(content: TwinFile) -> list[Fault]:
+    """Return all faults of a file whose tables have the right form each."""
+    return [*_gears(content), *_parameters(content), *_friction(content)]
+
+
+def _gears(content: TwinFile) -> Iterator[Fault]:
+    """Gears are held by elements of the file, by whose ratios theirs is made."""
+    transmission = content.transmission
+    elements = transmission.elements
+    held = Counter(gear.element for gear in transmission.gears.values())
+    for name, gear in transmission.gears.items():
+        key = f"transmission.gears.{name}"
+        element = elements.get(gear.element)
+        if element is None:
+            text = f"no element {gear.element!r}{did_you_mean(gear.element, elements)}"
+            yield Fault(f"{key}.element", text)
+            continue
+        product = transmission.i_in * element.i_c * element.i_out
+        # An element that holds several gears has the ratios of one of them.
+        if held[gear.element] == 1 and abs(product - gear.ratio) > RATIO_TOLERANCE * gear.ratio:
+            text = f"{gear.ratio:.6g}, but i_in·i_c·i_out of {gear.element} is {product:.6g}"
+            yield Fault(f"{key}.ratio", text)
+
+
+def _parameters(content: TwinFile) -> Iterator[Fault]:
+    """Ids and units are those of the parameter table."""
+    for name, one in content.parameters.items():
+        key = f"parameters.{name}"
+        try:
+            spec = spec_of(name)
+        except InputError as error:
+            yield Fault(key, error.what)
+            continue
+        if one.unit != spec.unit:
+            yield Fault(f"{key}.unit", f"{one.unit!r}, but the value is read in {spec.unit!r}")
+        if spec.stem in _ABOVE_ZERO and one.value is not None and one.value <= 0.0:
+            yield Fault(f"{key}.value", f"{one.value:g} is impossible; it must be above zero")
+
+
+def _friction(content: TwinFile) -> Iterator[Fault]:
+    """Curves belong to elements of the file and run over slips that increase."""
+    elements = content.transmission.elements
+    for name, curve in content.friction.items():
+        key = f"friction.{name}"
+        if name not in elements:
+            yield Fault(key, f"no element {name!r}{did_you_mean(name, elements)}")
+        if any(a >= b for a, b in zip(curve.slip, curve.slip[1:], strict=False)):
+            yield Fault(f"{key}.slip", "the slips do not increase")
+        if curve.stribeck is not None and curve.stribeck.v_s <= 0.0:
+            text = f"{curve.stribeck.v_s:g} is impossible; it must be above zero"
+            yield Fault(f"{key}.stribeck.v_s", text)

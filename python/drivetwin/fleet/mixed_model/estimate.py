@@ -1,0 +1,325 @@
+# SPDX-License-Identifier: MIT
+"""Joint estimates of a store: shared values with units' deviations, ageing, changes, outliers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.fleet.mixed_model.change_points import Step, find_steps
+from drivetwin.fleet.mixed_model.mixed import FloatArray, IntArray, MixedFit, Observations, fit
+from drivetwin.fleet.mixed_model.observations import LogFacts, Observed, facts, observed
+from drivetwin.fleet.mixed_model.outliers import limit, roughly_sound, unit_limit, unit_scores
+from drivetwin.fleet.mixed_model.reasons import reasons
+from drivetwin.fleet.mixed_model.result import (
+    Change,
+    Drift,
+    JointEstimate,
+    Outlier,
+    Points,
+    UnitValue,
+)
+from drivetwin.fleet.rows import RowKind
+from drivetwin.fleet.store import Store
+from drivetwin.parameters import spec_of
+
+Mask = NDArray[np.bool_]
+
+_KNOWN_SHARE = 0.8
+"""Share of logs that must have a field for it to count."""
+_LOGS_PER_UNIT = 4.0
+"""Logs per unit on average from which units may differ in their drift."""
+_ALIKE = 0.98
+"""Correlation of two fields beyond which their effects cannot be told apart."""
+_ROUNDS = 5
+_MIXED = (
+    "logs identified with {} different settings are taken together (card, channel mapping, method "
+    "or version of the program; the tables `logs` and `settings` tell them apart)"
+)
+
+
+def joint_estimates(store: Store, wanted: Sequence[str] = ()) -> list[JointEstimate]:
+    """Estimate all parameters, or the `wanted` ones by id, over the fleet.
+
+    Parameters with too few logs for that, fewer than four more than unknowns, are left out.
+    """
+    known = facts(store)
+    plain = {log: fact for log, (_, fact) in known.items()}
+    found = []
+    for seen in observed(store, known):
+        if not wanted or seen.parameter in wanted:
+            one = estimate(seen, plain)
+            if one is not None:
+                found.append(one)
+    return reasons(store, found)
+
+
+def untold(store: Store, found: Sequence[JointEstimate], wanted: Sequence[str] = ()) -> list[str]:
+    """Ids of the parameters of a store, or the `wanted` ones, that have no joint estimate: too few
+    logs tell them, or all have the card's design value.
+    """
+    names = store.rows(RowKind.PARAMETER).column("name").to_pylist()
+    told = {one.parameter for one in found}
+    return [name for name in dict.fromkeys(wanted or names) if name not in told]
+
+
+@dataclass(frozen=True, eq=False)
+class _Data:
+    """The logs of a parameter with all fields known: `readings` (n, fields), `unit` (n,) in
+    `names`; `notes` what could not be used.
+    """
+
+    logs: tuple[str, ...]
+    value: FloatArray
+    std: FloatArray
+    unit: IntArray
+    names: tuple[str, ...]
+    fields: tuple[str, ...]
+    readings: FloatArray
+    notes: tuple[str, ...]
+
+    @property
+    def scaled(self) -> FloatArray:
+        """Readings (n, fields) less their means, over their standard deviations."""
+        middle, width = self.readings.mean(axis=0), self.readings.std(axis=0)
+        return np.asarray((self.readings - middle) / width, dtype=np.float64)
+
+    def design(self, group: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Fixed effects (n, p): level and drifts; random effects (n, q) of the groups."""
+        ones = np.ones((self.value.size, 1))
+        groups = int(group.max()) + 1
+        if groups < 2:
+            return np.hstack([ones, self.scaled]), ones[:, :0]
+        own_drift = self.fields and self.value.size >= _LOGS_PER_UNIT * groups
+        random = self.scaled[:, :1] if own_drift else ones[:, :0]
+        return np.hstack([ones, self.scaled]), np.hstack([ones, random])
+
+
+def estimate(seen: Observed, known: Mapping[str, LogFacts]) -> JointEstimate | None:
+    """Estimate one parameter; None where there are too few logs."""
+    data = _data(seen, known)
+    if data is None:
+        return None
+    sound = roughly_sound(data.value, data.unit)
+    first = _fit(data, data.unit, sound)
+    if first is None:
+        return None
+    steps = _steps(data, first, sound)
+    group, since = _groups(data, steps)
+    found, sound = _without_outliers(data, group, sound)
+    if found is None:
+        return None
+    return _conclude(seen, known, _Settled(data, steps, group, since, found, sound))
+
+
+@dataclass(frozen=True, eq=False)
+class _Settled:
+    """What the conclusions are drawn from: groups are units, or what became of them after a step
+    at the reading `since`; `sound` (n,) tells the logs that took part.
+    """
+
+    data: _Data
+    steps: list[Step]
+    group: IntArray
+    since: tuple[float | None, ...]
+    fit: MixedFit
+    sound: Mask
+
+
+def _data(seen: Observed, known: Mapping[str, LogFacts]) -> _Data | None:
+    every = [known[log] for log in seen.logs]
+    names = dict.fromkeys(name for fact in every for name in fact.fields)
+    common = [n for n in names if sum(n in f.fields for f in every) >= _KNOWN_SHARE * len(every)]
+    kept = [k for k, fact in enumerate(every) if all(name in fact.fields for name in common)]
+    if len(kept) < 4:
+        return None
+    readings = np.array([[every[k].fields[name] for name in common] for k in kept], dtype=float)
+    fields, notes = _usable_fields(common, readings.reshape(len(kept), len(common)))
+    settings = {every[k].settings for k in kept}
+    if len(settings) > 1:
+        notes = (*notes, _MIXED.format(len(settings)))
+    units = sorted({every[k].unit for k in kept})
+    place = {name: k for k, name in enumerate(units)}
+    return _Data(
+        logs=tuple(seen.logs[k] for k in kept),
+        value=seen.value[kept],
+        std=seen.std[kept],
+        unit=np.array([place[every[k].unit] for k in kept]),
+        names=tuple(units),
+        fields=tuple(common[k] for k in fields),
+        readings=readings[:, fields],
+        notes=notes,
+    )
+
+
+def _usable_fields(names: Sequence[str], readings: FloatArray) -> tuple[list[int], tuple[str, ...]]:
+    """Fields that vary, each told apart from those before it; and what was left out."""
+    used: list[int] = []
+    notes = []
+    for k, name in enumerate(names):
+        if np.ptp(readings[:, k]) == 0.0:
+            notes.append(f"field {name!r} is the same in all logs")
+            continue
+        alike = [j for j in used if abs(np.corrcoef(readings[:, j], readings[:, k])[0, 1]) > _ALIKE]
+        if alike:
+            notes.append(f"field {name!r} runs with {names[alike[0]]!r}: only the latter is used")
+        else:
+            used.append(k)
+    return used, tuple(notes)
+
+
+def _fit(data: _Data, group: IntArray, sound: Mask, *, intervals: bool = False) -> MixedFit | None:
+    """Fit over the sound logs; residuals and variances of all. None with too few logs."""
+    x, z = data.design(group)
+    kept = np.flatnonzero(sound)
+    present, inverse = np.unique(group[kept], return_inverse=True)
+    if kept.size < x.shape[1] + z.shape[1] + 4:
+        return None
+    seen = Observations(data.value[kept], data.std[kept], inverse, x[kept], z[kept])
+    found = fit(seen, intervals=intervals)
+    groups = int(group.max()) + 1
+    deviation = np.zeros((groups, z.shape[1]))
+    error = np.tile(found.sigma, (groups, 1))
+    deviation[present], error[present] = found.deviation, found.deviation_std
+    residual = data.value - x @ found.beta - np.sum(z * deviation[group], axis=1)
+    stated = data.std**2
+    scale = found.excess**2
+    variance = stated * scale if scale <= 1.0 else stated + (scale - 1.0) * np.median(stated[kept])
+    return replace(
+        found,
+        deviation=deviation,
+        deviation_std=error,
+        residual=residual,
+        variance=np.asarray(variance),
+    )
+
+
+def _steps(data: _Data, first: MixedFit, sound: Mask) -> list[Step]:
+    """Changes of units over the first field."""
+    if not data.fields:
+        return []
+    kept = np.flatnonzero(sound)
+    x, _ = data.design(data.unit)
+    left = data.value - x @ first.beta
+    return find_steps(data.unit[kept], data.readings[kept, 0], left[kept], first.variance[kept])
+
+
+def _groups(data: _Data, steps: Sequence[Step]) -> tuple[IntArray, tuple[float | None, ...]]:
+    """Units as groups (n,); a unit that changed is a new one from there on."""
+    group = data.unit.copy()
+    since: list[float | None] = [None] * len(data.names)
+    for step in steps:
+        later = (data.unit == step.unit) & (data.readings[:, 0] >= step.after)
+        group[later] = len(since)
+        since.append(step.after)
+    return group, tuple(since)
+
+
+def _without_outliers(data: _Data, group: IntArray, sound: Mask) -> tuple[MixedFit | None, Mask]:
+    """Fit, leave out what does not fit, and again until nothing changes."""
+    bound = limit(data.value.size)
+    found = _fit(data, group, sound)
+    for _ in range(_ROUNDS):
+        if found is None:
+            break
+        fits = np.abs(found.residual) <= bound * np.sqrt(found.variance)
+        if np.array_equal(fits, sound):
+            break
+        sound = fits
+        found = _fit(data, group, sound)
+    return _fit(data, group, sound, intervals=True), sound
+
+
+def _conclude(seen: Observed, known: Mapping[str, LogFacts], end: _Settled) -> JointEstimate:
+    data, found = end.data, end.fit
+    nothing = np.full(data.value.size, np.nan)
+    spread = bool(found.sigma.size)
+    return JointEstimate(
+        parameter=seen.parameter,
+        rule=seen.rule,
+        si_unit=spec_of(seen.parameter).unit,
+        logs=data.value.size,
+        left_out=seen.left_out + len(seen.logs) - data.value.size,
+        value=float(found.beta[0]),
+        ci95=_interval(found, 0, 1.0),
+        spread=float(found.sigma[0]) if spread else None,
+        spread_ci95=(float(found.sigma_ci[0, 0]), float(found.sigma_ci[0, 1])) if spread else None,
+        excess=found.excess,
+        drifts=_drifts(data, found),
+        units=_units(end),
+        changes=tuple(
+            Change(data.names[s.unit], data.fields[0], s.before, s.after, s.size, s.std)
+            for s in end.steps
+        ),
+        outliers=_outliers(end, known),
+        notes=data.notes,
+        points=Points(
+            data.readings[:, 0] if data.fields else nothing,
+            data.value,
+            data.std,
+            tuple(data.names[k] for k in data.unit),
+        ),
+    )
+
+
+def _interval(found: MixedFit, place: int, scale: float) -> tuple[float, float]:
+    middle, half = float(found.beta[place]), float(found.half[place])
+    return (middle - half) / scale, (middle + half) / scale
+
+
+def _drifts(data: _Data, found: MixedFit) -> tuple[Drift, ...]:
+    scales = data.readings.std(axis=0)
+    return tuple(
+        Drift(
+            field=name,
+            slope=float(found.beta[1 + k] / scales[k]),
+            ci95=_interval(found, 1 + k, float(scales[k])),
+            reference=float(data.readings[:, k].mean()),
+            spread=float(found.sigma[1] / scales[k]) if k == 0 and found.sigma.size > 1 else None,
+        )
+        for k, name in enumerate(data.fields)
+    )
+
+
+def _units(end: _Settled) -> tuple[UnitValue, ...]:
+    """Deviations of units, and of what became of them."""
+    if not end.fit.sigma.size:
+        return ()
+    deviation = end.fit.deviation[:, 0]
+    scores = unit_scores(deviation)
+    bound = unit_limit(deviation.size)
+    owner = {int(g): int(u) for g, u in zip(end.group, end.data.unit, strict=True)}
+    return tuple(
+        UnitValue(
+            unit=end.data.names[owner[g]],
+            logs=int(np.sum((end.group == g) & end.sound)),
+            deviation=float(deviation[g]),
+            std=float(end.fit.deviation_std[g, 0]),
+            since=end.since[g],
+            score=float(scores[g]) if np.isfinite(scores[g]) else None,
+            odd=bool(abs(scores[g]) > bound),
+        )
+        for g in sorted(owner)
+    )
+
+
+def _outliers(end: _Settled, known: Mapping[str, LogFacts]) -> tuple[Outlier, ...]:
+    """Logs that were left out, the farthest first."""
+    data = end.data
+    score = end.fit.residual / np.sqrt(end.fit.variance)
+    places = sorted(np.flatnonzero(~end.sound), key=lambda k: -abs(score[k]))
+    return tuple(
+        Outlier(
+            log=data.logs[k],
+            path=known[data.logs[k]].path,
+            unit=data.names[data.unit[k]],
+            value=float(data.value[k]),
+            expected=float(data.value[k] - end.fit.residual[k]),
+            score=float(score[k]),
+            reason="",
+        )
+        for k in places
+    )

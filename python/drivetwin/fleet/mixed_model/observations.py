@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""The estimates of one parameter over a fleet, with what is known of each log."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.fleet.index import ONE_FILE_EACH
+from drivetwin.fleet.mixed_model.mixed import FloatArray
+from drivetwin.fleet.rows import RowKind
+from drivetwin.fleet.store import Store
+
+
+@dataclass(frozen=True)
+class LogFacts:
+    """What is known of a log: a file of it, its unit, its fields, channel means included, and the
+    hash of the settings it was identified with.
+    """
+
+    path: str
+    unit: str
+    fields: Mapping[str, float]
+    settings: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """One parameter of the vehicles that one rule reads: `value` (n,) and `std` (n,) by log.
+
+    They are what the log alone says. `left_out` counts logs that tell no value of it.
+    """
+
+    parameter: str
+    rule: str
+    logs: tuple[str, ...]
+    value: FloatArray
+    std: FloatArray
+    left_out: int
+
+
+def facts(store: Store) -> dict[str, tuple[str, LogFacts]]:
+    """Rule and facts of each log as its file was seen last; a log at several places once."""
+    means: dict[str, dict[str, float]] = {}
+    columns = store.rows(RowKind.FIELD).select(["log", "name", "value"]).to_pydict()
+    for log, name, value in zip(columns["log"], columns["name"], columns["value"], strict=True):
+        means.setdefault(log, {})[name] = value
+    found: dict[str, tuple[str, LogFacts]] = {}
+    sql = (
+        "SELECT log, path, rule, unit, fields, settings FROM files JOIN logs USING (log) "
+        f"WHERE {ONE_FILE_EACH}"
+    )
+    for log, path, rule, unit, fields, settings in store.index.select(sql):
+        known = {**json.loads(fields), **means.get(log, {})}
+        found[log] = (rule, LogFacts(path, unit, known, settings))
+    return found
+
+
+def observed(store: Store, known: Mapping[str, tuple[str, LogFacts]]) -> list[Observed]:
+    """All parameters with a value in some log, by rule, in the order of the first log.
+
+    Values that are the card's own are not counted: they say nothing of the fleet. Without any
+    stated error, as the paper's method leaves it, all logs count alike.
+    """
+    import pyarrow.compute as pc
+
+    rows = store.rows(RowKind.PARAMETER)
+    found = []
+    for name in dict.fromkeys(rows.column("name").to_pylist()):
+        columns = rows.filter(pc.equal(rows.column("name"), name)).to_pydict()
+        for rule in sorted({known[log][0] for log in columns["log"] if log in known}):
+            one = _one(name, rule, columns, known)
+            if one.value.size:
+                found.append(one)
+    return found
+
+
+def _one(
+    name: str,
+    rule: str,
+    columns: Mapping[str, list[object]],
+    known: Mapping[str, tuple[str, LogFacts]],
+) -> Observed:
+    logs, values, stds, left_out = [], [], [], 0
+    picked = ("log", "value", "std_noise", "std_total", "free_value", "free_std", "verdict")
+    for log, value, noise, total, free, free_std, verdict in zip(
+        *(columns[key] for key in picked), strict=True
+    ):
+        if log not in known or known[str(log)][0] != rule:
+            continue
+        own, std = (value, noise or total) if free is None else (free, free_std)
+        if own is None or (free is None and verdict == Verdict.DESIGN):
+            left_out += 1
+            continue
+        logs.append(str(log))
+        values.append(own)
+        stds.append(std)
+    numbers = np.array(values, dtype=float)
+    errors = np.array(stds, dtype=float)
+    return Observed(name, rule, tuple(logs), numbers, _filled(numbers, errors), left_out)
+
+
+def _filled(values: FloatArray, errors: FloatArray) -> FloatArray:
+    """Errors (n,) with those that are not stated put in: the middle of the others, or the scatter
+    of the values.
+    """
+    stated = np.isfinite(errors) & (errors > 0.0)
+    if stated.any():
+        typical = float(np.median(errors[stated]))
+    else:
+        scatter = (
+            1.4826 * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0
+        )
+        typical = scatter or 1.0
+    return np.where(stated, errors, typical)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""What the log alone says of friction and fill pressure, without the card's design value.
+
+An estimate that leans on a design prior leans the same way in every log: averaged over a fleet the
+prior would count as often as there are logs and hide ageing. For joint estimates it is taken out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.parametrization import LAW
+from drivetwin.estimation.linear.friction_points import P0, stribeck
+from drivetwin.estimation.result.estimate import FloatArray
+from drivetwin.estimation.result.prior_update import without_prior
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+_LAW_SIZE = P0
+
+
+@dataclass(frozen=True)
+class FreeFriction:
+    """μ at a slip, and P0 [Pa], with their standard deviations, of the log alone."""
+
+    mu: float
+    mu_std: float
+    P0: float
+    P0_std: float
+
+
+def free_friction(
+    found: Identification, card: VehicleCard, element: str, slip: float
+) -> FreeFriction | None:
+    """Friction at `slip` [rad/s] and P0 of an element without the card's prior of P0.
+
+    None where the method leaves no covariance of the two, or the log says nothing of P0 itself.
+    """
+    posterior = _posterior(found, element)
+    if posterior is None:
+        return None
+    theta, covariance = posterior
+    mu, slopes = stribeck(theta, np.array([slip]))
+    to_pair = np.zeros((2, _LAW_SIZE + 1))
+    to_pair[0, :_LAW_SIZE] = slopes[:, 0]
+    to_pair[1, P0] = 1.0
+    pair = np.array([float(mu[0]), theta[P0]])
+    prior = card.elements[element].P0
+    freed = without_prior(pair, to_pair @ covariance @ to_pair.T, 1, prior)
+    if freed is None:
+        return None
+    values, spread = freed
+    stds = np.sqrt(np.diag(spread))
+    return FreeFriction(float(values[0]), float(stds[0]), float(values[1]), float(stds[1]))
+
+
+def _posterior(found: Identification, element: str) -> tuple[FloatArray, FloatArray] | None:
+    """Friction law and P0 (5,) of an element, and their covariance, by either linear method."""
+    fit = found.evidence.likelihood
+    if fit is not None:
+        wanted = [f"{element}.{key}" for key in (*LAW, "P0")]
+        if not set(wanted) <= set(fit.point.names):
+            return None
+        place = [fit.point.names.index(name) for name in wanted]
+        return fit.mean.values[place], fit.covariance[np.ix_(place, place)]
+    for shift in found.evidence.integral:
+        if shift.friction is not None and shift.friction.element == element:
+            size = _LAW_SIZE + 1
+            return shift.friction.fit.theta[:size], shift.friction.fit.covariance[:size, :size]
+    return None

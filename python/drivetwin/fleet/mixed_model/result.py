@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""What a joint estimate of one parameter says; SI, fields in the unit of their name."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from drivetwin.fleet.mixed_model.mixed import FloatArray
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Change of the parameter with one unit of a field, 95 % interval; `reference` is the field's
+    mean, at which the shared value holds. `spread` (1 σ) is how much units differ in it.
+    """
+
+    field: str
+    slope: float
+    ci95: Interval
+    reference: float
+    spread: float | None = None
+
+
+@dataclass(frozen=True)
+class UnitValue:
+    """A unit's deviation from the shared value, and its standard error; `since` the field's reading
+    at which the unit changed, None at first. `score` is the deviation in robust standard
+    deviations of all units; `odd` says that this is more than chance makes.
+    """
+
+    unit: str
+    logs: int
+    deviation: float
+    std: float
+    since: float | None
+    score: float | None
+    odd: bool
+
+
+@dataclass(frozen=True)
+class Change:
+    """A unit's values are larger by `size` ± `std` after the reading `before` of a field."""
+
+    unit: str
+    field: str
+    before: float
+    after: float
+    size: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """A log that does not fit: `score` standard deviations from what its unit and fields let
+    expect, and what else is odd about it.
+    """
+
+    log: str
+    path: str
+    unit: str
+    value: float
+    expected: float
+    score: float
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """The logs behind an estimate, for figures: readings of the first field (NaN without one),
+    values and standard deviations (n,), units (n,).
+    """
+
+    reading: FloatArray
+    value: FloatArray
+    std: FloatArray
+    unit: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class JointEstimate:
+    """One parameter over the units that one rule reads.
+
+    `value` is shared by all units, at the fields' references; `spread` (1 σ) how much units differ.
+    `excess` is the scatter of the logs over what they state. `left_out` logs tell nothing of it.
+    """
+
+    parameter: str
+    rule: str
+    si_unit: str
+    logs: int
+    left_out: int
+    value: float
+    ci95: Interval
+    spread: float | None
+    spread_ci95: Interval | None
+    excess: float
+    drifts: tuple[Drift, ...]
+    units: tuple[UnitValue, ...]
+    changes: tuple[Change, ...]
+    outliers: tuple[Outlier, ...]
+    notes: tuple[str, ...]
+    points: Points
+
+    def document(self) -> dict[str, Any]:
+        """For JSON, without the single points."""
+        return {key: value for key, value in asdict(self).items() if key != "points"}

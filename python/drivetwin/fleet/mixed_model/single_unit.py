@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""The logs one by one in the report of a fleet, with the way to the report of each."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from drivetwin.fleet.mixed_model.observations import LogFacts, facts
+from drivetwin.fleet.mixed_model.reasons import output_fits
+from drivetwin.fleet.readings import reading_text
+from drivetwin.fleet.store import Store
+from drivetwin.report.sections.blocks import Block, Cell, Section, TableBlock, cells
+
+MOST_ROWS = 200
+"""Rows of a table; the store holds them all."""
+_MAKE_THEM = " `drivetwin fleet … --reports` writes a report of each, which is linked here then."
+
+
+def singles(store: Store, folder: Path) -> Section:
+    """Logs that are done, the poorest fits first; `folder` is where the page will stand."""
+    fits = output_fits(store)
+    known = facts(store)
+    done = [log for log, _ in store.index.done() if log in known]
+    worst = sorted(done, key=lambda log: (fits.get(log, 100.0), known[log][1].path))[:MOST_ROWS]
+    fields = list(dict.fromkeys(name for log in worst for name in known[log][1].fields))
+    rows = [_row(known[log][1], fields, fits.get(log), single(store, log, folder)) for log in worst]
+    head = (
+        *cells("log", "unit"),
+        *cells(*fields, "fit of the output torque, %", number=True),
+    )
+    caption = f"The poorest fit first{cut(len(done))}."
+    if not any(row[0].href for row in rows):
+        caption += _MAKE_THEM
+    blocks: list[Block] = [TableBlock(caption, head, rows)] if rows else []
+    intro = "Where to look closer: how well the simulation of each log follows its measurement."
+    return Section("logs", "Log by log", intro, blocks)
+
+
+def _row(fact: LogFacts, fields: list[str], fit: float | None, href: str) -> tuple[Cell, ...]:
+    readings = (
+        reading_text(name, fact.fields[name]) if name in fact.fields else "–" for name in fields
+    )
+    return (
+        Cell(Path(fact.path).name, href=href),
+        *cells(fact.unit),
+        *cells(*readings, "–" if fit is None else f"{fit:.1f}", number=True),
+    )
+
+
+def single(store: Store, log: str, folder: Path) -> str:
+    """Link from a page in `folder` to the report of a single log; empty where there is none."""
+    report = store.report(log)
+    return Path(os.path.relpath(report, folder)).as_posix() if report.is_file() else ""
+
+
+def cut(count: int) -> str:
+    """What a caption says of a table that would be longer."""
+    return f", the first {MOST_ROWS} of {count:,}" if count > MOST_ROWS else ""

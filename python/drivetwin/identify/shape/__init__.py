@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Friction beyond the Stribeck law: shape over slip, drag of open clutches, pressure, heat."""

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""Databases (DBC), read by cantools, and their signals as numbers, whole columns at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin._util.optional_dependencies import foreign_parser, require
+from drivetwin.channels.shiftlog import FloatArray
+from drivetwin.errors import FileFormatError, Where
+from drivetwin.logs.formats.frames import Signal
+
+Bytes = NDArray[np.uint8]
+_MOST_BITS = 56
+"""Longer integers do not fit float64 exactly and carry no physical quantity."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """A message: `identifier` of 11 bits, or 29 if `extended`; `j1939`: only its group counts."""
+
+    name: str
+    identifier: int
+    extended: bool
+    j1939: bool
+    signals: tuple[Signal, ...]
+
+
+def read_database(paths: Sequence[Path]) -> tuple[Message, ...]:
+    """Read DBC files.
+
+    Raises MissingExtraError without cantools, FileFormatError for what is no DBC.
+    """
+    messages: list[Message] = []
+    for path in paths:
+        cantools = require("cantools.database", "can", "decoding a bus log", path)
+        if not path.is_file():
+            raise FileFormatError(
+                "there is no such DBC file", "correct dbc under [bus]", Where(file=str(path))
+            )
+        with foreign_parser("a DBC file", path):
+            text = path.read_text(encoding="cp1252", errors="replace")
+            content = cantools.load_string(text, "dbc", strict=False)
+            messages += [_message(one) for one in content.messages]
+    return tuple(messages)
+
+
+def _message(source: Any) -> Message:
+    by_name = {one.name: one for one in source.signals}
+    return Message(
+        name=source.name,
+        identifier=int(source.frame_id),
+        extended=bool(source.is_extended_frame),
+        j1939=source.protocol == "j1939",
+        signals=tuple(_signal(one, by_name) for one in source.signals),
+    )
+
+
+def _signal(source: Any, by_name: dict[str, Any]) -> Signal:
+    selector = None
+    if source.multiplexer_ids and source.multiplexer_signal in by_name:
+        switch = _signal(by_name[source.multiplexer_signal], by_name)
+        selector = (switch, frozenset(int(each) for each in source.multiplexer_ids))
+    low, high = source.minimum, source.maximum
+    stated = low is not None and high is not None and low < high
+    return Signal(
+        name=source.name,
+        start=int(source.start),
+        length=int(source.length),
+        intel=source.byte_order == "little_endian",
+        signed=bool(source.is_signed),
+        is_float=bool(source.is_float),
+        scale=float(source.scale),
+        offset=float(source.offset),
+        unit=source.unit or None,
+        limits=(float(low), float(high)) if stated else None,
+        selector=selector,
+        spn=source.spn,
+    )
+
+
+def codes(data: Bytes, signal: Signal) -> NDArray[np.int64]:
+    """Return the unsigned codes (n,) of a signal in payloads `data` (n, bytes).
+
+    Raises ValueError where the signal is too long or does not fit the payloads.
+    """
+    if signal.length > _MOST_BITS or signal.end > data.shape[1]:
+        raise ValueError(f"{signal.name} has {signal.length} bits, ends in byte {signal.end}")
+    first, last = signal.start // 8, signal.end
+    total = np.zeros(len(data), np.uint64)
+    if signal.intel:
+        for place in range(last - 1, first - 1, -1):
+            total = (total << np.uint64(8)) | data[:, place].astype(np.uint64)
+        total >>= np.uint64(signal.start % 8)
+    else:
+        for place in range(first, last):
+            total = (total << np.uint64(8)) | data[:, place].astype(np.uint64)
+        total >>= np.uint64(8 * (last - first) - (7 - signal.start % 8) - signal.length)
+    return (total & np.uint64((1 << signal.length) - 1)).astype(np.int64)
+
+
+def physical(data: Bytes, signal: Signal) -> FloatArray:
+    """Return the values (n,) of a signal in its unit; ValueError as in `codes`."""
+    if signal.is_float:
+        return signal.scale * _floats(data, signal) + signal.offset
+    raw = codes(data, signal)
+    if signal.signed:
+        raw = np.where(raw >> (signal.length - 1), raw - (1 << signal.length), raw)
+    return signal.scale * raw.astype(np.float64) + signal.offset
+
+
+def _floats(data: Bytes, signal: Signal) -> FloatArray:
+    """IEEE numbers that start on a byte border."""
+    width = signal.length // 8
+    first = signal.start // 8
+    aligned = signal.start % 8 == (0 if signal.intel else 7)
+    if not aligned or width not in (4, 8) or first + width > data.shape[1]:
+        raise ValueError(f"{signal.name} is a number of {signal.length} bits inside bytes")
+    kind = np.dtype(f"{'<' if signal.intel else '>'}f{width}")
+    part = np.ascontiguousarray(data[:, first : first + width])
+    return part.view(kind)[:, 0].astype(np.float64)
+
+
+def admitted(
+    data: Bytes, length: NDArray[np.uint8] | NDArray[np.intp], signal: Signal
+) -> NDArray[np.bool_]:
+    """Tell for each payload (n,) whether it is long enough and its multiplexer fits the signal.
+
+    A multiplexer may be multiplexed itself, and then is in some payloads only.
+    """
+    there: NDArray[np.bool_] = np.asarray(length >= signal.end)
+    if signal.selector is not None:
+        switch, allowed = signal.selector
+        there &= np.isin(codes(data, switch), list(allowed)) & admitted(data, length, switch)
+    return there

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: MIT
+"""A bus log as columns: one for each signal, message and sender; decoded when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.channels.read_options import BusOptions, Column
+from drivetwin.channels.shiftlog import FloatArray
+from drivetwin.errors import DamagedChannelError, MissingChannelError, Where
+from drivetwin.logs.formats.can.database import Message, admitted, codes, physical
+from drivetwin.logs.formats.frames import Frames, Signal
+from drivetwin.logs.formats.j1939 import torque
+from drivetwin.logs.formats.j1939.codes import check_codes
+from drivetwin.logs.formats.j1939.identifier import ENGINE, TRANSMISSION, group_of, sender_of
+from drivetwin.logs.formats.j1939.transport import REPEATED, Assembled, reassemble
+from drivetwin.logs.quality.channel_checks import MIN_SAMPLES
+from drivetwin.logs.raw import RawChannel, Window
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """All payloads (n, bytes) of one message from one `sender`, at `time` (n,) [s].
+
+    `sender` is a J1939 address, None for other messages; `aside` as in `Column`.
+    """
+
+    message: Message
+    sender: int | None
+    bus: int
+    group: str
+    time: FloatArray
+    data: NDArray[np.uint8]
+    length: NDArray[np.intp]
+    aside: bool = False
+
+    def column(self, name: str, unit: str | None) -> Column:
+        """One of its signals as a column."""
+        return Column(name, unit, self.group, aside=self.aside)
+
+
+@dataclass(frozen=True)
+class _Entry:
+    column: Column
+    decode: Callable[[], RawChannel]
+
+
+class BusRecording:
+    """The signals of a bus log. The group is `message from sender`, with the bus where several."""
+
+    def __init__(
+        self, frames: Frames, messages: Sequence[Message], options: BusOptions, path: Path
+    ) -> None:
+        self._path = path
+        transport = reassemble(frames)
+        tracks = _with_aside(
+            [*_single(frames, messages), *_multiple(transport.messages, messages, frames)]
+        )
+        if not tracks:
+            raise MissingChannelError(
+                f"none of the {len(np.unique(frames.identifier))} identifiers on the bus is in the "
+                "database",
+                'name the DBC file of this bus in the channel mapping: bus = { dbc = ["..."] }',
+                Where(file=str(path)),
+            )
+        faults = ", ".join(f"{count} {why}" for why, count in sorted(transport.faults.items()))
+        incomplete = (f"multi-packet messages incomplete: {faults}",) if faults else ()
+        self.warnings: tuple[str, ...] = (*frames.warnings, *incomplete)
+        entries = [
+            _Entry(track.column(signal.name, signal.unit), partial(self._decode, track, signal))
+            for track in tracks
+            for signal in track.message.signals
+        ]
+        self._entries = [*entries, *self._torques(tracks, options)]
+        self.columns: Sequence[Column] = tuple(_marked(entry) for entry in self._entries)
+
+    def load(self, index: int, window: Window | None = None) -> RawChannel:
+        """Decode one signal; see `Recording`. Codes that are no values are left out and told."""
+        return self._entries[index].decode().within(window)
+
+    def _decode(self, track: Track, signal: Signal) -> RawChannel:
+        where = Where(file=str(self._path), channel=f"{signal.name} ({track.group})")
+        try:
+            there = admitted(track.data, track.length, signal)
+            values = physical(track.data, signal)
+            raw = None if signal.is_float else codes(track.data, signal)
+        except ValueError as fault:
+            raise DamagedChannelError(
+                f"the database does not fit the frames: {fault}", "use the DBC of this bus", where
+            ) from None
+        notes = []
+        if track.message.j1939 and raw is not None:
+            check = check_codes(raw[there], values[there], signal)
+            if check.note:
+                notes.append(check.note)
+            there[there] = check.valid
+        again = _again(track) & there
+        if again.any():
+            notes.append(f"{int(again.sum())} repeated frames, or with an earlier stamp, left out")
+            there &= ~again
+        if not there.any():
+            raise DamagedChannelError(
+                notes[0] if notes else "no frame holds this signal", "map another channel", where
+            )
+        return RawChannel(
+            signal.name, signal.unit, track.time[there], values[there], track.group, tuple(notes)
+        )
+
+    def _torques(self, tracks: Sequence[Track], options: BusOptions) -> Iterator[_Entry]:
+        """Percent torques in N·m, and the net torque of each engine."""
+        percent = [
+            (track, signal)
+            for track in tracks
+            for signal in track.message.signals
+            if signal.spn in torque.PERCENT_TORQUES
+        ]
+        if not percent:
+            return
+        reference, note = self._reference(tracks, options)
+        if reference is None:
+            self.warnings = (*self.warnings, note)
+            return
+        for track, signal in percent:
+            column = track.column(torque.torque_name(signal.name), torque.UNIT)
+            yield _Entry(column, partial(self._torque, track, signal, (reference, note)))
+        for track, actual in percent:
+            friction = [
+                pair for pair in percent
+                if pair[1].spn == torque.FRICTION and _source(pair[0]) == _source(track)
+            ]  # fmt: skip
+            if actual.spn == torque.ACTUAL and len(friction) == 1:
+                column = track.column(torque.NET_TORQUE, torque.UNIT)
+                pairs = ((track, actual), friction[0])
+                yield _Entry(column, partial(self._net, pairs, (reference, note)))
+
+    def _torque(self, track: Track, signal: Signal, reference: tuple[float, str]) -> RawChannel:
+        percent = self._decode(track, signal)
+        if signal.spn == torque.ACTUAL:
+            for other in track.message.signals:
+                if other.spn == torque.FRACTION:
+                    percent = self._with_fraction(percent, track, other)
+        return torque.in_newton_metres(percent, *reference)
+
+    def _with_fraction(self, percent: RawChannel, track: Track, signal: Signal) -> RawChannel:
+        try:
+            return torque.with_fraction(percent, self._decode(track, signal))
+        except DamagedChannelError:  # an engine that sends whole percents only
+            return percent
+
+    def _net(
+        self, pairs: tuple[tuple[Track, Signal], tuple[Track, Signal]], reference: tuple[float, str]
+    ) -> RawChannel:
+        actual, friction = (self._torque(*pair, reference) for pair in pairs)
+        return torque.net_torque(actual, friction)
+
+    def _reference(self, tracks: Sequence[Track], options: BusOptions) -> tuple[float | None, str]:
+        """Reference torque [N·m] and where it is from; without one, what to do."""
+        if options.reference_torque is not None:
+            return options.reference_torque, (
+                f"reference torque {options.reference_torque:g} N·m as the mapping states"
+            )
+        for track in tracks:
+            for signal in track.message.signals:
+                if signal.spn != torque.REFERENCE:
+                    continue
+                try:
+                    told = self._decode(track, signal).values
+                except DamagedChannelError:
+                    continue
+                if np.ptp(told) == 0.0 and told[0] > 0.0:
+                    return float(told[0]), f"reference torque {told[0]:g} N·m told by {track.group}"
+        return None, (
+            "percent torque stays in percent, the bus tells no reference torque (EC1); state it in "
+            "the channel mapping: bus = { reference_torque_Nm = ... }"
+        )
+
+
+def _marked(entry: _Entry) -> Column:
+    """The column, marked where a sender never fills the signal, or hardly ever speaks."""
+    try:
+        return replace(entry.column, empty=entry.decode().time.size < MIN_SAMPLES)
+    except DamagedChannelError:
+        return replace(entry.column, empty=True, silent=True)
+
+
+def _again(track: Track) -> NDArray[np.bool_]:
+    """Frames (n,) that do not come after the one before, or of J1939 repeat it at once."""
+    later = np.diff(track.time)
+    again = later <= 0.0
+    if track.message.j1939:
+        again |= (later < REPEATED) & np.all(track.data[1:] == track.data[:-1], axis=1)
+    return np.concatenate(([False], again))
+
+
+def _source(track: Track) -> tuple[int | None, int]:
+    return track.sender, track.bus
+
+
+def _with_aside(tracks: Sequence[Track]) -> list[Track]:
+    """Mark messages of a strange sender where engine or transmission itself sends the same."""
+    own = (ENGINE, TRANSMISSION)
+    told = {(one.message.name, one.bus) for one in tracks if one.sender in own}
+    return [
+        replace(one, aside=one.sender not in own and (one.message.name, one.bus) in told)
+        for one in tracks
+    ]
+
+
+def _group(message: Message, sender: int | None, bus: str, many: bool) -> str:
+    text = message.name if sender is None else f"{message.name} from 0x{sender:02X}"
+    return f"{text} on {bus}" if many else text
+
+
+def _single(frames: Frames, messages: Sequence[Message]) -> Iterator[Track]:
+    """Messages that fit one frame."""
+    groups, senders = group_of(frames.identifier), sender_of(frames.identifier)
+    many = len(frames.buses) > 1
+    for message in messages:
+        if message.j1939:
+            wanted = group_of(np.array([message.identifier], np.uint32))[0]
+            mine = frames.extended & (groups == wanted)
+            tags = np.where(mine, senders, 0)
+        else:
+            mine = (frames.extended == message.extended) & (frames.identifier == message.identifier)
+            tags = np.zeros(mine.size, np.uint32)
+        for bus, name in enumerate(frames.buses):
+            for tag in np.unique(tags[mine & (frames.bus == bus)]).tolist():
+                rows = mine & (frames.bus == bus) & (tags == tag)
+                group = _group(message, tag if message.j1939 else None, name, many)
+                yield Track(
+                    message,
+                    tag if message.j1939 else None,
+                    bus,
+                    group,
+                    frames.time[rows],
+                    frames.data[rows],
+                    frames.length[rows].astype(np.intp),
+                )
+
+
+def _multiple(
+    assembled: Sequence[Assembled], messages: Sequence[Message], frames: Frames
+) -> Iterator[Track]:
+    """Messages that the transport protocol brought."""
+    many = len(frames.buses) > 1
+    for message in messages:
+        if not message.j1939:
+            continue
+        wanted = int(group_of(np.array([message.identifier], np.uint32))[0])
+        mine = [one for one in assembled if one.group == wanted]
+        for bus, sender in sorted({(one.bus, one.sender) for one in mine}):
+            own = [one for one in mine if (one.bus, one.sender) == (bus, sender)]
+            width = max(max(len(one.payload) for one in own), _widest(message))
+            padded = b"".join(one.payload.ljust(width, b"\xff") for one in own)
+            yield Track(
+                message,
+                sender,
+                bus,
+                _group(message, sender, frames.buses[bus], many),
+                np.array([one.time for one in own]),
+                np.frombuffer(padded, np.uint8).reshape(-1, width),
+                np.array([len(one.payload) for one in own], np.intp),
+            )
+
+
+def _widest(message: Message) -> int:
+    return max((signal.end for signal in message.signals), default=0)

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""Which reader a file needs, told by its first bytes and not by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+
+from drivetwin.channels.read_options import ReadOptions
+from drivetwin.errors import FileFormatError, Where
+from drivetwin.logs.formats.can.open import is_bus_text, open_blf, open_bus_text
+from drivetwin.logs.formats.csv import read_csv
+from drivetwin.logs.formats.mat import open_mat
+from drivetwin.logs.formats.mat_integrity import is_version4
+from drivetwin.logs.formats.mdf import open_mdf
+from drivetwin.logs.formats.parquet import open_parquet
+from drivetwin.logs.raw import Recording
+
+Opener = Callable[[Path, ReadOptions], AbstractContextManager[Recording]]
+
+SUFFIXES = frozenset(
+    (".csv", ".txt", ".tsv", ".dat", ".mf4", ".mdf", ".mat", ".parquet", ".asc", ".blf", ".log")
+)
+"""Endings by which a folder's logs are known; a file that is named by itself may have any."""
+
+_HEAD = 8192
+"""Bytes from which a format is told."""
+
+_BY_MAGIC: dict[bytes, Opener] = {
+    b"MDF     ": open_mdf,
+    b"UnFinMF ": open_mdf,
+    b"MATLAB 5.0": open_mat,
+    b"MATLAB 7.3": open_mat,
+    b"PAR1": open_parquet,
+    b"LOGG": open_blf,
+}
+
+_REFUSED = {
+    b"\x89HDF": "an HDF5 file without MATLAB header",
+    b"PK\x03\x04": "a zip archive or Excel workbook",
+    b"\x1f\x8b": "a gzip archive",
+    b";$FILEVERSION": "a PCAN trace",
+}
+"""First bytes of formats that are told by name instead of `binary`."""
+
+
+def open_recording(
+    path: Path, options: ReadOptions | None = None
+) -> AbstractContextManager[Recording]:
+    """Open a log of any format for reading its columns one by one.
+
+    Raises FileFormatError where it cannot be read, MissingExtraError where the library for its
+    format is not installed, and the errors of its reader.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError as fault:
+        what = f"cannot read the file: {fault.strerror}"
+        raise FileFormatError(what, "check the path", Where(file=str(path))) from None
+    return _opener(head, path)(path, options or ReadOptions())
+
+
+def _opener(head: bytes, path: Path) -> Opener:
+    for magic, opener in _BY_MAGIC.items():
+        if head.startswith(magic):
+            return opener
+    for magic, name in _REFUSED.items():
+        if head.startswith(magic):
+            raise FileFormatError(
+                f"this is {name}, for which there is no reader",
+                "export the channels as CSV with a row of units, MDF 4, MATLAB or Parquet, frames "
+                "of a bus as ASC, BLF or candump",
+                Where(file=str(path)),
+            )
+    if is_version4(head):
+        return open_mat
+    return open_bus_text if is_bus_text(head) else _open_csv
+
+
+@contextmanager
+def _open_csv(path: Path, options: ReadOptions) -> Iterator[Recording]:
+    yield read_csv(path.read_bytes(), str(path), options.time)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""The frames of a bus log as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.channels.shiftlog import FloatArray
+from drivetwin.logs.origin import origin_of, since
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One signal of a message: value = `scale`·code + `offset` in `unit`.
+
+    `start` is the bit as a DBC counts it (least significant bit for Intel, most significant for
+    Motorola order). `limits` are the least and greatest value that is one, None where the database
+    states none. `selector` is the code of the multiplexer (start, length) that admits the signal.
+    `spn` is its SAE J1939 number.
+    """
+
+    name: str
+    start: int
+    length: int
+    intel: bool = True
+    signed: bool = False
+    is_float: bool = False
+    scale: float = 1.0
+    offset: float = 0.0
+    unit: str | None = None
+    limits: tuple[float, float] | None = None
+    selector: tuple[Signal, frozenset[int]] | None = None
+    spn: int | None = None
+
+    @property
+    def end(self) -> int:
+        """Number of bytes that a frame must have to hold the signal."""
+        if self.intel:
+            return (self.start + self.length + 7) // 8
+        return self.start // 8 + (7 - self.start % 8 + self.length + 7) // 8
+
+
+PAYLOAD, LONGEST = 8, 64
+"""Most data bytes of a classical frame, and of one of CAN FD."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Data frames in file order.
+
+    `time` (n,) [s]; `identifier` (n,) with 11 or 29 bits as `extended` (n,) says; `data` (n, width)
+    padded with 0xFF, as wide as the longest and at least 8; `length` (n,) of valid bytes; `bus`
+    (n,) an index into `buses`.
+    """
+
+    time: FloatArray
+    identifier: NDArray[np.uint32]
+    extended: NDArray[np.bool_]
+    data: NDArray[np.uint8]
+    length: NDArray[np.uint8]
+    bus: NDArray[np.intp]
+    buses: tuple[str, ...]
+    warnings: tuple[str, ...] = field(default=())
+
+
+def frame_table(
+    stamps: Sequence[float],
+    identifiers: Sequence[int],
+    extended: Sequence[bool],
+    payloads: Sequence[bytes],
+    buses: Sequence[str],
+    warnings: tuple[str, ...] = (),
+) -> Frames:
+    """Build the table from one entry for each frame; payloads have at most LONGEST bytes."""
+    time = np.array(stamps, np.float64)
+    names = tuple(dict.fromkeys(buses))
+    index = {name: place for place, name in enumerate(names)}
+    width = max(PAYLOAD, max(map(len, payloads), default=0))
+    padded = b"".join(payload.ljust(width, b"\xff") for payload in payloads)
+    return Frames(
+        time=since(time, origin_of(time[:1])),
+        identifier=np.array(identifiers, np.uint32),
+        extended=np.array(extended, np.bool_),
+        data=np.frombuffer(padded, np.uint8).reshape(-1, width),
+        length=np.array([len(payload) for payload in payloads], np.uint8),
+        bus=np.array([index[name] for name in buses], np.intp),
+        buses=names,
+        warnings=warnings,
+    )

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""Percent torque of SAE J1939 in N·m, by the engine's reference torque (SPN 544, message EC1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.logs.raw import RawChannel
+
+REFERENCE = 544
+"""Engine reference torque [N·m]: what 100 % means."""
+
+ACTUAL, FRICTION, FRACTION = 513, 514, 4154
+"""Actual indicated torque, nominal friction torque, and the fraction of a percent of the first."""
+
+PERCENT_TORQUES = frozenset((512, ACTUAL, FRICTION, 518, 2432, 2978))
+"""SPNs of torques in percent of the reference torque."""
+
+NET_TORQUE = "EngNetTorque"
+"""Name of the derived channel actual minus friction torque: what the crankshaft gives [N·m]."""
+
+UNIT = "Nm"
+
+
+def torque_name(name: str) -> str:
+    """Name of a percent torque's channel in N·m: `ActualEngPercentTorque` -> `ActualEngTorque`."""
+    return name.replace("PercentTorque", "Torque") if "PercentTorque" in name else f"{name}_Nm"
+
+
+def in_newton_metres(percent: RawChannel, reference: float, note: str) -> RawChannel:
+    """Return a percent torque as torque; `note` says where the `reference` [N·m] is from."""
+    return RawChannel(
+        torque_name(percent.name),
+        UNIT,
+        percent.time,
+        percent.values * (reference / 100.0),
+        percent.group,
+        (*percent.notes, note),
+    )
+
+
+def with_fraction(actual: RawChannel, fraction: RawChannel) -> RawChannel:
+    """Add the fraction of a percent, which travels in the same message, where it is sent."""
+    part = np.zeros(actual.time.size)
+    index = np.clip(np.searchsorted(fraction.time, actual.time), 0, max(0, fraction.time.size - 1))
+    if fraction.time.size:
+        same = fraction.time[index] == actual.time
+        part[same] = fraction.values[index[same]]
+    return RawChannel(
+        actual.name, actual.unit, actual.time, actual.values + part, actual.group, actual.notes
+    )
+
+
+def net_torque(actual: RawChannel, friction: RawChannel) -> RawChannel:
+    """Return actual minus friction torque [N·m] at the stamps of the actual torque.
+
+    Friction is interpolated linearly; outside its span and in its gaps there is no net torque.
+    """
+    values: FloatArray = actual.values - _channel(friction).at(actual.time)
+    known = np.isfinite(values)
+    notes = tuple(dict.fromkeys((*actual.notes, *friction.notes)))
+    return RawChannel(NET_TORQUE, UNIT, actual.time[known], values[known], actual.group, notes)
+
+
+def _channel(raw: RawChannel) -> Channel:
+    return Channel(raw.name, Quantity.TORQUE, raw.time, raw.values, raw.name, UNIT)

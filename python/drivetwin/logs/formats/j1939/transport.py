@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Transport protocol of SAE J1939-21: messages longer than 8 bytes put together again.
+
+A sender announces length, number of packets and parameter group (BAM to all, RTS to one receiver),
+then sends packets numbered from 1. Senders interleave; each pair of sender and receiver has one
+transfer at a time. What stays incomplete is counted, never filled.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drivetwin.logs.formats.frames import Frames
+from drivetwin.logs.formats.j1939.identifier import group_of, receiver_of, sender_of
+
+_CONNECTION, _DATA = 0xEC00, 0xEB00
+_RTS, _BAM, _ABORT = 16, 32, 255
+_TIMEOUT = 1.25
+"""Longest pause [s] between packets (T2 of J1939-21); a transfer that pauses longer has ended."""
+
+REPEATED = 1e-3
+"""An equal frame of one sender within this time [s] is the same frame recorded twice."""
+
+_BYTES, _LONGEST = 7, 1785
+
+
+@dataclass(frozen=True)
+class Assembled:
+    """A message put together: `time` [s] of its last packet."""
+
+    time: float
+    group: int
+    sender: int
+    bus: int
+    payload: bytes
+
+
+@dataclass(frozen=True)
+class Transport:
+    """All complete messages in order of completion; `faults` count what was incomplete, by why."""
+
+    messages: tuple[Assembled, ...]
+    faults: Counter[str] = field(default_factory=Counter)
+
+
+@dataclass
+class _Transfer:
+    group: int
+    length: int
+    packets: int
+    time: float
+    parts: list[bytes] = field(default_factory=list)
+
+
+def reassemble(frames: Frames) -> Transport:
+    """Put multi-packet messages together from all frames of a log."""
+    groups = group_of(frames.identifier)
+    chosen = np.flatnonzero(frames.extended & np.isin(groups, (_CONNECTION, _DATA)))
+    assembly = _Assembly()
+    senders, receivers = sender_of(frames.identifier), receiver_of(frames.identifier)
+    for index in chosen.tolist():
+        key = (int(frames.bus[index]), int(senders[index]), int(receivers[index]))
+        payload = frames.data[index, : frames.length[index]].tobytes()
+        time = float(frames.time[index])
+        if assembly.repeated((*key, int(groups[index])), payload, time):
+            continue
+        if groups[index] == _CONNECTION:
+            assembly.connect(key, payload, time)
+        else:
+            assembly.packet(key, payload, time)
+    return assembly.finish()
+
+
+class _Assembly:
+    """Open transfers by (bus, sender, receiver)."""
+
+    def __init__(self) -> None:
+        self._open: dict[tuple[int, int, int], _Transfer] = {}
+        self._messages: list[Assembled] = []
+        self._faults: Counter[str] = Counter()
+        self._last: dict[tuple[int, int, int, int], tuple[bytes, float]] = {}
+
+    def repeated(self, place: tuple[int, int, int, int], payload: bytes, time: float) -> bool:
+        """Whether a frame is the last of its `place`, told twice by a gateway or a logger.
+
+        A `place` is (bus, sender, receiver, group).
+        """
+        before, since = self._last.get(place, (b"", -np.inf))
+        self._last[place] = (payload, time)
+        return payload == before and time - since < REPEATED
+
+    def connect(self, key: tuple[int, int, int], payload: bytes, time: float) -> None:
+        if len(payload) < 8:
+            self._faults["announcement cut short"] += 1
+            return
+        if payload[0] == _ABORT:
+            for pair in (key, (key[0], key[2], key[1])):
+                self._drop(pair, "aborted")
+            return
+        if payload[0] not in (_RTS, _BAM):
+            return  # clear to send, end of message: the receiver's part
+        length = int.from_bytes(payload[1:3], "little")
+        group = int.from_bytes(payload[5:8], "little")
+        self._drop(key, "replaced by the next before its end")
+        if not 8 < length <= _LONGEST or payload[3] != -(-length // _BYTES):
+            self._faults["announced with an impossible length"] += 1
+            return
+        self._open[key] = _Transfer(group, length, payload[3], time)
+
+    def packet(self, key: tuple[int, int, int], payload: bytes, time: float) -> None:
+        transfer = self._open.get(key)
+        if transfer is None or len(payload) < 2:
+            self._faults["packet without announcement"] += 1
+            return
+        if time - transfer.time > _TIMEOUT:
+            self._drop(key, "paused too long")
+            return
+        expected = len(transfer.parts) + 1
+        number = payload[0]
+        if number == expected - 1 and number > 0 and payload[1:] == transfer.parts[-1]:
+            return  # sent once more
+        if number != expected:
+            self._drop(key, "packet missing")
+            return
+        transfer.parts.append(payload[1:])
+        transfer.time = time
+        if expected == transfer.packets:
+            del self._open[key]
+            data = b"".join(transfer.parts)
+            if len(data) < transfer.length:
+                self._faults["last packet too short"] += 1
+                return
+            self._messages.append(
+                Assembled(time, transfer.group, key[1], key[0], data[: transfer.length])
+            )
+
+    def finish(self) -> Transport:
+        for key in list(self._open):
+            self._drop(key, "cut by the end of the log")
+        return Transport(tuple(self._messages), self._faults)
+
+    def _drop(self, key: tuple[int, int, int], reason: str) -> None:
+        if self._open.pop(key, None) is not None:
+            self._faults[reason] += 1

@@ -1,0 +1,336 @@
+# SPDX-License-Identifier: MIT
+"""Reader of MDF 3 and 4 measurement files, by asammdf.
+
+Each channel keeps the time base of its group; nothing is resampled, and only what is asked for is
+read. asammdf's own resampling and one-table export hold or invent values, so they are not used.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drivetwin._util.optional_dependencies import foreign_parser, require
+from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.shiftlog import FloatArray
+from drivetwin.channels.units import is_time_unit, time_factor
+from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError, Where
+from drivetwin.logs.formats.can.mdf_frames import bus_frames, holds_frames
+from drivetwin.logs.formats.can.open import bus_recording
+from drivetwin.logs.formats.frames import Frames
+from drivetwin.logs.formats.mdf_integrity import check_blocks
+from drivetwin.logs.origin import origin_of, origin_told, since
+from drivetwin.logs.raw import Joined, RawChannel, Recording, Window
+
+_KIND = "an MDF file"
+_FRAGMENT = 1 << 23
+"""Bytes of records read at a time, of all channels; bounds the memory for one channel."""
+
+_FINISHED = b"MDF     "
+_OPTIONS = {"process_bus_logging": False, "use_display_names": False}
+_MOST_INFLATION = 1100
+"""Deflate packs zeros about 1030 to 1; a group that claims more than this is damaged."""
+
+
+_LISTED = 8
+"""So many texts of a table are told."""
+
+_MASTERS = (2, 3)
+"""Types of a channel of MDF 4 over which its group is recorded: stored, or counted."""
+
+_TIME, _NO_TIME = 1, (2, 3, 4)
+"""What such a channel holds: time; angle, distance or index."""
+
+_ALL_INVALID = 1
+"""Flag of a channel of MDF 4 none of whose samples is valid."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    group: int
+    index: int
+
+
+@contextmanager
+def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
+    """Open an MDF file.
+
+    Raises MissingExtraError without asammdf, FileFormatError for a damaged file.
+    """
+    asammdf = require("asammdf", "mdf", _KIND, path)
+    check_blocks(path)
+    with path.open("rb") as file:
+        finished = file.read(8) == _FINISHED
+        file.seek(0)
+        with foreign_parser(_KIND, path):
+            # An unfinished file is completed in a copy, which asammdf makes of a named file only.
+            mdf = asammdf.MDF(file if finished else path, **_OPTIONS)
+            mdf.configure(read_fragment_size=_FRAGMENT)
+        try:
+            with foreign_parser(_KIND, path):
+                signals = MdfRecording(mdf, path, options)
+                frames = bus_frames(mdf, signals.origin)
+            yield _with_bus(signals, frames, options, path)
+        finally:
+            mdf.close()
+
+
+def _with_bus(
+    signals: MdfRecording, frames: Frames | None, options: ReadOptions, path: Path
+) -> Recording:
+    """The signals of a file and those of its raw frames.
+
+    Frames are decoded where a database is stated or nothing else is in the file: else their signals
+    might stand in it twice. Raises MissingChannelError without any column.
+    """
+    if frames is not None and (options.bus.databases or not signals.columns):
+        return Joined((signals, bus_recording(frames, options, path)))
+    if frames is not None:
+        note = "raw bus frames are not decoded: name their DBC files under [bus]"
+        signals.warnings = (*signals.warnings, note)
+    if not signals.columns:
+        raise MissingChannelError(
+            "the file has no channel with a time base",
+            "record or export the log again",
+            Where(file=str(path)),
+        )
+    return signals
+
+
+class MdfRecording:
+    """Channels of an open MDF file; the group is the recorder's name for it, else its number.
+
+    `origin` [s] is the stamp of the file from which time counts.
+    """
+
+    def __init__(self, mdf: Any, path: Path, options: ReadOptions) -> None:
+        self._mdf = mdf
+        self._path = path
+        self._stamps: tuple[int, FloatArray] | None = None
+        self._asserted = options.time.unit
+        self._factors: dict[int, float] = {}
+        self.warnings: tuple[str, ...] = ()
+        names = _group_names(mdf.groups)
+        places: list[_Place] = []
+        columns: list[Column] = []
+        timeless: list[str] = []
+        for number, group in enumerate(mdf.groups):
+            if not self._has_time(number, group, names[number]):
+                timeless.append(names[number])
+                continue
+            self._check_size(group, names[number])
+            if holds_frames(group):
+                continue
+            empty = int(group.channel_group.cycles_nr) == 0
+            for index, channel in enumerate(group.channels):
+                if index == mdf.masters_db[number]:
+                    continue
+                unit = self._unit(number, index)
+                places.append(_Place(number, index))
+                columns.append(Column(channel.name, unit, names[number], empty=empty))
+        self._places = tuple(places)
+        self.columns: Sequence[Column] = tuple(columns)
+        self.origin = self._found_origin()
+        if timeless:
+            left = f"groups without a time channel left out: {', '.join(timeless)}"
+            self.warnings = (left, *self.warnings)
+        self.warnings = (*self.warnings, *origin_told(self.origin))
+
+    def _has_time(self, number: int, group: Any, name: str) -> bool:
+        """Whether a group is recorded over time; its stamps and their unit are known then.
+
+        By the standard they are seconds; a unit that says otherwise is believed, and told.
+        """
+        master = _time_channel(group, self._mdf.masters_db.get(number))
+        if master is None:
+            return False
+        self._mdf.masters_db[number] = master
+        stated, factor = self._unit(number, master), 1.0
+        if self._asserted is not None:
+            factor = time_factor(self._asserted, Where(file=str(self._path)))
+        elif stated is not None and is_time_unit(stated):
+            factor = time_factor(stated, Where(file=str(self._path)))
+            if factor != 1.0:
+                note = f"time of group {name!r} read in {stated!r}, as its unit says"
+                self.warnings = (*self.warnings, note)
+        self._factors[number] = factor
+        return True
+
+    def _unit(self, group: int, index: int) -> str | None:
+        text: str = self._mdf.get_channel_unit(group=group, index=index)
+        return text.strip() or None
+
+    def load(self, index: int, window: Window | None = None) -> RawChannel:
+        """Read one channel, in a window only the records inside; see `Recording`."""
+        place, column = self._places[index], self.columns[index]
+        with foreign_parser(_KIND, self._path):
+            time = self._time(place.group)
+            first, count = 0, time.size
+            if window is not None:
+                first, last = np.searchsorted(time, window)
+                last += int(last < time.size and time[last] == window[1])
+                count = int(last - first)
+                time = time[first:last]
+            values, invalid, codes = self._samples(place, int(first), count)
+        where = Where(file=str(self._path), channel=str(column))
+        if values.dtype.kind not in "iufb" or values.ndim != 1:
+            raise DamagedChannelError(
+                "it holds text or arrays, one number for each sample is needed",
+                "map another channel",
+                where,
+            )
+        if values.size != time.size:
+            raise FileFormatError(
+                f"{values.size} values for {time.size} time stamps", "record the log again", where
+            )
+        numbers = values.astype(np.float64)
+        notes = (codes,) if codes else ()
+        if invalid is not None and invalid.any():
+            if invalid.all():
+                what = f"the recorder marks all {invalid.size} samples invalid"
+                raise DamagedChannelError(what, "map another channel", where)
+            left = f"{int(invalid.sum())} samples that the recorder marks invalid left out"
+            notes = (*notes, left)
+            time, numbers = time[~invalid], numbers[~invalid]
+        return RawChannel(column.name, column.unit, time, numbers, column.group, notes)
+
+    def _found_origin(self) -> float:
+        """Origin of all groups; where the first one starts near zero, no other is looked at."""
+        starts = self._starts()
+        first = [*islice(starts, 1)]
+        return origin_of([*first, *starts]) if origin_of(first) else 0.0
+
+    def _starts(self) -> Iterator[float]:
+        """First stamp [s] of each group with records; one that is damaged is told when read."""
+        for number, factor in self._factors.items():
+            with contextlib.suppress(Exception):
+                first = self._mdf.get_master(number, record_offset=0, record_count=1)
+                yield from np.asarray(first, dtype=np.float64) * factor
+
+    def _time(self, group: int) -> FloatArray:
+        """Stamps [s] of a group; those of the last one stay in memory for its other channels."""
+        if self._stamps is None or self._stamps[0] != group:
+            master = np.asarray(self._mdf.get_master(group), dtype=np.float64)
+            self._stamps = (group, since(master * self._factors[group], self.origin))
+        return self._stamps[1]
+
+    def _samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:
+        """Values with the conversion of the file, the recorder's marks for invalid ones, a note.
+
+        A text among numbers, such as `not available`, is no number. Where all are texts their codes
+        are the values, and the note tells them.
+        """
+        wanted = {
+            "group": place.group,
+            "index": place.index,
+            "record_offset": first,
+            "record_count": count,
+            "samples_only": True,
+            "ignore_invalidation_bits": True,  # marked samples are left out here, and counted
+        }
+        channel = self._mdf.groups[place.group].channels[place.index]
+        formula = getattr(channel.conversion, "formula", "")
+        note = ""
+        samples, marks = self._mdf.get(raw=bool(formula), **wanted)
+        if formula:
+            samples = self._evaluated(formula, samples, channel.name)
+        elif samples.dtype.kind in "SUO":
+            if _holds_numbers(channel.conversion):
+                samples = np.full(samples.shape, np.nan)
+            else:
+                samples, marks = self._mdf.get(raw=True, **wanted)
+                note = _codes(channel.conversion)
+        if getattr(channel, "flags", 0) & _ALL_INVALID:
+            marks = np.ones(len(samples), dtype=np.bool_)
+        return samples, None if marks is None else np.asarray(marks, dtype=np.bool_), note
+
+    def _evaluated(self, formula: str, raw: Any, name: str) -> Any:
+        """The physical values (n,) of a formula over the raw ones `X`, also named `X1`.
+
+        asammdf takes raw values for physical ones where it cannot evaluate a formula, and computes
+        with integers where they are, which overflow.
+        """
+        numexpr = require("numexpr", "mdf", _KIND, self._path)
+        try:
+            numbers = np.asarray(raw, dtype=np.float64)
+            names = {"X": numbers, "X1": numbers, "INF": np.inf, "NaN": np.nan}
+            return np.broadcast_to(
+                numexpr.evaluate(formula, names, {}, sanitize=True), numbers.shape
+            )
+        except Exception:
+            raise DamagedChannelError(
+                f"its formula {formula!r} is none that can be evaluated",
+                "export the log with physical values, or map another channel",
+                Where(file=str(self._path), channel=name),
+            ) from None
+
+    def _check_size(self, group: Any, name: str) -> None:
+        """Refuse a group that claims more records than the file can hold, before it is loaded."""
+        block = group.channel_group
+        records = int(block.cycles_nr)
+        width = max(1, int(block.samples_byte_nr))
+        size = self._path.stat().st_size
+        if records * width > _MOST_INFLATION * size + 1_000_000 or records < 0:
+            raise FileFormatError(
+                f"group {name!r} claims {records} records in a file of {size} bytes",
+                "the file is cut or damaged: record or export the log again",
+                Where(file=str(self._path)),
+            )
+
+
+def _time_channel(group: Any, found: int | None) -> int | None:
+    """The channel that holds the time of a group; None where it is recorded over something else.
+
+    Of several over which it is recorded, as time and crank angle, asammdf has `found` the last.
+    """
+    if found is None:
+        return None
+    times = (
+        index
+        for index, channel in enumerate(group.channels)
+        if channel.channel_type in _MASTERS and getattr(channel, "sync_type", None) == _TIME
+    )
+    over_time = getattr(group.channels[found], "sync_type", _TIME) not in _NO_TIME
+    return found if over_time else next(times, None)
+
+
+def _group_names(groups: Sequence[Any]) -> list[str]:
+    """Name of each group: of its acquisition, else its comment; with its number where repeated."""
+    names = [_group_name(group.channel_group) for group in groups]
+    count = Counter(names)
+    return [
+        name if name and count[name] == 1 else f"{name} #{number}".strip()
+        for number, name in enumerate(names)
+    ]
+
+
+def _group_name(block: Any) -> str:
+    name = str(getattr(block, "acq_name", "") or "").strip()
+    comment = str(block.comment or "").strip()
+    return name or ("" if comment.startswith("<") else comment.partition("\n")[0])
+
+
+def _holds_numbers(conversion: Any) -> bool:
+    """Whether some codes of a table of texts stand for numbers."""
+    blocks = getattr(conversion, "referenced_blocks", None) or {}
+    return any(hasattr(block, "convert") for block in blocks.values())
+
+
+def _codes(conversion: Any) -> str:
+    """Words for a table of texts: `codes of texts: 0 = off, 1 = on`."""
+    blocks = getattr(conversion, "referenced_blocks", None) or {}
+    pairs = []
+    for index in range(_LISTED):
+        text = blocks.get(f"text_{index}")
+        code = getattr(conversion, f"val_{index}", getattr(conversion, f"lower_{index}", None))
+        if isinstance(text, bytes) and code is not None:
+            pairs.append(f"{code:g} = {text.decode('utf-8', 'replace').strip(chr(0))}")
+    return f"codes of texts: {', '.join(pairs)}" if pairs else ""

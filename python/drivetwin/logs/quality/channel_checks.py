@@ -1,0 +1,487 @@
+# SPDX-License-Identifier: MIT
+"""What a channel must satisfy before anything is computed from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.channels.roles import AUXILIARY
+from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.channels.units import BAR, RPM, lookup, usual_units
+from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
+from drivetwin.logs.quality.outliers import (
+    BEYOND,
+    Damage,
+    beyond,
+    clipped,
+    dropouts,
+    longest_rest,
+    missing,
+    pulses,
+    resolution,
+    runs,
+    spikes,
+    stale,
+    stuck,
+)
+from drivetwin.logs.quality.update_raster import find_raster, fresh_samples
+
+MIN_SAMPLES = 10
+"""Fewer samples cannot show a shift."""
+
+MIN_SOUND = 0.5
+"""Share of the samples that must hold a sound number."""
+
+MAX_WRAPS = 3
+"""So few steps back suggest a counter that wrapped, more suggest disorder."""
+
+SHORTEST_STEP, LONGEST_STEP = 2.5e-5, 0.9
+"""Sample intervals [s] between which a channel can show a shift; 50 Hz told in ms are below."""
+
+MAX_SPARSE = 100.0
+"""Time from first to last sample in units of samples times interval; more is mostly gap."""
+
+TYPICAL_STEP = (1e-4, 0.2)
+"""Sample interval [s] that a proposed unit of time must lead to."""
+
+COARSE = 0.03
+"""Resolution as a share of the largest number from which a channel counts as coarse; engines on a
+bus have 1 % of their reference torque."""
+
+MAX_AT_LIMIT = 0.1
+"""Share of samples at the largest number above which an engine torque may be saturated, ..."""
+
+HELD, LONGER = 0.25, 4.0
+"""... unless it holds other numbers too, for this time [s] or one that the longest there is so many
+times as long as: a pedal that is held still makes such a torque."""
+
+LEAST_SUCTION = BAR
+"""A gauge pressure below -1 bar [Pa] does not exist."""
+
+MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
+"""Speed change [rad/s] and rate [rad/s2] that no wheel shows between samples."""
+OF_A_MOTOR = 1e4
+"""The same rate of the other shafts: 300 N m turn an electric motor of 0.04 kg m2 with 7500 rad/s2,
+and what little turns between it and a soft shaft follows at lock-up."""
+
+WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
+"""An overflow jumps by this share of the range, and by so many usual steps."""
+
+WRAP_STEP = 15e-3
+"""Interval of samples [s] from which an output torque may do the same: at lock-up it falls within a
+quarter of a period of the shaft, and swings back."""
+
+WRAP_BESIDE, WRAP_DRIFT = 5, 0.02
+"""So many samples before and after an overflow move against the jump by this share at least."""
+
+_PLAUSIBLE: dict[Quantity, tuple[float, float]] = {
+    Quantity.PRESSURE: (1e-3 * BAR, 100 * BAR),
+    Quantity.SPEED: (0.1, 1.2e3),
+    Quantity.TORQUE: (1.0, 1e5),
+    Quantity.FRACTION: (1e-3, 2.0),
+}
+"""Limits of max|value| in SI over a recording that contains a shift."""
+
+_FASTEST = 2.7e3
+"""Limit of engine and gearbox input in rpm [rad/s], as of electric drives. In rad/s the limit of
+all speeds holds: larger numbers are those of an engine in rpm."""
+
+_DRIVING = ("input_speed", "engine_speed")
+"""Speeds of what drives: an engine, or an electric motor."""
+
+_IDLE = 30.0
+"""Largest speed [rad/s] that engine and gearbox input exceed in any shift."""
+
+_TYPICAL: dict[Quantity, tuple[float, float]] = {
+    Quantity.PRESSURE: (1 * BAR, 60 * BAR),
+    Quantity.SPEED: (10.0, 700.0),
+    Quantity.TORQUE: (50.0, 3e4),
+    Quantity.FRACTION: (0.05, 1.0),
+}
+"""Where max|value| usually lies; a unit that leads there is proposed."""
+
+_MUST_VARY = frozenset(
+    ("output_torque", "input_speed", "engine_speed", "output_speed", "wheel_speed")
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """A channel that passed, and what was left out of it."""
+
+    channel: Channel
+    warnings: tuple[str, ...] = ()
+
+
+def check_channel(channel: Channel, file: str) -> Checked:
+    """Return the channel fit for use: damaged samples are left out, never replaced, and listed.
+
+    Raises TimeError, DamagedChannelError, PlausibilityError where nothing sound would remain or the
+    whole channel is in doubt.
+    """
+    where = Where(file=file, channel=channel.source_name)
+    warnings: list[str] = []
+    check_order(channel.time, where)
+    _check_count(channel, channel.time.size, where)
+    _check_rate(channel, where)
+    warnings += _gaps(channel)
+    total = channel.time.size
+    found = missing(channel.time, channel.values)
+    channel = _without(channel, found, warnings)
+    _check_count(channel, total, where)
+    _check_variation(channel, where)
+    for look in (_dropouts, _spikes, _stuck, _beyond, _pulses, _clipped, _stale):
+        channel = _without(channel, look(channel), warnings)
+        _check_count(channel, total, where)
+    _check_magnitude(channel, where)
+    _check_sign(channel, where)
+    _check_jumps(channel, where)
+    _check_wraps(channel, where)
+    warnings += _at_limit(channel)
+    warnings += _at_rest(channel)
+    warnings += _coarse(channel)
+    return Checked(channel, tuple(warnings))
+
+
+def _gaps(channel: Channel) -> list[str]:
+    """Words for the gaps that the file itself has."""
+    if not channel.gaps:
+        return []
+    spans = ", ".join(f"{start:.3f} s to {end:.3f} s" for start, end in channel.gaps[:3])
+    more = f" and {len(channel.gaps) - 3} more" if len(channel.gaps) > 3 else ""
+    return [f"channel {channel.source_name!r}: no samples from {spans}{more}"]
+
+
+def _at_limit(channel: Channel) -> list[str]:
+    """Words for an engine torque that rests at its largest number alone; it may have reason to."""
+    limit = float(channel.values[np.abs(channel.values).argmax()])
+    at_limit = channel.values == limit
+    share = float(np.mean(at_limit))
+    if channel.role != "engine_torque" or not MAX_AT_LIMIT < share < 1.0:
+        return []
+    rests = runs(np.diff(channel.values) == 0.0)
+    there, elsewhere = (
+        max((channel.time[b] - channel.time[a] for a, b in rests if at_limit[a] == at), default=0.0)
+        for at in (True, False)
+    )
+    far = abs(limit) > BEYOND * float(np.abs(channel.values[~at_limit]).max())
+    if elsewhere > min(HELD, there / LONGER) and not far:
+        return []
+    return [
+        f"channel {channel.source_name!r}: at its largest number for {100 * share:.0f} % of the "
+        f"log, {_show(limit, channel.quantity)}; if it is saturated there, or none was received, "
+        "results that rest on it are wrong"
+    ]
+
+
+def _at_rest(channel: Channel) -> list[str]:
+    """Words for an engine torque that stays at one number where chance would have moved it."""
+    if channel.role != "engine_torque":
+        return []
+    fresh = fresh_samples(replace(channel, held=find_raster(channel) is not None))
+    span = longest_rest(fresh.time, fresh.values)
+    if span is None:
+        return []
+    return [
+        f"channel {channel.source_name!r}: one number from {span[0]:.3f} s to {span[1]:.3f} s, "
+        "though it jitters elsewhere; if it is stuck there, results that rest on it are wrong"
+    ]
+
+
+def _coarse(channel: Channel) -> list[str]:
+    """Words for a measured channel that was rounded so much that nothing precise rests on it."""
+    # Not from one sample to the next: along a ramp of a slow channel all may be many steps apart.
+    numbers = np.unique(channel.values[np.isfinite(channel.values)])
+    step, largest = resolution(numbers), float(np.abs(numbers).max(initial=0.0))
+    if channel.quantity in AUXILIARY or step <= COARSE * largest or _switched(channel.values):
+        return []
+    return [
+        f"channel {channel.source_name!r}: recorded in steps of {_show(step, channel.quantity)}, "
+        f"{100 * step / largest:.0f} % of its largest number; what rests on it may be as coarse"
+    ]
+
+
+def _switched(values: FloatArray) -> bool:
+    """Whether a signal knows two numbers only, as the pressure of a valve that is on or off."""
+    return bool(np.all((values == values.min()) | (values == values.max())))
+
+
+def _dropouts(channel: Channel) -> Damage | None:
+    if channel.quantity not in (Quantity.SPEED, Quantity.TORQUE):
+        return None
+    return _of_updates(channel, lambda fresh: dropouts(fresh.time, fresh.values))
+
+
+def _spikes(channel: Channel) -> Damage | None:
+    return spikes(channel.time, channel.values, channel.quantity)
+
+
+def _pulses(channel: Channel) -> Damage | None:
+    """Of a measured torque: an engine's may be cut that shortly, in the number that it sends."""
+    if channel.role != "output_torque":
+        return None
+    return _of_updates(channel, lambda fresh: pulses(fresh.time, fresh.values))
+
+
+def _stuck(channel: Channel) -> Damage | None:
+    """Stretches of one number; of an engine torque that a logger holds, in its fresh values."""
+    if channel.role == "engine_torque":
+        return _of_updates(channel, lambda fresh: stuck(fresh.time, fresh.values, fresh.quantity))
+    return stuck(channel.time, channel.values, channel.quantity) if _measured(channel) else None
+
+
+def _beyond(channel: Channel) -> Damage | None:
+    """Numbers that stand for no value; what a pressure can be may be the pulse of a valve."""
+    if channel.quantity in AUXILIARY:
+        return None
+    possible = _PLAUSIBLE[Quantity.PRESSURE][1] if channel.quantity is Quantity.PRESSURE else 0.0
+    return _of_updates(channel, lambda fresh: beyond(fresh.time, fresh.values, possible))
+
+
+def _of_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> Damage | None:
+    """What `look` finds in the fresh values of a channel, with the samples that repeat them."""
+    held = find_raster(channel) is not None
+    fresh = fresh_samples(replace(channel, held=held))
+    found = look(fresh)
+    if found is None or not held:
+        return found
+    update = np.searchsorted(fresh.time, channel.time, side="right") - 1
+    return Damage(found.mask[np.clip(update, 0, None)], found.text)
+
+
+def _stale(channel: Channel) -> Damage | None:
+    """Values that a logger shows on while their messages are lost."""
+    if channel.quantity in AUXILIARY:
+        return None
+    return _of_updates(channel, lambda fresh: stale(fresh.time, fresh.values))
+
+
+def _clipped(channel: Channel) -> Damage | None:
+    return clipped(channel.time, channel.values) if _measured(channel) else None
+
+
+def _measured(channel: Channel) -> bool:
+    """Whether a sensor's noise is expected in a channel."""
+    return channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
+
+
+def _without(channel: Channel, damage: Damage | None, warnings: list[str]) -> Channel:
+    """Leave the damaged samples out and say so."""
+    if damage is None:
+        return channel
+    warnings.append(f"channel {channel.source_name!r}: {damage.text}")
+    keep = ~damage.mask
+    return replace(channel, time=channel.time[keep], values=channel.values[keep])
+
+
+def check_order(time: FloatArray, where: Where) -> None:
+    """Refuse `time` (n,) [s] with stamps that are missing, repeated or run backward by a TimeError.
+
+    Which of them is wrong is open.
+    """
+    if not np.isfinite(time).all():
+        index = int(np.isfinite(time).argmin())
+        raise TimeError(f"sample {index} has no time stamp", "remove or repair it", where)
+    backward = np.flatnonzero(np.diff(time) <= 0)
+    if not backward.size:
+        return
+    index = int(backward[0]) + 1
+    step = float(time[index] - time[index - 1])
+    how = "repeats the stamp before it" if step == 0 else f"lies {-step:.6g} s before the last"
+    raise TimeError(
+        f"time does not increase: sample {index} {how} ({backward.size} such samples)",
+        _time_remedy(time, backward),
+        Where(file=where.file, channel=where.channel, time=float(time[index])),
+    )
+
+
+def _time_remedy(time: FloatArray, backward: NDArray[np.intp]) -> str:
+    """What to do about stamps that run backward; a counter that starts again goes on from there.
+
+    Where many repeat the one before and none lies behind it, they were rounded.
+    """
+    later = np.minimum(backward + MIN_SAMPLES, time.size - 1)
+    if backward.size <= MAX_WRAPS and np.all(time[later] < time[backward]):
+        index = int(backward[0])
+        wrapped = float(time[index] - time[index + 1])
+        return (
+            f"a time counter that starts again after {wrapped:.6g} s, or two recordings in one "
+            "file: export with a running clock, or cut the file there"
+        )
+    if backward.size > MAX_WRAPS and np.all(time[backward + 1] == time[backward]):
+        return "export the stamps with more decimals, or remove the repeated samples"
+    return (
+        "remove the repeated or misplaced samples, or map the right time column: "
+        'time = { source = "...", unit = "s" }'
+    )
+
+
+def _check_count(channel: Channel, total: int, where: Where) -> None:
+    """Refuse what has too few samples, or lost more than half of them."""
+    size = channel.time.size
+    if total < MIN_SAMPLES:
+        what = f"only {total} samples"
+    elif size < max(MIN_SAMPLES, MIN_SOUND * total):
+        what = f"only {size} of {total} samples hold a sound number"
+    else:
+        return
+    raise DamagedChannelError(
+        what, "the file may be cut, or the sensor failed: export the log again", where
+    )
+
+
+def _check_rate(channel: Channel, where: Where) -> None:
+    """Refuse stamps that jump, or are in another unit than s: no shift log is sampled like that."""
+    if channel.quantity is Quantity.STATE:
+        return
+    step = channel.step
+    longest = int(np.diff(channel.time).argmax())
+    if channel.time[-1] - channel.time[0] > MAX_SPARSE * channel.time.size * step:
+        pause = float(channel.time[longest + 1] - channel.time[longest])
+        raise TimeError(
+            f"time jumps ahead by {pause:.6g} s between two samples",
+            "a damaged time stamp, or two recordings in one file: cut the log there",
+            Where(where.file, where.channel, float(channel.time[longest])),
+        )
+    if SHORTEST_STEP <= step <= LONGEST_STEP:
+        return
+    fitting = [
+        unit
+        for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("ps", 1e-12))
+        if TYPICAL_STEP[0] <= factor * step <= TYPICAL_STEP[1]
+    ]
+    remedy = (
+        f'the stamps would fit "{fitting[0]}": assert it in the channel mapping, '
+        f'time = {{ unit = "{fitting[0]}" }}'
+        if fitting
+        else 'check its unit of time; the channel mapping asserts one: time = { unit = "s" }'
+    )
+    raise TimeError(f"samples lie {step:.4g} s apart, no log of a shift does that", remedy, where)
+
+
+def _check_jumps(channel: Channel, where: Where) -> None:
+    """Refuse a speed that jumps from one sample to the next: its number has overflown."""
+    if channel.quantity is not Quantity.SPEED:
+        return
+    pause, change = np.diff(channel.time), np.abs(np.diff(channel.values))
+    close = pause <= 2.5 * channel.step
+    fastest = MAX_ACCELERATION if channel.role == "wheel_speed" else OF_A_MOTOR
+    jumps = np.flatnonzero(close & (change > MAX_JUMP) & (change > fastest * pause))
+    if jumps.size:
+        index = int(jumps[0]) + 1
+        before, after = (
+            _show(float(channel.values[index - 1]), channel.quantity),
+            _show(float(channel.values[index]), channel.quantity),
+        )
+        raise DamagedChannelError(
+            f"jumps from {before} to {after} between two samples ({jumps.size} such jumps)",
+            "the number may overflow or the sensor drop out: cut the log to a sound span, or map "
+            "another channel",
+            Where(where.file, where.channel, float(channel.time[index])),
+        )
+
+
+def _check_wraps(channel: Channel, where: Where) -> None:
+    """Refuse a torque or pressure that starts again at its other end and goes on as before.
+
+    That is a number that overflows; a signal that truly jumps does not go on in the direction that
+    it came from.
+    """
+    if channel.quantity not in (Quantity.TORQUE, Quantity.PRESSURE):
+        return
+    if channel.role == "output_torque" and channel.step > WRAP_STEP:
+        return
+    values, span = channel.values, float(np.ptp(channel.values))
+    near = WRAP_BESIDE
+    steps = np.abs(np.diff(values))
+    usual = float(np.median(steps[steps > 0.0])) if steps.any() else 0.0
+    jumps = np.flatnonzero(steps > max(WRAP_SHARE * span, WRAP_CONTRAST * usual))
+    for index in jumps[(jumps >= near) & (jumps < values.size - near - 1)]:
+        jump = float(values[index + 1] - values[index])
+        came = float(values[index] - values[index - near])
+        went = float(values[index + 1 + near] - values[index + 1])
+        least = WRAP_DRIFT * span
+        if min(-np.sign(jump) * came, -np.sign(jump) * went) > least:
+            raise DamagedChannelError(
+                f"goes on at {_show(float(values[index + 1]), channel.quantity)} after "
+                f"{_show(float(values[index]), channel.quantity)}, as a number that overflows does",
+                "export the channel with more bits or another scale, or cut the log there",
+                Where(where.file, where.channel, float(channel.time[index])),
+            )
+
+
+def _check_variation(channel: Channel, where: Where) -> None:
+    if channel.role in _MUST_VARY and float(np.ptp(channel.values)) == 0.0:
+        raise DamagedChannelError(
+            f"constant throughout ({channel.values[0]:.6g} in SI), but {channel.role} must vary in "
+            "a shift",
+            "check sensor and cable, or map another column to this role",
+            where,
+        )
+
+
+def _check_magnitude(channel: Channel, where: Where) -> None:
+    if channel.quantity not in _PLAUSIBLE:
+        return
+    lowest, highest = _PLAUSIBLE[channel.quantity]
+    if channel.role in _DRIVING:
+        unit = lookup(channel.source_unit)
+        lowest = _IDLE
+        highest = _FASTEST if unit is not None and unit.factor == RPM else highest
+    largest = float(np.abs(channel.values).max())
+    if largest == 0.0 or lowest <= largest <= highest:
+        return
+    low, high = _TYPICAL[channel.quantity]
+    fitting = [
+        name
+        for name, factor in usual_units(channel.quantity, channel.source_unit)
+        if low <= factor * largest <= high
+    ]
+    side, limit = ("above", highest) if largest > highest else ("below", lowest)
+    remedy = (
+        f"the numbers would fit {' or '.join(map(repr, fitting))}: assert the unit in the channel "
+        f'mapping, channels.{channel.role} = {{ source = "{channel.source_name}", '
+        f'unit = "{fitting[0]}" }}'
+        if fitting
+        else f"correct unit or scale of channels.{channel.role} in the channel mapping"
+    )
+    raise PlausibilityError(
+        f"largest {channel.quantity} is {_show(largest, channel.quantity)}, {side} "
+        f"{_show(limit, channel.quantity)}, with unit {channel.source_unit!r}",
+        remedy,
+        where,
+    )
+
+
+def _show(value: float, quantity: Quantity) -> str:
+    """Value in the unit an engineer reads: bar, rpm, N·m."""
+    factor, unit = {
+        Quantity.PRESSURE: (1.0 / BAR, "bar"),
+        Quantity.SPEED: (1.0 / RPM, "rpm"),
+        Quantity.TORQUE: (1.0, "N·m"),
+    }.get(quantity, (1.0, ""))
+    return f"{value * factor:.4g} {unit}".rstrip()
+
+
+def _check_sign(channel: Channel, where: Where) -> None:
+    if channel.quantity is Quantity.PRESSURE:
+        lowest, highest = float(channel.values.min()), float(channel.values.max())
+        if -lowest > max(highest, LEAST_SUCTION):
+            raise PlausibilityError(
+                f"gauge pressure goes down to {_show(lowest, channel.quantity)}, but up to "
+                f"{_show(highest, channel.quantity)} only",
+                f"set the sign in the channel mapping: channels.{channel.role} = "
+                f'{{ source = "{channel.source_name}", sign = -1 }}',
+                where,
+            )
+    if channel.quantity is Quantity.SPEED and float(np.median(channel.values)) < 0.0:
+        raise PlausibilityError(
+            "the speed is negative for most of the log; forward motion counts positive",
+            f"set the sign in the channel mapping: channels.{channel.role} = "
+            f'{{ source = "{channel.source_name}", sign = -1 }}',
+            where,
+        )

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""What the channels of one log must satisfy together: one clock, speeds that fit the gearing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from drivetwin.channels.roles import AUXILIARY, quantity_of
+from drivetwin.channels.shiftlog import Channel, open_ends
+from drivetwin.errors import PlausibilityError, TimeError, Where
+from drivetwin.logs.quality.time_alignment import SIGNIFICANT, speed_ratio
+from drivetwin.logs.quality.update_raster import fresh_samples
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+STARTS_APART = 0.05
+"""The groups of a recording start and end so far apart [s]."""
+
+STANDSTILL = 1.0
+"""Median speed [rad/s] below which a log does not show the gearing."""
+
+FINAL_DRIVE_TOLERANCE = 0.2
+"""Relative; generous to one-wheel sensors in a bend, far below any mistaken unit."""
+
+FINAL_DRIVE_DRIFT = 0.001
+"""Relative deviation of the held final drive from the card that is worth a warning: no clutch lies
+between the two speeds, and J3 and the shaft's damping hang on it."""
+
+GEAR_MARGIN = 3.0
+"""Factor around the card's gears, for logs that also hold other gears; rpm/(rad/s) is 9.5."""
+
+TORQUE_BALANCE = (0.6, 1.1)
+"""Output torque over ratio times engine torque in a gear; losses and acceleration keep it below 1.
+
+The limits leave room for both; a factor of two, as of a wrong scale, is outside.
+"""
+
+LEAST_LOAD = 0.2
+"""Share of the largest engine torque above which the balance is looked at."""
+
+IN_GEAR, LEAST_SAMPLES = 0.01, 20
+"""A gear is held within this relative distance of its ratio; so few samples tell nothing."""
+
+OPPOSED = -0.5
+"""Normalised product of two torques below which one has the wrong sign."""
+
+
+def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
+    """Raise TimeError where no time belongs to all channels: then a time base is wrong."""
+    if not channels:
+        return
+    latest = max(channels.values(), key=lambda channel: float(channel.time[0]))
+    earliest = min(channels.values(), key=lambda channel: float(channel.time[-1]))
+    if latest.time[0] >= earliest.time[-1]:
+        raise TimeError(
+            f"no common time span: {latest.source_name!r} starts at {latest.time[0]:.3f} s, "
+            f"{earliest.source_name!r} ends at {earliest.time[-1]:.3f} s",
+            "set time_shift_s in the channel mapping, or export the channels on one clock",
+            Where(file=file),
+        )
+
+
+def partly_recorded(channels: Mapping[str, Channel]) -> list[str]:
+    """Tell which channels start later or end earlier than the log."""
+    measured = [one for role, one in channels.items() if quantity_of(role) not in AUXILIARY]
+    if not measured:
+        return []
+    whole = (
+        min(float(channel.time[0]) for channel in measured),
+        max(float(channel.time[-1]) for channel in measured),
+    )
+    return [
+        f"channel {channel.source_name!r}: no samples from {low:.3f} s to {high:.3f} s"
+        for channel in measured
+        for low, high in open_ends(fresh_samples(channel).time, whole)
+        if high - low > STARTS_APART
+    ]
+
+
+def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str) -> None:
+    """Raise PlausibilityError where two speeds contradict final drive or gears of the card.
+
+    Finds a speed with the unit of another (rpm taken as rad/s) and exchanged columns.
+    """
+    ratios = [gear.ratio for gear in card.gears]
+    final = card.final_drive
+    low, high = 1.0 - FINAL_DRIVE_TOLERANCE, 1.0 + FINAL_DRIVE_TOLERANCE
+    limits = (
+        ("output_speed", "wheel_speed", low * final, high * final, f"the final drive {final:g}"),
+        (
+            "input_speed",
+            "output_speed",
+            min(ratios) / GEAR_MARGIN,
+            max(ratios) * GEAR_MARGIN,
+            f"the gears {', '.join(f'{ratio:g}' for ratio in ratios)}",
+        ),
+    )
+    for faster, slower, lowest, highest, gearing in limits:
+        if faster not in channels or slower not in channels:
+            continue
+        fast, slow = channels[faster], channels[slower]
+        denominator = float(np.median(slow.values))
+        if denominator < STANDSTILL:
+            continue
+        ratio = float(np.median(fast.values)) / denominator
+        if not lowest <= ratio <= highest:
+            raise PlausibilityError(
+                f"{faster} ({fast.source_name!r}, {fast.source_unit}) over {slower} "
+                f"({slow.source_name!r}, {slow.source_unit}) is {ratio:.4g}, but the card has "
+                f"{gearing}",
+                "check the units of both and whether the columns are exchanged (channel mapping), "
+                "or correct the card",
+                Where(file=file),
+            )
+
+
+def final_drive_held(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
+    """Tell where output and wheel speed are not in the ratio of the final drive."""
+    if "output_speed" not in channels or "wheel_speed" not in channels:
+        return []
+    outlet, wheel, final = channels["output_speed"], channels["wheel_speed"], card.final_drive
+    found = speed_ratio(outlet, wheel)
+    if found is None or abs(found[0] - final) < FINAL_DRIVE_DRIFT * final + SIGNIFICANT * found[1]:
+        return []
+    return [
+        f"{outlet.source_name!r} over {wheel.source_name!r} is {found[0]:.5g}, the card says "
+        f"final_drive = {final:.5g}: correct it, or the scale of a speed; the speed of a wheel "
+        "that is not driven is off by the slip of the tyres and cannot stand for the driven ones"
+    ]
+
+
+def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
+    """Raise PlausibilityError where engine and output torque act against each other throughout."""
+    if "engine_torque" not in channels or "output_torque" not in channels:
+        return
+    engine, output = channels["engine_torque"], channels["output_torque"]
+    driven = output.at(engine.time)
+    known = np.isfinite(driven)
+    product = engine.values[known] * driven[known]
+    size = float(np.sqrt(np.sum(engine.values[known] ** 2) * np.sum(driven[known] ** 2)))
+    if size > 0.0 and float(product.sum()) < OPPOSED * size:
+        raise PlausibilityError(
+            f"{engine.source_name!r} and {output.source_name!r} have opposite signs for most of "
+            "the log; both count positive when the engine drives the vehicle",
+            f"set the sign in the channel mapping: channels.output_torque = "
+            f'{{ source = "{output.source_name}", sign = -1 }}, or that of the engine torque',
+            Where(file=file),
+        )
+
+
+def torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
+    """Tell where output and engine torque do not fit the ratio of the gear that is held."""
+    roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
+    if not all(role in channels for role in roles):
+        return []
+    engine = channels["engine_torque"]
+    output, inlet, outlet = (channels[role].at(engine.time) for role in roles[1:])
+    low, high = TORQUE_BALANCE
+    texts = []
+    loaded = (engine.values > LEAST_LOAD * engine.values.max()) & np.isfinite(output)
+    for gear in card.gears:
+        expected = gear.ratio * outlet
+        held = loaded & (np.abs(inlet - expected) < IN_GEAR * np.abs(expected))
+        if np.count_nonzero(held) < LEAST_SAMPLES:
+            continue
+        driving = card.ratio(gear.name) * float(engine.values[held].sum())
+        share = float(output[held].sum()) / driving
+        if not low <= share <= high:
+            texts.append(
+                f"in gear {gear.name} the output torque is {share:.2f} of ratio times engine "
+                f"torque, {low:g} to {high:g} is usual: check scale and unit of "
+                f"{engine.source_name!r} and {channels['output_torque'].source_name!r}"
+            )
+    return texts

@@ -1,0 +1,426 @@
+# SPDX-License-Identifier: MIT
+"""Damaged samples of one channel: found, left out, told. Nothing is put in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+from scipy.special import erf
+
+from drivetwin.channels.shiftlog import FloatArray, Quantity
+
+Mask = NDArray[np.bool_]
+
+_LISTED = 3
+"""So many places are named; more are counted."""
+
+_SPIKE_WIDTH = 3
+"""Longest spike in samples."""
+
+_SPIKE_CONTRAST = 5.0
+"""A spike stands out by so many times the largest step of its surroundings ..."""
+
+_SURROUNDINGS = 12
+"""... which are so many samples on both sides."""
+
+_SPIKE_SHARE = 0.05
+"""Least height of a spike as a share of the channel's range without its extremes."""
+
+_SPIKE_TIME = 5e-3
+"""Longest spike [s] of a torque or pressure, which may truly change that fast; speeds may not."""
+
+_PULSE_TIME = 0.025
+"""Longest stretch [s] that a shaft's torque may have jumped to and back from by a disturbance."""
+
+_STUCK_TIME = 0.25
+"""Shortest time [s] of one repeated number that may be a stuck signal."""
+
+_STUCK_SAMPLES = 10
+_STUCK_RELEASE = 8.0
+"""A stuck signal jumps at its end by so many usual steps ..."""
+
+_ENOUGH, _MOVING = 100, 0.9
+"""... or its numbers hardly ever repeat: of so many other steps such a share moves, ..."""
+
+_BEFORE, _RESTLESS, _ALIVE = 20, 5, 0.2
+"""... and noise stops or starts with the repeat: so many turns in so many steps of at least
+this share of the usual size.
+"""
+
+_JITTER = 0.3
+"""Least share of steps that move for a coarse signal to jitter."""
+
+_TWO_NEIGHBOURS = 2.0
+_WIDE_TURNS = (0.0, 0.03, 0.075, 0.12, 0.22, 0.3, 0.5, 0.6)
+_NOISES = (0.0, 0.4, 0.5, 0.6, 0.8, 1.0, 2.0, 5.0)
+"""Share of steps that turn over more than two neighbouring codes, by the deviation of normal noise
+in codes: simulated, and within a tenth the same wherever the true value lies."""
+
+_DITHER, _REPEATING = 0.3, 0.5
+"""Deviation of the noise in codes below which rounding errors stay alike from sample to sample, and
+the least share of samples that then repeat the one before."""
+
+_UNLIKELY = float(np.log(1e-9))
+"""Logarithm of the chance below which a rest is none of the jitter's own."""
+
+_DROP = 0.3
+"""Least step into and out of a dropout as a share of the signal's level; that of a spike is enough
+where the signal is calm before or after, and goes on from where it fell."""
+
+_DROP_TIME = 0.25
+"""Longest such dropout [s]."""
+
+BEYOND = 2.0
+"""A number is no measurement if it is so many times as large as any other of the log ..."""
+
+_BEYOND_STEP = 0.025
+"""... and reached in one sample, with no more than so much time [s] for it, ..."""
+
+_BEYOND_TIME, _OTHERS = 0.5, 10
+"""... left likewise, and one number for no longer than this [s], while the rest, which is more than
+half, takes so many numbers at least."""
+
+_BEYOND_AT_END = 3.0
+"""So many times as large at the start or end of a log, where it is only left or only reached."""
+
+_LIFT = 3.0
+"""A fill pulse leaves a pressure higher by so many times what it moved by before, in the same time,
+or by so many of its steps."""
+
+_LOST = 2
+"""Most messages in a row that are lost while the value before them is shown on, ..."""
+
+_MOVES = 4.0
+"""... told by a slope about it of so many times resolution and noise of a step, which repeat no
+number there, ..."""
+
+_CATCHES_UP = 1.5
+"""... and by a step after it of at most so many times what is missing by the one before it: a
+signal that sets off from rest may repeat a number just before."""
+
+_THIRD_DIFFERENCE = 3.02
+"""Median size of the third difference of unit white noise, 0.6745·sqrt(20)."""
+
+_CLIPPED_SAMPLES = 3
+_CLIPPED_RUNS = 3
+"""A limit is reached in so many runs of so many equal samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Damage:
+    """Samples (n,) that are no measurement, and the words for them."""
+
+    mask: Mask
+    text: str
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """Return first index and end (one past the last) of each stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def missing(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Samples without a number."""
+    mask = ~np.isfinite(values)
+    if not mask.any():
+        return None
+    found = runs(mask)
+    if all(end - start <= _CLIPPED_SAMPLES for start, end in found):
+        first = float(time[found[0][0]])
+        return Damage(
+            mask,
+            f"{int(mask.sum())} samples without a number left out, the first at {first:.3f} s",
+        )
+    return Damage(mask, f"no number {_spans(time, found)}")
+
+
+def spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
+    """Up to three samples that leave the signal and return to it, far beyond its usual steps."""
+    mask = np.zeros(values.size, np.bool_)
+    if quantity is Quantity.STATE or values.size < 4 * _SURROUNDINGS:
+        return None
+    steps = np.abs(np.diff(values))
+    least = max(
+        _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
+        _SPIKE_CONTRAST * float(np.median(steps[steps > 0.0])) if steps.any() else np.inf,
+    )
+    interval = float(np.median(np.diff(time)))
+    for width in range(1, _SPIKE_WIDTH + 1):
+        if quantity is not Quantity.SPEED and width * interval > _SPIKE_TIME:
+            break
+        for start in _spike_starts(values, steps, width, least):
+            mask[start : start + width] = True
+    if not mask.any():
+        return None
+    return Damage(mask, f"{len(runs(mask))} spikes left out, {_spans(time, runs(mask))}")
+
+
+def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: float) -> list[int]:
+    """First samples of spikes of one width: both neighbours agree, the rest around is calm."""
+    before, after = values[: -width - 1], values[width + 1 :]
+    base, apart = 0.5 * (before + after), np.abs(after - before)
+    inside = np.lib.stride_tricks.sliding_window_view(values[1:-1], width) - base[:, None]
+    height = np.abs(inside).min(axis=1)
+    height[np.abs(np.sign(inside).sum(axis=1)) < width] = 0.0
+    # Largest step in the windows that end before and start after the spike.
+    left = maximum_filter1d(steps, _SURROUNDINGS, origin=(_SURROUNDINGS - 1) // 2, mode="nearest")
+    right = maximum_filter1d(steps, _SURROUNDINGS, origin=-(_SURROUNDINGS // 2), mode="nearest")
+    count = height.size
+    lefts = np.concatenate(([0.0], left))[:count]  # steps up to the sample before
+    rights = np.concatenate((right[width + 1 :], [0.0]))[:count]
+    around = np.maximum(np.maximum(lefts, rights), apart)
+    found = (height > least) & (height > _SPIKE_CONTRAST * around)
+    return (np.flatnonzero(found) + 1).tolist()
+
+
+def pulses(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Stretches, longer than spikes, that a calm torque jumps to and back from in one sample each.
+
+    In between it goes on as it would have without the jump, as where an amplifier is disturbed. A
+    knock in the backlash of a driveline rises and falls over several samples.
+    """
+    steps = np.diff(values)
+    size = np.abs(steps)
+    if values.size < 4 * _SURROUNDINGS or not size.any():
+        return None
+    least = max(
+        _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
+        _SPIKE_CONTRAST * float(np.median(size[size > 0.0])),
+    )
+    mask = np.zeros(values.size, np.bool_)
+    for first, last in pairwise(np.flatnonzero(size > least)):
+        width = int(last - first)
+        if width <= _SPIKE_WIDTH or time[last] - time[first] > _PULSE_TIME:
+            continue
+        beside = (size[max(0, first - _SURROUNDINGS) : first], size[first + 1 : last],
+                  size[last + 1 :][:_SURROUNDINGS])  # fmt: skip
+        calm = max(part.max(initial=0.0) for part in beside)
+        drift = abs(float(steps[first] + steps[last]))
+        if min(size[first], size[last]) > _SPIKE_CONTRAST * max(calm, drift):
+            mask[first + 1 : last + 1] = True
+    if not mask.any():
+        return None
+    return Damage(mask, f"jumped up or down and back {_spans(time, runs(mask))}, left out")
+
+
+def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
+    """Stretches in which a varying signal repeats one number as it never does elsewhere.
+
+    Noise stops at the start or comes back at the end, or it is a speed, which cannot jump, and
+    jumps at the end. Standstill is none, nor a signal without noise that comes to rest or starts
+    from rest by itself.
+    """
+    steps = np.diff(values)
+    same, moving = steps == 0.0, np.abs(steps)
+    usual = float(np.median(moving[~same])) if (~same).any() else np.inf
+    long = [(start, end) for start, end in runs(same) if end - start >= _STUCK_SAMPLES]
+    outside = steps.size - sum(end - start for start, end in long)
+    fine = outside >= _ENOUGH and np.count_nonzero(~same) > _MOVING * outside
+    mask = np.zeros(values.size, np.bool_)
+    for start, end in long:
+        if values[start] == 0.0:
+            continue
+        slow = quantity is Quantity.SPEED and time[end] - time[start] >= _STUCK_TIME
+        released = end < moving.size and moving[end] > _STUCK_RELEASE * usual
+        beside = (steps[max(0, start - _BEFORE) : start], steps[end : end + _BEFORE])
+        noisy = any(_restless(some, usual) for some in beside)
+        if (slow and released) or (fine and noisy):
+            # The first is the last that was measured, unless the signal jumped to it.
+            jumped = start == 0 or moving[start - 1] > _STUCK_RELEASE * usual
+            mask[start if jumped else start + 1 : end + 1] = True
+    if not mask.any():
+        return None
+    return Damage(mask, f"stuck at one number {_spans(time, runs(mask))}, left out")
+
+
+def stale(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Updates (n,) that repeat the one before while the signal moves on and then catches up.
+
+    So a logger shows messages that were lost. Where the signal turns or rests a repeat may be true.
+    """
+    steps = np.diff(values)
+    mask = np.zeros(values.size, np.bool_)
+    if values.size < 4 * _SURROUNDINGS:
+        return None
+    noise = float(np.median(np.abs(np.diff(values, 3)))) / _THIRD_DIFFERENCE
+    size, least = np.abs(steps), _MOVES * max(resolution(np.unique(values)), noise)
+    for start, end in runs(steps == 0.0):
+        if start == 0 or end == steps.size or end - start > _LOST:
+            continue
+        before, after, lost = size[start - 1], size[end], end - start
+        onwards = steps[start - 1] * steps[end] > 0.0
+        catches_up = before < after < _CATCHES_UP * (lost + 1) * before
+        if onwards and catches_up and before + after >= least * (lost + 2):
+            mask[start + 1 : end + 1] = True
+    if not mask.any():
+        return None
+    count = int(mask.sum())
+    what = "sample repeats" if count == 1 else "samples repeat"
+    return Damage(
+        mask,
+        f"{count} {what} the one before while the signal moves on, as where a message is lost: "
+        f"left out, {_spans(time, runs(mask))}",
+    )
+
+
+def _restless(steps: FloatArray, usual: float) -> bool:
+    """Tell whether successive steps are as large as usual and turn as noise does."""
+    turns = np.count_nonzero(np.diff(np.sign(steps)))
+    return bool(turns >= _RESTLESS and np.median(np.abs(steps)) > _ALIVE * usual)
+
+
+def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | None:
+    """Longest span [s] of one number, if a signal that jitters would not rest so by itself.
+
+    Noise below the resolution rests where the true value lies in the middle between two changes of
+    the rounded one, so that is what the chance of so long a rest is reckoned for.
+    """
+    still = np.diff(values) == 0.0
+    found = runs(still)
+    if not found or still.all():
+        return None
+    start, end = max(found, key=lambda run: run[1] - run[0])
+    elsewhere = np.concatenate([values[: start + 1], values[end:]])
+    moving = np.diff(elsewhere) != 0.0
+    if values[start] == 0.0 or moving.size < _ENOUGH or np.mean(moving) < _JITTER:
+        return None
+    noise = _noise(elsewhere / resolution(elsewhere))
+    unlikely = (end - start) * np.log(erf(0.5 / (np.sqrt(2.0) * noise))) if noise > 0.0 else 0.0
+    return (float(time[start]), float(time[end])) if unlikely < _UNLIKELY else None
+
+
+def resolution(values: FloatArray) -> float:
+    """Smallest step between two samples in a row; 0 where there is none."""
+    steps = np.abs(np.diff(values))
+    return float(steps[steps > 0.0].min()) if steps.any() else 0.0
+
+
+def staircase(values: FloatArray) -> float:
+    """Resolution of a signal that goes in stairs, being rounded beyond its noise; else 0."""
+    step = resolution(values)
+    if step == 0.0 or np.mean(np.diff(values) == 0.0) < _REPEATING:
+        return 0.0
+    return step if _noise(values / step) < _DITHER else 0.0
+
+
+def _noise(codes: FloatArray) -> float:
+    """Standard deviation of the noise before rounding to whole `codes` (n,), in their unit.
+
+    To and fro between two neighbours tells nothing, since the true value may lie between them; to
+    and fro over three codes or more does, wherever it lies.
+    """
+    steps = np.round(np.diff(codes))
+    turns = steps[1:] * steps[:-1] < 0.0
+    wide = np.abs(steps[1:]) + np.abs(steps[:-1]) > _TWO_NEIGHBOURS
+    return float(np.interp(np.mean(turns & wide), _WIDE_TURNS, _NOISES))
+
+
+def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Stretches of exact zeros that the signal falls to, and leaves, in one step."""
+    level = float(np.percentile(np.abs(values), 98.0))
+    moving = np.abs(np.diff(values))
+    mask = np.zeros(values.size, np.bool_)
+    for start, end in runs(values == 0.0):
+        if start == 0 or end == values.size:
+            continue
+        least = _DROP * level
+        if time[end] - time[start] <= _DROP_TIME:
+            before, after = moving[: start - 1][-_SURROUNDINGS:], moving[end:][:_SURROUNDINGS]
+            apart = abs(float(values[end] - values[start - 1]))
+            calm = min(before.max(initial=apart), after.max(initial=apart))
+            least = min(least, max(_SPIKE_SHARE * level, _SPIKE_CONTRAST * calm))
+        if min(moving[start - 1], moving[end - 1]) > least:
+            mask[start:end] = True
+    if not mask.any():
+        return None
+    return Damage(mask, f"fell to zero {_spans(time, runs(mask))}, left out")
+
+
+def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damage | None:
+    """Short stretches of one number far beyond all others, entered and left in one step.
+
+    Numbers that stand for no value, as -9999, and those of a message that was not received; at the
+    start of a log that of one that was not received yet. What is positive and not above `possible`
+    may have been commanded: at the ends of the log, and where it is a fill pulse, it stays.
+    """
+    if float(np.median(np.diff(time))) > _BEYOND_STEP:
+        return None
+    size = np.abs(values)
+    sizes = np.unique(size)
+    far = np.flatnonzero(sizes[1:] > BEYOND * sizes[:-1])
+    for largest in sizes[far[sizes[far] >= np.median(size)]]:
+        mask = size > largest
+        found = runs(mask)
+        if (
+            np.unique(values[~mask]).size >= _OTHERS
+            and _are_put_in(time, values, found, float(largest))
+            and not any(_may_be_commanded(values, run, possible) for run in found)
+        ):
+            return Damage(mask, f"far beyond all other numbers {_spans(time, found)}, left out")
+    return None
+
+
+def _are_put_in(
+    time: FloatArray, values: FloatArray, found: Sequence[tuple[int, int]], largest: float
+) -> bool:
+    """Whether all stretches are one number each, short, and in the midst of others.
+
+    At the ends of the log they must exceed the `largest` of the others by more.
+    """
+    return all(
+        ((start > 0 and end < values.size) or abs(values[start]) > _BEYOND_AT_END * largest)
+        and time[min(end, values.size - 1)] - time[start] <= _BEYOND_TIME
+        and np.all(values[start:end] == values[start])
+        for start, end in found
+    )
+
+
+def _may_be_commanded(values: FloatArray, run: tuple[int, int], possible: float) -> bool:
+    """Whether a stretch of one number is a pulse that fills a clutch, or cut off by the log's ends.
+
+    A fill pulse comes from rest and leaves the pressure higher; where a number stands for no value,
+    the signal is in the end where its own course has brought it.
+    """
+    start, end = run
+    if not 0.0 < values[start] <= possible:
+        return False
+    if start == 0 or end == values.size:
+        return True
+    before = values[max(0, start - max(end - start, _SURROUNDINGS)) : start]
+    usual = max(float(np.ptp(before)), resolution(values))
+    return float(values[end] - values[start - 1]) > _LIFT * usual
+
+
+def clipped(time: FloatArray, values: FloatArray) -> Damage | None:
+    """Samples at the largest or smallest number, where a fine signal rests there repeatedly."""
+    same = runs(np.diff(values) == 0.0)
+    for limit in (float(values.max()), float(values.min())):
+        at_limit = values == limit
+        rests = [run for run in runs(at_limit) if run[1] - run[0] >= _CLIPPED_SAMPLES]
+        elsewhere = sum(
+            end - start + 1 >= _CLIPPED_SAMPLES for start, end in same if values[start] != limit
+        )
+        if limit != 0.0 and len(rests) >= _CLIPPED_RUNS and elsewhere == 0:
+            mask = np.zeros(values.size, np.bool_)
+            for start, end in rests:
+                mask[start:end] = True
+            return Damage(mask, f"saturated at one number {_spans(time, rests)}, left out")
+    return None
+
+
+def _spans(time: FloatArray, found: Sequence[tuple[int, int]]) -> str:
+    """`from 0.200 s to 0.290 s` of the first stretches, and how many more."""
+    parts = [
+        f"at {time[start]:.3f} s"
+        if end - start == 1
+        else f"from {time[start]:.3f} s to {time[end - 1]:.3f} s"
+        for start, end in found[:_LISTED]
+    ]
+    more = f" and {len(found) - _LISTED} more times" if len(found) > _LISTED else ""
+    return ", ".join(parts) + more

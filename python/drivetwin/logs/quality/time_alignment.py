@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: MIT
+"""Delay and clock drift between speed channels, where physics ties them together, and their ratio.
+
+In a gear ω_in = i·ω_out at every instant, so what differs in time with the acceleration is a delay.
+It is told, with the mapping line that cures it, and never applied unasked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import uniform_filter1d
+
+from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.logs.quality.update_raster import fresh_samples
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+GRID = 0.01
+"""Raster [s] on which the speeds are compared."""
+
+SMOOTH = 0.1
+"""Averaging [s] before comparison; noise would otherwise hide in the acceleration and bias it."""
+
+_IN_GEAR = 0.01
+"""Relative distance from a ratio within which its gear is held."""
+
+_LEAST_TIME = 1.0
+"""So much time in gear [s] is needed for a statement."""
+
+LONGEST = 100.0
+"""Points of the raster for each sample at most: beyond that the log is nearly all gap."""
+
+SIGNIFICANT = 5.0
+"""Standard deviations from which a delay is told ..."""
+
+_LEAST_DELAY = 5e-3
+"""... if it also exceeds this [s], and by so much half the coarser sample interval."""
+
+
+@dataclass(frozen=True)
+class Delay:
+    """How much later [s] one channel's stamps are than another's, in the middle of the log.
+
+    `drift` [s/s] is how the delay grows, zero where that was not asked; the `sigma`s are one
+    standard deviation; `span` [s] of the data in gear.
+    """
+
+    value: float
+    sigma: float
+    drift: float = 0.0
+    drift_sigma: float = 0.0
+    span: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Least-squares solution (p,) and its covariance (p, p)."""
+
+    solution: FloatArray
+    covariance: FloatArray
+
+
+def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> Delay | None:
+    """Return how late `slower` is against `faster` where their ratio is one of `ratios`.
+
+    Least squares of ω_f - i·ω_s = δ_g·ω_s + i·(τ + d·t)·dω_s/dt over all samples in gear g: the
+    ratio may be off by δ_g, so only changes of acceleration tell the delay. None where there is too
+    little time in gear or no such change.
+    """
+    start = max(faster.time[0], slower.time[0])
+    end = min(faster.time[-1], slower.time[-1])
+    if not _LEAST_TIME <= end - start <= LONGEST * max(faster.time.size, slower.time.size) * GRID:
+        return None
+    time = np.arange(start, end, GRID)
+    fast, slow = averaged(faster, time), averaged(slower, time)
+    rate = np.gradient(slow, GRID)
+    gear = _gears(fast, slow, ratios, round(SMOOTH / GRID))
+    known = (gear >= 0) & np.isfinite(rate) & np.isfinite(fast)
+    if np.count_nonzero(known) * GRID < _LEAST_TIME:
+        return None
+    ratio = np.asarray(ratios)[gear[known]]
+    t = time[known] - time[known].mean()
+    used = np.unique(gear[known])
+    columns = [np.where(gear[known] == one, slow[known], 0.0) for one in used]
+    design = np.column_stack([*columns, ratio * rate[known], ratio * rate[known] * t])
+    fit = least_squares(design, fast[known] - ratio * slow[known])
+    if fit is None:
+        return None
+    (value, drift), (sigma, drift_sigma) = fit.solution[-2:], np.sqrt(np.diag(fit.covariance))[-2:]
+    return Delay(float(value), float(sigma), float(drift), float(drift_sigma), float(np.ptp(t)))
+
+
+def speed_ratio(faster: Channel, slower: Channel) -> tuple[float, float] | None:
+    """Ratio of two speeds that are always geared to each other, and its standard deviation.
+
+    Least squares of ω_f = i·ω_s + i·τ·dω_s/dt: a delay τ between the two is no error of the ratio.
+    None where there is too little time, or no motion.
+    """
+    start, end = max(faster.time[0], slower.time[0]), min(faster.time[-1], slower.time[-1])
+    if not _LEAST_TIME <= end - start <= LONGEST * max(faster.time.size, slower.time.size) * GRID:
+        return None
+    time = np.arange(start, end, GRID)
+    fast, slow = averaged(faster, time), averaged(slower, time)
+    rate = np.gradient(slow, GRID)
+    known = np.isfinite(rate) & np.isfinite(fast)
+    if np.count_nonzero(known) * GRID < _LEAST_TIME:
+        return None
+    fit = least_squares(np.column_stack([slow[known], rate[known]]), fast[known])
+    return None if fit is None else (float(fit.solution[0]), float(np.sqrt(fit.covariance[0, 0])))
+
+
+def means(channel: Channel, time: FloatArray) -> FloatArray:
+    """Means (n,) of a channel over GRID around each `time` (n,), from all samples there are.
+
+    NaN outside its span and in its gaps.
+    """
+    start, end = channel.time[0], channel.time[-1]
+    edges = np.append(time - 0.5 * GRID, time[-1] + 0.5 * GRID).clip(start, end)
+    total = cumulative_trapezoid(channel.values, channel.time, initial=0)
+    sums = np.interp(edges, channel.time, total)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.diff(sums) / np.diff(edges)
+    return np.where(np.isfinite(channel.at(time)), mean, np.nan)
+
+
+def averaged(channel: Channel, time: FloatArray) -> FloatArray:
+    """Means (n,) of a channel over SMOOTH around each `time` (n,), which are GRID apart.
+
+    NaN outside its span and where they touch a gap.
+    """
+    width, values = round(SMOOTH / GRID), means(channel, time)
+    unknown = ~np.isfinite(values)
+    smooth = uniform_filter1d(np.where(unknown, 0.0, values), width, mode="nearest")
+    touched = uniform_filter1d(unknown.astype(np.float64), width, mode="nearest") > 1e-9
+    return np.where(touched, np.nan, smooth)
+
+
+def _gears(
+    fast: FloatArray, slow: FloatArray, ratios: Sequence[float], width: int
+) -> np.typing.NDArray[np.intp]:
+    """Index of the gear held at each sample, -1 for none; clear of the edges of each stretch."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        quotient = fast / slow
+    gear = np.full(fast.size, -1, np.intp)
+    for index, ratio in enumerate(ratios):
+        held = np.abs(quotient - ratio) < _IN_GEAR * ratio
+        gear[uniform_filter1d(held.astype(np.float64), 4 * width, mode="constant") > 0.999] = index
+    return gear
+
+
+def least_squares(design: FloatArray, target: FloatArray) -> Fit | None:
+    """Fit `design` (n, p) to `target` (n,), rows GRID apart of signals averaged over SMOOTH.
+
+    None where a column is none of its own.
+    """
+    scale = np.linalg.norm(design, axis=0)
+    if not np.all(scale > 0.0):
+        return None
+    solution, _, rank, _ = np.linalg.lstsq(design / scale, target, rcond=1e-8)
+    if rank < design.shape[1]:
+        return None
+    residual = target - design / scale @ solution
+    independent = max(1.0, target.size * GRID / SMOOTH - design.shape[1])
+    covariance = np.linalg.inv((design / scale).T @ (design / scale)) / np.outer(scale, scale)
+    return Fit(solution / scale, float(residual @ residual) / independent * covariance)
+
+
+def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
+    """Tell delays and drifts of speed channels against the input speed that are beyond doubt."""
+    if "input_speed" not in channels:
+        return []
+    inlet = fresh_samples(channels["input_speed"])
+    texts: list[str] = []
+    if "output_speed" in channels:
+        outlet = fresh_samples(channels["output_speed"])
+        found = speed_delay(inlet, outlet, [gear.ratio for gear in card.gears])
+        texts += _told(found, outlet, inlet)
+    if "engine_speed" in channels:
+        engine = fresh_samples(channels["engine_speed"])
+        found = speed_delay(engine, inlet, [card.i_in])
+        turned = None if found is None else replace(found, value=-found.value, drift=-found.drift)
+        texts += _told(turned, engine, inlet)
+    return texts
+
+
+def beyond_doubt(delay: Delay, one: Channel, other: Channel) -> bool:
+    """Whether a delay is more than noise and the sampling of both channels explain together.
+
+    A sample may be the mean over its period, as encoders on a bus send it, and is then half of it
+    late without any clock being wrong.
+    """
+    by_sampling = 0.5 * max(one.step, other.step)
+    beyond = abs(delay.value) - by_sampling
+    return abs(delay.value) > _LEAST_DELAY and beyond > SIGNIFICANT * delay.sigma
+
+
+def _least(one: Channel, other: Channel) -> float:
+    return max(_LEAST_DELAY, 0.5 * one.step, 0.5 * other.step)
+
+
+def _told(delay: Delay | None, other: Channel, reference: Channel) -> list[str]:
+    """Words for the delay of `other` against `reference`, if it is large and certain enough."""
+    if delay is None:
+        return []
+    least = _least(other, reference)
+    texts = []
+    if beyond_doubt(delay, other, reference):
+        side = "late" if delay.value > 0.0 else "early"
+        texts.append(
+            f"channel {other.source_name!r} is {1e3 * abs(delay.value):.1f} ms {side} against "
+            f"{reference.source_name!r} (± {1e3 * delay.sigma:.1f} ms): to correct it set "
+            f"channels.{other.role}.time_shift_s = {-delay.value:.4f} in the channel mapping"
+        )
+    if abs(delay.drift) * delay.span > max(least, SIGNIFICANT * delay.drift_sigma * delay.span):
+        texts.append(
+            f"the clocks of {other.source_name!r} and {reference.source_name!r} drift apart by "
+            f"{1e6 * abs(delay.drift):.0f} µs/s: export both on one clock"
+        )
+    return texts

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""Delay of the output torque against the speeds of the vehicle, which it accelerates.
+
+J_v·ω' = i_f·T_o - T_v holds at every instant whatever the gear and the clutches do, so the torque
+hole of a shift shows the delay. Slow changes of the load (grade, air) are left out by a band-pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.logs.quality.time_alignment import (
+    GRID,
+    LONGEST,
+    SMOOTH,
+    Delay,
+    Fit,
+    beyond_doubt,
+    least_squares,
+    means,
+)
+from drivetwin.logs.quality.update_raster import fresh_samples
+
+SLOW = 1.0
+"""Averaging [s] whose result is taken off both sides: a load that changes slowly goes with it."""
+
+LEAST_TIME = 1.0
+"""So much time [s] clear of gaps is needed for a statement."""
+
+DRIVEN = 10.0
+"""The speed must follow the torque by so many standard deviations; brakes and noise hide it."""
+
+ALIKE = 0.5
+"""Delays of two speeds are one of the torque if they differ by less, relative to their mean."""
+
+SPEEDS = ("wheel_speed", "output_speed")
+
+
+def torque_delay(torque: Channel, speed: Channel) -> Delay | None:
+    """Return how late `speed` is against `torque`; None where the log does not show it.
+
+    Least squares of ω = g·(∫T_o dt - τ·T_o) + s·T_o' + d·T_o'' + c, all averaged over SMOOTH less
+    the average over SLOW; s and d are twist and damping of a shaft between the two, c a load that
+    changes steadily.
+    """
+    start, end = max(torque.time[0], speed.time[0]), min(torque.time[-1], speed.time[-1])
+    if not SLOW < end - start <= LONGEST * max(torque.time.size, speed.time.size) * GRID:
+        return None
+    time = np.arange(start, end, GRID)
+    drive, motion = means(torque, time), means(speed, time)
+    unknown = ~(np.isfinite(drive) & np.isfinite(motion))
+    clear = uniform_filter1d(unknown.astype(float), _width(SLOW), mode="constant", cval=1.0) < 1e-9
+    if np.count_nonzero(clear) * GRID < LEAST_TIME:
+        return None
+    drive, motion = np.where(unknown, 0.0, drive), np.where(unknown, 0.0, motion)
+    impulse = GRID * (np.cumsum(drive) - 0.5 * drive)
+    rate = np.gradient(drive, GRID)
+    terms = (impulse, -drive, rate, np.gradient(rate, GRID))
+    columns = [_band(one)[clear] for one in terms]
+    design = np.column_stack([*columns, np.ones(columns[0].size)])
+    fit = least_squares(design, _band(motion)[clear])
+    return None if fit is None else _delay(fit)
+
+
+def _width(seconds: float) -> int:
+    return round(seconds / GRID)
+
+
+def _band(values: FloatArray) -> FloatArray:
+    """Average over SMOOTH less the average over SLOW: straight lines vanish."""
+    fast, slow = (uniform_filter1d(values, _width(span)) for span in (SMOOTH, SLOW))
+    return np.asarray(fast - slow)
+
+
+def _delay(fit: Fit) -> Delay | None:
+    """τ = (g·τ)/g with its standard deviation; None where the speed does not follow the torque."""
+    gain, shifted = fit.solution[:2]
+    if not gain > DRIVEN * np.sqrt(fit.covariance[0, 0]):
+        return None
+    value = float(shifted / gain)
+    slope = np.array([-value, 1.0]) / gain
+    return Delay(value, float(np.sqrt(slope @ fit.covariance[:2, :2] @ slope)))
+
+
+def torque_warnings(channels: Mapping[str, Channel]) -> list[str]:
+    """Tell a delay between output torque and speeds that is beyond doubt.
+
+    One against all speeds that there are is the torque's, else the speed's. Of a value that is
+    repeated until the next one comes, the first counts.
+    """
+    if "output_torque" not in channels:
+        return []
+    torque = fresh_samples(channels["output_torque"])
+    speeds = [fresh_samples(channels[role]) for role in SPEEDS if role in channels]
+    found = [(speed, delay) for speed in speeds if (delay := torque_delay(torque, speed))]
+    late = [(speed, one.value) for speed, one in found if beyond_doubt(one, torque, speed)]
+    if not late:
+        return []
+    values = np.array([one.value for _, one in found])
+    mean = float(values.mean())
+    if np.all(np.abs(values - mean) < ALIKE * abs(mean)):
+        names = " and ".join(repr(speed.source_name) for speed, _ in found)
+        return [_told(torque, -mean, names, mean < 0.0)]
+    return [_told(speed, value, repr(torque.source_name), value < 0.0) for speed, value in late]
+
+
+def _told(channel: Channel, value: float, others: str, torque_last: bool) -> str:
+    """Words for a channel that is `value` [s] late; tyre slip too puts a speed before a torque."""
+    side = "late" if value > 0.0 else "early"
+    doubt = "tyre slip looks the same; " if torque_last else ""
+    return (
+        f"channel {channel.source_name!r} is about {1e3 * abs(value):.0f} ms {side} against "
+        f"{others}, by what the torque does to the speed of the vehicle: {doubt}where two clocks "
+        f"recorded them set channels.{channel.role}.time_shift_s = {-value:.3f} in the channel "
+        "mapping"
+    )

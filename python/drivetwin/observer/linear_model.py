@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""The driveline of one shift as a linear model with known locks (THEORY section 3).
+
+State x = (ω_e, ω_out, ω_w, twist, e, m_A, m_B, T_v): e is the error of the engine torque as read,
+m the relative error of each element's torque while it slips, T_v the load at the wheel. In the
+four phases of a shift the elements are locked, slipping or open, and
+
+    M·v' = φ(T_e + e) - Gᵀ·T_slip·(1 + m) - shaft - load,   locked elements: no motion along slip
+
+is linear in x. What an element carries while it slips (`base`) is either its friction law at the
+measured pressure, or a level of which m then tells the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.estimation.likelihood.noise.linear_response import direction, exponential, observed
+from drivetwin.observer.result import FloatArray
+from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement
+
+BoolArray = NDArray[np.bool_]
+
+STATES = 8
+ENGINE, OUTPUT, WHEEL, TWIST, TORQUE_ERROR, CARRIED, LOAD = 0, 1, 2, 3, 4, 5, 7
+"""Places in the state; CARRIED is that of the first element, the other follows."""
+SPEEDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What is known over the grid `time` (N,), each over the N-1 steps between.
+
+    `engine_torque` [N m] as it acts; `driving`, whether power flows from the engine, T_g ≥ 0; by
+    element `locked`, `base` [N m], the torque while it slips, with the sign of the slip and 0 while
+    it is open, and least `drift` [1/sqrt(s)] of the relative error of that; `error_rate` [1/s] at
+    which the engine torque's error is forgotten.
+    """
+
+    time: FloatArray
+    engine_torque: FloatArray
+    driving: BoolArray
+    locked: Mapping[str, BoolArray]
+    base: Mapping[str, FloatArray]
+    drift: Mapping[str, FloatArray]
+    error_rate: float
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Discrete model: x_{k+1} = F_k·x_k + b_k with F (N-1, 8, 8), b (N-1, 8).
+
+    An observed torque over step k is rows (N-1, 8)·x + constant (N-1,), by name. `drift` (N-1,) by
+    element is as of the course, NaN where it carries nothing.
+    """
+
+    transition: FloatArray
+    push: FloatArray
+    rows: Mapping[str, FloatArray]
+    constants: Mapping[str, FloatArray]
+    drift: Mapping[str, FloatArray]
+
+
+def answer(model: DualClutch, one: ShiftElement) -> tuple[FloatArray, FloatArray]:
+    """What a unit impulse of an element does to the three speeds (3,), and its slip's row (3,)."""
+    g = _direction(model, one)
+    mass = np.diag([model.J1 * model.eta + model.J2e, model.J_out, model.J_v])
+    for each in model.elements:
+        mass += each.drum_inertia * np.outer(_direction(model, each), _direction(model, each))
+    return np.asarray(np.linalg.solve(mass, g), dtype=np.float64), g
+
+
+def linear(model: DualClutch, course: Course) -> Linear:
+    """The model in its modes over the course."""
+    step = np.diff(course.time)
+    force, known = _forces(model, course)
+    inverse = _inverse_mass(model, course)
+    held = _holding(model, course, inverse)
+    moving = inverse.copy()
+    for one in model.elements:
+        along = inverse @ _direction(model, one)
+        moving -= along[:, :, None] * held[one.name][:, None, :]
+    rate = np.zeros((step.size, STATES, STATES))
+    rate[:, :SPEEDS, :] = moving @ force
+    rate[:, TWIST, OUTPUT], rate[:, TWIST, WHEEL] = 1.0, -model.i_f
+    rate[:, TORQUE_ERROR, TORQUE_ERROR] = -course.error_rate
+    push = np.zeros((step.size, STATES))
+    push[:, :SPEEDS] = np.einsum("kij,kj->ki", moving, known)
+    transition, mean = exponential(rate * step[:, None, None])
+    shaft = np.zeros(STATES)
+    shaft[:4] = observed(model, "output_torque")
+    rows = {"output_torque": np.broadcast_to(shaft, (step.size, STATES))}
+    constants = {"output_torque": np.zeros(step.size)}
+    for place, one in enumerate(model.elements):
+        row = np.einsum("kj,kji->ki", held[one.name], force)
+        row[:, CARRIED + place] += course.base[one.name]
+        rows[one.name] = row
+        constants[one.name] = np.einsum("kj,kj->k", held[one.name], known) + course.base[one.name]
+    pushed = np.einsum("kij,kj->ki", mean, push) * step[:, None]
+    drift = {n: np.where(base != 0.0, course.drift[n], np.nan) for n, base in course.base.items()}
+    return Linear(transition, pushed, rows, constants, drift)
+
+
+def _direction(model: DualClutch, one: ShiftElement) -> FloatArray:
+    """Slip of an element as a row of the three speeds."""
+    return direction(model, one)[:SPEEDS]
+
+
+def _efficiency(model: DualClutch, course: Course) -> FloatArray:
+    """dφ/dT_g (N-1,), by the loss law."""
+    ahead, back = (model.efficiency(driving=driving) for driving in (True, False))
+    return np.where(course.driving, ahead, back)
+
+
+def _forces(model: DualClutch, course: Course) -> tuple[FloatArray, FloatArray]:
+    """Forces on the three speeds without those of locked elements: (N-1, 3, 8)·x + (N-1, 3)."""
+    count = course.engine_torque.size
+    share = _efficiency(model, course)
+    force = np.zeros((count, SPEEDS, STATES))
+    known = np.zeros((count, SPEEDS))
+    shaft = observed(model, "output_torque")
+    force[:, OUTPUT, :4] -= shaft
+    force[:, WHEEL, :4] += model.i_f * shaft
+    force[:, WHEEL, LOAD] = -1.0
+    force[:, ENGINE, TORQUE_ERROR] = share
+    known[:, ENGINE] = share * course.engine_torque
+    for place, one in enumerate(model.elements):
+        g, base = _direction(model, one), course.base[one.name]
+        force[:, :, CARRIED + place] -= base[:, None] * g
+        known -= base[:, None] * g
+    return force, known
+
+
+def _inverse_mass(model: DualClutch, course: Course) -> FloatArray:
+    """Accelerations per force (N-1, 3, 3) with no element locked."""
+    share = _efficiency(model, course)
+    mass = np.zeros((share.size, SPEEDS, SPEEDS))
+    mass[:, ENGINE, ENGINE] = model.J1 * share + model.J2e
+    mass[:, OUTPUT, OUTPUT] = model.J_out
+    mass[:, WHEEL, WHEEL] = model.J_v
+    for one in model.elements:
+        g = _direction(model, one)
+        mass += one.drum_inertia * np.outer(g, g)
+    return np.asarray(np.linalg.inv(mass), dtype=np.float64)
+
+
+def _holding(model: DualClutch, course: Course, inverse: FloatArray) -> dict[str, FloatArray]:
+    """Row (N-1, 3) by element that gives its torque from all other forces while it is locked."""
+    found = {}
+    for one in model.elements:
+        g = _direction(model, one)
+        along = inverse @ g
+        found[one.name] = course.locked[one.name][:, None] * along / (along @ g)[:, None]
+    return found

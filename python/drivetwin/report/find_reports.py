@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""What a comparison compares: several identifications, and their simulations of common logs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, SignalFit
+from drivetwin.estimation.result.validation import Validation
+from drivetwin.files.result_file import ResultFile
+from drivetwin.twin.twin import Twin
+
+DIFFER = 2.58
+"""Difference in its standard deviations from which two values differ: 1 % by chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One identification under the `name` that tables and figures give it.
+
+    `fit` by signal and phase is empty where only the twin is at hand.
+    """
+
+    name: str
+    method: str
+    estimates: Mapping[str, Estimate]
+    friction: Mapping[str, FrictionCurve]
+    fit: Mapping[str, Mapping[str, SignalFit]]
+    inputs: Mapping[str, str]
+    version: str
+
+    @classmethod
+    def of_twin(cls, name: str, twin: Twin) -> Candidate:
+        """What a twin file tells."""
+        return cls(name, twin.method, twin.parameters, twin.friction, {}, twin.inputs, twin.version)
+
+    @classmethod
+    def of_result(cls, name: str, content: ResultFile) -> Candidate:
+        """What a result file tells."""
+        nan = float("nan")
+        fit = {
+            signal: {
+                phase: SignalFit(
+                    nan if one.rmse is None else one.rmse,
+                    nan if one.fit_percent is None else one.fit_percent,
+                )
+                for phase, one in phases.items()
+            }
+            for signal, phases in content.fit.items()
+        }
+        return cls(
+            name,
+            content.method,
+            {key: record.estimate(key) for key, record in content.parameters.items()},
+            {element: record.curve() for element, record in content.friction.items()},
+            fit,
+            content.inputs,
+            content.version,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One shift of a log, simulated by each candidate that can; `refused` says why others cannot.
+
+    `label` names log and shift.
+    """
+
+    label: str
+    runs: Mapping[str, Validation]
+    refused: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """One parameter over the candidates, in their order; None where one does not tell it.
+
+    `mean` is weighted by the inverse variances; `apart` is the largest difference of two
+    candidates in its standard deviations (sensor tolerances included). A value without an interval
+    is held against those of the others as if it were exact; None where no value with an interval
+    has another beside it.
+    """
+
+    id: str
+    estimates: tuple[Estimate | None, ...]
+    mean: float
+    apart: float | None
+
+    @property
+    def bare(self) -> tuple[int, ...]:
+        """Places of the candidates that tell a value without an interval."""
+        told = [(k, one) for k, one in enumerate(self.estimates) if one and one.value is not None]
+        return tuple(k for k, one in told if not _has_interval(one.std_total))
+
+    @property
+    def agrees(self) -> bool | None:
+        """Whether the values agree within their uncertainty; None where that cannot be said."""
+        return None if self.apart is None else self.apart <= DIFFER
+
+
+def agreements(candidates: Sequence[Candidate]) -> list[Agreement]:
+    """Every parameter that some candidate tells, in the order of the first that does."""
+    ids = dict.fromkeys(name for one in candidates for name in one.estimates)
+    found = (_agreement(name, [one.estimates.get(name) for one in candidates]) for name in ids)
+    return [one for one in found if one is not None]
+
+
+def _agreement(name: str, estimates: Sequence[Estimate | None]) -> Agreement | None:
+    told = [(one.value, one.std_total) for one in estimates if one and one.value is not None]
+    if not told:
+        return None
+    values = np.array([value for value, _ in told])
+    stds = np.array([np.nan if std is None else std for _, std in told])
+    known = np.array([_has_interval(std) for _, std in told])
+    weights = np.where(known, 1.0 / np.where(known, stds, 1.0) ** 2, 0.0)
+    mean = float(np.average(values, weights=weights if known.any() else None))
+    spread = np.where(known, stds, 0.0)
+    apart = [
+        abs(values[i] - values[j]) / np.hypot(spread[i], spread[j])
+        for i in range(values.size)
+        for j in range(i)
+        if known[i] or known[j]
+    ]
+    return Agreement(name, tuple(estimates), mean, float(max(apart)) if apart else None)
+
+
+def _has_interval(std: float | None) -> bool:
+    return std is not None and np.isfinite(std) and std > 0.0

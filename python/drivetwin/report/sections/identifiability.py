@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""What cannot be told from a log, and which experiment would tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isfinite
+
+from drivetwin._util.display_units import Display, display_of, significant
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import Estimate, Verdict
+from drivetwin.estimation.result.suggestion import Suggestion
+from drivetwin.estimation.result.verdict import advice_for
+from drivetwin.report.figures.parameters import correlation_figure, half_width_percent
+from drivetwin.report.labels import parameter_label
+from drivetwin.report.sections.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    NotesBlock,
+    Section,
+    TableBlock,
+    cells,
+)
+from drivetwin.report.sections.parameters import TONES
+
+_INSEPARABLE = (
+    "μ and the clutch geometry N·D·A·r: only their product acts.",
+    "η and a gain error of the engine torque: only their product acts.",
+    "The common scale of all torques rests on the output-torque sensor's gain: an error of it "
+    "scales J′, J3, T_v/i_f, k_o, c_o and μ alike.",
+    "J1·η + J2: the inertias before and behind the input gear act as one number.",
+)
+_CLOSE = 0.9
+"""Correlation from which a pair is named."""
+_LEAST_KNOWN = 5
+"""How many parameters are listed with the experiment that would narrow them."""
+
+
+def limits_section(found: Identification) -> Section:
+    """What the log cannot tell, and which experiment would help."""
+    suggestions = found.evidence.suggestions
+    narrower = _suggested(suggestions, found) if suggestions else _least_known(found)
+    blocks: list[Block] = [*_remarks(found), *narrower]
+    blocks.append(NotesBlock("Not separable from any one shift", _INSEPARABLE))
+    if found.correlation is not None:
+        pairs = list(_close_pairs(found))
+        if pairs:
+            blocks.append(NotesBlock("Known together better than apart", pairs))
+        blocks.append(
+            FigureBlock(
+                correlation_figure(found.correlation_ids, found.correlation),
+                "Correlation of the estimates: near +1 their errors go up and down together, "
+                "near −1 one is too high where the other is too low.",
+            )
+        )
+    return Section(
+        "limits",
+        "What this log cannot tell",
+        "Limits of the data, not of the computation.",
+        blocks,
+    )
+
+
+def _remarks(found: Identification) -> Iterator[TableBlock]:
+    """One row for each reason that stands behind verdicts."""
+    remarked: dict[tuple[Verdict, str], list[str]] = {}
+    for one in found.estimates.values():
+        if one.reason:
+            remarked.setdefault((one.verdict, one.reason), []).append(parameter_label(one.id))
+    if remarked:
+        rows = [
+            (
+                Cell(", ".join(labels)),
+                Cell(verdict.value, badge=True, tone=TONES[verdict]),
+                Cell(reason),
+            )
+            for (verdict, reason), labels in remarked.items()
+        ]
+        yield TableBlock(
+            "Parameters that call for a remark.",
+            cells("parameter", "verdict", "remark: why, and which experiment would help"),
+            rows,
+        )
+
+
+def _suggested(suggestions: Sequence[Suggestion], found: Identification) -> Iterator[TableBlock]:
+    """What each open or least known parameter would gain by the best experiment, simulated."""
+    rows = []
+    for one in suggestions:
+        display = display_of(found.estimates[one.parameter].unit)
+        then = None if one.best is None else one.best.half_width
+        rows.append(
+            (
+                Cell(parameter_label(one.parameter)),
+                Cell(one.verdict.value, badge=True, tone=TONES[one.verdict]),
+                Cell(_half_width(one.half_width, display), number=True),
+                Cell(one.text),
+                Cell("–" if then is None else _half_width(then, display), number=True),
+            )
+        )
+    head = (
+        *cells("parameter", "verdict"),
+        Cell("now", number=True, note="± 95 %"),
+        Cell("experiment that would narrow it"),
+        Cell("then", number=True, note="± 95 %, to expect"),
+    )
+    yield TableBlock(
+        "What to record next: each experiment was simulated with this model and the noise of this "
+        "log's sensors, and the information it adds gives the interval to expect.",
+        head,
+        rows,
+    )
+
+
+def _half_width(value: float, display: Display) -> str:
+    if not isfinite(value):
+        return "open"
+    return f"± {significant(value * display.factor, 2)} {display.label}".removesuffix(" –")
+
+
+def _least_known(found: Identification) -> Iterator[TableBlock]:
+    """The parameters of widest relative interval, and what to record for a narrower one."""
+    widths = {
+        one.id: half_width_percent(one.value, one.std_total)
+        for one in found.estimates.values()
+        if one.verdict in (Verdict.IDENTIFIED, Verdict.WEAK) and one.unit != "s"
+    }
+    ranked = sorted((w, name) for name, w in widths.items() if w is not None)[::-1][:_LEAST_KNOWN]
+    if ranked:
+        rows = [
+            (
+                Cell(parameter_label(name)),
+                Cell(f"± {significant(width, 2)} %", number=True),
+                Cell(_sensor_share(found.estimates[name]), number=True),
+                Cell(_advice(found.estimates[name])),
+            )
+            for width, name in ranked
+        ]
+        head = (
+            Cell("parameter"),
+            Cell("interval", number=True, note="95 %, of the value"),
+            Cell("from sensors", number=True, note="share of the variance"),
+            Cell("what would narrow it"),
+        )
+        yield TableBlock(
+            "The least well known. Where tolerances of the sensors make the interval, no "
+            "experiment narrows it.",
+            head,
+            rows,
+        )
+
+
+def _advice(one: Estimate) -> str:
+    return advice_for(one.id, one.std_noise or 0.0, one.std_systematic)
+
+
+def _sensor_share(one: Estimate) -> str:
+    if not one.std_total or one.std_systematic is None:
+        return "not stated"
+    return f"{100.0 * (one.std_systematic / one.std_total) ** 2:.0f} %"
+
+
+def _close_pairs(found: Identification) -> Iterator[str]:
+    """Pairs of estimates whose errors go together, in words."""
+    ids, matrix = found.correlation_ids, found.correlation
+    assert matrix is not None
+    for i, one in enumerate(ids):
+        for j in range(i + 1, len(ids)):
+            if abs(matrix[i, j]) >= _CLOSE:
+                way = "rise and fall together" if matrix[i, j] > 0 else "go against each other"
+                number = f"{matrix[i, j]:+.2f}".replace("-", "−")
+                yield f"{parameter_label(one)} and {parameter_label(ids[j])} {way} ({number})."

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: MIT
+"""First page: can I trust this model?"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+
+from drivetwin._util.display_units import (
+    NM,
+    RPM,
+    Display,
+    display_of,
+    significant,
+    with_uncertainty,
+)
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.diagnostics.residual_tests import residual_tests
+from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit, Verdict
+from drivetwin.parameters import spec_of
+from drivetwin.report.figures.parameters import interval_figure
+from drivetwin.report.labels import parameter_label
+from drivetwin.report.sections.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    NotesBlock,
+    Section,
+    TableBlock,
+    Tile,
+    TilesBlock,
+    Tone,
+)
+
+TONES = {
+    Verdict.IDENTIFIED: Tone.GOOD,
+    Verdict.WEAK: Tone.DOUBTFUL,
+    Verdict.NOT_IDENTIFIABLE: Tone.UNKNOWN,
+    Verdict.DESIGN: Tone.PLAIN,
+}
+SIGNALS: dict[str, tuple[str, Display]] = {
+    "output_torque": ("output torque", NM),
+    "input_speed": ("input speed", RPM),
+    "output_speed": ("output speed", RPM),
+}
+PHASES = {
+    "all": "whole",
+    "before": "1 before",
+    "torque": "2 torque phase",
+    "inertia": "3 inertia phase",
+    "after": "4 after lock-up",
+}
+
+FITS = 80.0
+"""Fit [%] from which the simulation counts as one of the signal ..."""
+UNEVEN = 1.5
+"""... in every phase too that has an error so many times that of the whole."""
+
+
+def trust_section(found: Identification) -> Section:
+    """Verdicts, agreement and warnings at a glance, then the parameter table."""
+    blocks: list[Block] = [TilesBlock(_tiles(found))]
+    if found.warnings:
+        blocks.append(NotesBlock("Warnings", found.warnings, Tone.DOUBTFUL))
+    blocks.append(parameter_table(found))
+    if found.fit:
+        blocks.append(fit_table(found))
+    blocks.append(
+        FigureBlock(
+            interval_figure(found.estimates),
+            "How narrowly each parameter is known. Dots: sensor noise together with the sensors' "
+            "tolerances on the vehicle card and values shown late; bars: noise alone.",
+        )
+    )
+    return Section("trust", "Can I trust this model?", _headline(found), blocks)
+
+
+def _headline(found: Identification) -> str:
+    count = _verdicts(found)
+    identified = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)}"
+    text = f"{_answer(found)} {identified} parameters are identified"
+    if count[Verdict.WEAK]:
+        text += f", {count[Verdict.WEAK]} only weakly"
+    if count[Verdict.NOT_IDENTIFIABLE]:
+        text += f", {count[Verdict.NOT_IDENTIFIABLE]} cannot be told from this log"
+    if count[Verdict.DESIGN]:
+        text += f", {count[Verdict.DESIGN]} taken from the vehicle card"
+    text += "."
+    fit = found.fit.get("output_torque", {}).get("all")
+    if fit is not None and math.isfinite(fit.fit_percent):
+        text += (
+            f" Driven by the measured inputs alone, the model reproduces the output torque with a "
+            f"fit of {significant(fit.fit_percent, 3)} %."
+        )
+    return text
+
+
+def _answer(found: Identification) -> str:
+    """The answer in a word, with what stands against a plain yes."""
+    count, (passed, tests) = _verdicts(found), residual_score(found)
+    against = []
+    if not found.fit:
+        against.append("the model could not be simulated over the log")
+    elif any(_missed(fits) for fits in found.fit.values()):
+        against.append("the simulation leaves too much of an output")
+    if passed < tests:
+        against.append("the residuals show an effect that the model lacks")
+    if count[Verdict.WEAK] or count[Verdict.NOT_IDENTIFIABLE]:
+        against.append("not every parameter is known well")
+    if found.warnings:
+        against.append("there are warnings")
+    if not against:
+        return "Yes, within the range that the log covered."
+    return f"With reservations: {'; '.join(against)}."
+
+
+def residual_score(found: Identification) -> tuple[int, int]:
+    """Tests of the likelihood's residuals: how many passed, of how many; (0, 0) without any."""
+    fit = found.evidence.likelihood
+    if fit is None:
+        return 0, 0
+    tests = [test for group in residual_tests(fit).values() for test in group]
+    total = sum(1 + len(test.correlation) for test in tests)
+    return total - sum(len(test.warnings) for test in tests), total
+
+
+def _verdicts(found: Identification) -> Counter[Verdict]:
+    return Counter(estimate.verdict for estimate in found.estimates.values())
+
+
+def _tiles(found: Identification) -> list[Tile]:
+    tiles = []
+    for name, (label, display) in SIGNALS.items():
+        fits = found.fit.get(name, {})
+        if "all" in fits:
+            fit, missed = fits["all"], _missed(fits)
+            note = f"rmse {significant(fit.rmse * display.factor, 3)} {display.label}"
+            if missed not in ("", "all"):
+                note += f"; {PHASES[missed]}: {_percent(fits[missed])}"
+            tone = Tone.DOUBTFUL if missed else Tone.GOOD
+            tiles.append(Tile(f"fit of {label}", _percent(fit), tone, note))
+    passed, tests = residual_score(found)
+    if tests:
+        tone = Tone.GOOD if passed == tests else Tone.DOUBTFUL
+        tiles.append(Tile("residual tests passed", f"{passed} of {tests}", tone, "see the fit"))
+    count = _verdicts(found)
+    complete = not count[Verdict.WEAK] and not count[Verdict.NOT_IDENTIFIABLE]
+    tiles.append(
+        Tile(
+            "identified",
+            f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)}",
+            Tone.GOOD if complete else Tone.DOUBTFUL,
+            "parameters",
+        )
+    )
+    tone = Tone.DOUBTFUL if found.warnings else Tone.GOOD
+    tiles.append(Tile("warnings", str(len(found.warnings)), tone))
+    return tiles
+
+
+def parameter_table(found: Identification) -> TableBlock:
+    """All parameters with their intervals and verdicts."""
+    head = (
+        Cell("parameter"),
+        Cell("value", number=True),
+        Cell("± 95 %", number=True, note="sensors included"),
+        Cell("± 95 %", number=True, note="noise alone"),
+        Cell("unit"),
+        Cell("verdict"),
+        Cell("method", secondary=True),
+    )
+    caption = "Parameters."
+    if not any(one.std_systematic for one in found.estimates.values()):
+        caption += (
+            " The vehicle card states no sensor tolerance, so both intervals are of noise alone."
+        )
+    first: dict[str, str] = {}
+    rows = []
+    for one in found.estimates.values():
+        label = parameter_label(one.id)
+        owner = first.setdefault(one.reason, label)
+        rows.append(_parameter_row(one, one.reason if owner == label else f"as for {owner}"))
+    return TableBlock(caption, head, rows)
+
+
+def _parameter_row(estimate: Estimate, remark: str) -> tuple[Cell, ...]:
+    spec = spec_of(estimate.id)
+    display = display_of(estimate.unit)
+    value, total = _shown(estimate, estimate.std_total, display)
+    _, noise = _shown(estimate, estimate.std_noise, display)
+    return (
+        Cell(
+            parameter_label(estimate.id),
+            note=f"{spec.meaning} · {estimate.id}",
+            remark=remark if estimate.reason else "",
+        ),
+        Cell(value, number=True),
+        Cell(total, number=True),
+        Cell(noise, number=True),
+        Cell(display.label),
+        Cell(estimate.verdict.value, badge=True, tone=TONES[estimate.verdict]),
+        Cell(estimate.method, secondary=True),
+    )
+
+
+def _shown(estimate: Estimate, std: float | None, display: Display) -> tuple[str, str]:
+    if estimate.value is None:
+        return "–", "–"
+    half = None if std is None else Z95 * std * display.factor
+    value, width = with_uncertainty(estimate.value * display.factor, half)
+    return value, width or "–"
+
+
+def fit_table(found: Identification) -> TableBlock:
+    """Fit % and rmse by signal and phase."""
+    head = [Cell("signal"), *(Cell(label, number=True) for label in PHASES.values())]
+    rows = []
+    for name, (label, display) in SIGNALS.items():
+        if name not in found.fit:
+            continue
+        fits = [found.fit[name].get(phase) for phase in PHASES]
+        rows.append([Cell(label), *(fit_cell(fit, display) for fit in fits)])
+    return TableBlock(
+        "Simulation against measurement: fit % = 100·(1 − ‖y − ŷ‖ / ‖y − mean(y)‖), the mean taken "
+        "over the whole log for every phase; root mean square error below. Where a signal hardly "
+        "moves, fit % is low although only noise is left: the error in its unit tells.",
+        head,
+        rows,
+    )
+
+
+def fit_cell(fit: SignalFit | None, display: Display) -> Cell:
+    """Fit % with the error in its unit below; a dash where there is none."""
+    if fit is None:
+        return Cell("–", number=True)
+    note = f"{significant(fit.rmse * display.factor, 3)} {display.label}"
+    return Cell(_percent(fit), number=True, note=note)
+
+
+def _percent(fit: SignalFit) -> str:
+    return f"{fit.fit_percent:.1f} %" if math.isfinite(fit.fit_percent) else "–"
+
+
+def _missed(fits: Mapping[str, SignalFit]) -> str:
+    """Phase of a signal that the simulation misses: "all", else the worst; empty for none.
+
+    A phase in which the signal hardly moves has a low fit although only noise is left, of which it
+    has no more than the others.
+    """
+    whole = fits["all"]
+    if not whole.fit_percent >= FITS:
+        return "all"
+    uneven = [phase for phase, one in fits.items() if one.rmse > UNEVEN * whole.rmse]
+    low = [phase for phase in uneven if fits[phase].fit_percent < FITS]
+    return min(low, key=lambda phase: fits[phase].fit_percent, default="")

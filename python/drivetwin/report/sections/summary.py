@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""The story of an identification: the log and its shift, simulation over measurement."""
+
+from __future__ import annotations
+
+from drivetwin._util.display_units import significant
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.estimation.result.validation import Validation
+from drivetwin.report.figures.friction import friction_figure
+from drivetwin.report.figures.recording import log_figure, log_panels
+from drivetwin.report.figures.shift_phases import shift_panels, shift_phases
+from drivetwin.report.figures.validation import validation_figure, validation_panels
+from drivetwin.report.sections.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    NotesBlock,
+    Section,
+    TableBlock,
+    Tone,
+    cells,
+    link_of,
+)
+from drivetwin.shifts.shift import Shift, ShiftKind, shift_labels
+
+_TORQUE_PHASE = {
+    ShiftKind.POWER_ON_UP: "the on-coming element takes over torque, the output torque dips",
+    ShiftKind.POWER_OFF_DOWN: "the on-coming element takes over torque",
+    ShiftKind.POWER_OFF_UP: "empty where the on-coming element takes hold only later",
+    ShiftKind.POWER_ON_DOWN: "empty where the on-coming element takes hold only later",
+}
+
+OF_TORQUE = (
+    "The clutch torque follows from the output torque (eq. 16, with the output side's inertia), "
+    "the slip from both speeds (eq. 15); μ = T_c / (N·D·A·r·(P − P0))."
+)
+OF_SPEEDS = (
+    "The log has no output torque: the clutch torque follows from the engine torque and what it "
+    "does to the speeds, which tells it over η alone. So the curve is "
+    "μ/η = T_c/η / (N·D·A·r·(P − P0)), the slip from both speeds (eq. 15); the twin has μ where "
+    "the vehicle card states η."
+)
+
+
+def phase_key(kind: ShiftKind) -> str:
+    """What the numbers of the four phases stand for in a shift of this kind."""
+    up = kind in (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_UP)
+    return (
+        f"1 gear held before the shift · 2 torque phase: {_TORQUE_PHASE[kind]} · 3 inertia phase: "
+        f"the input speed {'falls' if up else 'rises'} to that of the new gear · 4 new gear "
+        "locked, lock-up oscillation."
+    )
+
+
+def shift_section(found: Identification, log: ShiftLog) -> Section:
+    """Measured signals with the detected phases, one figure per shift."""
+    blocks: list[Block] = []
+    if len(found.shifts) > 1:
+        text = "The whole log; each button shows one shift of those that were used."
+        blocks.append(FigureBlock(log_figure(log, found.shifts), text, log_panels(log)))
+    for name, shift in zip(shift_labels(found.shifts), found.shifts, strict=True):
+        title = f"Shift {name}, {shift.kind.value}. "
+        blocks.append(
+            FigureBlock(
+                shift_phases(log, shift),
+                title + phase_key(shift.kind),
+                shift_panels(log, shift),
+                link_of(shift),
+            )
+        )
+        blocks.append(_phase_table(name, shift))
+        if shift.warnings:
+            blocks.append(NotesBlock("About this shift", shift.warnings, Tone.DOUBTFUL))
+    if found.rejected:
+        texts = [f"{r.time[0]:.2f} to {r.time[1]:.2f} s: {r.reason}" for r in found.rejected]
+        blocks.append(NotesBlock("Not used", texts))
+    return Section(
+        "shift",
+        "The log and its phases",
+        "What was measured, and where the shift was found in it.",
+        blocks,
+    )
+
+
+def _phase_table(name: str, shift: Shift) -> TableBlock:
+    spans = (
+        ("1 gear held", shift.before, None),
+        ("2 torque phase", shift.torque_phase, "torque_start"),
+        ("3 inertia phase", shift.inertia_phase, "inertia_start"),
+        ("4 new gear locked", (shift.lockup_time, shift.after[1]), "lockup"),
+    )
+    rows = []
+    for label, (start, end), boundary in spans:
+        sigma = shift.sigma.get(boundary) if boundary else None
+        doubt = f"± {significant(1e3 * Z95 * sigma, 2)} ms" if sigma else ""
+        rows.append(
+            (
+                Cell(label),
+                Cell(f"{start:.3f} s", number=True),
+                Cell(doubt, number=True),
+                Cell(f"{end:.3f} s", number=True),
+                Cell(f"{1e3 * (end - start):.0f} ms", number=True),
+            )
+        )
+    head = (
+        Cell("phase"),
+        Cell("starts", number=True),
+        Cell("± 95 %", number=True),
+        Cell("ends", number=True),
+        Cell("lasts", number=True),
+    )
+    elements = f"{shift.offgoing} off-going, {shift.oncoming} on-coming."
+    return TableBlock(f"Phases of shift {name}: {elements}", head, rows)
+
+
+def friction_section(found: Identification) -> Section:
+    """μ over slip of every element that slipped under load."""
+    blocks: list[Block] = []
+    for element, curve in found.friction.items():
+        caption = f"Friction of {element}, method: {curve.method_text}. "
+        blocks.append(FigureBlock(friction_figure(element, curve), caption + _law_text(curve)))
+    over_eta = any(curve.over_eta for curve in found.friction.values())
+    return Section(
+        "friction",
+        "Friction over slip",
+        f"{OF_SPEEDS if over_eta else OF_TORQUE} Only the product of μ and N·D·A·r can be told "
+        "from a log: an error of the geometry scales the whole curve. Points that scatter at one "
+        "slip are of the torque phase, where the element carries little.",
+        blocks,
+    )
+
+
+def _law_text(curve: FrictionCurve) -> str:
+    if (law := curve.stribeck) is None:
+        return "No Stribeck law fits within the range seen; the smoothed curve is used."
+    return (
+        f"Stribeck law {curve.symbol} = μ_c + (μ_s − μ_c)·exp(−|s|/v_s) + μ_v·|s| with "
+        f"μ_c = {significant(law.mu_c)}, μ_s = {significant(law.mu_s)}, "
+        f"v_s = {significant(law.v_s, 3)} rad/s, μ_v = {significant(law.mu_v, 3)} s/rad."
+    )
+
+
+def validation_section(validations: tuple[Validation, ...]) -> Section:
+    """Simulation over measurement (Fig. 11)."""
+    blocks: list[Block] = []
+    names = shift_labels([one.shift for one in validations])
+    for name, one in zip(names, validations, strict=True):
+        text = (
+            f"Shift {name}: the measured engine torque and pressures "
+            "drive the identified model; nothing else is fed in after the start. Below each output "
+            "stands what is left, measured minus simulated. While an element slips, the "
+            "noise of its pressure sensor passes into the simulated torque and output speed, and "
+            "moves the lock-up by a millisecond or two: the residual then swings on after it."
+        )
+        blocks.append(
+            FigureBlock(validation_figure(one), text, validation_panels(one), link_of(one.shift))
+        )
+        blocks.append(_event_table(one))
+    return Section(
+        "validation",
+        "Simulation over measurement",
+        "The proof of the model: does it do what the vehicle did?",
+        blocks,
+    )
+
+
+def _event_table(validation: Validation) -> TableBlock:
+    """Changes of friction mode; filling and venting repeat with every ripple of the pressure."""
+    rows = [
+        cells(f"{event.time:.4f} s", event.element, event.kind.replace("_", " "))
+        for event in validation.trajectory.events
+        if event.kind not in ("fill", "vent")
+    ]
+    return TableBlock(
+        f"Events of the simulation (status: {validation.status}).",
+        cells("time", "element", "event"),
+        rows,
+    )

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: MIT
+"""Break-away of the off-going and lock-up of the on-coming element, from the slip alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.shifts.changepoint import Hinge, Moving, fit_hinge
+from drivetwin.shifts.kinematics import GearboxSpeeds
+from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.shifts.slow_sampling import Crossing, begun, ended
+
+FloatArray = NDArray[np.float64]
+
+_REST = 0.3
+"""Span of held gear [s] from which level and noise of the slip at rest are taken."""
+_QUIET = 0.04
+"""Span [s] over which the slip must stay at rest to count as held."""
+_SMOOTH = 0.01
+_LEAST = 10
+"""Fewest samples on either side of a boundary that a fit is made from."""
+_LIMIT = 4.0
+"""Standard deviations beyond which a smoothed slip is no longer at rest."""
+_WINDOWS = (1.0, 0.5, 0.25)
+"""Parts of the first window tried from wide to narrow."""
+_CLEAR = 10.0
+"""Standard deviations by which the slip has left rest at the end of the first window."""
+_WIDEN = 4
+"""Most times `hinge_window` that the first window may be."""
+_BUS = 8e-3
+"""Sample interval [s] from which speeds are taken for those of a bus."""
+_ROUNDING = 2e-5
+"""Least noise of a speed, relative: resolution of two decimals in rpm."""
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A phase boundary, `time` ± `sigma` [s]."""
+
+    time: float
+    sigma: float
+
+
+def break_away(
+    speeds: GearboxSpeeds, ratio: float, held: tuple[int, int], stop: int, settings: ShiftSettings
+) -> Boundary | None:
+    """Where the gear of `ratio`, held in samples `held`, lets go; None if it cannot be told.
+
+    `stop` is the first sample at which the next gear is held.
+    """
+    first, last = held
+    rest = slice(max(first, last + 1 - speeds.samples(_REST, 8)), last + 1)
+    slip = _slip(speeds, ratio, rest)
+    part = slice(first, stop + 1)
+    seen = begun(slip.time[part], slip.error[part] - slip.level, slip.noise)
+    if slip.stairs or _is_sparse(speeds, settings):
+        return _boundary(seen)
+    run = speeds.samples(_QUIET, 3)
+    still = _runs_of_true(slip.departure[: last + 1] < _LIMIT, run)
+    anchor = max(int(still.max()) + run - 1, first) if len(still) else last
+    window = _first_window(
+        slip, anchor, Moving.AFTER, speeds.samples(settings.hinge_window, _LEAST)
+    )
+    found = _locate(slip, (anchor, window), Moving.AFTER, (first, stop))
+    if found is None or seen is None or speeds.step < _BUS:
+        return found
+    # On a bus the two speeds contradict each other a little before an element lets go for good.
+    doubt = 0.5 * max(seen.time - found.time, 0.0)
+    return Boundary(found.time, float(np.hypot(found.sigma, doubt)))
+
+
+def lock_up(
+    speeds: GearboxSpeeds, ratio: float, held: tuple[int, int], start: int, settings: ShiftSettings
+) -> Boundary | None:
+    """Where the gear of `ratio`, held in samples `held`, is reached; None if it cannot be told.
+
+    `start` is the last sample at which the gear before is held.
+    """
+    first, last = held
+    rest = slice(first, min(last + 1, first + speeds.samples(_REST, 8)))
+    slip = _slip(speeds, ratio, rest)
+    if slip.stairs or _is_sparse(speeds, settings):
+        part = slice(start, last + 1)
+        return _boundary(ended(slip.time[part], slip.error[part] - slip.level, slip.noise))
+    run = speeds.samples(_QUIET, 3)
+    still = _runs_of_true(slip.departure[first : last + 1] < _LIMIT, run)
+    anchor = first + int(still.min()) if len(still) else first
+    window = _first_window(
+        slip, anchor, Moving.BEFORE, speeds.samples(settings.hinge_window, _LEAST)
+    )
+    return _locate(slip, (anchor, window), Moving.BEFORE, (start, last))
+
+
+def _is_sparse(speeds: GearboxSpeeds, settings: ShiftSettings) -> bool:
+    """Whether the fewest samples of a fit would take longer than any curve can follow."""
+    return _LEAST * speeds.step > 2.0 * settings.hinge_window
+
+
+def _boundary(found: Crossing | None) -> Boundary | None:
+    return None if found is None else Boundary(found.time, found.sigma)
+
+
+@dataclass(frozen=True, eq=False)
+class _Slip:
+    """Synchronisation error (n,) on `time` [s], and how far it is from that of the gear held.
+
+    `level` is the error at rest. `noise` [rad/s] is that of one sample at rest, at least `floor`.
+    `departure` (n,) is the distance, smoothed over _SMOOTH, in standard deviations of the smoothed
+    error; divided by `root` in those of a sample. `stairs`: the noise is that of rounding, alike
+    over many samples, so that no curve can be fitted.
+    """
+
+    time: FloatArray
+    error: FloatArray
+    level: float
+    floor: float
+    noise: float
+    departure: FloatArray
+    root: float
+    stairs: bool
+
+
+def _slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
+    """Slip of a gear that is held in the samples `rest`."""
+    error = speeds.sync_error(ratio)
+    width = speeds.samples(_SMOOTH, 3)
+    level = float(np.median(error[rest]))
+    noise = 1.4826 * float(np.median(np.abs(error[rest] - level)))
+    floor = _ROUNDING * float(np.median(np.abs(speeds.input[rest])))
+    rounding = speeds.rounding(ratio)
+    noise = max(noise, floor, rounding)
+    root = float(np.sqrt(width))
+    mean = np.convolve(np.pad(error - level, width // 2, mode="edge"), np.ones(width), "same")
+    mean = np.abs(mean[width // 2 : width // 2 + len(error)]) / width
+    stairs = rounding > _white(error[rest])
+    return _Slip(speeds.time, error, level, floor, noise, mean * root / noise, root, stairs)
+
+
+def _white(error: FloatArray) -> float:
+    """White noise of a slip at rest, from second differences: mostly zero between stairs."""
+    bend = np.abs(np.diff(error, 2))
+    return 1.4826 * float(np.median(bend)) / float(np.sqrt(6.0)) if len(bend) else 0.0
+
+
+def _first_window(slip: _Slip, anchor: int, moving: Moving, shortest: int) -> int:
+    """Samples from `anchor` on to where the slip has clearly left rest, within bounds."""
+    ahead = slip.departure[anchor:] if moving is Moving.AFTER else slip.departure[anchor::-1]
+    clear = np.flatnonzero(ahead > _CLEAR * slip.root)
+    reached = int(clear[0]) if len(clear) else _WIDEN * shortest
+    return int(np.clip(reached, shortest, _WIDEN * shortest))
+
+
+def _runs_of_true(flags: NDArray[np.bool_], length: int) -> NDArray[np.intp]:
+    """Indices at which `length` true flags in a row begin."""
+    if len(flags) < length:
+        return np.empty(0, dtype=np.intp)
+    count = np.convolve(flags.astype(np.int64), np.ones(length, dtype=np.int64), "valid")
+    return np.flatnonzero(count == length)
+
+
+def _locate(
+    slip: _Slip, where: tuple[int, int], moving: Moving, limits: tuple[int, int]
+) -> Boundary | None:
+    """Fit the hinge around sample `where[0]` in the widest window that the curve can follow.
+
+    The widest tried has `where[1]` samples on either side; `limits` bound it in the log.
+    Pressure vibration and a steep end bend the slip more than the curve can; narrower windows are
+    tried then, and what the last narrowing moved counts as uncertainty.
+    """
+    anchor, widest = where
+    time, sigma = float("nan"), float("inf")
+    for part in _WINDOWS:
+        span = max(round(part * widest), _LEAST)
+        hinge = _centred(slip, (anchor, span), moving, limits)
+        if hinge is None:
+            break
+        moved = 0.0 if np.isnan(time) else abs(hinge.time - time)
+        time, sigma = hinge.time, float(np.hypot(hinge.sigma, 0.5 * moved))
+        anchor = int(np.searchsorted(slip.time, time))
+        if hinge.noise_moving < slip.noise * (1.0 + 2.0 / np.sqrt(2.0 * span)):
+            break
+    if np.isnan(time):
+        return None
+    # Between two samples, further apart across a gap, the time is known to a uniform error only.
+    after = int(np.clip(np.searchsorted(slip.time, time), 1, len(slip.time) - 1))
+    step = float(slip.time[after] - slip.time[after - 1])
+    return Boundary(time, float(np.hypot(sigma, step / np.sqrt(12.0))))
+
+
+def _centred(
+    slip: _Slip, where: tuple[int, int], moving: Moving, limits: tuple[int, int]
+) -> Hinge | None:
+    """Fit the hinge around sample `where[0]` ± `where[1]`, then again around what was found."""
+    anchor, span = where
+    hinge: Hinge | None = None
+    for _ in range(2):
+        # A gentle onset hides in the noise, so it may lie well before what is first seen to move.
+        before, after = (2 * span, span) if moving is Moving.AFTER else (span, span)
+        low, high = max(limits[0], anchor - before), min(limits[1], anchor + after)
+        rest, motion = span // 2, (2 * span) // 3
+        begin, end = (span, motion) if moving is Moving.AFTER else (motion, rest)
+        begin, end = max(anchor - begin, low + 2), min(anchor + end, high - 2)
+        if end <= begin:
+            return hinge
+        window = slice(low, high + 1)
+        interval = (float(slip.time[begin]), float(slip.time[end]))
+        hinge = fit_hinge(slip.time[window], slip.error[window], moving, interval, slip.floor)
+        if hinge is None:
+            return None
+        anchor = int(np.searchsorted(slip.time, hinge.time))
+    return hinge

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""The part of a shift over which all that drives it was recorded, and that one load holds for.
+
+A gap in the engine torque or in a pressure is no input that a model could be driven by, so the
+gears held before and after the shift are cut at it, and a shift with a gap inside is refused. A
+pressure counts only while an element may slip: one that stays above or below P0 on both sides of
+its gap, while the speeds show a held gear, decides nothing. An input that starts after the gear
+before the shift, or ends before the gear after it, has a gap there. So has the torque that drives
+the gearbox where the converter is open: the engine torque is not it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.shiftlog import Channel, ShiftLog, open_ends
+from drivetwin.errors import DamagedChannelError, Where
+from drivetwin.logs.quality.update_raster import fresh_samples
+from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE, open_spans
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import PriorValue
+
+Span = tuple[float, float]
+
+OLDEST, YOUNGEST = 0.08, 0.02
+"""A stamp of the engine torque shows an instant so much earlier at most, or so much later [s]."""
+
+LEAST = 0.15
+"""Shortest time [s] of a held gear before and after the shift that anything is told from."""
+
+BEFORE, AFTER = 8.0, 5.0
+"""Longest time [s] of the gears held before and after the shift over which a load is taken as
+constant: on a drive grade and service brake change it."""
+
+
+def parts_between(span: Span, gaps: tuple[Span, ...]) -> tuple[Span, ...]:
+    """The parts of `span` [s] that no gap touches, in order of time."""
+    parts, start = [], span[0]
+    for low, high in sorted(gaps):
+        if high <= start or low >= span[1]:
+            continue
+        if low > start:
+            parts.append((start, low))
+        start = max(start, high)
+    if start < span[1]:
+        parts.append((start, span[1]))
+    return tuple(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Gap:
+    """A gap [s] of one channel, and the `reach` of what it leaves unknown.
+
+    Without a channel it is the converter that is open.
+    """
+
+    channel: Channel | None
+    span: Span
+    reach: Span
+
+    def __str__(self) -> str:
+        low, high = self.span
+        if self.channel is None:
+            return f"the converter is open from {low:.3f} s to {high:.3f} s"
+        return f"{self.channel.source_name!r} has no samples from {low:.3f} s to {high:.3f} s"
+
+
+def near(shift: Shift, most: tuple[float, float] = (BEFORE, AFTER)) -> Shift:
+    """Return `shift` with no more of the gears before and after it than `most` [s].
+
+    Unless stated, that is what one load holds for.
+    """
+    before = max(shift.before[0], shift.before[1] - most[0]), shift.before[1]
+    after = shift.after[0], min(shift.after[1], shift.after[0] + most[1])
+    if (before, after) == (shift.before, shift.after):
+        return shift
+    return replace(shift, before=before, after=after)
+
+
+def recorded(
+    log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue], i_in: float = 1.0
+) -> Shift:
+    """Return `shift` with `before` and `after` cut to what its inputs were recorded for.
+
+    `fills` is P0 [Pa] of both elements by name, `i_in` the ratio of the input gear. A cut is told
+    in the warnings of the shift. Raises DamagedChannelError where a gap lies in the shift itself or
+    leaves less than LEAST of a gear.
+    """
+    gaps = _gaps(log, shift, fills)
+    gaps += [
+        _Gap(None, span, (span[0] - LETS_GO, span[1] + LETS_GO)) for span in open_spans(log, i_in)
+    ]
+    start, end = shift.before[1], shift.lockup_time
+    inside = [gap for gap in gaps if gap.reach[0] < end and gap.reach[1] > start]
+    if inside:
+        raise _refused(log, inside[0], "during the shift")
+    earlier = [gap for gap in gaps if shift.before[0] < gap.reach[1] <= start]
+    if earlier:
+        last = max(earlier, key=lambda gap: gap.reach[1])
+        if start - last.reach[1] < LEAST:
+            raise _refused(log, last, f"less than {LEAST:g} s before the shift")
+        text = f"{last}: gear {shift.start_gear} counts from there on"
+        shift = replace(shift, before=(last.reach[1], start), warnings=(*shift.warnings, text))
+    later = [gap for gap in gaps if end <= gap.reach[0] < shift.after[1]]
+    if later:
+        first = min(later, key=lambda gap: gap.reach[0])
+        if first.reach[0] - end < LEAST:
+            raise _refused(log, first, f"less than {LEAST:g} s after the shift")
+        text = f"{first}: gear {shift.end_gear} counts up to there"
+        shift = replace(
+            shift, after=(shift.after[0], first.reach[0]), warnings=(*shift.warnings, text)
+        )
+    return shift
+
+
+def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[_Gap]:
+    """Gaps of the inputs that matter to the shift, where they start late or end early too."""
+    found = []
+    whole = (shift.before[0], shift.after[1])
+    if "engine_torque" in log:
+        torque = fresh_samples(log["engine_torque"])
+        gaps = (*torque.gaps, *open_ends(torque.time, whole))
+        found += [_Gap(torque, gap, (gap[0] - OLDEST, gap[1] + YOUNGEST)) for gap in gaps]
+    for name, fill in fills.items():
+        if pressure_role(name) in log:
+            pressure = log.pressure(name)
+            inner = [gap for gap in pressure.gaps if _decides(pressure, gap, shift, fill)]
+            gaps = (*inner, *open_ends(pressure.time, whole))
+            found += [_Gap(pressure, gap, gap) for gap in gaps]
+    return found
+
+
+def _decides(pressure: Channel, gap: Span, shift: Shift, fill: PriorValue) -> bool:
+    """Whether an element might have begun to carry torque, or to slip, within a gap."""
+    if gap[1] > shift.before[1] and gap[0] < shift.lockup_time:
+        return True
+    beside = np.interp(gap, pressure.time, pressure.values) - fill.value
+    return bool(np.sign(beside[0]) != np.sign(beside[1]) or np.abs(beside).min() < fill.std)
+
+
+def _refused(log: ShiftLog, gap: _Gap, where: str) -> DamagedChannelError:
+    if gap.channel is None:
+        return DamagedChannelError(
+            f"{gap}, {where}: the engine torque does not drive the gearbox there",
+            "state the map of the converter as [converter] on the card, or record the shift with "
+            "the lock-up clutch closed",
+            Where(file=log.source, time=gap.span[0]),
+        )
+    again = "record the shift again: what drives a model must be there throughout"
+    if gap.channel.source_name.startswith(TURBINE_TORQUE):
+        again = (
+            "keep the lock-up clutch open, or closed, from a second before the shift to a second "
+            "after it; where it was open at the same speeds on both sides, map its flag as "
+            "`lockup_engaged`"
+        )
+    return DamagedChannelError(
+        f"{gap}, {where}",
+        again,
+        Where(file=log.source, channel=gap.channel.source_name, time=gap.span[0]),
+    )

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""Shifts and their four phases from a log and a vehicle card (THEORY section 4)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import NoShiftError, Where
+from drivetwin.shifts.candidate import (
+    CandidateRefusedError,
+    Search,
+    build_shift,
+    gear_list,
+    ratio_in,
+    resting_ratio,
+)
+from drivetwin.shifts.gear_runs import Run, gear_runs
+from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds, gear_ratios, gearbox_speeds
+from drivetwin.shifts.quality import shift_quality
+from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.shifts.tcu_flags import checked
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+
+class FoundShifts(NamedTuple):
+    """What a log holds: usable shifts and refused candidates, both in order of time."""
+
+    shifts: tuple[Shift, ...]
+    rejected: tuple[RejectedShift, ...]
+
+
+def find_shifts(
+    log: ShiftLog, card: VehicleCard, settings: ShiftSettings | None = None
+) -> FoundShifts:
+    """Find every gear shift of a log, its phases and quality figures, and the candidates refused.
+
+    A gear is held where ω_in = ic·iout·ω_out (zero slip, eq. 15, of the element that makes it).
+    Between two gears held, the inertia phase runs from the hinge at which the off-going slip
+    leaves zero to the one at which the on-coming slip reaches it; the torque phase precedes it,
+    from the on-coming pressure's crossing of P0 (without it: from the fall of the output torque,
+    or halfway from the shift flag). Flag and gear of the bus are checked against the speeds.
+    Raises MissingChannelError where a speed is missing, TimeError where the speeds share no time.
+    """
+    speeds = gearbox_speeds(log, card)
+    search = Search(log, card, speeds, gear_ratios(card), settings or ShiftSettings())
+    runs = gear_runs(speeds, search.ratios, search.settings)
+    if not runs:
+        return FoundShifts((), (_standing(search),))
+    shifts: list[Shift] = []
+    rejected = [
+        RejectedShift(_span(speeds, run), reason)
+        for index, run in enumerate(runs)
+        if (reason := _unfinished(search, runs, index))
+    ]
+    held = _lasting([run for run in runs if run.gear is not None], speeds.time, search.settings)
+    for before, after in pairwise(held):
+        if _interrupted(runs, before, after):
+            continue
+        try:
+            shifts.append(build_shift(search, before, after))
+        except CandidateRefusedError as no_shift:
+            span = (float(speeds.time[before.last]), float(speeds.time[after.first]))
+            rejected.append(RejectedShift(span, str(no_shift)))
+    chained = _chain(shifts, search.settings)
+    rated = tuple(replace(s, quality=shift_quality(log, card, s)) for s in chained)
+    finished, refused = checked(log, rated, rejected)
+    return FoundShifts(finished, tuple(sorted(refused, key=lambda item: item.time)))
+
+
+def held_spans(log: ShiftLog, card: VehicleCard) -> list[tuple[str, tuple[float, float]]]:
+    """The gears that a log holds, in order of time, with first and last time [s] of each.
+
+    Raises as `find_shifts`.
+    """
+    speeds = gearbox_speeds(log, card)
+    runs = gear_runs(speeds, gear_ratios(card), ShiftSettings())
+    return [(run.gear, _span(speeds, run)) for run in runs if run.gear is not None]
+
+
+def _standing(search: Search) -> RejectedShift:
+    speeds = search.speeds
+    return RejectedShift(
+        (float(speeds.time[0]), float(speeds.time[-1])),
+        f"the output speed is never above {search.settings.min_output_speed:g} rad/s "
+        f"(highest {speeds.output.max():.4g} rad/s): standstill, or the wrong sign or unit",
+    )
+
+
+def _span(speeds: GearboxSpeeds, run: Run) -> tuple[float, float]:
+    return float(speeds.time[run.first]), float(speeds.time[run.last])
+
+
+def _interrupted(runs: list[Run], before: Run, after: Run) -> bool:
+    """Whether the vehicle stood still between two gears held."""
+    between = [run for run in runs if before.last < run.first and run.last < after.first]
+    missing = (after.first - before.last - 1) - sum(run.last - run.first + 1 for run in between)
+    return missing > 0
+
+
+def _lasting(held: list[Run], time: FloatArray, settings: ShiftSettings) -> list[Run]:
+    """Without gears that are passed once more on the way to another: a slip that first turned."""
+    return [
+        run
+        for before, run, after in zip([None, *held], held, [*held[1:], None], strict=False)
+        if before is None
+        or after is None
+        or before.gear != run.gear
+        or after.gear == run.gear
+        or time[run.last] - time[run.first] > 2.0 * settings.min_hold
+        or time[after.first] - time[before.last] > settings.max_inertia_phase
+    ]
+
+
+def _unfinished(search: Search, runs: list[Run], index: int) -> str:
+    """Why a stretch without gear belongs to no shift with a gear on either side; empty if none."""
+    run, speeds = runs[index], search.speeds
+    if run.gear is not None:
+        return ""
+    before = runs[index - 1] if index > 0 else None
+    after = runs[index + 1] if index + 1 < len(runs) else None
+    if before is not None and _interrupted(runs, before, run):
+        before = None
+    if after is not None and _interrupted(runs, run, after):
+        after = None
+    start, end = _span(speeds, run)
+    if end - start < search.settings.min_hold or (before and after):
+        return ""
+    ratio = ratio_in(speeds, run.first, run.last)
+    measured = f"measured ratio {ratio.min():.4g} to {ratio.max():.4g}"
+    resting = resting_ratio(search, start, end)
+    if resting is not None:
+        return f"steady ratio {resting:.4g} matches no gear of the card ({gear_list(search)})"
+    if before is None and after is None:
+        return f"no gear of the card is held; {measured}"
+    if before is None:
+        return f"no gear is held before gear {after.gear if after else ''}; {measured}"
+    return (
+        f"slip reaches zero in no gear after gear {before.gear}: the on-coming element "
+        f"does not lock before the recording or the motion ends; {measured}"
+    )
+
+
+def _chain(shifts: list[Shift], settings: ShiftSettings) -> list[Shift]:
+    """End each `after` where the next torque phase starts, begin each `before` after lock-up."""
+    chained: list[Shift] = []
+    for index, shift in enumerate(shifts):
+        before, after = shift.before, shift.after
+        if index > 0 and shifts[index - 1].lockup_time + settings.settle > before[0]:
+            before = (min(shifts[index - 1].lockup_time + settings.settle, before[1]), before[1])
+        if index + 1 < len(shifts):
+            after = (after[0], min(after[1], shifts[index + 1].torque_phase[0]))
+        chained.append(replace(shift, before=before, after=after))
+    return chained
+
+
+def usable_shifts(log: ShiftLog, card: VehicleCard) -> FoundShifts:
+    """What `find_shifts` finds; NoShiftError lists what was refused where nothing can be used."""
+    found = find_shifts(log, card)
+    if found.shifts:
+        return found
+    reasons = "; ".join(
+        f"{one.time[0]:.3f} s to {one.time[1]:.3f} s: {one.reason}" for one in found.rejected
+    )
+    raise NoShiftError(
+        f"no usable gear shift; {reasons}" if reasons else "no gear shift: one gear throughout",
+        "record from a second before the torque phase to a second after lock-up; "
+        "check the ratios on the card and the speed channels with `drivetwin inspect`",
+        Where(file=log.source),
+    )

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: MIT
+"""The converter's lock-up clutch: when it closes and opens, and whether a shift has it closed.
+
+With the clutch open the gearbox is driven by the turbine; a map tells its torque from both speeds.
+Closed means ω_e = i_in·ω_in. The flag on the bus tells when; the speeds decide whether it is true.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.errors import IdentificationError, Where
+from drivetwin.logs.quality.outliers import runs
+from drivetwin.logs.quality.update_raster import fresh_samples
+from drivetwin.shifts.kinematics import FloatArray
+from drivetwin.shifts.shift import Shift
+from drivetwin.shifts.tcu_flags import set_spans
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+Span = tuple[float, float]
+BoolArray = NDArray[np.bool_]
+
+TURBINE_TORQUE = "turbine torque"
+"""What the name of a torque starts with that is the turbine's, by the map."""
+
+CLOSED = 0.02
+"""Relative slip between engine and input below which the lock-up clutch counts as closed."""
+_RIGID = 0.005
+"""The same where nothing else tells whether an open converter only runs through synchronism."""
+_HOLD = 0.3
+"""Time [s] over which the slip must stay closed."""
+_LASTS = 1.0
+"""Time [s] from which on slip is no late speed in a shift."""
+LETS_GO = 0.3
+"""Time [s] before the converter is seen open or closed, and after it is, in which its lock-up
+clutch may slip."""
+_BEYOND = 0.01
+"""Speed ratio by which noise may lead beyond the ends of a map."""
+_BESIDE = 0.5
+"""Span before a shift [s] over which its converter is looked at."""
+_STEP = 0.01
+"""Raster [s] on which slip is looked at."""
+
+
+@dataclass(frozen=True)
+class LockUp:
+    """The lock-up clutch closes at `time` ± `sigma` [s] and stays so until `end` [s].
+
+    `warning` says where flag and speeds contradict each other; empty where they agree.
+    """
+
+    time: float
+    sigma: float
+    end: float
+    warning: str = ""
+
+
+def converter_slip(log: ShiftLog, card: VehicleCard, span: Span) -> float | None:
+    """Mean of ω_e/(i_in·ω_in) - 1 over `span` [s]; None where no channel tells it."""
+    if "engine_speed" not in log or "input_speed" not in log:
+        return None
+    engine = log["engine_speed"]
+    inside = (engine.time >= span[0]) & (engine.time <= span[1])
+    inlet = card.i_in * log["input_speed"].at(engine.time[inside])
+    known = np.isfinite(inlet) & (inlet > 0.0)
+    if not known.any():
+        return None
+    return float(np.mean(engine.values[inside][known] / inlet[known])) - 1.0
+
+
+def open_slip(log: ShiftLog, card: VehicleCard, shift: Shift) -> float | None:
+    """Slip of the converter before `shift`; None where it is closed or no channel tells it."""
+    slip = converter_slip(log, card, (shift.before[1] - _BESIDE, shift.before[1]))
+    return slip if slip is not None and abs(slip) > CLOSED else None
+
+
+def unseen(log: ShiftLog, card: VehicleCard) -> tuple[str, ...]:
+    """What is said where the card has a converter and no channel tells whether it is open."""
+    lacks = [role for role in ("engine_speed", "input_speed") if role not in log]
+    if card.converter is None or not lacks or "lockup_engaged" in log:
+        return ()
+    return (
+        f"nothing tells whether the converter is open, for the log has no {lacks[0]}: it counts as "
+        f"closed, and values are wrong where it is not; map `{lacks[0]}`, or the lock-up flag as "
+        "`lockup_engaged`",
+    )
+
+
+def behind_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog:
+    """The log as the gearbox sees it: where the converter is open, the turbine is its engine.
+
+    Its torque, by the card's map from the speeds of engine and input, takes the place of
+    `engine_torque`, and its speed that of the engine. It has no samples where the lock-up clutch
+    may carry some of it, nor beyond the ends of the map. The log as it is where the converter is
+    closed before `shift` or the card has no map. Raises IdentificationError where the map ends
+    short of the shift.
+    """
+    if card.converter is None or open_slip(log, card, shift) is None:
+        return log
+    engine = fresh_samples(log["engine_speed"])
+    turbine = card.i_in * fresh_samples(log["input_speed"]).at(engine.time)
+    known = np.isfinite(turbine) & (engine.values > 0.0)
+    ratio = np.divide(turbine, engine.values, out=np.zeros_like(turbine), where=known)
+    first, last = card.converter.speed_ratio[0], card.converter.speed_ratio[-1]
+    beyond = known & ((ratio < first - _BEYOND) | (ratio > last + _BEYOND))
+    _require_map(log, shift, engine.time[beyond], ratio[beyond], (first, last))
+    known &= ~beyond
+    for start, end in _closed_spans(log, card.i_in):
+        known &= (engine.time < start - LETS_GO) | (engine.time > end + LETS_GO)
+    torque = Channel(
+        role="engine_torque",
+        quantity=Quantity.TORQUE,
+        time=engine.time[known],
+        values=card.converter.turbine_torque(engine.values[known], turbine[known]),
+        source_name=f"{TURBINE_TORQUE} from {engine.source_name}, lock-up clutch open",
+        source_unit="Nm",
+    )
+    others = {role: c for role, c in log.channels.items() if role != "engine_speed"}
+    return replace(log, channels={**others, "engine_torque": torque})
+
+
+def _require_map(
+    log: ShiftLog, shift: Shift, time: FloatArray, ratio: FloatArray, ends: Span
+) -> None:
+    """Raise IdentificationError where speed ratios (n,) beyond the `ends` of the map, at `time`
+    (n,) [s], lie in the shift or just beside it."""
+    near = (time > shift.before[1] - _HOLD) & (time < shift.lockup_time + _HOLD)
+    if not near.any():
+        return
+    worst = ratio[near][np.argmax(np.maximum(ends[0] - ratio[near], ratio[near] - ends[1]))]
+    raise IdentificationError(
+        f"the map of the converter on the card has speed ratios from {ends[0]:g} to {ends[1]:g}; "
+        f"in the shift {shift.start_gear}-{shift.end_gear} it is {worst:.3f}",
+        "give the map under [converter] as far as the log goes; in overrun the turbine is faster "
+        "than the pump, which is a ratio above 1",
+        Where(file=log.source, time=float(time[near][0])),
+    )
+
+
+def _closed_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
+    """Spans [s] in which the lock-up clutch is closed: by its flag, else by the speeds of engine
+    and input, the same for _HOLD on. An open converter seldom lingers there, and carries nothing.
+    """
+    if "lockup_engaged" in log:
+        return tuple(set_spans(log["lockup_engaged"]))
+    return _spans(log, i_in, lambda mean: np.abs(mean) < _RIGID, _HOLD)
+
+
+def require_closed(log: ShiftLog, card: VehicleCard, shift: Shift) -> None:
+    """Raise IdentificationError where the converter slips before `shift` and has no map.
+
+    Its torque would have to be known then; the engine torque is not that of the gearbox.
+    """
+    slip = open_slip(log, card, shift)
+    if slip is not None and card.converter is None:
+        raise IdentificationError(
+            f"the converter is open before the shift {shift.start_gear}-{shift.end_gear}: engine "
+            f"and gearbox input differ by {100.0 * slip:.1f} %",
+            "state the map of the converter as [converter] on the card, or record the shift with "
+            "the lock-up clutch closed; phases and speeds of this one are told by "
+            "`drivetwin shifts`",
+            Where(file=log.source, time=shift.before[1]),
+        )
+
+
+def lock_ups(log: ShiftLog, card: VehicleCard) -> tuple[LockUp, ...]:
+    """Every closing of the lock-up clutch; one that is closed from the first sample on is none."""
+    if "lockup_engaged" in log:
+        flag = log["lockup_engaged"]
+        return tuple(
+            _flagged(log, card, flag, span) for span in set_spans(flag) if span[0] > flag.time[0]
+        )
+    if "engine_speed" in log and "input_speed" in log:
+        return _seen(log["engine_speed"], log["input_speed"], card.i_in)
+    return ()
+
+
+def _flagged(log: ShiftLog, card: VehicleCard, flag: Channel, span: Span) -> LockUp:
+    """A closing that the flag tells, with the slip's word on it."""
+    slip = converter_slip(log, card, (span[0] + _HOLD, max(span[1], span[0] + 2.0 * _HOLD)))
+    warning = ""
+    if slip is None:
+        warning = "no speeds of engine and input: the flag is unchecked"
+    elif abs(slip) > CLOSED:
+        warning = f"the flag tells lock-up, but engine and input differ by {100 * slip:.1f} %"
+    return LockUp(span[0], flag.step / float(np.sqrt(12.0)), span[1], warning)
+
+
+def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
+    """Closings that the speeds show: the slip, averaged over _HOLD/3, comes to rest for _HOLD.
+
+    It has to be there for as long before.
+    """
+    time, slip = _slip(engine, inlet, i_in)
+    width = round(_HOLD / _STEP / 3.0)
+    if time.size < 4 * width:
+        return ()
+    mean = np.convolve(np.where(np.isfinite(slip), slip, 1.0), np.ones(width) / width, "same")
+    closed = np.abs(mean) < CLOSED
+    for first, stop in runs(~closed):
+        # A late engine speed looks like slip while a shift changes the speeds.
+        if first > 0 and (stop - first) * _STEP < _HOLD:
+            closed[first:stop] = True
+    return tuple(
+        LockUp(float(time[first]), _HOLD / 6.0, float(time[stop - 1]))
+        for first, stop in runs(closed)
+        if (stop - first) * _STEP >= _HOLD and first > width
+    )
+
+
+def open_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
+    """Spans [s] in which the speeds of engine and input show the converter open, for _LASTS on.
+
+    Less may be a late engine speed while a shift changes the speeds. Empty where the log lacks one
+    of the speeds, as one does that sees the turbine as its engine.
+    """
+    if "engine_speed" not in log or "input_speed" not in log:
+        return ()
+    return _spans(log, i_in, lambda mean: np.abs(mean) > CLOSED, _LASTS)
+
+
+def _spans(
+    log: ShiftLog, i_in: float, shows: Callable[[FloatArray], BoolArray], least: float
+) -> tuple[Span, ...]:
+    """Spans [s] of `least` or more in which the slip's mean over _HOLD/3 `shows` something."""
+    time, slip = _slip(log["engine_speed"], log["input_speed"], i_in)
+    width = round(_HOLD / _STEP / 3.0)
+    if time.size < 4 * width:
+        return ()
+    mean = np.convolve(np.where(np.isfinite(slip), slip, 0.0), np.ones(width) / width, "same")
+    return tuple(
+        (float(time[first]), float(time[stop - 1]))
+        for first, stop in runs(shows(mean))
+        if (stop - first) * _STEP >= least
+    )
+
+
+def _slip(engine: Channel, inlet: Channel, i_in: float) -> tuple[FloatArray, FloatArray]:
+    """ω_e/(i_in·ω_in) - 1 (n,) at times (n,) [s] every _STEP that both speeds share.
+
+    Not finite in a gap and where the input stands.
+    """
+    start, end = max(engine.time[0], inlet.time[0]), min(engine.time[-1], inlet.time[-1])
+    time = np.arange(start, end, _STEP)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return time, engine.at(time) / (i_in * inlet.at(time)) - 1.0

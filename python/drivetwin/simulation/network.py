@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""Any driveline as a network of elements: described as data, simulated by the core.
+
+An element is a mapping with `type`, `name` and the fields of its kind, SI throughout; the kinds
+and their laws are listed in docs/reference/elements.md. Nodes are the names used at the flanges;
+`ground` does not turn.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from drivetwin import _native
+from drivetwin.errors import InputError
+from drivetwin.simulation.dual_clutch import (
+    Accuracy,
+    EnergyAudit,
+    Event,
+    FloatArray,
+    Signal,
+    run_time,
+    samples,
+)
+from drivetwin.simulation.serialize import as_json, as_names
+
+Element = Mapping[str, Any]
+OutputKind = Literal["speed", "angle", "twist", "shaft_torque", "slip", "friction_torque"]
+Output = tuple[OutputKind, str]
+"""What to record and of which node or element."""
+
+
+def element(kind: str, name: str, **fields: object) -> Element:
+    """Return an element of this type and name with the fields of its kind."""
+    return {"type": kind, "name": name, **fields}
+
+
+@dataclass(frozen=True)
+class Sine:
+    """An input `offset + amplitude·sin(2π·frequency·t + phase)`; frequency in Hz, phase in rad."""
+
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Start:
+    """Speeds of nodes [rad/s], twists of shafts [rad] (0 where absent), elements without slip."""
+
+    speeds: Mapping[str, float]
+    twists: Mapping[str, float] = field(default_factory=dict)
+    locked: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkRun:
+    """Result: `columns[kind, name]` (n,) on `time`; NaN after a failure, see `status`."""
+
+    time: FloatArray
+    columns: Mapping[Output, FloatArray]
+    events: tuple[Event, ...]
+    status: str
+    audit: EnergyAudit | None
+
+
+def simulate(
+    elements: Sequence[Element],
+    inputs: Mapping[str, Signal | Sine],
+    start: Start,
+    time: FloatArray,
+    outputs: Sequence[Output],
+    *,
+    audit: bool = False,
+    accuracy: Accuracy | None = None,
+) -> NetworkRun:
+    """Simulate a network from `time[0]` and record `outputs` on `time` (n,) [s], increasing.
+
+    Sampled inputs are linear between samples and act by their `delay` later; a time that stands
+    twice is a jump.
+    Raises InputError where the description is inconsistent, naming the element; a run that fails
+    on the way returns its status.
+    """
+    accuracy = accuracy or Accuracy()
+    foreign = [name for name, one in inputs.items() if not isinstance(one, Signal | Sine)]
+    if foreign:
+        raise InputError(
+            f"inputs {', '.join(foreign)} are no signals", "give each a Signal or a Sine"
+        )
+    sampled = {name: one for name, one in inputs.items() if isinstance(one, Signal)}
+    sines = [
+        (name, sine.offset, sine.amplitude, sine.frequency, sine.phase)
+        for name, sine in inputs.items()
+        if isinstance(sine, Sine)
+    ]
+    try:
+        columns, events, status, energy = _native.simulate_network(
+            as_json(list(elements)),
+            json.dumps([{kind: name} for kind, name in outputs]),
+            (samples(sampled), sines),
+            (list(start.speeds.items()), list(start.twists.items()), as_names(start.locked)),
+            run_time(time),
+            (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit),
+        )
+    except ValueError as error:
+        raise InputError(str(error), "correct the elements, their inputs or the start") from error
+    return NetworkRun(
+        time,
+        dict(zip(outputs, columns, strict=True)),
+        tuple(Event(*event) for event in events),
+        status,
+        EnergyAudit(*energy) if energy is not None else None,
+    )

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Identified driveline model with its uncertainty."""

@@ -1,0 +1,338 @@
+# SPDX-License-Identifier: MIT
+"""The twin: an identified driveline model with its uncertainty, validity range and provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drivetwin._util.rich_display import Shown
+from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.errors import InputError, MissingParameterError, Where
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import (
+    Estimate,
+    FloatArray,
+    FrictionCurve,
+    LoadLaw,
+    Verdict,
+)
+from drivetwin.estimation.result.method import Method
+from drivetwin.parameters import OVER_ETA
+from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.converter_map import Converter
+from drivetwin.simulation.dual_clutch import (
+    DualClutch,
+    FrictionTable,
+    LossLaw,
+    RoadLoad,
+    ShiftElement,
+    Stribeck,
+)
+from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+COMMON = ("eta", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+"""Parameters that every model of a twin needs, besides a J′."""
+OF_ELEMENT = ("P0", "drum")
+"""Stems of the parameters of a shift element that stand for its design value where told."""
+SIMULATED = (*COMMON, "J_prime", *OF_ELEMENT, "te_delay")
+"""Stems of the parameters that a simulation depends on; the others follow from them."""
+
+
+@dataclass(frozen=True)
+class TwinGear:
+    """A gear: overall ratio i_in·i_c·i_out and the shift element that holds it."""
+
+    ratio: float
+    element: str
+
+
+@dataclass(frozen=True)
+class TwinElement:
+    """Design data of one shift element: ratios of eq. 15, gain [m^3], P0 [Pa], drum [kg m^2].
+
+    `P0` and `drum` are what the card says; parameters of the same name go before them.
+    """
+
+    kind: ElementKind
+    i_c: float
+    i_out: float
+    gain: float
+    P0: float
+    peak: float
+    drum: float
+
+    def spec(self, name: str) -> ElementSpec:
+        """The same as on a vehicle card, all of it taken as known."""
+        P0, drum = PriorValue(self.P0), PriorValue(self.drum)
+        return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
+
+
+@dataclass(frozen=True, eq=False)
+class Twin(Shown):
+    """What is known of one driveline after an identification; immutable, SI.
+
+    `parameters` by id (see parameters.py), also those that could not be told; `friction` by
+    element; `covariance` (n, n) over `covariance_ids`, total; `validity` the ranges of slip,
+    pressure, torque and speed that the log covered; `inputs` file name -> SHA-256. The design
+    ranges [kg m^2] and `channels` by role are those of the vehicle card. `load_law` says how the
+    load torque grows with speed; None where it is constant. `converter` is the card's map of the
+    torque converter, None where it has none.
+    """
+
+    name: str
+    method: Method
+    loss_law: LossLaw
+    i_in: float
+    final_drive: float
+    gears: Mapping[str, TwinGear]
+    elements: Mapping[str, TwinElement]
+    J_prime_range: tuple[float, float]
+    J_vehicle_range: tuple[float, float]
+    parameters: Mapping[str, Estimate]
+    friction: Mapping[str, FrictionCurve]
+    validity: Mapping[str, tuple[float, float]]
+    inputs: Mapping[str, str]
+    settings: Mapping[str, Any]
+    assumptions: tuple[str, ...]
+    version: str
+    covariance_ids: tuple[str, ...] = ()
+    covariance: FloatArray | None = None
+    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+    load_law: LoadLaw | None = None
+    converter: Converter | None = None
+
+    @classmethod
+    def from_identification(cls, found: Identification, card: VehicleCard) -> Twin:
+        """Join what the log told with what the card knew."""
+        from drivetwin.files.twin_from_result import twin_of
+
+        return twin_of(found, card)
+
+    @classmethod
+    def load(cls, path: Path | str) -> Twin:
+        """Read `twin.toml`. Raises ResultFileError where it is damaged or of a newer schema."""
+        from drivetwin.files.twin_file import read_twin_file
+        from drivetwin.files.twin_from_result import twin_from_file
+
+        return twin_from_file(read_twin_file(path))
+
+    def save(self, path: Path | str) -> None:
+        """Write `twin.toml`; the file appears whole or not at all."""
+        from drivetwin.files.twin_file import write_twin_file
+        from drivetwin.files.twin_from_result import file_of
+
+        write_twin_file(path, file_of(self))
+
+    def dual_clutch(
+        self,
+        shift: Shift,
+        *,
+        overrides: Mapping[str, float] | None = None,
+        loss_law: LossLaw | None = None,
+        load: float | None = None,
+    ) -> DualClutch:
+        """Model for the simulation of one shift (eqs. 2-9).
+
+        Only Je = J1·η + J2e is identifiable: J′ = Je + Jo′/i_g² gives it, and it is carried as
+        J2e = 0, J1 = Je/η. `overrides` sets parameters by id, in place of identified ones: any of
+        `model_ids`, of the two J′ one.
+        What is known over η only counts times the twin's own η, else times that of the overrides.
+        Without either (`over_eta`) η is 1: the speeds are the same, all torques are then over η.
+        `load` [N m] is T_v/i_f on the road of this shift, known as the twin's own is.
+        Raises MissingParameterError naming every parameter that neither source gives, and
+        InputError for a gear or element the twin does not know and for an override without effect.
+        """
+        given = dict(overrides or {})
+        self._refuse_idle(shift, given)
+        gear = self.inertia_gear(shift, given)
+        inertia_id = f"J_prime_{gear}"
+        scale = self.value("eta", given.get("eta", 1.0))
+        if load is not None:
+            given = {"Tv_over_if": scale * load if self.over_eta else load, **given}
+        values = self._values((*COMMON, inertia_id), given, scale)
+        J_e = values[inertia_id] - values["J_out"] / self.gear(gear).ratio ** 2
+        return DualClutch(
+            J1=J_e / values["eta"],
+            J2e=0.0,
+            eta=values["eta"],
+            loss_law=loss_law or self.loss_law,
+            i_in=self.i_in,
+            J_out=values["J_out"],
+            i_f=self.final_drive,
+            J_v=values["J_vehicle"],
+            k_o=values["k_o"],
+            c_o=values["c_o"],
+            load=self._load(values["Tv_over_if"], scale),
+            elements=tuple(
+                self._element(name, partner, given, scale)
+                for name, partner in (
+                    (shift.offgoing, shift.oncoming),
+                    (shift.oncoming, shift.offgoing),
+                )
+            ),
+        )
+
+    def model_ids(self, shift: Shift) -> tuple[str, ...]:
+        """Ids of the parameters that the model of a shift is made from."""
+        inertias = (f"J_prime_{gear}" for gear in (shift.start_gear, shift.end_gear))
+        elements = (shift.offgoing, shift.oncoming)
+        own = (f"{stem}.{element}" for stem in OF_ELEMENT for element in elements)
+        return (*COMMON, *inertias, *own)
+
+    def card(self) -> VehicleCard:
+        """The vehicle card, as far as it takes to read another log and find its shifts."""
+        return VehicleCard(
+            name=self.name,
+            loss_law=self.loss_law,
+            i_in=self.i_in,
+            final_drive=self.final_drive,
+            gears=tuple(
+                Gear(name, gear.ratio / self.i_in, (gear.element,))
+                for name, gear in self.gears.items()
+            ),
+            elements={name: one.spec(name) for name, one in self.elements.items()},
+            J_prime_range=self.J_prime_range,
+            J_vehicle_range=self.J_vehicle_range,
+            channels=self.channels,
+            converter=self.converter,
+        )
+
+    def _load(self, Tv_over_if: float, scale: float) -> RoadLoad:
+        """Load at the wheel: constant, or with the part that grows with speed."""
+        law = self.load_law or LoadLaw(aero=0.0, std=0.0, mean_speed=0.0)
+        return (law.times(scale) if law.over_eta else law).road_load(Tv_over_if, self.final_drive)
+
+    def gear(self, name: str) -> TwinGear:
+        """Gear by its name on the card. Raises InputError where the twin has none such."""
+        try:
+            return self.gears[name]
+        except KeyError:
+            raise InputError(
+                f"the twin {self.name!r} knows no gear {name!r}",
+                f"use one of {', '.join(self.gears)}",
+            ) from None
+
+    def value(self, parameter_id: str, default: float) -> float:
+        """Identified value, or `default` where the log could not tell it."""
+        estimate = self.parameters.get(parameter_id)
+        return default if estimate is None or estimate.value is None else estimate.value
+
+    @property
+    def over_eta(self) -> bool:
+        """Whether torque-like quantities are known over η only: no output torque was measured."""
+        return self._known("J_vehicle") is None and self._known("J_vehicle" + OVER_ETA) is not None
+
+    def _known(self, parameter_id: str) -> float | None:
+        estimate = self.parameters.get(parameter_id)
+        return None if estimate is None else estimate.value
+
+    def _refuse_idle(self, shift: Shift, given: Mapping[str, float]) -> None:
+        """Raise InputError for what the model of a shift does not depend on."""
+        ids = self.model_ids(shift)
+        label = f"the model of shift {shift.start_gear}-{shift.end_gear}"
+        if idle := [name for name in given if name not in ids]:
+            raise InputError(
+                f"{label} does not depend on {', '.join(idle)}", f"override {', '.join(ids)}"
+            )
+        inertias = [name for name in given if name.startswith("J_prime_")]
+        if len(inertias) > 1:
+            raise InputError(
+                f"{label} takes one of {' and '.join(inertias)}, from which the other follows",
+                "override one of them",
+            )
+
+    def inertia_gear(self, shift: Shift, overrides: Mapping[str, float] | None = None) -> str:
+        """Gear whose J′ carries the engine-side inertia in the model of a shift: overridden, else
+        stated without an interval, else told most narrowly for its size."""
+        given = overrides or {}
+
+        def rank(gear: str) -> float:
+            if f"J_prime_{gear}" in given:
+                return -2.0
+            ending = OVER_ETA if self.over_eta else ""
+            estimate = self.parameters.get(f"J_prime_{gear}{ending}")
+            if estimate is None or estimate.value is None:
+                return np.inf
+            if estimate.std_total is None:
+                return -1.0 if estimate.verdict is Verdict.DESIGN else 1e9
+            return estimate.std_total / estimate.value
+
+        return min((shift.start_gear, shift.end_gear), key=rank)
+
+    def _values(
+        self, ids: tuple[str, ...], given: Mapping[str, float], scale: float
+    ) -> dict[str, float]:
+        """Values of `ids`, all of which a model needs."""
+        values, missing = {"eta": scale} if self.over_eta else {}, []
+        for parameter_id in ids:
+            value = self._value(parameter_id, given, scale)
+            if value is not None:
+                values[parameter_id] = value
+            elif parameter_id not in values:
+                missing.append(f"{parameter_id} ({self._why_unknown(parameter_id)})")
+        if missing:
+            raise MissingParameterError(
+                f"the twin cannot be simulated without {'; '.join(missing)}",
+                "give these values as overrides, or identify from a log that can tell them",
+                Where(file=self.name),
+            )
+        return values
+
+    def _value(self, parameter_id: str, given: Mapping[str, float], scale: float) -> float | None:
+        """Value of one parameter: given, told, or told over η and brought to `scale`."""
+        value = given.get(parameter_id, self._known(parameter_id))
+        ratio = self._known(parameter_id + OVER_ETA)
+        if value is None and ratio is not None:
+            value = scale * ratio
+        return None if value is None else float(value)
+
+    def _why_unknown(self, parameter_id: str) -> str:
+        estimate = self.parameters.get(parameter_id)
+        if estimate is None:
+            return "not part of the identification"
+        return estimate.reason or estimate.verdict.value
+
+    def _element(
+        self, name: str, partner: str, given: Mapping[str, float], scale: float
+    ) -> ShiftElement:
+        try:
+            design = self.elements[name]
+        except KeyError:
+            raise InputError(
+                f"the twin {self.name!r} knows no shift element {name!r}",
+                f"use one of {', '.join(self.elements)}",
+            ) from None
+        curve = self.friction.get(name, self.friction.get(partner))
+        if curve is None:
+            raise MissingParameterError(
+                f"no friction curve of {name} or {partner} was identified",
+                "identify from a log where one of them slips under load",
+                Where(file=self.name),
+            )
+        P0, drum = (self._value(f"{stem}.{name}", given, scale) for stem in OF_ELEMENT)
+        return ShiftElement(
+            name=name,
+            i_c=design.i_c,
+            i_out=design.i_out,
+            gain=design.gain,
+            P0=design.P0 if P0 is None else P0,
+            friction=friction_law(curve.times(scale) if curve.over_eta else curve),
+            peak=design.peak,
+            drum_inertia=design.drum if drum is None else drum,
+        )
+
+
+def friction_law(curve: FrictionCurve) -> Stribeck | FrictionTable:
+    """Fitted Stribeck law, or the smoothed curve continued flat to zero slip."""
+    if curve.stribeck is not None:
+        return curve.stribeck
+    slip, mu = curve.slip.tolist(), curve.mu.tolist()
+    if slip[0] > 0.0:
+        slip, mu = [0.0, *slip], [mu[0], *mu]
+    return FrictionTable(tuple(slip), tuple(mu))

@@ -1,0 +1,344 @@
+# SPDX-License-Identifier: MIT
+"""Validation (paper Fig. 11): measured torque and pressures drive the model, outputs compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin._util.progress import tell
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.shiftlog import Channel, ShiftLog
+from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import FloatArray, SignalFit
+from drivetwin.estimation.result.validation import SignalTrace, Validation
+from drivetwin.logs.quality.update_raster import fresh_samples
+from drivetwin.shifts.coverage import near, recorded
+from drivetwin.shifts.lockup_clutch import behind_converter
+from drivetwin.shifts.pressures import shift_pressures
+from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory, simulate
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.initial_state import calm_moment, start_state
+from drivetwin.vehicle.spec import PriorValue
+
+SIGNALS = ("output_torque", "input_speed", "output_speed")
+_GRID = 1e-3
+"""Output step [s] of the simulation: 80 points per period of a 12 Hz oscillation."""
+_CARRIES = 0.02
+"""Share of a run's largest clutch torque from which an element's slip asks for its friction."""
+
+
+Start = tuple[float, State]
+"""Time [s] and state from which a simulation starts."""
+
+
+def validate(
+    twin: Twin,
+    log: ShiftLog,
+    shift: Shift,
+    model: DualClutch | None = None,
+    start: Start | None = None,
+) -> Validation:
+    """Simulate one shift, from a calm moment in `before` to the end of `after`.
+
+    The engine torque is moved by the twin's `te_delay`; the start state comes from the first
+    measured moments, unless `start` gives it. `model` replaces the twin's own (e.g. the other loss
+    law).
+    Raises MissingChannelError, MissingParameterError, DamagedChannelError where an input has a gap
+    in the shift or a compared channel knows nothing of it; a run that fails returns its status.
+    """
+    model = model or twin.dual_clutch(shift)
+    fills = {one.name: PriorValue(one.P0) for one in model.elements}
+    seen = behind_converter(log, twin.card(), shift)
+    shift = near(recorded(seen, shift, fills, model.i_in))
+    window = _window(log, shift)
+    if start is None:
+        return _simulated(twin, log, shift, model, window)
+    return _simulated(twin, log, shift, model, (start[0], window[1]), start[1])
+
+
+def simulated_again(before: Validation, twin: Twin, log: ShiftLog, model: DualClutch) -> Validation:
+    """The shift of `before` with another `model`, over the same window of the same log.
+
+    For what follows a slider: the search for the window takes longer than the simulation.
+    """
+    window = (before.phases["before"][0], before.phases["after"][1])
+    return _simulated(twin, log, before.shift, model, window)
+
+
+def _simulated(
+    twin: Twin,
+    log: ShiftLog,
+    shift: Shift,
+    model: DualClutch,
+    window: tuple[float, float],
+    state: State | None = None,
+) -> Validation:
+    """Run and comparison over `window` [s], from `state` or from what the log shows there."""
+    log = behind_converter(log, twin.card(), shift)
+    engine_torque = _moved(log["engine_torque"], -twin.value("te_delay", 0.0))
+    pressures = {name: _signal(each) for name, each in shift_pressures(log, shift).items()}
+    count = int((window[1] - window[0]) / _GRID + 1e-6)
+    time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
+    start = state or start_state(model, log, shift, window[0])
+    trajectory = simulate(model, engine_torque, pressures, start, time)
+    traces = _traces(model, log, trajectory)
+    phases = phases_of(shift, window)
+    validation = Validation(
+        shift=shift,
+        model=model,
+        phases=phases,
+        engine_torque=engine_torque,
+        pressures=pressures,
+        trajectory=trajectory,
+        traces=traces,
+        fit={name: _fit(trace, phases) for name, trace in traces.items()},
+        status=trajectory.status,
+        warnings=(),
+    )
+    return replace(validation, warnings=_warnings(twin, validation))
+
+
+def compared(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) -> Validation:
+    """`before` with another run of the same shift in place of its own."""
+    traces = _traces(before.model, log, run)
+    made = replace(
+        before,
+        trajectory=run,
+        traces=traces,
+        fit={name: _fit(trace, before.phases) for name, trace in traces.items()},
+        status=run.status,
+    )
+    return replace(made, warnings=_warnings(twin, made))
+
+
+def with_fit(found: Identification, validations: Sequence[Validation]) -> Identification:
+    """Identification with the fits of its validations entered: pooled over the shifts.
+
+    Of their warnings count runs that ended early and those that left the speeds of their own log:
+    all other ranges are those of these logs.
+    """
+    if not validations:
+        return found
+    warnings = tuple(text for one in validations for text in _strayed(one))
+    return replace(
+        found,
+        fit=_pooled_fit(validations),
+        evidence=replace(found.evidence, validation=tuple(validations)),
+        warnings=found.warnings + warnings,
+    )
+
+
+def validated(found: Identification, twin: Twin, log: ShiftLog) -> Identification:
+    """Identification with all its shifts simulated and compared.
+
+    Where the log could not tell a parameter that the simulation needs, or holds nothing of a shift
+    to compare with, the fit stays empty and a warning says which: the parameters stand all the
+    same. Raises MissingChannelError.
+    """
+    try:
+        return with_fit(found, list(_runs(twin, log, found)))
+    except (MissingParameterError, DamagedChannelError) as incomplete:
+        return replace(found, warnings=(*found.warnings, f"no validation: {incomplete.what}"))
+
+
+def _runs(twin: Twin, log: ShiftLog, found: Identification) -> Iterator[Validation]:
+    """Simulate one shift after the other, telling how far it is; on hills with its own load."""
+    loads = found.evidence.loads
+    for count, shift in enumerate(found.shifts):
+        tell(count / len(found.shifts))
+        model = twin.dual_clutch(shift, load=loads[count]) if loads else None
+        yield validate(twin, log, shift, model)
+
+
+def fit_of(measured: FloatArray, simulated: FloatArray, mean: FloatArray | float) -> SignalFit:
+    """Rmse and fit % = 100·(1 - ‖y - ŷ‖/‖y - mean‖) (THEORY section 4); arrays (n,), SI.
+
+    `mean` is that of the log, or of each sample's log (n,) where samples of several are pooled.
+    NaN where there are no samples; a constant measurement has no fit %.
+    """
+    if measured.size == 0:
+        return SignalFit(float("nan"), float("nan"))
+    miss = float(np.linalg.norm(measured - simulated))
+    spread = float(np.linalg.norm(measured - mean))
+    percent = 100.0 * (1.0 - miss / spread) if spread > 0.0 else float("nan")
+    return SignalFit(miss / float(np.sqrt(measured.size)), percent)
+
+
+def phases_of(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[float, float]]:
+    """The four phases of THEORY section 4, cut to `window`."""
+    return {
+        "before": (window[0], shift.torque_phase[0]),
+        "torque": shift.torque_phase,
+        "inertia": shift.inertia_phase,
+        "after": (shift.lockup_time, window[1]),
+    }
+
+
+def _window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
+    """Span of the shift's four phases that all channels cover, from a calm moment on.
+
+    Raises DamagedChannelError for a channel that knows nothing of the shift itself.
+    """
+    roles = ["engine_torque", *map(pressure_role, (shift.offgoing, shift.oncoming))]
+    channels = [log[role] for role in (*roles, *(name for name in SIGNALS if name in log))]
+    for channel in channels:
+        if not channel.time[0] < shift.before[1] < channel.time[-1]:
+            raise DamagedChannelError(
+                f"{channel.source_name!r} was recorded from {channel.time[0]:.3f} s to "
+                f"{channel.time[-1]:.3f} s only, the shift begins at {shift.before[1]:.3f} s",
+                "map another sensor to that channel, or none",
+                Where(file=log.source, channel=channel.source_name),
+            )
+    start = max(shift.before[0], *(channel.time[0] for channel in channels))
+    end = min(shift.after[1], *(channel.time[-1] for channel in channels))
+    return calm_moment(log, (float(start), shift.before[1])), float(end)
+
+
+def _signal(channel: Channel) -> Signal:
+    return Signal(channel.time, channel.values)
+
+
+def _moved(channel: Channel, shift: float) -> Signal:
+    """Fresh samples moved by `shift` [s]; the last value is held to the end of the channel."""
+    fresh = fresh_samples(channel)
+    time, values = fresh.time + shift, fresh.values
+    if time[0] > channel.time[0]:
+        time, values = np.append(channel.time[0], time), np.append(values[0], values)
+    if time[-1] < channel.time[-1]:
+        time, values = np.append(time, channel.time[-1]), np.append(values, values[-1])
+    return Signal(time, values)
+
+
+def simulated_signals(model: DualClutch, run: Trajectory) -> dict[str, FloatArray]:
+    """What a run says of each of SIGNALS (n,) on its own time; SI."""
+    return {
+        "output_torque": run.shaft_torque,
+        "input_speed": run.engine_speed / model.i_in,
+        "output_speed": run.output_speed,
+    }
+
+
+def _traces(model: DualClutch, log: ShiftLog, run: Trajectory) -> dict[str, SignalTrace]:
+    simulated = simulated_signals(model, run)
+    traces = {}
+    for name in SIGNALS:
+        if name not in log:
+            continue
+        channel = log[name]
+        inside = (channel.time >= run.time[0]) & (channel.time <= run.time[-1])
+        time = channel.time[inside]
+        traces[name] = SignalTrace(
+            time=time,
+            measured=channel.values[inside],
+            simulated=np.interp(time, run.time, simulated[name]),
+            log_mean=float(np.mean(channel.values)),
+        )
+    return traces
+
+
+def _fit(trace: SignalTrace, phases: Mapping[str, tuple[float, float]]) -> dict[str, SignalFit]:
+    spans = {"all": None, **phases}
+    return {phase: fit_of(*_part(trace, span), trace.log_mean) for phase, span in spans.items()}
+
+
+def _pooled_fit(validations: Sequence[Validation]) -> dict[str, dict[str, SignalFit]]:
+    """Fits over the samples of all shifts together, by signal and phase."""
+    pooled: dict[str, dict[str, SignalFit]] = {}
+    for name in SIGNALS:
+        traces = [(one.traces[name], one.phases) for one in validations if name in one.traces]
+        if not traces:
+            continue
+        pooled[name] = {}
+        for phase in ("all", *validations[0].phases):
+            parts = [_part(trace, phases.get(phase)) for trace, phases in traces]
+            measured, simulated = (np.concatenate(side) for side in zip(*parts, strict=True))
+            means = [
+                np.full(seen.size, trace.log_mean)
+                for (trace, _), (seen, _) in zip(traces, parts, strict=True)
+            ]
+            pooled[name][phase] = fit_of(measured, simulated, np.concatenate(means))
+    return pooled
+
+
+def _part(trace: SignalTrace, span: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
+    if span is None:
+        return trace.measured, trace.simulated
+    inside = (trace.time >= span[0]) & (trace.time <= span[1])
+    return trace.measured[inside], trace.simulated[inside]
+
+
+def _warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
+    """Say where the run failed or left the range of the log behind the twin."""
+    run = validation.trajectory
+    texts = _ended(run)
+    seen = {
+        "slip": _slip_under_load(run),
+        "pressure": [signal.values for signal in validation.pressures.values()],
+        "torque": [validation.engine_torque.values],
+        "speed": [run.engine_speed],
+    }
+    for name, arrays in seen.items():
+        if name in twin.validity:
+            texts += _outside(name, arrays, twin.validity[name])
+    return tuple(texts)
+
+
+def _ended(run: Trajectory) -> list[str]:
+    if run.status == "completed":
+        return []
+    return [f"simulation of the validation ended early: {run.status}"]
+
+
+def _strayed(one: Validation) -> list[str]:
+    """Words for a run of the log behind a twin that goes where that log does not."""
+    texts, speed = _ended(one.trajectory), one.traces.get("input_speed")
+    if speed is None or not np.isfinite(speed.measured).any():
+        return texts
+    limits = (float(np.nanmin(speed.measured)), float(np.nanmax(speed.measured)))
+    if (reached := _beyond([speed.simulated], limits)) is None:
+        return texts
+    shift = one.shift
+    return [
+        *texts,
+        f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s: the simulated "
+        f"input speed goes from {reached[0]:.4g} to {reached[1]:.4g} rad/s, the measured one from "
+        f"{limits[0]:.4g} to {limits[1]:.4g}",
+    ]
+
+
+def _slip_under_load(run: Trajectory) -> list[FloatArray]:
+    """|slip| of each element while it carries torque [rad/s]; an open one may turn at any speed."""
+    torques = {name: np.abs(torque) for name, torque in run.clutch_torque.items()}
+    least = _CARRIES * max(float(np.nanmax(torque)) for torque in torques.values())
+    return [np.abs(slip[torques[name] > least]) for name, slip in run.slip.items()]
+
+
+_RANGES = {"slip": "rad/s", "pressure": "Pa", "torque": "N·m", "speed": "rad/s"}
+"""Units of what a twin has a range of."""
+
+
+def _outside(name: str, arrays: list[FloatArray], limits: tuple[float, float]) -> list[str]:
+    if (reached := _beyond(arrays, limits)) is None:
+        return []
+    return [
+        f"the simulation leaves the twin's range of {name}: {reached[0]:.4g} to {reached[1]:.4g}, "
+        f"identified for {limits[0]:.4g} to {limits[1]:.4g} {_RANGES[name]}"
+    ]
+
+
+def _beyond(arrays: list[FloatArray], limits: tuple[float, float]) -> tuple[float, float] | None:
+    """Least and greatest value; None where no value lies clearly beyond the limits."""
+    values = np.concatenate(arrays)
+    values = values[np.isfinite(values)]
+    if values.size == 0:
+        return None
+    low, high = float(values.min()), float(values.max())
+    margin = 0.02 * (limits[1] - limits[0])
+    if low >= limits[0] - margin and high <= limits[1] + margin:
+        return None
+    return low, high

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+"""What a session hands over as a file: the twin for other programs, result, report, mapping."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from drivetwin.errors import InputError
+from drivetwin.estimation.identification import Identification
+from drivetwin.export.targets import Target
+from drivetwin.workbench import jobs
+from drivetwin.workbench.identifying import report_of
+from drivetwin.workbench.session_state import Work
+
+if TYPE_CHECKING:
+    from drivetwin.export.fmu.experiment import Experiment
+    from drivetwin.export.subject import Subject
+
+REPORT_LIMIT = 120.0
+"""Time [s] after which writing a report is given up."""
+
+
+class Record(StrEnum):
+    """Files of drivetwin itself."""
+
+    TWIN = "twin.toml"
+    RESULT = "result.json"
+    REPORT = "report.html"
+    MAPPING = "channels.toml"
+
+
+@dataclass(frozen=True)
+class Product:
+    """A file to be handed over."""
+
+    name: str
+    content: bytes
+
+
+def produce(work: Work, wanted: Target | Record, scratch: Path) -> Product:
+    """Make one file from what is shown; `scratch` is a folder of our own.
+
+    Raises InputError where the session has nothing of the kind, and the errors of the writers.
+    """
+    stem = Path(work.log.name).stem if work.log is not None else "twin"
+    if isinstance(wanted, Record):
+        return Product(f"{stem}.{wanted.value}", _record(work, wanted, scratch))
+    if wanted is Target.C:
+        return Product(f"{stem}.c.zip", _sources(work, scratch))
+    path = scratch / f"{stem}.{wanted.ending}"
+    _write(work, wanted, path)
+    return Product(path.name, _taken(path))
+
+
+def _write(work: Work, wanted: Target, path: Path) -> None:
+    match wanted:
+        case Target.FMU:
+            from drivetwin.export.fmu.build import BuildOptions, build_fmu
+
+            subject, experiment = _subject(work)
+            build_fmu(subject, path, BuildOptions(experiment=experiment))
+        case Target.MODELICA:
+            from drivetwin.export.modelica.dual_clutch import write_modelica
+
+            write_modelica(*_subject(work), path)
+        case _:
+            from drivetwin.export.parameters.files import ParameterFormat, write_parameters
+            from drivetwin.export.parameters.of_twin import parameters_of
+
+            content = parameters_of(work.require_twin())
+            write_parameters(content, path, ParameterFormat(wanted.value))
+
+
+def _subject(work: Work) -> tuple[Subject, Experiment | None]:
+    """The model of the shift that is shown, started as it was measured."""
+    from drivetwin.export.fmu.measured import measured_subject
+
+    twin, shift = work.require_twin(), work.require_shift()
+    return measured_subject(twin, work.require_log(), (shift.start_gear, shift.end_gear))
+
+
+def _record(work: Work, wanted: Record, scratch: Path) -> bytes:
+    path = scratch / wanted.value
+    match wanted:
+        case Record.TWIN:
+            work.require_twin().save(path)
+        case Record.RESULT:
+            from drivetwin.files.result_file import save_result
+
+            save_result(path, _evidence(work))
+        case Record.REPORT:
+            log = work.require_log()
+            text: str = jobs.call(report_of, _evidence(work), log, limit=REPORT_LIMIT)
+            return text.encode()
+        case Record.MAPPING:
+            from drivetwin.channels.mapping_file import mapping_text
+
+            survey = work.require_opened().survey
+            return mapping_text({**survey.mapping, **work.channels}, survey.options).encode()
+    return _taken(path)
+
+
+def _evidence(work: Work) -> Identification:
+    """The result that is shown. Raises InputError for one from a workspace."""
+    found = work.require_outcome().found
+    if found is None:
+        raise InputError(
+            "a reopened workspace holds the twin, not the evidence behind it",
+            "identify again, then export result and report",
+        )
+    return found
+
+
+def _sources(work: Work, scratch: Path) -> bytes:
+    """The C sources as one archive; equal twins give equal bytes."""
+    from drivetwin.export.c import write_c
+
+    folder = scratch / "c"
+    folder.mkdir(exist_ok=True)
+    paths = write_c(_subject(work)[0], folder)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in paths:
+            archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes())
+    return packed.getvalue()
+
+
+def _taken(path: Path) -> bytes:
+    content = path.read_bytes()
+    path.unlink()
+    return content

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""The identification as a job: one method after the other, each result told when it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drivetwin._util.progress import part
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.analysis.experiment_design import examined
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identify import identify
+from drivetwin.estimation.result.method import Method
+from drivetwin.shifts.detect import FoundShifts
+from drivetwin.shifts.shift import Shift
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import validated
+from drivetwin.vehicle.card import VehicleCard
+from drivetwin.workbench.jobs import Emit, fault_of
+
+_WEIGHTS = {Method.PAPER: 1.0, Method.INTEGRAL: 30.0, Method.LIKELIHOOD: 70.0}
+"""How long the methods take, relative to each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What to identify from; `card` is as the locks have it, `shifts` as moved by hand."""
+
+    log: ShiftLog
+    card: VehicleCard
+    shifts: tuple[Shift, ...]
+    methods: Sequence[Method]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What one method found, with its twin; `found` holds the validation.
+
+    `found` is None where the twin comes from a saved workspace: the evidence is not saved.
+    """
+
+    method: Method
+    twin: Twin
+    found: Identification | None = None
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why one method found nothing, and what to do."""
+
+    method: Method
+    text: str
+
+
+def identify_all(emit: Emit, task: Task) -> None:
+    """Run every method of the task and validate its twin; emits an Outcome or Refusal for each.
+
+    Whatever ends one method, a fault of the program included, leaves the others their turn.
+    """
+    whole, start = sum(_WEIGHTS[method] for method in task.methods), 0.0
+    shifts = FoundShifts(task.shifts, ())
+    for method in task.methods:
+        end = start + _WEIGHTS[method] / whole
+        with part(start, end, f"{method.value} method"):
+            emit(_tried(task, shifts, method))
+        start = end
+
+
+def _tried(task: Task, shifts: FoundShifts, method: Method) -> Outcome | Refusal:
+    """What a method finds, or why it does not."""
+    try:
+        return _outcome(task, shifts, method)
+    except Exception as error:
+        fault = fault_of(error)
+        return Refusal(method, f"{fault.what} -> {fault.remedy}")
+
+
+def _outcome(task: Task, shifts: FoundShifts, method: Method) -> Outcome:
+    found = identify(task.log, task.card, shifts, method)
+    twin = Twin.from_identification(found, task.card)
+    return Outcome(method, twin, examined(validated(found, twin, task.log)))
+
+
+def report_of(emit: Emit, found: Identification, log: ShiftLog) -> None:
+    """The report of an identification as HTML text; emits it."""
+    from drivetwin.report.html import render_report
+
+    emit(render_report(found, log))

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: MIT
+"""Work in a process of its own: it tells how far it is, may be cancelled, and may die alone.
+
+What is handed in and comes back are dataclasses of the program itself, through a pipe between
+parent and child; bytes of a user's file never take that way.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.context import BaseContext
+from typing import Any
+
+from drivetwin._util.progress import listening
+from drivetwin.errors import DrivetwinError, InputError, Where
+
+Emit = Callable[[object], None]
+"""What a job calls with each result that it has."""
+Work = Callable[..., None]
+"""A function of a module: called as work(emit, *arguments) in the child."""
+
+_PRELOADED = ["drivetwin.workbench.sandboxed_parse", "drivetwin.workbench.identifying"]
+_PATIENCE = 2.0
+"""Time [s] that a process gets to end after it was told to."""
+_PAUSE = 0.1
+"""Shortest time [s] between two messages about progress."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why a job failed, as it passes through the pipe."""
+
+    what: str
+    remedy: str
+    where: Where = field(default_factory=Where)
+
+    def error(self) -> InputError:
+        """The same as an exception."""
+        return InputError(self.what, self.remedy, self.where)
+
+
+def fault_of(error: Exception) -> Fault:
+    """What is told of an error; of one that nobody raised on purpose the terminal has more."""
+    match error:
+        case DrivetwinError():
+            return Fault(error.what, error.remedy, error.where)
+        case MemoryError() | RecursionError():
+            return Fault("this takes more memory than there is", "cut or split the file")
+    traceback.print_exception(error)
+    return Fault(
+        f"the workbench met a fault of its own ({type(error).__name__}: {error})",
+        "its terminal has the details: please report them",
+    )
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Share done (0 to 1) and what is being done."""
+
+    share: float
+    text: str
+
+
+@dataclass(frozen=True)
+class _Done:
+    """The last message of a job that came to its end."""
+
+
+@dataclass
+class Job:
+    """A running process. `share` and `text` say how far it is, `fault` why it ended early."""
+
+    process: Any
+    pipe: Connection
+    share: float = 0.0
+    text: str = ""
+    fault: Fault | None = None
+    finished: bool = False
+    started: float = field(default_factory=time.monotonic)
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the start [s]."""
+        return time.monotonic() - self.started
+
+    def results(self) -> list[Any]:
+        """What has come in since the last call; never waits."""
+        found: list[Any] = []
+        while not self.finished and self.pipe.poll():
+            try:
+                message = self.pipe.recv()
+            except (EOFError, OSError):
+                self._died()
+                break
+            match message:
+                case Progress(share, text):
+                    self.share, self.text = share, text
+                case Fault():
+                    self.fault = message
+                    self._end()
+                case _Done():
+                    self._end()
+                case _:
+                    found.append(message)
+        return found
+
+    def wait(self, limit: float) -> list[Any]:
+        """All results; raises InputError where the job fails or takes longer than `limit` [s]."""
+        found: list[Any] = []
+        while not self.finished:
+            left = limit - self.elapsed
+            if left <= 0.0 or not self.pipe.poll(left):
+                self.cancel()
+                raise InputError(
+                    f"this took longer than {limit:.0f} s and was stopped",
+                    "hand in a shorter log, or cut it to the shift",
+                )
+            found += self.results()
+        if self.fault is not None:
+            raise self.fault.error()
+        return found
+
+    def cancel(self) -> None:
+        """Stop the process; nothing of it stays."""
+        if not self.finished:
+            self.process.terminate()
+            self._end()
+
+    def _died(self) -> None:
+        self.process.join(_PATIENCE)
+        self.fault = Fault(
+            f"the process that did this stopped (exit code {self.process.exitcode})",
+            "the file may be damaged, or expand to more memory than there is",
+        )
+        self._end()
+
+    def _end(self) -> None:
+        self.finished = True
+        self.pipe.close()
+        self.process.join(_PATIENCE)
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
+
+
+def start(work: Work, *arguments: object) -> Job:
+    """Run `work(emit, *arguments)` in a process of its own."""
+    context = _context()
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(  # type: ignore[attr-defined]
+        target=_child, args=(theirs, work, arguments), daemon=True
+    )
+    process.start()
+    theirs.close()
+    return Job(process, ours)
+
+
+def call(work: Work, *arguments: object, limit: float) -> Any:
+    """The one result of `work` in a process of its own; raises as `Job.wait` does."""
+    return start(work, *arguments).wait(limit)[-1]
+
+
+def warm_up() -> None:
+    """Import what jobs need before the first one is started."""
+    start(_nothing)
+
+
+def _nothing(emit: Emit) -> None:
+    emit(None)
+
+
+def _context() -> BaseContext:
+    """Children of a server with the libraries loaded start at once; elsewhere they load them."""
+    if sys.platform == "win32":
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(_PRELOADED)
+    return context
+
+
+def _child(pipe: Connection, work: Work, arguments: tuple[Any, ...]) -> None:
+    last = 0.0
+
+    def tell(share: float, text: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= _PAUSE:
+            last = now
+            pipe.send(Progress(share, text))
+
+    with suppress(BrokenPipeError, KeyboardInterrupt):
+        try:
+            with listening(tell):
+                work(pipe.send, *arguments)
+            pipe.send(_Done())
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            pipe.send(fault_of(error))

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""The mapping as it is shown and corrected: one row for each column of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from drivetwin.channels.mapping import ChannelSpec, spec_of
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.read_options import Column as LogColumn
+from drivetwin.channels.roles import ROLES, quantity_of
+from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.units import channel_unit, first_spellings
+from drivetwin.errors import MappingError, UnitError, Where
+from drivetwin.logs.survey import Column, Survey
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+
+@dataclass(frozen=True)
+class Row:
+    """A column as recorded and what it is taken for; an empty `role`: not used."""
+
+    column: Column
+    role: str
+    unit: str
+    reversed: bool
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the user states of one column, in the order of the rows."""
+
+    role: str
+    unit: str
+    reversed: bool
+
+
+def roles_of(card: VehicleCard) -> tuple[str, ...]:
+    """All roles that a column may have, the pressures of the card's elements last."""
+    return (*ROLES, *(pressure_role(element) for element in card.elements))
+
+
+def unit_names() -> list[str]:
+    """The first spelling of each unit, for completion."""
+    measured = (Quantity.TORQUE, Quantity.SPEED, Quantity.PRESSURE, Quantity.FRACTION)
+    return [spelling for quantity in measured for spelling in first_spellings(quantity)]
+
+
+def rows_of(survey: Survey) -> list[Row]:
+    """The columns with the role, unit and sign that they are read with."""
+    return [_row(column, survey) for column in survey.columns]
+
+
+def corrected(survey: Survey, entries: Sequence[Entry]) -> dict[str, ChannelSpec]:
+    """Channel specs by role as the user states them; scale, offset and time shift stay.
+
+    Raises MappingError where two columns have one role or a column that is recognised by its name
+    is set aside while no other takes its role, UnitError for a unit that does not fit the role.
+    """
+    found: dict[str, ChannelSpec] = {}
+    every = [LogColumn(one.name, one.unit, one.group) for one in survey.columns]
+    for column, entry in zip(survey.columns, entries, strict=True):
+        if not entry.role:
+            continue
+        if entry.role in found:
+            raise MappingError(
+                f"{found[entry.role].source!r} and {column.name!r} are both {entry.role}",
+                "give the role to one of them",
+            )
+        present = survey.mapping.get(entry.role)
+        spec = spec_of(LogColumn(column.name, column.unit, column.group), every)
+        if present is not None and present.source == column.name:
+            spec = replace(present, group=spec.group)
+        found[entry.role] = replace(
+            spec,
+            unit=_asserted(entry, column),
+            sign=-1 if entry.reversed else 1,
+        )
+    _refuse_set_aside(survey, found)
+    return found
+
+
+def _row(column: Column, survey: Survey) -> Row:
+    role, spec = _spec_for(column, survey.mapping)
+    unit = spec.unit if spec is not None and spec.unit is not None else column.unit
+    return Row(column, role, unit or "", spec is not None and spec.sign < 0)
+
+
+def _spec_for(column: Column, mapping: Mapping[str, ChannelSpec]) -> tuple[str, ChannelSpec | None]:
+    for role, spec in mapping.items():
+        if spec.source == column.name and spec.group in (None, column.group):
+            return role, spec
+    return "", None
+
+
+def _asserted(entry: Entry, column: Column) -> str | None:
+    """The unit where it is not the file's own; checked against the role."""
+    unit = entry.unit.strip()
+    if unit == (column.unit or ""):
+        return None
+    where = Where(channel=column.name)
+    try:
+        channel_unit(unit, quantity_of(entry.role), where)
+    except UnitError as error:
+        usual = ", ".join(first_spellings(quantity_of(entry.role)))
+        raise UnitError(error.what, f"use one of {usual}", where) from None
+    return unit
+
+
+def _refuse_set_aside(survey: Survey, found: Mapping[str, ChannelSpec]) -> None:
+    """A column whose name tells its role would be recognised again by the reader."""
+    for role, spec in survey.mapping.items():
+        used = any(one.source == spec.source for one in found.values())
+        if role not in found and not used:
+            raise MappingError(
+                f"column {spec.source!r} is recognised as {role} by its name",
+                "give that role to another column, or rename the column in the file",
+            )

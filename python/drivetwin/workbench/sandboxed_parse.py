@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Files of a user are parsed here, in a child process with a bound on its memory.
+
+A compressed file of a few kilobytes may claim gigabytes: then the child fails, not the program.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from drivetwin.channels.mapping import ChannelSpec, Mapped
+from drivetwin.channels.mapping_file import mapping_text, read_mapping
+from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import DrivetwinError, InputError
+from drivetwin.gearbox import load_gearbox
+from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.read import read_log
+from drivetwin.logs.survey import Survey, survey
+from drivetwin.shifts.detect import FoundShifts, find_shifts
+from drivetwin.vehicle.card import VehicleCard, load_card
+from drivetwin.workbench.decompression_limit import refuse_expansion
+from drivetwin.workbench.jobs import Emit
+
+MEMORY = 2 * 2**30
+"""Bytes that reading a file may take beyond what the libraries hold."""
+LONGEST = 60.0
+"""Time [s] after which reading a small file is given up."""
+PER_BYTE = 2e-6
+"""Time [s] that a log may take besides for each of its bytes: half an hour at 1 kHz, 160 MB of
+text, takes a minute on an idle machine and a multiple of it on a busy one."""
+AT_ALL = 600.0
+"""Time [s] after which reading is given up whatever the size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """What a log holds and how it is read.
+
+    `log` and `found` are None where it cannot be read as mapped, `fault` then says why.
+    """
+
+    survey: Survey
+    card: VehicleCard
+    log: ShiftLog | None = None
+    found: FoundShifts | None = None
+    fault: str = ""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to open: files, and the channels as the user has corrected them.
+
+    The labels are what the files are called in messages and results.
+    """
+
+    log: Path
+    label: str
+    card: Path
+    card_label: str
+    mapping: Path | None = None
+    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+
+
+def open_log(emit: Emit, request: Request, scratch: Path) -> None:
+    """Read card, columns and log, and find the shifts; emits one Opened.
+
+    `scratch` is a file of our own for the corrected mapping. Raises the errors of card and file;
+    those of the mapping become `fault`, so that it can be corrected.
+    """
+    bound_memory()
+    labels = {request.log: request.label, request.card: request.card_label}
+    with _labelled(labels):
+        refuse_expansion(request.log, request.label, MEMORY)
+        card = replace(load_card(request.card), source=request.card_label)
+        stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
+        stated = replace(stated, channels={**stated.channels, **request.channels})
+        with open_recording(request.log, stated.options) as recording:
+            looked = survey(recording, str(request.log), card, stated)
+    try:
+        with _labelled(labels):
+            mapping = _written(scratch, stated.channels, stated.options)
+            read = read_log(request.log, card, mapping)
+            log = replace(read, source=request.label, mappings={})
+            found = find_shifts(log, card)
+    except InputError as error:
+        emit(Opened(looked, card, fault=str(error)))
+        return
+    emit(Opened(looked, card, log, found))
+
+
+def time_for(log: Path) -> float:
+    """Time [s] after which reading a log is given up, by the size of its file."""
+    size = log.stat().st_size if log.exists() else 0
+    return min(LONGEST + PER_BYTE * size, AT_ALL)
+
+
+def open_gearbox(emit: Emit, path: Path, label: str) -> None:
+    """Read a gearbox card, called `label` in messages; emits it. Raises CardError."""
+    bound_memory()
+    with _labelled({path: label}):
+        emit(load_gearbox(str(path)))
+
+
+def bound_memory() -> None:
+    """Let this process take `MEMORY` more than it has; where the system cannot, nothing happens."""
+    status = Path("/proc/self/statm")
+    if sys.platform == "win32" or not status.exists():
+        return
+    import resource
+
+    held = int(status.read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (held + MEMORY, held + MEMORY))
+
+
+@contextmanager
+def _labelled(labels: Mapping[Path, str]) -> Iterator[None]:
+    """Errors call files by their labels: uploads stand under names of ours."""
+    try:
+        yield
+    except DrivetwinError as error:
+        what, file = error.what, error.where.file
+        for path, label in labels.items():
+            what = what.replace(str(path), label)
+            file = label if file == str(path) else file
+        raise InputError(what, error.remedy, replace(error.where, file=file)) from None
+
+
+def _written(path: Path, channels: Mapping[str, ChannelSpec], options: ReadOptions) -> Path:
+    path.write_text(mapping_text(channels, options), encoding="utf-8")
+    return path

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""The server of the workbench: pages, uploads, and its life from start to end."""
+
+from __future__ import annotations
+
+import json
+import logging
+import socket
+import sys
+from pathlib import Path
+
+from dash import Dash
+from flask import Response, request
+from werkzeug.serving import BaseWSGIServer, make_server
+
+from drivetwin.errors import InputError, RefusedError
+from drivetwin.workbench import jobs
+from drivetwin.workbench.access_control import protect, refusal
+from drivetwin.workbench.session import Sessions
+from drivetwin.workbench.uploads import LIMITS
+from drivetwin.workbench.views.page import Start, build_page
+from drivetwin.workbench.workspace_folder import Folder
+
+SESSION_HEADER = "X-Drivetwin-Session"
+
+
+def build(folder: Folder, start: Start, host: str = "127.0.0.1") -> tuple[Dash, Sessions]:
+    """The application and its sessions, ready to be served on `host`."""
+    sessions = Sessions(folder)
+    app = Dash(
+        "drivetwin",
+        title="drivetwin workbench",
+        update_title="",
+        assets_folder=str(Path(__file__).parent / "assets"),
+        serve_locally=True,
+        suppress_callback_exceptions=True,
+        add_log_handler=False,
+    )
+    build_page(app, sessions, start)
+    _take_uploads(app, sessions)
+    protect(app.server, host, list(app.csp_hashes()))
+    return app, sessions
+
+
+def listen(app: Dash, host: str, port: int) -> BaseWSGIServer:
+    """A server on `host` and `port` (0: any free one), not yet serving.
+
+    Raises InputError where it cannot listen there.
+    """
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        bound = socket.create_server((host, port), family=family)
+    except (OSError, OverflowError) as fault:
+        raise InputError(
+            f"cannot listen on {host}, port {port}: {fault}",
+            "choose another --port, or 0 for any free one",
+        ) from None
+    jobs.warm_up()
+    with bound:
+        return make_server(host, port, app.server, threaded=True, fd=bound.fileno())
+
+
+def _take_uploads(app: Dash, sessions: Sessions) -> None:
+    @app.server.post("/upload/<purpose>")  # type: ignore[untyped-decorator]
+    def upload(purpose: str) -> Response:
+        limit = LIMITS.get(purpose)
+        if limit is None:
+            return refusal(404, "there is no such upload")
+        request.max_content_length = sys.maxsize  # counted while it is received
+        name = request.args.get("name", "")
+        try:
+            session = sessions.get(request.headers.get(SESSION_HEADER))
+            key = session.receive(request.stream, name, request.content_length, limit)
+        except RefusedError as error:
+            return refusal(400, str(error))
+        return Response(json.dumps({"key": key, "name": name}), mimetype="application/json")

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: MIT
+"""One session: its work, its running job, its own scratch folder. Sessions share nothing."""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+import tempfile
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import IO, Any
+
+import plotly.graph_objects as go
+
+from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.errors import InputError, RefusedError
+from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.validation import Validation
+from drivetwin.gearbox import Gearbox, builtin_gearboxes, load_gearbox
+from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
+from drivetwin.workbench.identifying import Task, identify_all
+from drivetwin.workbench.locks import Lock
+from drivetwin.workbench.mapping import Entry, corrected
+from drivetwin.workbench.phases import Boundary
+from drivetwin.workbench.session_state import Source, Work
+from drivetwin.workbench.workspace_folder import Folder
+
+MOST_SESSIONS = 16
+"""Sessions held; the one that was idle longest goes when another is opened."""
+MOST_UPLOADS = 8
+"""Uploads kept for one session; the oldest goes that is not open."""
+
+
+@dataclass(frozen=True, eq=False)
+class Live:
+    """What the sliders move: the run as identified, the present run and the figure of both."""
+
+    identified: Validation
+    present: Validation
+    figure: go.Figure
+
+
+@dataclass(eq=False)
+class Session:
+    """The mutable shell around an immutable `Work`; every change goes through its lock."""
+
+    folder: Folder
+    scratch: Path
+    work: Work = field(default_factory=Work)
+    job: jobs.Job | None = None
+    live: Live | None = None
+    gearbox: Gearbox | None = None
+    uploads: dict[str, uploads.Upload] = field(default_factory=dict)
+    used: float = field(default_factory=time.monotonic)
+    lock: threading.RLock = field(default_factory=threading.RLock)
+
+    def receive(self, stream: IO[bytes], name: str, claimed: int | None, limit: int) -> str:
+        """Take an upload; returns the key to open it by. Raises RefusedError."""
+        key = secrets.token_hex(8)
+        upload = uploads.receive(stream, name, claimed, self.scratch / key, limit)
+        with self.lock:
+            used = {one.path for one in (self.work.log, self.work.card) if one is not None}
+            while len(self.uploads) >= MOST_UPLOADS:
+                oldest = next(k for k, one in self.uploads.items() if one.path not in used)
+                self.uploads.pop(oldest).path.unlink(missing_ok=True)
+            self.uploads[key] = upload
+        return key
+
+    def uploaded(self, key: str) -> Source:
+        """An upload by its key. Raises RefusedError where it is no longer there."""
+        upload = self.uploads.get(key)
+        if upload is None:
+            raise RefusedError("this upload is no longer there", "upload the file again")
+        return Source(upload.name, upload.path, uploaded=True)
+
+    def in_folder(self, name: str) -> Source:
+        """A file of the folder. Raises RefusedError for a path that leads elsewhere."""
+        path = self.folder.file(name)
+        return Source(self.folder.name_of(path), path)
+
+    def open(self, log: Source, card: Source, mapping: Path | None = None) -> None:
+        """Open a log with its card; what was done with the one before goes.
+
+        Raises the typed errors of the readers; the work stays as it was then, and goes on.
+        """
+        with self.lock:
+            work = Work(log=log, card=card, mapping=mapping)
+            work = work.with_opened(self._read(work, {}))
+            self.cancel()
+            self._set(work)
+
+    def correct(self, entries: Sequence[Entry]) -> None:
+        """Read the log again with the mapping as corrected; what was found before goes.
+
+        Raises MappingError, UnitError; the work stays as it was then, and goes on.
+        """
+        with self.lock:
+            channels = corrected(self.work.require_opened().survey, entries)
+            opened = self._read(self.work, channels)
+            self.cancel()
+            self._set(replace(self.work, channels=channels).with_opened(opened))
+
+    def move(self, index: int, changes: Mapping[Boundary, float]) -> None:
+        """Set boundaries of a shift by hand; none: as detected. Raises InputError."""
+        with self.lock:
+            self._set(self.work.with_moves(index, changes))
+
+    def set_lock(self, parameter_id: str, lock: Lock) -> None:
+        """Lock a parameter for the next identification. Raises InputError."""
+        with self.lock:
+            self.work = self.work.with_lock(parameter_id, lock)
+
+    def identify(self, methods: Sequence[Method]) -> None:
+        """Start the identification in a process of its own. Raises InputError where it cannot."""
+        with self.lock:
+            if self.job is not None:
+                raise InputError("an identification is running", "wait for it or cancel it")
+            work = self.work
+            work.require_shift()
+            task = Task(work.require_log(), work.locked_card(), work.shifts, tuple(methods))
+            self._set(work.without_results())
+            self.job = jobs.start(identify_all, task)
+
+    def poll(self) -> bool:
+        """Take in what the job has found; True where something came or it ended."""
+        with self.lock:
+            if self.job is None:
+                return False
+            results = self.job.results()
+            for result in results:
+                self._set(self.work.with_result(result))
+            if not self.job.finished:
+                return bool(results)
+            fault, self.job = self.job.fault, None
+            if fault is not None:
+                error = fault.error()
+                self._set(replace(self.work, ended=str(error)))
+                raise error
+            return True
+
+    def cancel(self) -> None:
+        """Stop the running job, if any; results that have come in stay."""
+        with self.lock:
+            if self.job is not None:
+                self.job.cancel()
+                self.job = None
+
+    def choose_shift(self, index: int) -> None:
+        """Show another shift of the log. Raises InputError where there is none such."""
+        with self.lock:
+            if not 0 <= index < len(self.work.shifts):
+                raise InputError("there is no such shift", "choose one that is listed")
+            self._set(replace(self.work, shift=index, changes={}))
+
+    def choose_method(self, method: Method) -> None:
+        """Show the result of another method. Raises InputError where it found none."""
+        with self.lock:
+            if method not in self.work.results:
+                raise InputError("there is no such result", "choose one that is listed")
+            self._set(replace(self.work, method=method, changes={}))
+
+    def simulation(self) -> Live:
+        """Run and figure at the present sliders. Raises what the simulation needs and lacks."""
+        with self.lock:
+            if self.live is None:
+                work = self.work
+                twin, log = work.require_twin(), work.require_log()
+                identified = what_if.first_run(twin, log, work.require_shift())
+                present = what_if.replay(identified, twin, log, work.changes)
+                self.live = Live(identified, present, what_if.figure_of(identified, present))
+            return self.live
+
+    def slide(self, changes: Mapping[str, float]) -> dict[int, dict[str, Any]]:
+        """Simulate with other parameters (SI); returns what changes in the figure, by trace."""
+        with self.lock:
+            live, work = self.simulation(), self.work
+            present = what_if.replay(
+                live.identified, work.require_twin(), work.require_log(), changes
+            )
+            self.work = replace(work, changes=dict(changes))
+            self.live = replace(live, present=present)
+            return what_if.moved_curves(live.figure, present)
+
+    def open_gearbox(self, card: Source | str) -> None:
+        """Load a gearbox card, or a built-in one by its name. Raises CardError."""
+        if isinstance(card, str):
+            if card not in builtin_gearboxes():
+                raise InputError("no gearbox is named", "choose a built-in one, or name a card")
+            self.gearbox = load_gearbox(card)
+        else:
+            limit = sandboxed_parse.LONGEST
+            self.gearbox = jobs.call(
+                sandboxed_parse.open_gearbox, card.path, card.name, limit=limit
+            )
+
+    def save(self, name: str) -> str:
+        """Save the workspace in the folder; returns the name it has there."""
+        with self.lock:
+            path = self.folder.new_file(name, workspace.ENDING)
+            workspace.save(self.work, path, self.folder)
+            return self.folder.name_of(path)
+
+    def reopen(self, source: Source) -> None:
+        """Go on with a saved workspace. Raises RefusedError, and the errors of log and card."""
+        with self.lock:
+            content = workspace.load(source.path, source.name)
+            log, card = workspace.sources_of(content, self.folder, source.name)
+            work = Work(log=log, card=card, channels=content.specs())
+            work = work.with_opened(self._read(work, work.channels))
+            work = workspace.restored(content, work)
+            self.cancel()
+            self._set(work)
+
+    def close(self) -> None:
+        """Stop what runs and remove the scratch folder."""
+        self.cancel()
+        shutil.rmtree(self.scratch, ignore_errors=True)
+
+    def _set(self, work: Work) -> None:
+        self.work = work
+        self.live = None
+
+    def _read(self, work: Work, channels: Mapping[str, ChannelSpec]) -> sandboxed_parse.Opened:
+        if work.log is None or work.card is None:
+            raise InputError("no log is open", "open a log and its vehicle card first")
+        request = sandboxed_parse.Request(
+            log=work.log.path,
+            label=work.log.name,
+            card=work.card.path,
+            card_label=work.card.name,
+            mapping=work.mapping,
+            channels=channels,
+        )
+        scratch = self.scratch / "mapping.toml"
+        opened: sandboxed_parse.Opened = jobs.call(
+            sandboxed_parse.open_log, request, scratch, limit=sandboxed_parse.time_for(request.log)
+        )
+        return opened
+
+
+@dataclass(eq=False)
+class Sessions:
+    """All sessions of a server by an unguessable key."""
+
+    folder: Folder
+    _held: dict[str, Session] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def new(self) -> str:
+        """Open a session and return its key."""
+        key = secrets.token_urlsafe(24)
+        scratch = Path(tempfile.mkdtemp(prefix="drivetwin-app-"))
+        with self._lock:
+            while len(self._held) >= MOST_SESSIONS:
+                idle = min(self._held, key=lambda one: self._held[one].used)
+                self._held.pop(idle).close()
+            self._held[key] = Session(self.folder, scratch)
+        return key
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._held
+
+    def get(self, key: str | None) -> Session:
+        """A session by its key. Raises RefusedError for one that is not held."""
+        session = self._held.get(key or "")
+        if session is None:
+            raise RefusedError("this session has ended", "load the page again")
+        session.used = time.monotonic()
+        return session
+
+    def close(self) -> None:
+        """End all sessions."""
+        with self._lock:
+            for session in self._held.values():
+                session.close()
+            self._held.clear()

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: MIT
+"""What one session is at: files, mapping, phases, locks, results, sliders; immutable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import InputError
+from drivetwin.estimation.result.method import Method
+from drivetwin.shifts.shift import Shift
+from drivetwin.twin.twin import Twin
+from drivetwin.vehicle.card import VehicleCard
+from drivetwin.workbench.identifying import Outcome, Refusal
+from drivetwin.workbench.locks import Lock, card_lock, checked, locked
+from drivetwin.workbench.phases import Boundary, moved
+from drivetwin.workbench.sandboxed_parse import Opened
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file in use: the name it is shown under, where it is, and whether it was uploaded."""
+
+    name: str
+    path: Path
+    uploaded: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """The state of a session.
+
+    `channels` are the corrections of the mapping, `moves` the boundaries set by hand [s] by number
+    of the shift, `changes` the sliders (SI) away from what was identified. `method` and `shift`
+    say which result and which shift the sliders show. `ended` says why the last identification
+    ended before its last method; empty where it did not.
+    """
+
+    log: Source | None = None
+    card: Source | None = None
+    mapping: Path | None = None
+    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+    opened: Opened | None = None
+    shifts: tuple[Shift, ...] = ()
+    moves: Mapping[int, Mapping[Boundary, float]] = field(default_factory=dict)
+    locks: Mapping[str, Lock] = field(default_factory=dict)
+    results: Mapping[Method, Outcome] = field(default_factory=dict)
+    refusals: Mapping[Method, str] = field(default_factory=dict)
+    ended: str = ""
+    method: Method | None = None
+    shift: int = 0
+    changes: Mapping[str, float] = field(default_factory=dict)
+
+    def with_opened(self, opened: Opened) -> Work:
+        """After a log was read: what was found from another reading no longer holds."""
+        shifts = opened.found.shifts if opened.found is not None else ()
+        return replace(
+            self,
+            opened=opened,
+            shifts=shifts,
+            moves={},
+            shift=0,
+        ).without_results()
+
+    def with_moves(self, index: int, changes: Mapping[Boundary, float]) -> Work:
+        """With boundaries of one shift set by hand; none: as detected. Raises InputError."""
+        log, card = self.require_log(), self.require_card()
+        detected = self._detected(index)
+        kept = {**self.moves.get(index, {}), **changes} if changes else {}
+        fresh = moved(log, card, detected, kept)
+        shifts = tuple(fresh if k == index else one for k, one in enumerate(self.shifts))
+        moves = {k: v for k, v in {**self.moves, index: kept}.items() if v}
+        return replace(self, shifts=shifts, moves=moves)
+
+    def with_lock(self, parameter_id: str, lock: Lock) -> Work:
+        """With one parameter locked; a lock as on the card is none. Raises InputError."""
+        kept = {name: one for name, one in self.locks.items() if name != parameter_id}
+        if checked(parameter_id, lock) != card_lock(self.require_card(), parameter_id):
+            kept[parameter_id] = lock
+        return replace(self, locks=kept)
+
+    def without_results(self) -> Work:
+        """Before an identification."""
+        return replace(self, results={}, refusals={}, ended="", method=None, changes={})
+
+    def with_result(self, result: Outcome | Refusal) -> Work:
+        """With what one method found, which is shown from now on."""
+        if isinstance(result, Refusal):
+            return replace(self, refusals={**self.refusals, result.method: result.text})
+        results = {**self.results, result.method: result}
+        return replace(self, results=results, method=result.method, changes={})
+
+    def lock_of(self, parameter_id: str) -> Lock:
+        """The lock of a parameter: as set, else as on the card."""
+        return self.locks.get(parameter_id) or card_lock(self.require_card(), parameter_id)
+
+    def locked_card(self) -> VehicleCard:
+        """The card as the locks have it."""
+        return locked(self.require_card(), self.locks)
+
+    def require_opened(self) -> Opened:
+        """What was opened; raises InputError before that."""
+        if self.opened is None:
+            raise InputError("no log is open", "open a log and its vehicle card first")
+        return self.opened
+
+    def require_card(self) -> VehicleCard:
+        """The vehicle card; raises InputError before one is open."""
+        return self.require_opened().card
+
+    def require_log(self) -> ShiftLog:
+        """The log as read; raises InputError where there is none or it cannot be read."""
+        opened = self.require_opened()
+        if opened.log is None:
+            raise InputError("the log cannot be read as mapped", "correct the mapping first")
+        return opened.log
+
+    def require_shift(self) -> Shift:
+        """The shift that is shown; raises InputError where the log has none."""
+        self.require_log()
+        if not self.shifts:
+            raise InputError(
+                "the log holds no usable gear shift", "see the log view for what was refused"
+            )
+        return self.shifts[self.shift]
+
+    def require_outcome(self) -> Outcome:
+        """The result that is shown; raises InputError before an identification."""
+        if self.method is None:
+            raise InputError("nothing is identified yet", "run the identification first")
+        return self.results[self.method]
+
+    def require_twin(self) -> Twin:
+        """The twin that is shown; raises InputError before an identification."""
+        return self.require_outcome().twin
+
+    def _detected(self, index: int) -> Shift:
+        found = self.require_opened().found
+        if found is None or not 0 <= index < len(found.shifts):
+            raise InputError("there is no such shift", "choose one of the shifts of the log")
+        return found.shifts[index]

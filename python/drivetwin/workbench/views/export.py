@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""Export: a button for every form that a twin has, and for drivetwin's own files."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+from dash import ALL, Dash, Input, Output, State, ctx, dcc, html, no_update
+from dash.development.base_component import Component
+
+from drivetwin.export.targets import Target
+from drivetwin.workbench.exports import Record, produce
+from drivetwin.workbench.session import Sessions
+from drivetwin.workbench.views.widgets import hint, tell, told
+
+TARGETS = {
+    Target.C: ("C sources", "C99 model of the shift for a controller, as an archive"),
+    Target.FMU: ("FMU", "co-simulation, FMI 2.0, sources inside"),
+    Target.MODELICA: ("Modelica", "the shift in components of the Standard Library"),
+    Target.SSV: ("SSV", "parameter values for SSP and FMUs"),
+    Target.CDFX: ("CDFX", "calibration data, ASAM CDF"),
+    Target.DCM: ("DCM", "calibration data, ETAS DAMOS"),
+    Target.M: ("MATLAB", "script with all parameters"),
+    Target.JSON: ("JSON", "parameters with units and intervals"),
+    Target.CSV: ("CSV", "parameters as a table"),
+}
+RECORDS = {
+    Record.REPORT: ("Report", "one offline page with all evidence"),
+    Record.TWIN: ("Twin", "twin.toml, for simulate, report and export"),
+    Record.RESULT: ("Result", "result.json, for other programs"),
+    Record.MAPPING: ("Channel mapping", "channels.toml, for logs of the same logger"),
+}
+
+
+def layout() -> list[Component]:
+    """Two groups of buttons."""
+    return [
+        hint(
+            "What is exported is the result shown under Model, as identified: sliders do not "
+            "change it."
+        ),
+        html.H3("The twin for other programs"),
+        _group({target.value: text for target, text in TARGETS.items()}),
+        html.H3("Files of drivetwin"),
+        _group({record.value: text for record, text in RECORDS.items()}),
+        dcc.Download(id="download"),
+    ]
+
+
+def _group(entries: dict[str, tuple[str, str]]) -> Component:
+    return html.Div(
+        [
+            html.Button(
+                [html.Strong(title), html.Small(text)],
+                id={"export": name},
+                type="button",
+                className="tall",
+            )
+            for name, (title, text) in entries.items()
+        ],
+        className="exports",
+    )
+
+
+def register(app: Dash, sessions: Sessions) -> None:
+    """Making the file that is asked for."""
+
+    @app.callback(
+        Output("download", "data"),
+        Input({"export": ALL}, "n_clicks"),
+        State("session", "data"),
+        prevent_initial_call=True,
+    )
+    @told
+    def hand_over(clicks: list[int | None], key: str) -> Any:
+        """Write the file and let the browser keep it."""
+        if not isinstance(ctx.triggered_id, dict) or not any(clicks):
+            return no_update
+        session = sessions.get(key)
+        product = produce(session.work, _wanted(ctx.triggered_id["export"]), session.scratch)
+        tell(f"{product.name}: {len(product.content) / 1e3:.0f} kB")
+        content = base64.b64encode(product.content).decode()
+        return {"content": content, "filename": product.name, "base64": True}
+
+
+def _wanted(name: str) -> Target | Record:
+    return Record(name) if name in set(Record) else Target(name)

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""Log: open a recording and its vehicle card; what was found in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dash import Dash, Input, Output, State, dcc, html
+from dash.development.base_component import Component
+
+from drivetwin.logs.formats.detect import SUFFIXES
+from drivetwin.workbench.sandboxed_parse import Opened
+from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.session_state import Source
+from drivetwin.workbench.views.widgets import (
+    Topic,
+    acted,
+    announce,
+    button,
+    due_id,
+    field,
+    hint,
+    notes,
+    row,
+    table,
+    tell_read,
+    told,
+    upload_button,
+)
+
+_CARDS = (".toml",)
+_UPLOADED = "uploaded: "
+_SHIFT_HEAD = ("shift", "kind", "elements", "starts", "locks")
+
+
+def layout() -> list[Component]:
+    """Two files, by path or upload, and what they hold."""
+    return [
+        hint(
+            "A recording with at least one gear shift, and the vehicle card that says what is "
+            "known from design. Paths are inside the folder that the workbench was started in."
+        ),
+        row(
+            html.Div(field("log-path", "Log", type="text", list="log-names"), className="wide"),
+            upload_button("Upload a log…", "log", "log-upload"),
+        ),
+        row(
+            html.Div(
+                field("card-path", "Vehicle card", type="text", list="card-names"),
+                className="wide",
+            ),
+            upload_button("Upload a card…", "card", "card-upload"),
+        ),
+        row(button("Open", "open", main=True)),
+        html.Datalist(id="log-names"),
+        html.Datalist(id="card-names"),
+        dcc.Store(id="log-upload"),
+        dcc.Store(id="card-upload"),
+        html.Div(id="log-content"),
+    ]
+
+
+def register(app: Dash, sessions: Sessions) -> None:
+    """Opening, and what is shown of it."""
+
+    for name in ("log", "card"):
+
+        @app.callback(
+            Output(f"{name}-path", "value", allow_duplicate=True),
+            Input(f"{name}-upload", "data"),
+            prevent_initial_call=True,
+        )
+        def arrived(upload: dict[str, str]) -> str:
+            """An upload stands in the field of its path."""
+            return _UPLOADED + upload["name"]
+
+    @app.callback(
+        Input("open", "n_clicks"),
+        State("session", "data"),
+        State("log-path", "value"),
+        State("card-path", "value"),
+        State("log-upload", "data"),
+        State("card-upload", "data"),
+        running=[(Output("open", "disabled"), True, False)],
+        prevent_initial_call=True,
+    )
+    @acted
+    def open_files(
+        _: int, key: str, log: str | None, card: str | None, log_up: Any, card_up: Any
+    ) -> None:
+        """Read log and card."""
+        session = sessions.get(key)
+        session.open(_source(session, log, log_up), _source(session, card, card_up))
+        opened = session.work.require_opened()
+        announce(Topic.LOG)
+        tell_read(f"{log} is open", opened.fault, len(session.work.shifts))
+
+    @app.callback(
+        Output("log-content", "children"),
+        Output("log-path", "value"),
+        Output("card-path", "value"),
+        Output("log-names", "children"),
+        Output("card-names", "children"),
+        Input(due_id("log"), "data"),
+        State("session", "data"),
+        prevent_initial_call=True,
+    )
+    @told
+    def show(_: int, key: str) -> tuple[Any, ...]:
+        """What is open."""
+        session = sessions.get(key)
+        work, folder = session.work, session.folder
+        content = [] if work.opened is None else _content(work.opened)
+        names = [
+            [html.Option(value=name) for name in folder.names(ends)] for ends in (SUFFIXES, _CARDS)
+        ]
+        return content, _shown(work.log), _shown(work.card), *names
+
+
+def _source(session: Session, typed: str | None, upload: dict[str, str] | None) -> Source:
+    """The file that a field names: an upload, or a path in the folder."""
+    if upload is not None and typed == _UPLOADED + upload["name"]:
+        return session.uploaded(upload["key"])
+    return session.in_folder(typed or "")
+
+
+def _shown(source: Source | None) -> str:
+    if source is None:
+        return ""
+    return _UPLOADED + source.name if source.uploaded else source.name
+
+
+def _content(opened: Opened) -> list[Component]:
+    if opened.log is None or opened.found is None:
+        return [
+            notes("The log cannot be read as mapped", [opened.fault]),
+            hint("Correct the mapping under Channels."),
+        ]
+    log, found = opened.log, opened.found
+    first = min(float(one.time[0]) for one in log.channels.values())
+    last = max(float(one.time[-1]) for one in log.channels.values())
+    facts = {
+        "columns": str(len(opened.survey.columns)),
+        "channels used": str(len(log.channels)),
+        "from": f"{first:.3f} s",
+        "to": f"{last:.3f} s",
+        "usable shifts": str(len(found.shifts)),
+    }
+    shifts = [
+        (
+            f"{one.start_gear}→{one.end_gear}",
+            one.kind.value,
+            f"{one.offgoing} → {one.oncoming}",
+            f"{one.torque_phase[0]:.3f} s",
+            f"{one.lockup_time:.3f} s",
+        )
+        for one in found.shifts
+    ]
+    refused = [f"{r.time[0]:.2f} s to {r.time[1]:.2f} s: {r.reason}" for r in found.rejected]
+    return [
+        facts_line(facts),
+        *([table(_SHIFT_HEAD, shifts, "Shifts of the log")] if shifts else []),
+        notes("About the log", log.warnings),
+        notes(
+            "Not used" if shifts else "No usable shift", refused, "plain" if shifts else "doubtful"
+        ),
+    ]
+
+
+def facts_line(facts: dict[str, str]) -> Component:
+    """Figures side by side, each under its name."""
+    return html.Div(
+        [html.Div([html.Span(name), html.Strong(value)]) for name, value in facts.items()],
+        className="facts",
+    )

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: MIT
+"""The page around the views: navigation, status line, message, and the start of a session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from dash import Dash, Input, Output, State, dcc, html, no_update
+from dash.development.base_component import Component
+
+from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.session_state import Source
+from drivetwin.workbench.views import (
+    channels,
+    compare,
+    export,
+    gearbox,
+    identify,
+    log,
+    model,
+    phases,
+    workspace,
+)
+from drivetwin.workbench.views.widgets import Topic, announce, attributes, due_id, told, topic_id
+
+
+@dataclass(frozen=True)
+class Start:
+    """What a session begins with: files that were named on the command line."""
+
+    log: Source | None = None
+    card: Source | None = None
+    mapping: Path | None = None
+
+
+VIEWS = {
+    "log": ("Log", log),
+    "channels": ("Channels", channels),
+    "phases": ("Phases", phases),
+    "identify": ("Identify", identify),
+    "model": ("Model", model),
+    "compare": ("Compare", compare),
+    "gearbox": ("Gearbox", gearbox),
+    "export": ("Export", export),
+    "workspace": ("Workspace", workspace),
+}
+_FIRST = "log"
+_TOPICS = {
+    "log": (Topic.LOG,),
+    "channels": (Topic.LOG,),
+    "phases": (Topic.PHASES,),
+    "identify": (Topic.RESULTS, Topic.PHASES),
+    "model": (Topic.RESULTS, Topic.LIVE),
+    "compare": (Topic.RESULTS,),
+    "gearbox": (Topic.GEARBOX,),
+    "workspace": (Topic.LOG,),
+}
+"""What each view shows of a session."""
+_DUE = """(hidden, ...rest) => {
+  const drawn = rest.pop();
+  const present = rest.join(" ").trim();
+  return hidden || !present || present === drawn ? dash_clientside.no_update : present;
+}"""
+_INDEX = """<!DOCTYPE html>
+<html lang="en">
+  <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}</head>
+  <body>{%app_entry%}<footer hidden>{%config%}{%scripts%}{%renderer%}</footer></body>
+</html>"""
+_SWITCH = """(...clicked) => {
+  const names = NAMES;
+  const times = clicked.map((time) => time ?? -1);
+  const last = Math.max(...times);
+  const at = names.includes(location.hash.slice(1)) ? location.hash.slice(1) : names[0];
+  const id = last < 0 ? at : names[times.indexOf(last)];
+  if (id !== at) history.pushState(null, "", `#${id}`);
+  setTimeout(() => window.dispatchEvent(new Event("resize")), 0);
+  const current = names.map((name) => (name === id ? "page" : "false"));
+  return [...names.map((name) => name !== id), ...current];
+}"""
+"""By the times of clicks: of several that a busy page answers together the last one counts.
+
+The view stands in the address, for the browser's way back and for loading the page again.
+"""
+
+
+def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
+    """Give the application its layout and the callbacks of all views."""
+    app.index_string = _INDEX
+    app.layout = _layout
+    _switch_views(app)
+    _draw_what_is_shown(app)
+    _enter(app, sessions, start)
+    _show_status(app, sessions)
+    for _, view in VIEWS.values():
+        view.register(app, sessions)
+
+
+def _layout() -> Component:
+    navigation = html.Nav(
+        [
+            html.H1(["drivetwin", html.Small("workbench")]),
+            *(
+                html.Button(
+                    title, id=f"nav-{name}", type="button", **attributes(aria_current="false")
+                )
+                for name, (title, _) in VIEWS.items()
+            ),
+        ],
+        className="side",
+        **attributes(aria_label="Views"),
+    )
+    panels = [
+        html.Section(
+            [html.H2(title), *view.layout()],
+            id=f"view-{name}",
+            hidden=name != _FIRST,
+            **attributes(aria_label=f"{title} view"),
+        )
+        for name, (title, view) in VIEWS.items()
+    ]
+    return html.Div(
+        [
+            dcc.Store(id="session", storage_type="session"),
+            *(dcc.Store(id=topic_id(topic)) for topic in Topic),
+            *(dcc.Store(id=due_id(name)) for name in _TOPICS),
+            navigation,
+            html.Main(
+                [
+                    html.P(id="status", className="status"),
+                    html.Div(id="message", role="status", className="message"),
+                    *panels,
+                ]
+            ),
+        ],
+        className="shell",
+    )
+
+
+def _switch_views(app: Dash) -> None:
+    script = _SWITCH.replace("NAMES", str(list(VIEWS)))
+    app.clientside_callback(  # type: ignore[no-untyped-call]
+        script,
+        *(Output(f"view-{name}", "hidden") for name in VIEWS),
+        *(Output(f"nav-{name}", "aria-current") for name in VIEWS),
+        *(Input(f"nav-{name}", "n_clicks_timestamp") for name in VIEWS),
+    )
+
+
+def _draw_what_is_shown(app: Dash) -> None:
+    """A view is drawn when it is looked at: all of them at once would keep the browser busy."""
+    for name, topics in _TOPICS.items():
+        app.clientside_callback(  # type: ignore[no-untyped-call]
+            _DUE,
+            Output(due_id(name), "data"),
+            Input(f"view-{name}", "hidden"),
+            *(Input(topic_id(topic), "data") for topic in topics),
+            State(due_id(name), "data"),
+        )
+
+
+def _enter(app: Dash, sessions: Sessions, start: Start) -> None:
+    @app.callback(
+        Output("session", "data"), Input("session", "modified_timestamp"), State("session", "data")
+    )
+    @told
+    def enter(_: int, key: str | None) -> object:
+        """Go on with the session of this tab, or begin one with what the command line named."""
+        if key in sessions:
+            announce(Topic.LOG)
+            announce(Topic.GEARBOX)
+            return no_update
+        fresh = sessions.new()
+        if start.log is not None and start.card is not None:
+            _open_first(sessions.get(fresh), start)
+        return fresh
+
+
+@told
+def _open_first(session: Session, start: Start) -> None:
+    if start.log is not None and start.card is not None:
+        session.open(start.log, start.card, start.mapping)
+
+
+def _show_status(app: Dash, sessions: Sessions) -> None:
+    @app.callback(
+        Output("status", "children"),
+        Input(topic_id(Topic.LOG), "data"),
+        Input(topic_id(Topic.RESULTS), "data"),
+        State("session", "data"),
+        prevent_initial_call=True,
+    )
+    def status(_log: int, _results: int, key: str | None) -> list[Component | str]:
+        """One line that says what is open and what is known."""
+        if key not in sessions:
+            return []
+        work = sessions.get(key).work
+        if work.log is None or work.card is None:
+            return ["no log is open"]
+        parts: list[Component | str] = [html.B(work.log.name), f" · card {work.card.name}"]
+        for shift in work.shifts:
+            parts.append(f" · shift {shift.start_gear}→{shift.end_gear}")
+        if work.results:
+            parts.append(f" · identified: {', '.join(method.value for method in work.results)}")
+        return parts

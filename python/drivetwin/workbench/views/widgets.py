@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: MIT
+"""The few things that views are made of: labelled controls, tables, messages, topics.
+
+Selects are the browser's own: they work with keyboard and screen reader as they are. The script of
+the page hands their value to the property `data-value`.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, cast
+
+import plotly.graph_objects as go
+from dash import dcc, html, no_update, set_props
+from dash.development.base_component import Component
+
+from drivetwin.errors import DrivetwinError, Where
+from drivetwin.workbench.uploads import LIMITS
+
+P = ParamSpec("P")
+R = TypeVar("R")
+Id = str | dict[str, str | int]
+Content = str | Component
+
+_counter = itertools.count(1)
+
+
+class Topic(StrEnum):
+    """Something of a session that views draw; its number changes when it does."""
+
+    LOG = "log"
+    PHASES = "phases"
+    RESULTS = "results"
+    LIVE = "live"
+    GEARBOX = "gearbox"
+
+
+_CONCERNED = {
+    Topic.LOG: (Topic.LOG, Topic.PHASES, Topic.RESULTS, Topic.LIVE),
+    Topic.PHASES: (Topic.PHASES, Topic.LIVE),
+    Topic.RESULTS: (Topic.RESULTS, Topic.LIVE),
+    Topic.LIVE: (Topic.LIVE,),
+    Topic.GEARBOX: (Topic.GEARBOX,),
+}
+
+
+def attributes(**values: str) -> dict[str, Any]:
+    """Attributes with a hyphen, such as `aria_label` for `aria-label`."""
+    return {name.replace("_", "-"): value for name, value in values.items()}
+
+
+def topic_id(topic: Topic) -> str:
+    """Id of the store whose change redraws what shows a topic."""
+    return f"topic-{topic}"
+
+
+def due_id(view: str) -> str:
+    """Id of the store that changes when a view has to be drawn: it is shown, and out of date."""
+    return f"due-{view}"
+
+
+def announce(topic: Topic) -> None:
+    """Redraw, after the present callback, what shows a topic or follows from it."""
+    for one in _CONCERNED[topic]:
+        set_props(topic_id(one), {"data": next(_counter)})
+
+
+def tell(text: str, *, fault: bool = False) -> None:
+    """Show a message at the head of the page."""
+    set_props(
+        "message", {"children": text, "className": "message fault" if fault else "message good"}
+    )
+
+
+def tell_read(how: str, fault: str, shifts: int) -> None:
+    """Show what came of reading a log, `how` in words: its fault, or how many shifts it holds."""
+    if fault:
+        tell(f"The log cannot be read as mapped. {fault}", fault=True)
+    elif shifts:
+        tell(f"{how}: {shifts} usable {'shift' if shifts == 1 else 'shifts'}")
+    else:
+        tell(f"{how}, but holds no usable shift: the view Log says why", fault=True)
+
+
+def told(callback: Callable[P, R]) -> Callable[P, R]:
+    """A callback whose faults become the message of the page; it then changes nothing."""
+
+    @functools.wraps(callback)
+    def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return callback(*args, **kwargs)
+        except (DrivetwinError, OSError) as fault:
+            tell(_words(fault), fault=True)
+            return cast(R, no_update)
+
+    return guarded
+
+
+def acted(callback: Callable[P, None]) -> Callable[P, None]:
+    """The same for a callback without outputs."""
+
+    @functools.wraps(callback)
+    def guarded(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            callback(*args, **kwargs)
+        except (DrivetwinError, OSError) as fault:
+            tell(_words(fault), fault=True)
+
+    return guarded
+
+
+def _words(fault: DrivetwinError | OSError) -> str:
+    """A typed error, or what the system refuses, as it is told; files by their names alone."""
+    if isinstance(fault, DrivetwinError):
+        return str(fault)
+    where = Where(file=None if fault.filename is None else Path(fault.filename).name)
+    remedy = "see whether the file is there, its permissions and the free space"
+    return str(DrivetwinError(fault.strerror or type(fault).__name__, remedy, where))
+
+
+def choice(
+    id: Id, label: str, options: Mapping[str, str], value: str, *, hidden_label: bool = False
+) -> Component:
+    """A labelled select: `options` are texts by value; read it as the property `data-value`."""
+    entries = [
+        html.Option(text, value=key, selected="selected" if key == value else None)
+        for key, text in options.items()
+    ]
+    select = html.Select(entries, id=id, className="choice", **attributes(data_value=value))
+    return _labelled(label, select, hidden=hidden_label)
+
+
+def field(id: Id, label: str, *, hidden_label: bool = False, **options: Any) -> Component:
+    """A labelled input; `options` are those of dcc.Input."""
+    return _labelled(label, dcc.Input(id=id, **options), hidden=hidden_label)
+
+
+def _labelled(label: str, control: Component, *, hidden: bool) -> Component:
+    text = html.Span(label, className="unseen" if hidden else "label")
+    return html.Label([text, control], className="field")
+
+
+def button(text: str, id: Id, *, main: bool = False, **options: Any) -> Component:
+    """A button; `main` is the one to press next."""
+    style = "main" if main else ""
+    return html.Button(text, id=id, type="button", className=style, **options)
+
+
+def upload_button(text: str, purpose: str, target: str) -> Component:
+    """A button that lets the browser send a file; the store `target` then holds key and name."""
+    return html.Button(
+        text,
+        type="button",
+        **attributes(data_upload=purpose, data_target=target, data_limit=str(LIMITS[purpose])),
+    )
+
+
+def table(
+    head: Iterable[Content], rows: Iterable[Sequence[Content]], caption: str = "", name: str = ""
+) -> Component:
+    """A table whose first column names the row."""
+    body = [
+        html.Tr([html.Th(row[0], scope="row"), *(html.Td(cell) for cell in row[1:])])
+        for row in rows
+    ]
+    children = [
+        html.Thead(html.Tr([html.Th(cell, scope="col") for cell in head])),
+        html.Tbody(body),
+    ]
+    if caption:
+        children.insert(0, html.Caption(caption))
+    return html.Div(html.Table(children), className=f"table {name}".strip())
+
+
+def notes(title: str, texts: Iterable[str], tone: str = "doubtful") -> Component:
+    """A list of sentences under a heading; nothing where there are none."""
+    items = [html.Li(text) for text in dict.fromkeys(texts)]
+    if not items:
+        return html.Div()
+    return html.Div([html.H3(title), html.Ul(items)], className=f"notes {tone}")
+
+
+def badge(text: str, tone: str) -> Component:
+    """A coloured label."""
+    return html.Span(text, className=f"badge {tone}")
+
+
+def row(*children: Component) -> Component:
+    """Controls side by side."""
+    return html.Div(list(children), className="row")
+
+
+def hint(text: str) -> Component:
+    """A paragraph of quiet text."""
+    return html.P(text, className="hint")
+
+
+def graph(id: str, label: str, figure: go.Figure, **config: Any) -> Component:
+    """A figure; `label` says to a screen reader what it is."""
+    options: Any = {
+        "displaylogo": False,
+        "responsive": True,
+        "modeBarButtons": [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
+        **config,
+    }
+    plot = dcc.Graph(id=id, config=options, figure=figure, className="plot")
+    return html.Figure(plot, **attributes(aria_label=label))

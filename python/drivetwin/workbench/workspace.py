@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: MIT
+"""The workspace file: a session saved as JSON, checked key by key when it is read."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, ValidationError, field_validator
+
+from drivetwin._util.atomic import write_bytes, write_text
+from drivetwin._util.toml import StrictModel, key_path
+from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.mapping_file import ChannelTable
+from drivetwin.channels.roles import quantity_of
+from drivetwin.errors import RefusedError, Where
+from drivetwin.estimation.result.method import Method
+from drivetwin.files.records import program_version
+from drivetwin.files.twin_file import TwinFile
+from drivetwin.files.twin_from_result import file_of, twin_from_file
+from drivetwin.workbench.identifying import Outcome
+from drivetwin.workbench.locks import Lock, LockKind
+from drivetwin.workbench.phases import Boundary
+from drivetwin.workbench.session_state import Source, Work
+from drivetwin.workbench.uploads import LIMITS
+from drivetwin.workbench.workspace_folder import Folder
+
+ENDING = ".workspace.json"
+LARGEST = LIMITS["workspace"]
+
+
+class FileEntry(StrictModel):
+    """A file of the folder by its path there, and what it held when the workspace was saved."""
+
+    path: str = Field(min_length=1, max_length=1000)
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+
+
+class LockEntry(StrictModel):
+    """A lock; SI."""
+
+    kind: LockKind
+    value: float = 0.0
+    std: float = Field(default=0.0, ge=0)
+
+
+class WorkspaceFile(StrictModel):
+    """The whole file. `phases` [s] go by number of the shift, `sliders` (SI) by parameter id."""
+
+    format: Literal["drivetwin workspace"] = "drivetwin workspace"
+    version: Literal[1] = 1
+    program: str
+    log: FileEntry
+    card: FileEntry
+    channels: dict[str, ChannelTable] = Field(default_factory=dict)
+    phases: dict[int, dict[Boundary, float]] = Field(default_factory=dict)
+    locks: dict[str, LockEntry] = Field(default_factory=dict)
+    twins: dict[Method, TwinFile] = Field(default_factory=dict)
+    method: Method | None = None
+    shift: int = Field(default=0, ge=0)
+    sliders: dict[str, float] = Field(default_factory=dict)
+
+    @field_validator("channels")
+    @classmethod
+    def _known_roles(cls, channels: dict[str, ChannelTable]) -> dict[str, ChannelTable]:
+        for role in channels:
+            try:
+                quantity_of(role)
+            except KeyError:
+                raise ValueError(f"{role!r} is no channel role") from None
+        return channels
+
+    def specs(self) -> dict[str, ChannelSpec]:
+        """Corrections of the mapping by role."""
+        return {role: table.spec() for role, table in self.channels.items()}
+
+    def lock_values(self) -> dict[str, Lock]:
+        """Locks by parameter id."""
+        return {name: Lock(one.kind, one.value, one.std) for name, one in self.locks.items()}
+
+
+def save(work: Work, path: Path, folder: Folder) -> None:
+    """Write the workspace; the file appears whole or not at all.
+
+    Uploaded files are kept beside it, so that it can be reopened. Raises InputError before a log is
+    open, RefusedError where another file has the name of an upload or of the workspace, OSError.
+    """
+    work.require_opened()
+    if path.exists() and not _is_workspace(path):
+        raise RefusedError(
+            "a file of this name exists and is no workspace", "choose another name",
+            Where(file=path.name),
+        )  # fmt: skip
+    log, card = (_kept(one, path.parent, folder) for one in (work.log, work.card))
+    content = WorkspaceFile(
+        program=program_version(),
+        log=log,
+        card=card,
+        channels={role: _table(spec) for role, spec in work.channels.items()},
+        phases={index: dict(times) for index, times in work.moves.items()},
+        locks={
+            name: LockEntry(kind=one.kind, value=one.value, std=one.std)
+            for name, one in work.locks.items()
+        },
+        twins={method: file_of(one.twin) for method, one in work.results.items()},
+        method=work.method,
+        shift=work.shift,
+        sliders=dict(work.changes),
+    )
+    write_text(path, content.model_dump_json(by_alias=True, indent=1) + "\n")
+
+
+def load(path: Path, label: str) -> WorkspaceFile:
+    """Read a workspace. Raises RefusedError that names every fault by its key."""
+    where = Where(file=label)
+    if path.stat().st_size > LARGEST:
+        text = f"the file has more than {LARGEST / 1e6:.0f} MB"
+        raise RefusedError(text, "hand in a workspace that the workbench has saved", where)
+    try:
+        return WorkspaceFile.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        faults = error.errors(include_url=False, include_context=False, include_input=False)
+        listed = "; ".join(f"{key_path(one['loc'])} {one['msg']}".strip() for one in faults[:5])
+        raise RefusedError(
+            f"this is no workspace of this version: {listed}",
+            "hand in a workspace that the workbench has saved",
+            where,
+        ) from None
+
+
+def sources_of(content: WorkspaceFile, folder: Folder, label: str) -> tuple[Source, Source]:
+    """Log and card of a workspace in the folder. Raises RefusedError where one is not the same."""
+    return _found(content.log, folder, label), _found(content.card, folder, label)
+
+
+def restored(content: WorkspaceFile, work: Work) -> Work:
+    """`work` with the log read anew, brought to where the workspace was saved.
+
+    Raises InputError where phases, locks or sliders do not belong to the log.
+    """
+    for index, times in content.phases.items():
+        work = work.with_moves(index, times)
+    for name, lock in content.lock_values().items():
+        work = work.with_lock(name, lock)
+    results = {
+        method: Outcome(method, twin_from_file(twin)) for method, twin in content.twins.items()
+    }
+    work = replace(work, results=results)
+    if content.method in results and content.shift < len(work.shifts):
+        changes = dict(content.sliders)
+        work = replace(work, method=content.method, shift=content.shift, changes=changes)
+    return work
+
+
+def _found(entry: FileEntry, folder: Folder, label: str) -> Source:
+    path = folder.file(entry.path)
+    if digest(path) != entry.sha256:
+        raise RefusedError(
+            f"{entry.path} is no longer the file that the workspace was saved with",
+            "put the original file back, or open the changed one as a new log",
+            Where(file=label),
+        )
+    return Source(entry.path, path)
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _kept(source: Source | None, beside: Path, folder: Folder) -> FileEntry:
+    if source is None:
+        raise RefusedError("no log is open", "open a log and its vehicle card first")
+    if not source.uploaded:
+        return FileEntry(path=source.name, sha256=digest(source.path))
+    target = folder.new_file(folder.name_of(beside / source.name), "")
+    content = digest(source.path)
+    if target.exists() and digest(target) != content:
+        raise RefusedError(
+            f"the upload {source.name} cannot be kept: another file has its name",
+            "save the workspace into another folder",
+            Where(file=source.name),
+        )
+    if not target.exists():
+        write_bytes(target, source.path.read_bytes())
+    return FileEntry(path=folder.name_of(target), sha256=content)
+
+
+def _is_workspace(path: Path) -> bool:
+    try:
+        load(path, path.name)
+    except RefusedError:
+        return False
+    return True
+
+
+def _table(spec: ChannelSpec) -> ChannelTable:
+    values: Mapping[str, object] = {
+        "source": spec.source,
+        "group": spec.group,
+        "unit": spec.unit,
+        "sign": spec.sign,
+        "scale": spec.scale,
+        "offset": spec.offset,
+        "time_shift_s": spec.time_shift,
+    }
+    return ChannelTable.model_validate(values)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""Files appear whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from drivetwin._util.atomic import keeping, write_text
+from drivetwin.errors import InputError
+
+
+def test_replaces_the_old_file_and_leaves_nothing_beside(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "result.json"
+    write_text(path, "old")
+    write_text(path, "new μ")
+    assert path.read_text(encoding="utf-8") == "new μ"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_failed_write_keeps_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "result.json"
+    write_text(path, "old")
+    with pytest.raises(UnicodeEncodeError):
+        write_text(path, "long text before the fault \ud800")
+    assert path.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("how", ["same", "around", "symbolic", "hard"])
+def test_a_file_to_be_kept_is_not_written_over(tmp_path: Path, how: str) -> None:
+    kept, other = tmp_path / "log.csv", tmp_path / "other.csv"
+    kept.write_text("log")
+    if how == "symbolic":
+        other.symlink_to(kept)
+    elif how == "hard":
+        other.hardlink_to(kept)
+    names = {"same": kept, "around": tmp_path.parent / tmp_path.name / "log.csv"}
+    path = names.get(how, other)
+    with keeping([kept, tmp_path, tmp_path / "absent", Path("\0")]):
+        with pytest.raises(InputError, match="would be written over") as fault:
+            write_text(path, "result")
+        write_text(tmp_path / "new.csv", "result")
+        write_text(tmp_path / "new.csv", "result again")
+    assert fault.value.where.file == str(path)
+    assert kept.read_text() == "log"
+    write_text(path, "result")
+    assert path.read_text() == "result"

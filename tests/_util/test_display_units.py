@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""Display units and number formats."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivetwin._util.display_units import (
+    BAR,
+    RPM,
+    display_of,
+    in_units,
+    significant,
+    with_uncertainty,
+)
+from drivetwin.parameters import SPECS
+from drivetwin.shifts.quality import QUALITY_UNITS
+
+
+def test_si_is_converted_for_display() -> None:
+    assert RPM.of(np.array([2.0 * np.pi])) == pytest.approx([60.0])
+    assert BAR.of(np.array([1.4e6])) == pytest.approx([14.0])
+
+
+@pytest.mark.parametrize("spec", SPECS.values(), ids=lambda spec: spec.stem)
+def test_every_parameter_unit_has_a_display_without_ascii_stars(spec: object) -> None:
+    label = display_of(getattr(spec, "unit")).label  # noqa: B009
+    assert label
+    assert "*" not in label
+    assert "^" not in label
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "shown"),
+    [
+        (17.5034, 0.1234, ("17.50", "0.12")),
+        (176_012.0, 1234.0, ("176\u202f000", "1\u202f200")),
+        (0.85, None, ("0.8500", "")),
+        (0.85, 0.0, ("0.8500", "")),
+        (-3.21e-4, 2e-5, ("−0.000321", "0.000020")),
+        (0.9, 1.9e-7, ("0.900000", "1.9e-07")),
+        (2300.4, 0.96, ("2\u202f300.40", "0.96")),
+    ],
+)
+def test_value_and_half_width_share_their_last_digit(
+    value: float, half: float | None, shown: tuple[str, str]
+) -> None:
+    assert with_uncertainty(value, half) == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (float("nan"), "–"), (123456.0, "123\u202f500"), (1.5e-9, "1.500e-09")],
+)
+def test_significant_digits(value: float, text: str) -> None:
+    assert significant(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "half", "text"),
+    [
+        (96_300.0, "Pa", 7400.0, "0.963 ± 0.074 bar"),
+        (0.0144, "s", None, "14.40 ms"),
+        (0.85, "1", 0.012, "0.850 ± 0.012"),
+        (4.9, "N*m*s^2/rad^2", 0.31, "4.90 ± 0.31 Nm·s²/rad²"),
+        (17.5, "kg*m^2", 0.0, "17.50 kg·m²"),
+    ],
+)
+def test_a_sentence_has_the_units_of_the_tables(
+    value: float, unit: str, half: float | None, text: str
+) -> None:
+    assert in_units(value, unit, half) == text
+
+
+@pytest.mark.parametrize("unit", sorted(set(QUALITY_UNITS.values())))
+def test_no_figure_of_shift_quality_has_a_unit_in_ascii(unit: str) -> None:
+    assert not set("*^") & set(display_of(unit).label)

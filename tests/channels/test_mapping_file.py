@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""Mapping files: written ones read back, faults named by key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.mapping_file import ByRole, ChannelTable, mapping_text, read_mapping
+from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
+from drivetwin.channels.roles import ROLES
+from drivetwin.errors import MappingError
+
+
+def test_a_written_mapping_reads_back(tmp_path: Path) -> None:
+    channels = {
+        "engine_torque": ChannelSpec('M "Mot" ä', "Nm", -1, 0.5, 3.0, -0.01),
+        "gear": ChannelSpec("Gang"),
+        "pressure.B2": ChannelSpec("p2", "bar"),
+        "pressure.K 1": ChannelSpec("p1", "kPa"),
+    }
+    path = tmp_path / "map.toml"
+    path.write_text(mapping_text(channels), encoding="utf-8")
+    assert read_mapping(path).channels == channels
+    assert path.read_text(encoding="utf-8").startswith("# Channel mapping")
+
+
+def test_options_for_the_whole_file_read_back(tmp_path: Path) -> None:
+    bus = BusOptions((tmp_path / "bus.dbc",), 1109.0)
+    options = ReadOptions(TimeColumn("clk", "ms", simultaneous=True), bus)
+    path = tmp_path / "map.toml"
+    text = mapping_text({"gear": ChannelSpec("Gang", group="10ms")}, options)
+    path.write_text(text, encoding="utf-8")
+    again = read_mapping(path)
+    assert again.options == options
+    assert again.channels == {"gear": ChannelSpec("Gang", group="10ms")}
+
+
+def test_the_time_column_can_be_mapped(tmp_path: Path) -> None:
+    path = tmp_path / "map.toml"
+    path.write_text('[time]\nsource = "clk"\nunit = "ms"\n', encoding="utf-8")
+    assert read_mapping(path).options.time == TimeColumn("clk", "ms")
+
+
+def test_every_role_has_its_table() -> None:
+    assert set(ByRole[ChannelTable].model_fields) == {*ROLES, "pressure"}
+
+
+def test_all_faults_are_told_with_their_keys(tmp_path: Path) -> None:
+    path = tmp_path / "map.toml"
+    path.write_text(
+        "[channels.engine_torq]\nsource = 'a'\n"
+        "[channels.output_torque]\nsource = 'b'\nsign = 2\nscal = 1.0\n"
+        "[channels.pressure.B2]\nunit = 'bar'\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(MappingError) as caught:
+        read_mapping(path)
+    text = str(caught.value)
+    assert "4 faults" in text
+    assert "channels.engine_torq: unknown key; did you mean 'engine_torque'?" in text
+    assert "channels.output_torque.sign: the value should be 1 or -1" in text
+    assert "channels.output_torque.scal: unknown key; did you mean 'scale'?" in text
+    assert "channels.pressure.B2.source: this key is required and missing" in text
+
+
+def test_a_missing_file_is_told(tmp_path: Path) -> None:
+    with pytest.raises(MappingError, match="cannot read the file"):
+        read_mapping(tmp_path / "none.toml")
+
+
+def test_a_unit_that_the_log_does_not_name_has_a_line_to_fill_in(tmp_path: Path) -> None:
+    path = tmp_path / "map.toml"
+    text = mapping_text({"input_speed": ChannelSpec("n")}, unitless={"input_speed"})
+    path.write_text(text, encoding="utf-8")
+    assert read_mapping(path).channels == {"input_speed": ChannelSpec("n")}
+    path.write_text(text.replace('# unit = "..."', 'unit = "rpm"'), encoding="utf-8")
+    assert read_mapping(path).channels == {"input_speed": ChannelSpec("n", "rpm")}

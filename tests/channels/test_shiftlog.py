@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: MIT
+"""A log in memory: what none can be made of, and the units of what it holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.units import Unit, lookup
+from drivetwin.errors import TimeError
+
+
+@pytest.mark.parametrize("start", [1763866345.0, -1e9, 1e6 - 0.5])
+def test_a_log_whose_time_is_too_far_from_zero_is_refused(start: float) -> None:
+    time = np.linspace(start, start + 0.99, 100)
+    channel = Channel("input_speed", Quantity.SPEED, time, np.ones(100), "SpdIn", "rad/s")
+    with pytest.raises(TimeError, match="let time count from the start of the log") as fault:
+        ShiftLog({"input_speed": channel}, "a.csv", "")
+    assert fault.value.where.channel == "SpdIn"
+
+
+@pytest.mark.parametrize("quantity", [one for one in Quantity if one is not Quantity.STATE])
+def test_the_unit_of_a_quantity_is_that_of_numbers_in_si(quantity: Quantity) -> None:
+    assert lookup(quantity.unit) == Unit(1.0, 0.0, quantity)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""The profile is the least cost with a parameter held: a parabola where all acts linearly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.errors import IdentificationError, InputError
+from drivetwin.estimation.analysis.profile_likelihood import likelihood_of, profile
+from drivetwin.estimation.optimize.gauss_newton import minimise
+from tests.estimation.asked import by_the_paper, slowed, stepped
+
+
+def test_of_a_parameter_that_acts_linearly_is_that_of_the_covariance() -> None:
+    one = profile(stepped(), "eta")
+    half = 0.5 * (one.linear[1] - one.linear[0])
+    assert one.interval == pytest.approx(one.linear, abs=0.1 * half)
+    distance = (one.values - one.estimate) / (half / 1.96)
+    assert one.rise == pytest.approx(distance**2, rel=0.15, abs=0.3)
+    assert one.rise[np.argmin(np.abs(distance))] == 0.0
+
+
+def test_slow_errors_widen_it_like_the_covariance() -> None:
+    one = profile(slowed(stepped()), "eta")
+    half = 0.5 * (one.linear[1] - one.linear[0])
+    assert half > 1.4 * 1.96 * (stepped().estimates["eta"].std_noise or 0.0)
+    assert one.interval == pytest.approx(one.linear, abs=0.15 * half)
+
+
+def test_is_the_least_cost_with_the_parameter_held() -> None:
+    """Jo′ acts through the locks, not quite linearly; held by a hard prior Q is searched anew."""
+    one = profile(stepped(), "J_out")
+    fit, _ = likelihood_of(stepped())
+    place = fit.point.names.index("J_out")
+    for k in (1, -2):
+        held = replace(fit.problem, prior=fit.problem.prior.held(place, float(one.values[k])))
+        start = fit.point.values.copy()
+        start[place] = one.values[k]
+        found = minimise(held, fit.point.moved(start))
+        assert found is not None
+        data = found.normal.cost - held.prior.cost(found.point.values)
+        least = data + fit.problem.prior.cost(found.point.values)
+        rise = (least - fit.normal.cost) / max(fit.chi2, 1.0)
+        assert one.rise[k] == pytest.approx(rise, abs=0.1)
+
+
+def test_rises_to_both_sides_of_a_parameter_of_several_unknowns() -> None:
+    one = profile(stepped(), "J_prime_3")
+    middle = int(np.argmin(one.rise))
+    assert np.all(np.diff(one.rise[middle:]) > 0.0)
+    assert np.all(np.diff(one.rise[: middle + 1]) < 0.0)
+    assert one.interval[0] < one.estimate < one.interval[1]
+    width = (one.interval[1] - one.interval[0]) / (one.linear[1] - one.linear[0])
+    assert width == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("name", "match"), [("k_x", "choose one of eta"), ("P0.B2", "design")])
+def test_refuses_what_does_not_move(name: str, match: str) -> None:
+    with pytest.raises(InputError, match=match):
+        profile(stepped(), name)
+
+
+def test_refuses_other_methods() -> None:
+    with pytest.raises(IdentificationError, match="paper method"):
+        profile(by_the_paper(), "eta")
+
+
+def test_of_a_search_that_was_given_up_it_is_told_why() -> None:
+    evidence = replace(by_the_paper().evidence, gave_up="the work ran out")
+    with pytest.raises(IdentificationError, match=r"gave up on this log.+ the work ran") as told:
+        likelihood_of(replace(by_the_paper(), evidence=evidence))
+    assert "--method likelihood" not in told.value.remedy

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: MIT
+"""From a drive to what the estimators see of one shift: what is near it, and the fitted shifts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.estimation import identify
+from drivetwin.estimation.data.prepare import BESIDE, sampled, signals_of, tolerances_of
+from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.linear.multi_shift import disturbed
+from drivetwin.shifts.coverage import AFTER, BEFORE
+from drivetwin.shifts.detect import FoundShifts
+from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
+from drivetwin.vehicle.spec import SensorTolerance
+from tests.shifts.fixtures import make_card
+
+CARD = make_card({"2": 1.91, "3": 1.43})
+KINDS = {
+    "engine_torque": Quantity.TORQUE,
+    "output_torque": Quantity.TORQUE,
+    "input_speed": Quantity.SPEED,
+    "output_speed": Quantity.SPEED,
+    "wheel_speed": Quantity.SPEED,
+    "pressure.B2": Quantity.PRESSURE,
+    "pressure.B3": Quantity.PRESSURE,
+}
+
+
+def shift(start: float) -> Shift:
+    """A shift of 0.6 s between gears held for a minute and half a minute."""
+    middle, lockup = start + 0.2, start + 0.6
+    return Shift(
+        "2", "3", "B2", "B3", ShiftKind.POWER_ON_UP,
+        before=(start - 60.0, start), torque_phase=(start, middle), inertia_phase=(middle, lockup),
+        after=(lockup, lockup + 30.0), lockup_time=lockup,
+    )  # fmt: skip
+
+
+def drive() -> ShiftLog:
+    """200 s of channels that are noise about 100."""
+    rng = np.random.default_rng(0)
+    time = np.arange(0.0, 200.0, 0.01)
+    channels = {
+        role: Channel(role, kind, time, 100.0 + rng.normal(0.0, 1.0, time.size), role, "")
+        for role, kind in KINDS.items()
+    }
+    return ShiftLog(channels, "made", "")
+
+
+def test_of_a_long_log_the_estimators_see_what_is_near_the_shift() -> None:
+    log, one = drive(), replace(shift(100.0), before=(95.0, 100.0), after=(100.6, 104.0))
+    signals = signals_of(log, CARD, one)
+    seen = [
+        signals.engine_torque,
+        signals.output_torque,
+        signals.engine_speed,
+        signals.output_speed,
+        signals.pressures["B2"],
+    ]
+    for signal in seen:
+        assert signal.time[0] == pytest.approx(95.0 - BESIDE, abs=0.011)
+        assert signal.time[-1] == pytest.approx(104.0 + BESIDE, abs=0.011)
+    assert signals.engine_torque.sigma == sampled(log["engine_torque"]).sigma
+    whole = signals_of(log, CARD, replace(one, before=(0.0, 100.0), after=(100.6, 200.0)))
+    assert whole.engine_torque.time.size == log["engine_torque"].time.size
+
+
+def test_the_tolerance_of_the_speed_sensor_that_is_read_is_one_of_the_engine_speed() -> None:
+    sensors = {
+        "input_speed": SensorTolerance(1e-3, 0.5),
+        "engine_speed": SensorTolerance(2e-3, 0.1),
+        "output_torque": SensorTolerance(0.01, 30.0),
+    }
+    log, card = drive(), replace(CARD, i_in=1.2, sensors=sensors)
+    other = {"output_torque": sensors["output_torque"]}
+    found = tolerances_of(log, card, shift(100.0))
+    assert found == {**other, "engine_speed": SensorTolerance(1e-3, 0.6)}
+    # What such an error does to the log is what it does to the signals.
+    wrong = replace(log["input_speed"], values=1.001 * log["input_speed"].values + 0.5)
+    there = signals_of(
+        replace(log, channels={**log.channels, "input_speed": wrong}), card, shift(100.0)
+    )
+    here = disturbed(
+        signals_of(log, card, shift(100.0)), "engine_speed", SensorTolerance(1e-3, 0.6)
+    )
+    assert here.engine_speed.values == pytest.approx(there.engine_speed.values)
+    engine = replace(
+        log["input_speed"], role="engine_speed", values=1.2 * log["input_speed"].values
+    )
+    both = replace(log, channels={**log.channels, "engine_speed": engine})
+    assert tolerances_of(both, card, shift(100.0)) == {
+        **other,
+        "engine_speed": sensors["engine_speed"],
+    }
+
+
+def test_rows_that_show_values_late_make_ages_uncertain() -> None:
+    log = drive()
+    late = {role: replace(one, late=0.01) for role, one in log.channels.items()}
+    card = replace(CARD, sensors={"output_torque": SensorTolerance(0.01, 30.0, 4e-3)})
+    found = tolerances_of(replace(log, channels=late), card, shift(100.0))
+    spread = 0.01 / float(np.sqrt(12.0))
+    assert found["output_torque"] == SensorTolerance(0.01, 30.0, float(np.hypot(4e-3, spread)))
+    assert found["engine_speed"] == found["pressure.B2"] == SensorTolerance(age=spread)
+    assert "input_speed" not in found
+    assert tolerances_of(log, card, shift(100.0)) == card.sensors
+
+
+def test_what_is_older_has_the_values_of_before() -> None:
+    signals = signals_of(drive(), CARD, shift(100.0))
+    older = disturbed(signals, "output_torque", SensorTolerance(age=2e-3)).output_torque
+    assert older.time == pytest.approx(signals.output_torque.time + 2e-3)
+    assert older.values == pytest.approx(signals.output_torque.values)
+
+
+class Fitted(Exception):
+    """Stands in place of a fit."""
+
+
+def test_what_is_fitted_is_near_the_shifts_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[Sequence[ShiftSignals]] = []
+
+    def chosen(
+        _log: ShiftLog, _card: object, shifts: Sequence[Shift]
+    ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
+        return tuple(shifts[1:]), (RejectedShift(shifts[0].inertia_phase, "left out"),)
+
+    def fitted(signals: Sequence[ShiftSignals], *_: object) -> None:
+        told.append(signals)
+        raise Fitted
+
+    monkeypatch.setattr(identify, "chosen", chosen)
+    monkeypatch.setattr(identify, "_with_torque", fitted)
+    with pytest.raises(Fitted):
+        identify.identify(drive(), CARD, FoundShifts((shift(80.0), shift(150.0)), ()))
+    ((one,),) = told
+    assert one.shift.before == (150.0 - BEFORE, 150.0)
+    assert one.shift.after == (150.6, 150.6 + AFTER)
+
+
+def test_a_shift_in_overrun_does_not_stop_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[Sequence[ShiftSignals]] = []
+
+    def fitted(signals: Sequence[ShiftSignals], *_: object) -> None:
+        told.append(signals)
+        raise Fitted
+
+    log = drive()
+    torque = log["output_torque"]
+    coasting = np.where(torque.time < 115.0, -100.0, 100.0) + (torque.values - 100.0)
+    changed = {**log.channels, "output_torque": replace(torque, values=coasting)}
+    monkeypatch.setattr(identify, "_with_torque", fitted)
+    monkeypatch.setattr(identify, "chosen", lambda _log, _card, shifts: (tuple(shifts), ()))
+    shifts = FoundShifts((shift(80.0), shift(150.0)), ())
+    with pytest.raises(Fitted):
+        identify.identify(
+            replace(log, channels=changed), replace(CARD, loss_law="dissipative"), shifts
+        )
+    ((one,),) = told
+    assert one.shift.before[1] == 150.0

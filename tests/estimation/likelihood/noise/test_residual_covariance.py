@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: MIT
+"""The banded weighting is the dense R + G·U·Gᵀ, and the expected inputs are the right way round."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.data.shift_data import TorqueOfSpeeds
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Output
+from drivetwin.estimation.likelihood.noise.linear_response import observed, response_of
+from drivetwin.estimation.likelihood.noise.residual_covariance import sensor_noise, with_input_noise
+from drivetwin.estimation.likelihood.objective import Part
+from drivetwin.estimation.optimize.objective import Point
+from drivetwin.simulation.dual_clutch import Signal
+from tests.estimation.likelihood.fixtures import bench, fitted, problem
+
+
+def _short() -> tuple[Part, Point]:
+    posed, start = problem(bench())
+    part = posed.parts[0]
+    return Part.unweighted(part.structure, part.record.until(part.record.time[0] + 0.15)), start
+
+
+def test_weighting_equals_the_dense_covariance() -> None:
+    part, point = _short()
+    run = part.run(point)
+    assert run is not None
+    model, record = part.structure.model(point), part.record
+    response = response_of(model, run, record)
+    whiteness = with_input_noise(model, record, response)
+    assert whiteness.path is not None
+    columns = []
+    for name, power in whiteness.path.power.items():
+        for k in range(record.time.size - 1):
+            impulse = np.zeros(record.time.size - 1)
+            impulse[k] = np.sqrt(power[k])
+            z = response.to({name: impulse})
+            columns.append(
+                np.concatenate([z[out.place] @ observed(model, out.name) for out in record.outputs])
+            )
+    G = np.column_stack(columns)
+    dense = np.diag(record.sigma**2) + G @ G.T
+    columns_in: FloatArray = np.random.default_rng(0).standard_normal((record.size, 3))
+    columns_in *= record.sigma[:, None]
+    expected = np.linalg.solve(dense, columns_in)
+    found = whiteness.weighted(columns_in) * record.sigma[:, None]
+    assert np.allclose(found, expected * record.sigma[:, None], rtol=1e-3, atol=1e-2)
+
+
+def _of_speeds(part: Part, slope: float, rest: float) -> Part:
+    """The part with an engine torque computed from ω_e, on which it hangs by `slope`."""
+    record, read = part.record, part.record.engine_torque
+    torque = Signal(record.time, np.interp(record.time, read.time, read.values))
+    size = np.linspace(0.5, 1.5, record.time.size)
+    share = TorqueOfSpeeds(record.time, size * slope, size * rest)
+    sigma = {**record.input_sigma, TORQUE: rest}
+    made = replace(record, engine_torque=torque, of_speeds=share, input_sigma=sigma, rounding={})
+    return replace(part, record=made)
+
+
+def _torque_by_speed(part: Part) -> FloatArray:
+    """Noise of the engine torque over each step per that of a compared sample (N-1, n)."""
+    record, torque = part.record, part.record.engine_torque.time
+    assert record.of_speeds is not None
+    middle, columns = 0.5 * (record.time[1:] + record.time[:-1]), []
+    for out in record.outputs:
+        for k in range(out.values.size):
+            one = np.zeros(out.values.size)
+            one[k] = 1.0 if out.name == "engine_speed" else 0.0
+            of_torque = record.of_speeds.slope * np.interp(torque, record.time[out.place], one)
+            columns.append(np.interp(middle, torque, of_torque))
+    return np.column_stack(columns)
+
+
+def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
+    part, point = _short()
+    part = _of_speeds(part, slope=-400.0, rest=2.0)
+    run = part.run(point)
+    assert run is not None
+    model, record = part.structure.model(point), part.record
+    response = response_of(model, run, record)
+    whiteness = with_input_noise(model, record, response)
+    assert whiteness.path is not None
+    effect = {}
+    for name in response.drive:
+        steps = np.eye(record.time.size - 1)
+        answers = [response.to({name: step}) for step in steps]
+        effect[name] = np.column_stack([part.seen(point, z) for z in answers])
+    share, power = _torque_by_speed(part), whiteness.path.power
+    assert power[TORQUE][[0, -1]] == pytest.approx(np.array([1.0, 9.0]), rel=0.1)
+    own = np.eye(record.size) - effect[TORQUE] @ share
+    dense = own @ np.diag(record.sigma**2) @ own.T
+    dense += sum((effect[name] * power[name]) @ effect[name].T for name in effect)
+    columns = np.linalg.cholesky(dense) @ np.random.default_rng(0).standard_normal((record.size, 3))
+    expected = np.linalg.solve(dense, columns)
+    assert np.diag(columns.T @ whiteness.weighted(columns)) == pytest.approx(
+        np.diag(columns.T @ expected), rel=1e-4
+    )
+    told = whiteness.input_noise(columns[:, 0])[TORQUE]
+    common = share @ np.diag(record.sigma**2) @ own.T - power[TORQUE][:, None] * effect[TORQUE].T
+    best = common @ expected[:, 0]
+    assert np.max(np.abs(told - best)) < 1e-3 * np.max(np.abs(best))
+
+
+def test_its_determinant_is_that_of_the_dense_covariance() -> None:
+    part, point = _short()
+    weighting = part.weighted_by(point).weighting
+    assert weighting.path is not None
+    dense = np.linalg.inv(weighting.weighted(np.eye(part.record.size)))
+    sensors = part.weighting.log_determinant
+    assert sensors == pytest.approx(2.0 * np.sum(np.log(part.record.sigma)), rel=1e-12)
+    more = weighting.log_determinant - sensors
+    assert more > 1.0
+    expected = np.linalg.slogdet(0.5 * (dense + dense.T)).logabsdet
+    assert weighting.log_determinant == pytest.approx(expected, abs=1e-3 * more)
+
+
+def _sparse(every: int) -> tuple[Part, Point]:
+    """A shift up to lock-up of which outputs and pressures show one sample in so many."""
+    made = bench()
+    posed, start = problem(made)
+    part = posed.until([made.signals.shift.lockup_time - 0.02]).parts[0]
+    record = part.record
+    outputs = tuple(
+        Output(out.name, out.place[::every], out.values[::every], out.sigma)
+        for out in record.outputs
+    )
+    pressures = {
+        name: Signal(p.time[::every], p.values[::every]) for name, p in record.pressures.items()
+    }
+    sigma = {**record.input_sigma, TORQUE: 0.03}
+    sparse = replace(record, outputs=outputs, pressures=pressures, input_sigma=sigma, held_back={})
+    return Part.unweighted(part.structure, sparse).weighted_by(start), start
+
+
+def _filtered(part: Part, point: Point, columns: FloatArray) -> FloatArray:
+    """Products (q, q) of columns (n, q) weighted by a Kalman filter, sample after sample."""
+    path, record = part.weighting.path, part.record
+    assert path is not None
+    response, model = path.response, part.structure.model(point)
+    quiet = np.diag(1.0 / np.diag(path.inverse[0]))
+    spread, state = quiet.copy(), np.zeros((len(quiet), columns.shape[1]))
+    products = np.zeros((columns.shape[1], columns.shape[1]))
+    seen = sorted((k, o) for o, out in enumerate(record.outputs) for k in out.centre)
+    first = np.cumsum([0, *(out.values.size for out in record.outputs)])
+    now = 0
+    for k, o in seen:
+        for step in range(now, k):
+            pushed = sum(
+                power[step] * np.outer(response.drive[name][step], response.drive[name][step])
+                for name, power in path.power.items()
+            )
+            past = response.transition[step]
+            spread, state = past @ spread @ past.T + quiet + pushed, past @ state
+        now = k
+        row, out = observed(model, record.outputs[o].name), record.outputs[o]
+        error = columns[first[o]] - row @ state
+        first[o] += 1
+        variance = float(row @ spread @ row) + out.sigma**2
+        gain = spread @ row / variance
+        state = state + np.outer(gain, error)
+        spread = spread - variance * np.outer(gain, gain)
+        products += np.outer(error, error) / variance
+    return products
+
+
+@pytest.mark.parametrize("every", [10, 20])
+def test_slow_samples_weigh_as_a_kalman_filter_weighs_them(every: int) -> None:
+    part, point = _sparse(every)
+    found = part.linearised(point)
+    assert found is not None
+    slopes = found[1] / np.linalg.norm(found[1], axis=0)
+    expected = np.diag(_filtered(part, point, slopes))
+    weighed = np.einsum("ni,ni->i", slopes, part.weighting.weighted(slopes))
+    assert np.allclose(weighed, expected, rtol=1e-2, atol=0.0)
+
+
+def test_without_input_noise_the_sensors_weigh_alone() -> None:
+    part, _ = _short()
+    residual = np.ones(part.record.size)
+    assert np.allclose(sensor_noise(part.record).weighted(residual), part.record.sigma**-2)
+    assert not np.any(sensor_noise(part.record).driven(residual))
+
+
+def test_pressures_count_beside_a_still_engine_torque_and_no_output_torque() -> None:
+    part, point = _short()
+    speeds = tuple(one for one in part.record.outputs if one.name.endswith("speed"))
+    silent = {**part.record.input_sigma, TORQUE: 0.0}
+    record = replace(part.record, outputs=speeds, input_sigma=silent)
+    weighted = Part.unweighted(part.structure, record).weighted_by(point)
+    assert weighted.weighting.path is not None
+
+
+def test_expected_inputs_move_back_towards_the_truth() -> None:
+    found = fitted(0)
+    part = found.problem.parts[0]
+    run = part.run(found.point)
+    assert run is not None
+    measured, _ = problem(bench())
+    record, exact = measured.parts[0].record, bench(noise=0.0).signals.pressures["B3"]
+    shift = bench().signals.shift
+    inside = (exact.time > shift.inertia_phase[0] + 0.02) & (exact.time < shift.lockup_time - 0.02)
+    errors = [
+        np.convolve(
+            (one.pressures["B3"].values - exact.values)[inside], np.ones(10) / 10.0, "valid"
+        )
+        for one in (record, part.record)
+    ]
+    assert np.std(errors[1]) < 0.8 * np.std(errors[0])
+
+
+def test_what_is_held_back_acts_on_the_residual_as_on_a_run() -> None:
+    posed, truth = problem(bench())
+    part = posed.until([bench().signals.shift.lockup_time - 0.02]).parts[0]
+    small = {name: 0.05 * values for name, values in part.record.held_back.items()}
+    whole = {
+        name: Signal(p.time, p.values + small[name]) for name, p in part.record.pressures.items()
+    }
+    smooth = replace(part, record=replace(part.record, held_back=small))
+    read = replace(part, record=replace(part.record, pressures=whole, held_back={}))
+    runs = smooth.run(truth), read.run(truth)
+    assert runs[0] is not None
+    assert runs[1] is not None
+    before = smooth.residual(runs[0])
+    expected = (read.residual(runs[1]) - before) / part.record.sigma
+    found = (smooth.weighted_by(truth).residual(runs[0]) - before) / part.record.sigma
+    assert np.linalg.norm(found - expected) < 0.1 * np.linalg.norm(expected)
+
+
+def test_expected_noise_of_samples_is_the_transpose_of_interpolation() -> None:
+    rng = np.random.default_rng(1)
+    record = problem(bench())[0].parts[0].record
+    steps = {
+        name: rng.standard_normal(record.time.size - 1) for name in (TORQUE, *record.pressures)
+    }
+    held = record.less(steps, 0.007).held_back[TORQUE] - record.held_back.get(TORQUE, 0.0)
+    stamps = record.engine_torque.time - 0.007
+    values = rng.standard_normal(stamps.size)
+    middle = 0.5 * (record.time[1:] + record.time[:-1])
+    through = np.interp(middle, stamps, values) * np.diff(record.time) @ steps[TORQUE]
+    period = float(np.median(np.diff(stamps)))
+    assert held @ values * period == pytest.approx(through, rel=1e-9)

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""The fit against known truth: exact without noise, honest with it, and failing aloud."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.dyno.actuators import Program
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenarios import SCENARIOS
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.likelihood.optimize import multistart as fitting
+from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, Hopeless, fit, nearest
+from drivetwin.estimation.likelihood.optimize.staged_start import in_lower_gear
+from drivetwin.estimation.optimize.gauss_newton import Found
+from tests.estimation.likelihood.fixtures import ROUGH, bench, fitted, problem, truth_of
+from tests.support.bench import Knowledge, record_bench
+
+DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+
+
+def test_ideal_sensors_return_every_parameter_from_a_start_beside_it() -> None:
+    made = bench(noise=0.0, know=Knowledge(J_out=1.0))
+    posed, start = problem(made, off=0.05)
+    found = fit(posed, start, [made.signals.shift])
+    truth = truth_of(made)
+    for name in (*DRIVELINE, "B3.mu_c", "B3.mu_drop", "B3.mu_v", "B3.ln_v_s"):
+        assert found.point[name] == pytest.approx(truth[name], rel=2e-4), name
+    assert found.point["te_delay"] == pytest.approx(truth["te_delay"], abs=2e-5)
+
+
+def test_intervals_hold_the_truth_over_noise_realisations() -> None:
+    deviates = []
+    for seed in range(5):
+        found, truth = fitted(seed), truth_of(bench(seed))
+        std = np.sqrt(np.diag(found.covariance))
+        assert found.chi2 == pytest.approx(1.0, abs=0.05)
+        deviates += [
+            (found.point[name] - truth[name]) / std[found.point.names.index(name)]
+            for name in (*DRIVELINE, "te_delay", "B3.P0", "B3.mu_c")
+        ]
+    assert float(np.mean(np.square(deviates))) < 1.6
+    assert float(np.max(np.abs(deviates))) < 4.0
+
+
+def test_a_wrong_start_is_brought_in_by_stages() -> None:
+    made = bench()
+    posed, start = problem(made, off=0.4)
+    found = fit(posed, start, [made.signals.shift])
+    assert found.chi2 < 1.05
+    near = fitted()
+    std = np.sqrt(np.diag(near.covariance))
+    shared = [near.point.names.index(name) for name in DRIVELINE]
+    assert np.all(np.abs(found.point.values - near.point.values)[shared] < 0.5 * std[shared])
+
+
+def test_a_minimum_is_one_over_unknowns_and_inputs_alike() -> None:
+    """B3 slips at twice the noise of its pressure above P0, B2 waits at its own."""
+    base = SCENARIOS[ScenarioName.POWER_ON_DOWN]()
+    low = base.model.elements[1].P0 + 1.2e4
+    programs = {
+        "B3": Program(((2.15, 1.4e6), (2.20, low), (2.70, low), (2.75, 0.0))),
+        "B2": Program(
+            ((2.30, 0.0), (2.32, 7.6e4), (2.60, 7.6e4), (2.75, 3e5), (2.95, 3.6e5), (3.05, 1.4e6))
+        ),
+    }
+    actuators = {name: replace(base.actuators[name], command=programs[name]) for name in programs}
+    posed, start = problem(record_bench(replace(base, actuators=actuators, duration=4.6), 1, ROUGH))
+    found = nearest(posed, start)
+    assert found is not None
+    again = posed.weighted_by(found.point).with_expected_inputs(found.point)
+    assert again.cost(found.point) > found.normal.cost - MULTI_START.min_input_decrease
+
+
+def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
+    made = bench()
+    posed, start = problem(made)
+    part = posed.parts[0]
+    driveline = replace(part.structure.driveline, i_f=1.3 * part.structure.driveline.i_f)
+    wrong = replace(part, structure=replace(part.structure, driveline=driveline))
+    with pytest.raises(IdentificationError, match="could not be brought onto the measurement"):
+        fit(replace(posed, parts=(wrong,)), start, [made.signals.shift])
+
+
+def test_two_starts_that_lead_nowhere_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = bench()
+    posed, start = problem(made)
+    seen = []
+    monkeypatch.setattr(fitting, "staged", lambda *given: seen.append(given))
+    heavy = [5.0 if name == "J_e" else 1.0 for name in start.names]
+    far = start.moved(start.values * np.array(heavy))
+    assert posed.cost(far) > MULTI_START.direct_chi2 * posed.size
+    with pytest.raises(Hopeless):
+        fit(posed, far, [made.signals.shift])
+    assert len(seen) == MULTI_START.min_starts
+    with pytest.raises(IdentificationError) as one:
+        fit(posed, far, [made.signals.shift], restarts=MULTI_START.shaft_factors[:1])
+    assert not isinstance(one.value, Hopeless)
+
+
+def test_input_noise_that_stages_leave_out_is_no_doubt() -> None:
+    """Outputs so quiet that at the truth all that is left is the noise of the inputs."""
+    posed, start = problem(bench(noise=0.02))
+    normal = posed.normal(start)
+    assert normal is not None
+    assert normal.cost > MULTI_START.doubtful_chi2 * posed.size
+    assert not fitting._is_doubtful(posed, Found(posed, start, normal, True, 0))
+    posed, start = problem(bench(noise=0.02), off=0.05)
+    normal = posed.normal(start)
+    assert normal is not None
+    assert fitting._is_doubtful(posed, Found(posed, start, normal, True, 0))
+
+
+def test_what_starts_at_zero_is_sought_too() -> None:
+    made = bench()
+    posed, start = problem(made)
+    values = start.values.copy()
+    values[start.names.index("J_out")] = 0.0
+    found = in_lower_gear(posed, start.moved(values), [made.signals.shift])
+    assert found is not None
+    assert found.point["J_out"] > 0.0

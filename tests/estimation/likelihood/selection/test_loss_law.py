@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""The other loss law is told where the log speaks for it, from one expansion of Q."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.estimation.likelihood.estimates import conclude
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.optimize.multistart import nearest
+from drivetwin.estimation.likelihood.priors import problem_of
+from drivetwin.estimation.likelihood.selection import loss_law
+from drivetwin.simulation.dual_clutch import LossLaw
+from tests.estimation.likelihood.fixtures import bench, fitted, truth_of
+from tests.support.bench import Bench, Knowledge, record_bench
+from tests.support.shared_results import shared
+
+LAWS: tuple[LossLaw, ...] = ("paper", "dissipative")
+
+
+@cache
+def _made(law: LossLaw) -> Bench:
+    """A log whose lock-up oscillation reverses the torque through the gears."""
+    base = paper_steps()
+    return record_bench(replace(base, model=replace(base.model, loss_law=law)), 0, Knowledge())
+
+
+@shared
+def _fit(true: LossLaw, card: LossLaw) -> LikelihoodFit:
+    made = _made(true)
+    found = nearest(*problem_of([made.signals], [made.driveline], card, truth_of(made)))
+    assert found is not None
+    return found
+
+
+def _said(made: Bench, fit: LikelihoodFit) -> list[str]:
+    told = conclude(fit, [made.signals], [made.driveline], {}, {})
+    return [text for text in told.warnings if "loss_law" in text]
+
+
+@pytest.mark.parametrize("true", LAWS)
+def test_a_wrong_law_is_told_with_what_the_right_one_gives(true: LossLaw) -> None:
+    wrong, right = _fit(true, loss_law.OTHER[true]), _fit(true, true)
+    (text,) = _said(_made(true), wrong)
+    assert f"loss_law = '{true}'" in text
+    assert "speaks for it" in text
+    told = float(text.split("k_o = ")[1].split(" Nm")[0].replace("\u202f", ""))
+    k = right.point.names.index("k_o")
+    std = float(np.sqrt(right.covariance[k, k]))
+    assert abs(told - right.point["k_o"]) < 0.5 * std
+    assert abs(told - wrong.point["k_o"]) > 3.0 * std
+    fall = float(text.split("(Q ")[1].rstrip(")"))
+    # The expansion stops at second order, and weighs by the wrong law's response.
+    assert fall == pytest.approx(right.normal.cost - wrong.normal.cost, rel=0.1)
+
+
+@pytest.mark.parametrize("true", LAWS)
+def test_of_a_right_law_nothing_is_said(true: LossLaw) -> None:
+    assert _said(_made(true), _fit(true, true)) == []
+
+
+def test_nothing_is_said_where_the_laws_are_the_same() -> None:
+    assert _said(bench(), fitted()) == []
+
+
+def test_a_log_that_tells_neither_law_from_the_other_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(loss_law, "RULED_OUT", 1e6)
+    (text,) = _said(_made("paper"), _fit("paper", "paper"))
+    assert "does not tell which of the two holds" in text

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT
+"""Loads of shifts as departures from their mean, and whether they may all be one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from drivetwin._util.arrays import Span
+from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals
+from drivetwin.estimation.likelihood.parametrization import departures_of
+from drivetwin.estimation.likelihood.priors import problem_of
+from drivetwin.estimation.likelihood.selection.per_shift_load import with_one_load
+from drivetwin.estimation.optimize.objective import Point
+from drivetwin.vehicle.spec import PriorValue
+from tests.estimation.likelihood.fixtures import bench, truth_of
+
+NAMES = ("Tv_over_if", "J_vehicle", "start1.load", "start2.load")
+LOADS = (600.0, 400.0, 200.0)
+CHANNELS = ("engine_torque", "output_torque", "engine_speed", "output_speed", "wheel_speed")
+PHASES = ("before", "torque_phase", "inertia_phase", "after")
+
+
+def _fit(departures: tuple[float, float]) -> Any:
+    """Unknowns whose departures have a standard deviation of 10 N m, and go with J3."""
+    rows = np.array([[2.0, 0, 0, 0], [0, 5, 3, 0], [0, 0, 10, 0], [0, 0, 4, 10]])
+    point = Point(NAMES, np.array([500.0, 4000.0, *departures]))
+    return cast("Any", SimpleNamespace(point=point, covariance=rows @ rows.T))
+
+
+def test_loads_that_may_be_one_are_taken_for_one() -> None:
+    fit = _fit((8.0, 3.0))
+    told = with_one_load(fit)
+    assert told is not None
+    point, covariance = told
+    assert point.names == NAMES[:2]
+    # Measuring the departures as zero, exactly: the conditional mean and covariance.
+    weight = np.linalg.inv(fit.covariance)
+    assert np.linalg.inv(covariance) == pytest.approx(weight[:2, :2])
+    pull = weight[:2, :2] @ (fit.point.values[:2] - point.values) + weight[:2, 2:] @ [8.0, 3.0]
+    assert pull == pytest.approx(np.zeros(2), abs=1e-9)
+
+
+def test_loads_that_differ_stay_apart() -> None:
+    assert with_one_load(_fit((40.0, 3.0))) is None
+
+
+def _later(signals: ShiftSignals, by: float) -> ShiftSignals:
+    """The same shift `by` seconds later."""
+
+    def moved(one: Sampled) -> Sampled:
+        return replace(one, time=one.time + by)
+
+    def span(one: Span) -> Span:
+        return one[0] + by, one[1] + by
+
+    shift = signals.shift
+    channels: dict[str, Any] = {name: moved(getattr(signals, name)) for name in CHANNELS}
+    phases: dict[str, Any] = {name: span(getattr(shift, name)) for name in PHASES}
+    return replace(
+        signals,
+        **channels,
+        pressures={name: moved(one) for name, one in signals.pressures.items()},
+        shift=replace(shift, **phases, lockup_time=shift.lockup_time + by),
+    )
+
+
+def _three(known: dict[str, PriorValue] | None = None) -> Any:
+    """The fit of one shift three times over, on a hilly road."""
+    made = bench()
+    driveline = replace(made.driveline, known=known or {})
+    guess = truth_of(made) | departures_of(LOADS)
+    law = made.run.scenario.model.loss_law
+    signals = [_later(made.signals, 20.0 * k) for k in range(3)]
+    return problem_of(signals, [driveline] * 3, law, guess, hilly=True)
+
+
+def test_departures_add_up_to_zero_about_the_load_of_the_log() -> None:
+    problem, point = _three()
+    structures = [part.structure for part in problem.parts]
+    assert [one.load(point) for one in structures] == pytest.approx(LOADS)
+    assert point["Tv_over_if"] == pytest.approx(np.mean(LOADS))
+    for one in structures:
+        names, matrix = one.slopes(point)
+        row = matrix[names.index("load.constant")]
+        for k in (point.names.index(name) for name in ("start1.load", "start2.load")):
+            values = point.values.copy()
+            values[k] += 1.0
+            change = one.model(point.moved(values)).load.constant - one.model(point).load.constant
+            assert row[k] == pytest.approx(change, abs=1e-6)
+
+
+def test_a_load_that_is_known_is_that_of_all_shifts() -> None:
+    _, point = _three({"Tv_over_if": PriorValue(2300.0, 10.0)})
+    assert not [name for name in point.names if name.endswith(".load")]

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: MIT
+"""What is told of the unknowns where a log hardly tells what kind of signals it holds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from drivetwin.channels.shiftlog import Quantity
+from drivetwin.dyno.scenarios import paper_steps, throttle_steps
+from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.noise.residual_covariance import Whiteness
+from drivetwin.estimation.likelihood.objective import Problem
+from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, nearest
+from drivetwin.estimation.likelihood.priors import problem_of
+from drivetwin.estimation.likelihood.selection import sampling_mode as of_signals
+from drivetwin.estimation.likelihood.selection.sampling_mode import (
+    SPEEDS,
+    averaged_over_kinds,
+    likely_kinds,
+    with_best_kinds,
+    with_either_kind,
+    with_slow_outputs,
+)
+from drivetwin.estimation.optimize.objective import Point
+from tests.estimation.likelihood.fixtures import ROUGH, problem, truth_of
+from tests.support.bench import record_bench
+from tests.support.shared_results import shared
+
+MEANS = frozenset({"output_torque"})
+UNDECIDED = 78
+"""Seed of a noise whose Q is lower by 4.7 of 26,847 with means of the output torque, which are
+none."""
+AS_READ = 2
+"""Seed of a noise with which an expansion takes means over 20 ms for samples."""
+
+
+@cache
+def _posed() -> Problem:
+    return problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))[0]
+
+
+@shared
+def _fit(kinds: frozenset[str]) -> LikelihoodFit:
+    _, start = problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))
+    found = nearest(_posed().of_kinds(kinds), start)
+    assert found is not None
+    return found
+
+
+def _age(fit: LikelihoodFit) -> tuple[float, float]:
+    """The age told and its standard deviation [s]."""
+    k = fit.point.names.index("te_delay")
+    return fit.mean["te_delay"], float(np.sqrt(fit.covariance[k, k]))
+
+
+def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> None:
+    ages = [_fit(kinds).point["te_delay"] for kinds in (frozenset[str](), MEANS)]
+    sharp = _age(_fit(MEANS))[1]
+    assert abs(ages[0] - ages[1]) > 5.0 * sharp
+    told, doubts = averaged_over_kinds(_posed(), _fit(MEANS))
+    value, std = _age(told)
+    assert all(abs(age - value) < 1.96 * std for age in ages)
+    truth = record_bench(throttle_steps(), UNDECIDED, ROUGH).truth["te_delay"]
+    assert abs(truth - value) < 1.96 * std
+    assert len(doubts) == 1
+    assert doubts[0].endswith("output torque")
+
+
+def test_it_does_not_matter_from_which_kind_one_comes() -> None:
+    one, other = (
+        _age(averaged_over_kinds(_posed(), with_best_kinds(_posed(), _fit(kinds)))[0])
+        for kinds in (frozenset[str](), MEANS)
+    )
+    assert one[0] == pytest.approx(other[0], abs=0.1 * one[1])
+    assert one[1] == pytest.approx(other[1], rel=0.1)
+
+
+def test_a_clear_log_is_left_as_it_is() -> None:
+    posed, start = problem(record_bench(paper_steps(), 0, ROUGH))
+    fit = nearest(posed, start)
+    assert fit is not None
+    told, doubts = averaged_over_kinds(posed, fit)
+    std = np.sqrt(np.diag(fit.covariance))
+    assert doubts == []
+    assert np.all(np.abs(told.mean.values - fit.point.values) < 1e-3 * std)
+    assert np.diag(told.covariance) == pytest.approx(np.diag(fit.covariance), rel=1e-3)
+
+
+def test_the_expansion_foretells_the_other_minimum() -> None:
+    here, there = _fit(MEANS), _fit(frozenset[str]())
+    told, _ = averaged_over_kinds(_posed(), here)
+    added = told.covariance - here.covariance
+    k = here.point.names.index("te_delay")
+    apart = there.point["te_delay"] - here.point["te_delay"]
+    share = (told.mean["te_delay"] - here.point["te_delay"]) / apart
+    assert 0.0 < share < 1.0
+    assert added[k, k] >= 0.99 * share * (1.0 - share) * apart**2
+    assert np.all(np.linalg.eigvalsh(added) > -1e-9 * np.max(np.linalg.eigvalsh(added)))
+
+
+def test_what_another_search_alone_lowers_speaks_for_no_kind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here, there = _fit(MEANS), _fit(frozenset[str]())
+
+    def told(fall: float) -> float:
+        """The age where every search after the first ends so much lower in Q."""
+        again = {
+            one.problem.kinds: replace(one, normal=replace(one.normal, cost=one.normal.cost - fall))
+            for one in (here, there)
+        }
+        monkeypatch.setattr(of_signals, "_nearby", lambda posed, *_: again.get(posed.kinds))
+        return averaged_over_kinds(_posed(), here)[0].mean["te_delay"]
+
+    std = _age(here)[1]
+    assert abs(told(0.0) - here.point["te_delay"]) > 0.1 * std
+    assert told(8.0) == pytest.approx(told(0.0), abs=0.02 * std)
+
+
+@shared
+def _without_torque() -> tuple[Problem, Point, LikelihoodFit]:
+    """A problem of samples without an output torque, where its search starts, and its minimum."""
+    made = record_bench(throttle_steps(), 0, ROUGH)
+    signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
+    eta = made.truth["eta"]
+    scaled = ("J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+    guess = {
+        name: value / eta if name in scaled or ".mu_" in name else value
+        for name, value in truth_of(made).items()
+    }
+    law = made.run.scenario.model.loss_law
+    posed, start = problem_of([signals], [made.driveline], law, guess)
+    best = nearest(posed, start)
+    assert best is not None
+    return posed, start, best
+
+
+def test_a_weighting_with_more_room_that_leaves_less_is_no_better_kind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    posed, _, best = _without_torque()
+    parts = [
+        replace(part, weighting=Whiteness(2.0 * part.record.sigma**2))
+        for part in posed.of_kinds(SPEEDS).parts
+    ]
+    roomy = replace(
+        best,
+        problem=replace(posed, parts=tuple(parts)),
+        normal=replace(best.normal, cost=0.5 * best.normal.cost),
+        chi2=0.5 * best.chi2,
+    )
+    monkeypatch.setattr(of_signals, "_promising", lambda *_: frozenset(SPEEDS))
+    monkeypatch.setattr(of_signals, "_nearby", lambda *_: roomy)
+    assert with_best_kinds(posed, best) is best
+
+
+def test_kinds_are_compared_by_the_same_samples() -> None:
+    assert _posed().of_kinds(SPEEDS).size == _posed().size
+
+
+def test_from_far_off_signals_are_taken_as_read() -> None:
+    posed, start, best = _without_torque()
+    way = start.values - best.point.values
+    far = start.moved(best.point.values + 0.5 * way)
+    weighted = posed.weighted_by(far)
+    normal = weighted.normal(far)
+    assert normal is not None
+    assert MULTI_START.far_chi2 < normal.cost / posed.size < MULTI_START.direct_chi2
+    assert of_signals._promising(weighted, far, normal)  # wrong: there are samples alone
+    likely, other = likely_kinds(
+        posed, far, [record_bench(throttle_steps(), 0, ROUGH).signals.shift]
+    )
+    assert likely.kinds == frozenset()
+    assert other.kinds == frozenset(SPEEDS)
+
+
+def test_from_far_off_the_lower_gear_tells_kinds() -> None:
+    """Speeds that a bus sends as means over 10 ms, with pedal steps, from a poor start."""
+    base = throttle_steps()
+    sensors = [
+        replace(one, rate=100.0, window=0.01) if one.quantity is Quantity.SPEED else one
+        for one in base.sensors
+    ]
+    made = record_bench(replace(base, sensors=tuple(sensors)), 0, ROUGH)
+    posed, start = problem(made, off=0.1)
+    assert posed.weighted_by(start).cost(start) > MULTI_START.far_chi2 * posed.size
+    likely, _ = likely_kinds(posed, start, [made.signals.shift])
+    assert frozenset(SPEEDS) <= likely.kinds
+
+
+def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    posed, _, best = _without_torque()
+    monkeypatch.setattr(of_signals, "EITHER_KIND", np.inf)
+    wide, doubts = with_either_kind(posed, best)
+    other = nearest(posed.of_kinds(frozenset(SPEEDS)), best.point)
+    assert other is not None
+    far = abs(other.point["te_delay"] - best.point["te_delay"])
+    assert far == pytest.approx(0.5e-3, rel=0.3)  # half a period of the speeds
+    assert far < 1.96 * _age(wide)[1]
+    assert "engine speed" in doubts[0]
+    monkeypatch.setattr(of_signals, "EITHER_KIND", -np.inf)
+    assert with_either_kind(posed, best) == (best, [])
+
+
+def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
+    fit = _fit(MEANS)
+    assert with_either_kind(_posed(), fit) == (fit, [])
+
+
+@shared
+def _at_50_hertz(window: float) -> tuple[Problem, LikelihoodFit]:
+    """A problem of outputs every 20 ms that are means over the `window` [s], and its minimum with
+    the kinds that an expansion tells."""
+    base = throttle_steps()
+    sensors = [
+        replace(one, rate=50.0, window=window)
+        if one.quantity is Quantity.SPEED or one.role == "output_torque"
+        else one
+        for one in base.sensors
+    ]
+    posed, start = problem(record_bench(replace(base, sensors=tuple(sensors)), AS_READ, ROUGH))
+    fit = nearest(posed, start)
+    assert fit is not None
+    return posed, with_best_kinds(posed, fit)
+
+
+def test_slow_outputs_are_tried_as_the_other_kind_for_no_expansion_reaches_so_far() -> None:
+    posed, known = _at_50_hertz(0.02)
+    assert known.problem.kinds == frozenset()
+    assert abs(_age(known)[0]) > 20.0 * _age(known)[1]  # half a period of the outputs
+    told = with_slow_outputs(posed, known)
+    assert told.problem.kinds == {*SPEEDS, "output_torque"}
+    assert abs(_age(told)[0]) < 2.0 * _age(told)[1]
+
+
+def test_slow_samples_stay_samples() -> None:
+    posed, known = _at_50_hertz(0.0)
+    assert known.problem.kinds == frozenset()
+    assert with_slow_outputs(posed, known) is known
+
+
+def test_fast_outputs_of_the_other_kind_are_within_reach_of_the_expansion() -> None:
+    assert with_slow_outputs(_posed(), _fit(frozenset())) is _fit(frozenset())

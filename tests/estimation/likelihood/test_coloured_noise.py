@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""Intervals count errors slower than white noise, and only those."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of, spread_of
+from tests.estimation.likelihood.fixtures import fitted
+
+FILTER = 0.8
+"""Share of a sample that stays until the next: a filter of 4.5 ms at 1 kHz."""
+
+
+def _draws(fit: LikelihoodFit, count: int, slow: bool) -> FloatArray:
+    """Sensor noise (n, count) of the fit's only shift; the output torque's of its power, filtered
+    where it is `slow`."""
+    (part,) = fit.problem.parts
+    noise = np.random.default_rng(1).standard_normal((part.record.size, count))
+    torque = part.record.outputs[0]
+    assert torque.name == "output_torque"
+    if slow:
+        rows = slice(torque.values.size)
+        gain = np.sqrt(1.0 - FILTER**2)
+        noise[rows] = lfilter([gain], [1.0, -FILTER], noise[rows], axis=0)
+    return np.asarray(part.record.sigma[:, None] * noise)
+
+
+def _spread(fit: LikelihoodFit, residual: FloatArray) -> FloatArray:
+    return spread_of(fit.problem, replace(fit.normal, residuals=(residual,)), 1.0)
+
+
+def test_a_filtered_sensor_widens_intervals_to_what_its_noise_does() -> None:
+    fit = fitted()
+    noise = _draws(fit, 100, slow=True)
+    plain = covariance_of(fit.normal.information)
+    moves = plain @ (fit.normal.regressors[0].T @ noise)
+    told = _spread(fit, noise[:, 0])
+    for name in ("eta", "Tv_over_if", "J_vehicle"):
+        k = fit.point.names.index(name)
+        scatter = float(np.std(moves[k]))
+        assert scatter > 1.3 * np.sqrt(plain[k, k]), "the case is of no use"
+        # Blocks of 20 ms show the noise of this filter nearly, a log's mean all of it.
+        assert 0.7 * scatter < np.sqrt(told[k, k]) < 1.5 * scatter
+
+
+def test_white_noise_widens_nothing() -> None:
+    fit = fitted()
+    plain = covariance_of(fit.normal.information)
+    told = _spread(fit, _draws(fit, 1, slow=False)[:, 0])
+    assert told == pytest.approx(plain, rel=1e-12, abs=0.0)

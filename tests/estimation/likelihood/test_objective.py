@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""Q and its expansion, also where the weighting has lost its digits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.noise.residual_covariance import Whiteness
+from drivetwin.estimation.likelihood.objective import Problem
+from tests.estimation.likelihood.fixtures import bench, problem
+
+
+@dataclass(frozen=True)
+class _Lost(Whiteness):
+    """A weighting under which the column `place` has a square of the wrong sign, or none has."""
+
+    place: int | None = None
+
+    def weighted(self, columns: FloatArray) -> FloatArray:
+        found = super().weighted(columns)
+        if self.place is not None and found.ndim == 2:
+            found[:, self.place] *= -1.0
+        return found
+
+
+def _weighted_by(posed: Problem, place: int | None) -> Problem:
+    """The problem under that weighting; column 0 is the residual, then come the slopes."""
+    parts = (
+        replace(one, weighting=_Lost(one.weighting.variance, one.weighting.path, place))
+        for one in posed.parts
+    )
+    return replace(posed, parts=tuple(parts))
+
+
+def test_the_expansion_is_that_of_q() -> None:
+    posed, start = problem(bench(), off=0.002)
+    normal = _weighted_by(posed, None).normal(start)
+    assert normal is not None
+    assert normal.cost == pytest.approx(posed.cost(start), rel=1e-12)
+    assert np.linalg.eigvalsh(normal.data)[0] > 0.0
+
+
+@pytest.mark.parametrize("place", [0, 1, 5])
+def test_a_weighting_without_digits_expands_nothing(place: int) -> None:
+    posed, start = problem(bench())
+    assert _weighted_by(posed, place).normal(start) is None

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""The likelihood method beside the linear one: where their difference is worth a warning."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from drivetwin.dyno.scenarios import throttle_steps
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.likelihood.pipeline import DISAGREE, likelihood
+from drivetwin.estimation.linear.estimates import conclude
+from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
+from drivetwin.simulation.dual_clutch import RoadLoad
+from drivetwin.vehicle.vehicle_card import VehicleCard
+from tests.support.bench import Bench, Knowledge, record_bench
+
+CARD = VehicleCard("truck", "paper", 1.0, 5.0, (), {}, (3.0, 9.0), (1000.0, 9000.0))
+GROWTH = 40.0
+"""Enough, N·m·s²/rad², for the linear method to err beyond its noise."""
+
+
+def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> None:
+    base = throttle_steps()
+    load = RoadLoad(base.model.load.constant, aero=GROWTH)
+    made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
+    signals, drivelines = [made.signals], [made.driveline]
+    shifts = [identify_shift(made.signals, made.driveline, 5.0)]
+    linear = conclude(shifts, signals, drivelines, {})
+    told, _ = likelihood(signals, drivelines, (linear, shifts), CARD)
+    assert told.load is not None
+    assert sum("grows with the square of the speed" in text for text in told.warnings) == 1
+    linear_J, J = linear.estimates["J_vehicle"], told.estimates["J_vehicle"]
+    assert linear_J.value is not None
+    assert linear_J.std_noise is not None
+    assert J.value is not None
+    assert abs(linear_J.value - J.value) > DISAGREE * linear_J.std_noise
+    assert not any("the linear method" in text for text in told.warnings)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e3, -1.0])
+def test_a_vehicle_that_cannot_be_is_no_start(
+    factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = record_bench(throttle_steps(), 0, Knowledge())
+    found = identify_shift(made.signals, made.driveline, 5.0)
+    values = found.values.copy()
+    values[found.ids.index("J_vehicle")] *= factor
+    guess = _started_from(made, replace(found, values=values), monkeypatch)
+    told = dict(zip(found.ids, found.values, strict=True))
+    low, high = CARD.J_vehicle_range
+    assert guess["eta"] == told["eta"]
+    assert (guess["J_vehicle"] == told["J_vehicle"]) == (factor == 1.0)
+    assert low <= guess["J_vehicle"] <= high
+    assert 0.2 < guess["k_o"] / made.truth["k_o"] < 5.0
+
+
+def _started_from(
+    made: Bench, shift: IntegralShift, monkeypatch: pytest.MonkeyPatch
+) -> dict[str, float]:
+    """The start values of the likelihood after what the linear method told of a shift."""
+    seen: list[dict[str, float]] = []
+
+    def caught(*given: object) -> None:
+        assert isinstance(given[3], dict)
+        seen.append(given[3])
+        raise IdentificationError("seen", "")
+
+    monkeypatch.setattr("drivetwin.estimation.likelihood.pipeline.choose", caught)
+    signals, drivelines = [made.signals], [made.driveline]
+    linear = conclude([shift], signals, drivelines, {})
+    with pytest.raises(IdentificationError, match="seen"):
+        likelihood(signals, drivelines, (linear, [shift]), CARD)
+    return seen[0]

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+"""Friction curves of a fit: over which slips they go."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.estimation.likelihood.objective import Part
+from drivetwin.estimation.likelihood.uncertainty.friction_bands import curves_of
+from tests.estimation.likelihood.fixtures import fitted
+
+
+def test_a_curve_goes_over_the_slips_of_all_shifts_and_not_of_the_first_alone() -> None:
+    """An element may let go in the first shift of a log, under little slip, and come on later."""
+    fit = fitted()
+    (whole,) = fit.problem.parts
+    oncoming = whole.structure.driveline.oncoming.name
+    run = whole.run(fit.point)
+    assert run is not None
+    lock = next(one.time for one in run.events if (one.kind, one.element) == ("lock", oncoming))
+    brief = Part.unweighted(whole.structure, whole.record.until(lock - 0.15))
+    nothing = np.zeros_like(fit.covariance)
+    alone = curves_of(fit, {}, nothing)[oncoming]
+    both = replace(fit, problem=replace(fit.problem, parts=(brief, whole)))
+    joined = curves_of(both, {}, nothing)[oncoming]
+    assert joined.slip[[0, -1]] == pytest.approx(alone.slip[[0, -1]])
+    short = replace(fit, problem=replace(fit.problem, parts=(brief,)))
+    assert curves_of(short, {}, nothing)[oncoming].slip[0] > 10.0 * alone.slip[0]

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""Real bus logs: resonance and total inertia where they show, refused where they do not."""
+
+from __future__ import annotations
+
+from drivetwin.estimation.linear.inertia_in_gear import held_gears
+from drivetwin.estimation.linear.resonance import Resonance, after_shift
+from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.shifts.detect import find_shifts
+from tests.shifts.test_detect_j1939 import recording
+
+
+def test_resonance_after_the_one_shift_that_shows_it() -> None:
+    log, card = recording("normal")
+    first, second = find_shifts(log, card).shifts
+    found = after_shift(log, first)
+    assert isinstance(found, Resonance)
+    assert abs(found.f_d - 4.4) < 0.25
+    assert isinstance(after_shift(log, second), str)
+    log, card = recording("address_claim")
+    assert isinstance(after_shift(log, find_shifts(log, card).shifts[0]), str)
+
+
+def test_total_inertia_in_4th_and_nowhere_else() -> None:
+    log, card = recording("normal")
+    second, third, fourth = held_gears(log, card, find_shifts(log, card).shifts)
+    assert second.verdict is third.verdict is Verdict.NOT_IDENTIFIABLE
+    assert fourth.value is not None
+    assert fourth.half is not None
+    assert abs(fourth.value - 70.0) < fourth.half < 30.0
+
+
+def test_a_log_without_shifts_tells_of_the_gears_that_it_holds() -> None:
+    log, card = recording("normal")
+    *_, last = held_gears(log, card, ())
+    assert last.gear == "4"
+    assert last.value is not None
+    assert last.half is not None
+    assert abs(last.value - 70.0) < last.half < 30.0

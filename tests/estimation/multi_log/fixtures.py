@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""Short synthetic logs of one vehicle, at two torque levels and loads, and what they tell."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import drivetwin
+from drivetwin.cli.synth import write_run
+from drivetwin.dyno.actuators import Program
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.shifts.detect import usable_shifts
+from drivetwin.simulation.dual_clutch import RoadLoad
+from drivetwin.validation.multi_log import Source, Together, identify_together
+from drivetwin.vehicle.vehicle_card import VehicleCard
+from tests.estimation.asked import DURATION
+from tests.support.shared_results import shared
+
+LEVEL = 0.85
+"""Engine torque of the second log over that of the first."""
+LOADS = (2300.0, 2000.0)
+"""T_v/i_f [N m] of both."""
+
+
+def scenario(level: float = 1.0, load: float = LOADS[0], payload: float = 1.0) -> Scenario:
+    """The paper's vehicle with throttle steps; `payload` multiplies the vehicle's inertia."""
+    base = paper_steps()
+    torque = Program(tuple((time, level * value) for time, value in base.engine_torque.knots))
+    model = replace(
+        base.model, load=RoadLoad(constant=load * base.model.i_f), J_v=payload * base.model.J_v
+    )
+    return replace(base, model=model, engine_torque=torque, duration=DURATION)
+
+
+def source(made: Scenario, seed: int, held: frozenset[int] = frozenset()) -> Source:
+    """A log of the scenario with its shifts; named after the seed."""
+    with tempfile.TemporaryDirectory() as folder:
+        file, card_file, _ = write_run(Path(folder) / f"log{seed}.csv", run(made, seed=seed))
+        card = drivetwin.load_card(card_file)
+        log = drivetwin.read_log(file, card)
+    return Source(log, usable_shifts(log, card), held)
+
+
+@cache
+def card() -> VehicleCard:
+    """The card of all of them."""
+    with tempfile.TemporaryDirectory() as folder:
+        _, file, _ = write_run(Path(folder) / "any.csv", run(scenario(), seed=0))
+        return drivetwin.load_card(file)
+
+
+@shared
+def pair() -> tuple[Source, Source]:
+    """Two logs at two torque levels and loads."""
+    return source(scenario(), 21), source(scenario(LEVEL, LOADS[1]), 22)
+
+
+@shared
+def together() -> Together:
+    """Both fitted as one, and a third one predicted."""
+    third = source(scenario(), 23, frozenset({1}))
+    return identify_together([*pair(), third], card())
+
+
+@shared
+def loaded() -> Together:
+    """Two logs of which the second has a payload that the first has not."""
+    return identify_together([pair()[0], source(scenario(payload=1.03), 24)], card())

@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: MIT
+"""identify() from log and card: contract, verdicts, refusals, truth of the shared log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import IdentificationError, NoShiftError
+from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.data.prepare import driveline_of
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identify import ALL_BEFORE_LOSS, identify
+from drivetwin.estimation.likelihood.estimates import WITH_ETA, conclude
+from drivetwin.estimation.linear.pipeline import IntegralShift
+from drivetwin.estimation.paper.pipeline import PaperShift
+from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.estimation.result.method import Method
+from drivetwin.logs.read import read_log
+from drivetwin.shifts.detect import FoundShifts, find_shifts
+from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+ROOT = Path(__file__).parents[2]
+LOGS = ROOT.parent / "shared" / "logs"
+
+
+@cache
+def recording(name: str) -> tuple[ShiftLog, VehicleCard, FoundShifts]:
+    path = LOGS / f"{name}.csv"
+    if not path.exists():
+        pytest.skip(f"{path.name} is not beside the repository")
+    card = load_card(ROOT / "examples" / "vehicles" / f"{name}.toml")
+    log = read_log(path, card)
+    return log, card, find_shifts(log, card)
+
+
+@cache
+def identified(name: str, method: Method) -> Identification:
+    return identify(*recording(name), method)
+
+
+def test_the_paper_like_log_returns_its_truth_within_the_intervals() -> None:
+    truth = {
+        "eta": 0.85,
+        "J_prime_2": 17.50,
+        "J_prime_3": 17.69,
+        "J_vehicle": 6056.0,
+        "Tv_over_if": 2300.0,
+        "k_o": 1.76e5,
+        "c_o": 280.0,
+        "f_d_3": 12.0,
+    }
+    found = identified("paper_like", Method.INTEGRAL)
+    for name, value in truth.items():
+        estimate = found.estimates[name]
+        assert estimate.value is not None
+        assert estimate.std_noise is not None
+        assert abs(estimate.value - value) < 3.0 * estimate.std_noise, name
+        assert abs(estimate.value / value - 1.0) < 0.01, name
+    curve = found.friction["B3"]
+    mu = 0.110 + 0.025 * np.exp(-curve.slip / 15.0) + 1e-4 * curve.slip
+    assert np.mean((mu >= curve.mu_lo) & (mu <= curve.mu_hi)) > 0.8
+    assert np.max(np.abs(curve.mu / mu - 1.0)) < 0.015
+
+
+def test_a_likelihood_that_gives_up_leaves_its_reason_and_the_integral_values(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def gives_up(*_: object) -> None:
+        raise IdentificationError("the search crawls", "drive on")
+
+    monkeypatch.setattr("drivetwin.estimation.identify.likelihood", gives_up)
+    found = identify(*recording("paper_like"), Method.LIKELIHOOD)
+    assert found.method is Method.INTEGRAL
+    assert found.evidence.gave_up == "the search crawls"
+    assert found.warnings[0].startswith("likelihood: the search crawls; the values are those of")
+    integral = identified("paper_like", Method.INTEGRAL)
+    assert found.estimates["J_vehicle"].value == integral.estimates["J_vehicle"].value
+    assert integral.evidence.gave_up == ""
+    with pytest.raises(IdentificationError, match=r"gave up on this log.*the search crawls"):
+        likelihood_of(found)
+
+
+def _held_briefly(before: float, after: float) -> tuple[ShiftLog, VehicleCard, FoundShifts]:
+    """The paper-like log without a wheel speed, its gears held for so long [s]."""
+    log, card, shifts = recording("paper_like")
+    channels = {role: c for role, c in log.channels.items() if role != "wheel_speed"}
+    (shift,) = shifts.shifts
+    end, lockup = shift.before[1], shift.lockup_time
+    brief = replace(shift, before=(end - before, end), after=(lockup, lockup + after))
+    return replace(log, channels=channels), card, FoundShifts((brief,), ())
+
+
+def test_gears_held_too_briefly_for_the_linear_method_are_fitted_without_it() -> None:
+    log, card, shifts = _held_briefly(0.2, 0.2)
+    with pytest.raises(IdentificationError, match=r"no 0\.4 s of held gear"):
+        identify(log, card, shifts, Method.INTEGRAL)
+    found = identify(log, card, shifts, Method.LIKELIHOOD)
+    assert found.method is Method.LIKELIHOOD
+    (told,) = [text for text in found.warnings if text.startswith("linear method: no 0.4 s of")]
+    assert told.endswith("the likelihood started without it")
+    truth = {"eta": 0.85, "J_prime_2": 17.50, "J_vehicle": 6056.0, "k_o": 1.76e5, "c_o": 280.0}
+    for name, value in truth.items():
+        estimate = found.estimates[name]
+        assert estimate.value is not None
+        assert estimate.std_total is not None
+        assert abs(estimate.value - value) < 3.0 * estimate.std_total, name
+        assert estimate.std_total < 0.02 * value, name
+
+
+def test_where_neither_method_finds_anything_the_linear_one_says_what_to_record(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def gives_up(*_: object) -> None:
+        raise IdentificationError("the search crawls", "drive on")
+
+    monkeypatch.setattr("drivetwin.estimation.identify.likelihood_alone", gives_up)
+    with pytest.raises(IdentificationError, match=r"no 0\.4 s of held gear") as caught:
+        identify(*_held_briefly(0.2, 0.2), Method.LIKELIHOOD)
+    assert "record at least a second" in caught.value.remedy
+
+
+def test_constant_engine_torque_is_said_in_words_not_hidden() -> None:
+    found = identified("paper_like", Method.INTEGRAL)
+    assert "cannot tell η from J′" in found.estimates["eta"].reason
+    assert "cannot tell η from J′" in found.estimates["J_prime_2"].reason
+    assert found.estimates["te_delay"].verdict is Verdict.NOT_IDENTIFIABLE
+    assert found.estimates["te_delay"].value is None
+    assert any("gear 2 alone determines η and J′ poorly" in text for text in found.warnings)
+
+
+def test_a_log_with_throttle_steps_tells_everything() -> None:
+    found = identified("truck_a", Method.INTEGRAL)
+    assert list(found.inputs) == ["truck_a.csv", "truck_a.toml"]
+    told = {name for name, e in found.estimates.items() if e.verdict is Verdict.IDENTIFIED}
+    assert {"eta", "J_prime_2", "J_prime_3", "J_vehicle", "Tv_over_if", "te_delay"} <= told
+    assert {"k_o", "c_o", "f_d_3", "zeta_3", "P0.B3"} <= told
+    assert found.correlation is not None
+    assert found.correlation.shape == (len(found.correlation_ids),) * 2
+    assert isinstance(found.evidence.integral[0], IntegralShift)
+    assert isinstance(found.evidence.paper[0], PaperShift)
+
+
+def test_the_papers_method_claims_no_interval_and_doubts_the_constant_torque() -> None:
+    found = identified("paper_like", Method.PAPER)
+    assert found.estimates["eta"].value == 0.85
+    assert found.estimates["eta"].std_noise is None
+    assert found.estimates["eta"].verdict is Verdict.WEAK
+    assert not any(one.verdict is Verdict.IDENTIFIED for one in found.estimates.values())
+    assert found.estimates["J_vehicle"].value is None, "the least error lies at a negative inertia"
+
+
+@pytest.mark.parametrize("method", [Method.INTEGRAL, Method.PAPER])
+def test_design_values_do_not_pass_for_measured_ones(method: Method) -> None:
+    found = identified("paper_like", method)
+    for name, value in (("J_out", 0.9), ("P0.B2", 0.8e5), ("P0.B3", 0.8e5)):
+        estimate = found.estimates[name]
+        assert (estimate.verdict, estimate.method) == (Verdict.DESIGN, "card")
+        assert estimate.value == pytest.approx(value)
+        assert estimate.std_total == 0.0
+        assert "card" in estimate.reason
+
+
+def test_the_default_method_agrees_with_the_linear_one_and_knows_more() -> None:
+    found = identified("truck_a", Method.LIKELIHOOD)
+    linear = identified("truck_a", Method.INTEGRAL)
+    assert found.method is Method.LIKELIHOOD
+    for name in ("eta", "J_prime_2", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay"):
+        new, old = found.estimates[name], linear.estimates[name]
+        assert new.verdict is Verdict.IDENTIFIED
+        assert new.value is not None
+        assert old.value is not None
+        assert new.std_noise is not None
+        assert old.std_noise is not None
+        assert new.std_noise < old.std_noise, name
+        assert abs(new.value - old.value) < 4.0 * old.std_noise, name
+    assert found.estimates["J_out"].method == "likelihood with design prior"
+    assert likelihood_of(found)[0].chi2 == pytest.approx(1.0, abs=0.05)
+
+
+def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise IdentificationError("the simulation went astray", "nothing")
+
+    monkeypatch.setattr("drivetwin.estimation.likelihood.selection.select_model.fit", fail)
+    found = identify(*recording("truck_a"), Method.LIKELIHOOD)
+    assert found.method is Method.INTEGRAL
+    assert any("went astray" in text for text in found.warnings)
+    assert Verdict.IDENTIFIED not in [one.verdict for one in found.estimates.values()]
+    stiffness = found.estimates["k_o"]
+    assert (stiffness.verdict, stiffness.value is None) == (Verdict.WEAK, False)
+    assert "no simulation" in stiffness.reason
+
+
+def test_inertias_outside_the_cards_ranges_are_told() -> None:
+    log, card, shifts = recording("truck_a")
+    assert not [one for one in identify(log, card, shifts).warnings if "design range" in one]
+    strict = replace(card, J_prime_range=(3.0, 9.0), J_vehicle_range=(1000.0, 2000.0))
+    texts = [one for one in identify(log, strict, shifts).warnings if "design range" in one]
+    assert [one.split()[0] for one in texts] == ["J_prime_2", "J_prime_3", "J_vehicle"]
+
+
+def test_tolerances_enter_the_likelihood_as_shifts_of_its_minimum() -> None:
+    log, card, shifts = recording("truck_a")
+    stated = replace(card, sensors={"output_torque": SensorTolerance(gain=0.01)})
+    found = identify(log, stated, shifts, Method.LIKELIHOOD)
+    for name in ("eta", "k_o", "Tv_over_if", "J_vehicle"):
+        estimate = found.estimates[name]
+        assert estimate.value is not None
+        assert estimate.std_systematic == pytest.approx(0.01 * estimate.value, rel=0.1), name
+
+
+def test_sensor_tolerances_widen_the_total_interval_only() -> None:
+    log, card, shifts = recording("truck_a")
+    strict = identified("truck_a", Method.INTEGRAL)
+    stated = replace(card, sensors={"output_torque": SensorTolerance(gain=0.01)})
+    found = identify(log, stated, shifts, Method.INTEGRAL)
+    for name in ("k_o", "Tv_over_if", "J_vehicle"):
+        wide, narrow = found.estimates[name], strict.estimates[name]
+        assert wide.std_noise == pytest.approx(narrow.std_noise)
+        assert wide.value is not None
+        assert wide.std_systematic == pytest.approx(0.01 * wide.value, rel=0.1)
+    curve, before = found.friction["B3"], strict.friction["B3"]
+    assert np.all(curve.mu_hi - curve.mu_lo > before.mu_hi - before.mu_lo)
+
+
+def test_the_law_that_could_tell_the_gearbox_side_apart_says_that_it_is_not() -> None:
+    log, card, shifts = recording("truck_a")
+    other = identify(log, replace(card, loss_law="dissipative"), shifts, Method.INTEGRAL)
+    assert ALL_BEFORE_LOSS in other.assumptions
+    assert ALL_BEFORE_LOSS not in identified("truck_a", Method.INTEGRAL).assumptions
+
+
+def test_refusals() -> None:
+    log, card, shifts = recording("truck_a")
+    with pytest.raises(NoShiftError, match="no usable gear shift"):
+        identify(log, card, FoundShifts((), ()))
+    channels = {role: c for role, c in log.channels.items() if role != "output_torque"}
+    with pytest.raises(IdentificationError, match="no output torque"):
+        identify(replace(log, channels=channels), card, shifts, Method.INTEGRAL)
+
+
+def test_without_an_output_torque_ratios_are_told_and_absolute_values_refused() -> None:
+    log, card, shifts = recording("truck_a")
+    whole = identified("truck_a", Method.LIKELIHOOD)
+    channels = {role: c for role, c in log.channels.items() if role != "output_torque"}
+    found = identify(replace(log, channels=channels), card, shifts, Method.LIKELIHOOD)
+    eta = whole.estimates["eta"].value
+    assert eta is not None
+    for name in ("J_prime_2", "J_vehicle", "Tv_over_if", "k_o", "c_o"):
+        assert found.estimates[name].value is None
+        assert "output torque" in found.estimates[name].reason
+        ratio, absolute = found.estimates[f"{name}_over_eta"], whole.estimates[name].value
+        assert ratio.value is not None
+        assert ratio.std_noise is not None
+        assert absolute is not None
+        assert abs(ratio.value - absolute / eta) < 4.0 * ratio.std_noise, name
+    assert found.estimates["eta"].verdict is Verdict.NOT_IDENTIFIABLE
+    assert found.friction["B3"].method_text == "likelihood, μ over η"
+    _check_efficiency_from_design(found, card)
+
+
+def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> None:
+    """With η on the card the absolute values are told, and η's spread is their systematic part."""
+    known = replace(card, known={"eta": PriorValue(0.9, 0.02)})
+    driveline = driveline_of(known, found.shifts[0])
+    fit, signals = likelihood_of(found)
+    told = conclude(fit, signals, [driveline], {}, {}).estimates
+    ratio = found.estimates["J_vehicle_over_eta"]
+    assert ratio.value is not None
+    assert told["J_vehicle"].value == pytest.approx(0.9 * ratio.value)
+    assert told["J_vehicle"].std_systematic == pytest.approx(0.02 * ratio.value)
+    assert told["J_vehicle"].method == WITH_ETA
+    assert told["eta"].verdict is Verdict.DESIGN

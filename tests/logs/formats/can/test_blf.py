@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""BLF by python-can: other frames counted, damage typed, the library optional."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import can
+import pytest
+
+from drivetwin.errors import FileFormatError, MissingExtraError
+from drivetwin.logs.formats.can.blf import read_blf
+from tests.fuzz.seeds import SEEDS
+
+
+def test_frames_without_signals_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "bus.blf"
+    with can.BLFWriter(str(path)) as writer:
+        for number in range(4):
+            writer.on_message_received(
+                can.Message(
+                    timestamp=1.0 + number,
+                    arbitration_id=0x123,
+                    is_extended_id=False,
+                    is_remote_frame=number == 2,
+                    data=b"" if number == 2 else b"\1\2",
+                    channel=0,
+                )
+            )
+    frames = read_blf(path)
+    assert frames.time.size == 3
+    assert frames.identifier.tolist() == [0x123] * 3
+    assert frames.warnings == ("1 remote or error frames left out",)
+
+
+@pytest.mark.parametrize("keep", [10, 144, 200])
+def test_a_cut_blf_is_told(tmp_path: Path, keep: int) -> None:
+    path = tmp_path / "bus.blf"
+    path.write_bytes(SEEDS["blf"](tmp_path)[:keep])
+    with pytest.raises(FileFormatError):
+        read_blf(path)
+
+
+def test_without_the_library_the_install_command_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "bus.blf"
+    path.write_bytes(SEEDS["blf"](tmp_path))
+    monkeypatch.setitem(sys.modules, "can", None)
+    with pytest.raises(MissingExtraError) as caught:
+        read_blf(path)
+    assert caught.value.remedy == 'pip install "drivetwin[can]"'
+
+
+def test_frames_of_can_fd_are_longer(tmp_path: Path) -> None:
+    path = tmp_path / "bus.blf"
+    with can.BLFWriter(str(path)) as writer:
+        for number, data in enumerate((bytes(range(32)), b"\1\2")):
+            writer.on_message_received(
+                can.Message(
+                    timestamp=1.0 + number,
+                    arbitration_id=0x123,
+                    is_extended_id=False,
+                    is_fd=len(data) > 8,
+                    data=data,
+                    channel=0,
+                )
+            )
+    frames = read_blf(path)
+    assert frames.length.tolist() == [32, 2]
+    assert frames.data[0].tobytes() == bytes(range(32))
+    assert frames.warnings == ()

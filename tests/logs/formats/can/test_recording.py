@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+"""Bus logs as columns: J1939 by the built-in messages, other buses by a DBC."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.channels.read_options import BusOptions, ReadOptions
+from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError
+from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.read import read_log, read_raw
+from tests.fuzz.seeds import SEEDS, candump
+from tests.logs.fixtures import card, columns
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    path = tmp_path / "bus.log"
+    path.write_bytes(candump(spaced=True))
+    return path
+
+
+def by_name(path: Path, options: ReadOptions | None = None) -> dict[str, RawChannel]:
+    return {channel.name: channel for channel in read_raw(path, options).channels}
+
+
+@pytest.mark.parametrize("form", ["candump", "candump-L", "asc", "blf"])
+def test_every_form_gives_the_same_signals(tmp_path: Path, form: str) -> None:
+    path = tmp_path / "bus.log"
+    path.write_bytes(SEEDS[form](tmp_path))
+    found = by_name(path)
+    speed = found["TransInputShaftSpeed"]
+    assert (speed.unit, speed.group) == ("rpm", "ETC1 from 0x03")
+    assert speed.values == pytest.approx(columns()["SpdIn"], abs=0.0625)
+    assert speed.time == pytest.approx(columns()["time"], abs=2e-6)
+    assert found["EngReferenceTorque"].values.tolist() == [2000.0]
+    assert found["EngReferenceTorque"].time == pytest.approx([0.75], abs=2e-6)
+
+
+def test_percent_torque_becomes_torque(log: Path) -> None:
+    found = by_name(log)
+    assert found["ActualEngPercentTorque"].unit == "%"
+    actual = found["ActualEngTorque"]
+    assert actual.unit == "Nm"
+    assert actual.values == pytest.approx(np.full(200, 1500.0))
+    assert actual.notes == ("reference torque 2000 N·m told by EC1 from 0x00",)
+    friction = found["NominalFrictionTorque"]
+    assert friction.values == pytest.approx(np.full(200, 200.0))
+    net = found["EngNetTorque"]
+    assert net.values == pytest.approx(np.full(net.values.size, 1300.0))
+    assert net.time.tolist() == actual.time[1:].tolist()  # before the first friction: unknown
+
+
+def test_the_reference_torque_can_be_asserted(log: Path) -> None:
+    asserted = by_name(log, ReadOptions(bus=BusOptions(reference_torque=1000.0)))
+    assert asserted["ActualEngTorque"].values == pytest.approx(np.full(200, 750.0))
+
+
+def test_without_reference_torque_percent_stays(log: Path) -> None:
+    lines = [line for line in log.read_bytes().splitlines() if b"1CE" not in line]
+    log.write_bytes(b"\n".join(lines) + b"\n")
+    raw = read_raw(log)
+    assert not any(one.name.endswith("Torque") and one.unit == "Nm" for one in raw.channels)
+    assert "reference_torque_Nm" in raw.warnings[0]
+
+
+def test_codes_that_are_no_value_are_left_out_and_told(log: Path) -> None:
+    lines = log.read_bytes().splitlines()
+    speeds = [index for index, line in enumerate(lines) if b"0CF00203" in line]
+    for index, code in zip(speeds[10:14], (0xFFFF, 0xFE00, 0xFEFF, 0xFB00), strict=True):
+        part = struct.pack("<H", code).hex(" ").upper().encode()
+        lines[index] = lines[index][:-8] + part + lines[index][-3:]
+    log.write_bytes(b"\n".join(lines) + b"\n")
+    channel = by_name(log)["TransInputShaftSpeed"]
+    assert channel.time.size == 196
+    assert channel.notes == (
+        "1 not available, 2 marked as error, 1 outside the valid range of 200 samples left out",
+    )
+    assert channel.values.max() < 1600.0
+
+
+def test_what_a_sender_never_fills_is_no_candidate(log: Path) -> None:
+    with open_recording(log) as recording:
+        slip = [one.name for one in recording.columns].index("PercentClutchSlip")
+        assert recording.columns[slip].empty
+        with pytest.raises(DamagedChannelError, match="200 not available of 200"):
+            recording.load(slip)
+
+
+def test_roles_are_recognised(log: Path, tmp_path: Path) -> None:
+    found = read_log(log, card(tmp_path))
+    assert {role: one.source_name for role, one in found.channels.items()} == {
+        "engine_torque": "EngNetTorque",
+        "input_speed": "TransInputShaftSpeed",
+        "engine_speed": "EngSpeed",
+        "output_speed": "TransOutputShaftSpeed",
+        "shift_in_process": "TransShiftInProcess",
+        "lockup_engaged": "TransTorqueConverterLockupEngaged",
+    }
+
+
+def test_senders_and_buses_are_told_apart(log: Path) -> None:
+    data = log.read_bytes()
+    other = data.replace(b"0CF00400", b"0CF00401").replace(b"can0", b"can1")
+    log.write_bytes(data + other)
+    groups = [one.group for one in read_raw(log).channels if one.name == "EngSpeed"]
+    assert groups == ["EEC1 from 0x00 on can0", "EEC1 from 0x01 on can1"]
+
+
+DBC = """VERSION ""
+BU_: A
+BO_ 291 Speeds: 4 A
+ SG_ n_in : 0|16@1+ (0.25,0) [0|0] "rpm" A
+ SG_ n_ab : 16|16@1+ (0.25,0) [0|0] "rpm" A
+"""
+
+
+def test_another_bus_by_its_dbc(tmp_path: Path) -> None:
+    (tmp_path / "bus.dbc").write_text(DBC)
+    log = tmp_path / "bus.log"
+    rows = [struct.pack("<HH", 4000 + k, 2000 + k).hex() for k in range(20)]
+    log.write_text("".join(f"({0.01 * k:.6f}) can0 123#{row}\n" for k, row in enumerate(rows)))
+    with pytest.raises(MissingChannelError, match="none of the 1 identifiers") as caught:
+        read_raw(log)
+    assert "bus = { dbc = [" in caught.value.remedy
+    found = by_name(log, ReadOptions(bus=BusOptions((tmp_path / "bus.dbc",))))
+    assert found["n_in"].values == pytest.approx(1000.0 + 0.25 * np.arange(20))
+    assert (found["n_ab"].unit, found["n_ab"].group) == ("rpm", "Speeds")
+
+
+def test_the_mapping_file_names_the_dbc(tmp_path: Path) -> None:
+    from drivetwin.channels.mapping_file import read_mapping
+
+    path = tmp_path / "map.toml"
+    path.write_text('[bus]\ndbc = ["bus.dbc"]\nreference_torque_Nm = 1109.0\n')
+    assert read_mapping(path).options.bus == BusOptions((tmp_path / "bus.dbc",), 1109.0)
+
+
+def test_asc_with_stamps_between_events_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bus.asc"
+    text = SEEDS["asc"](tmp_path).replace(b"timestamps absolute", b"timestamps relative")
+    path.write_bytes(text)
+    with pytest.raises(FileFormatError, match="count from event to event"):
+        read_raw(path)

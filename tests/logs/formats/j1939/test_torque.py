@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Percent torque in N·m, and two real truck logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from drivetwin.logs.formats.j1939 import torque
+from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.read import read_log, read_raw
+from drivetwin.vehicle.card import load_card
+
+ROOT = Path(__file__).resolve().parents[3]
+SHARED = ROOT.parent / "shared" / "j1939"
+RPM = np.pi / 30.0
+
+
+def raw(name: str, time: list[float], values: list[float]) -> RawChannel:
+    return RawChannel(name, "%", np.array(time), np.array(values), "EEC1 from 0x00")
+
+
+def test_percent_of_the_reference() -> None:
+    percent = raw("ActualEngPercentTorque", [0.0, 0.02], [50.0, -10.0])
+    found = torque.in_newton_metres(percent, 1109.0, "told")
+    assert (found.name, found.unit, found.notes) == ("ActualEngTorque", "Nm", ("told",))
+    assert found.values.tolist() == pytest.approx([554.5, -110.9])
+    assert torque.torque_name("Retarder") == "Retarder_Nm"
+
+
+def test_the_fraction_is_added_where_it_is_sent() -> None:
+    percent = raw("ActualEngPercentTorque", [0.0, 0.02, 0.04], [50.0, 51.0, 52.0])
+    found = torque.with_fraction(percent, raw("f", [0.0, 0.04], [0.125, 0.875]))
+    assert found.values.tolist() == [50.125, 51.0, 52.875]
+
+
+def test_net_torque_is_unknown_without_friction() -> None:
+    actual = raw("a", [0.0, 0.1, 0.2, 0.3], [10.0, 11.0, 12.0, 13.0])
+    friction = raw("f", [0.05, 0.15, 0.25], [1.0, 2.0, 3.0])
+    found = torque.net_torque(actual, friction)
+    assert found.time.tolist() == [0.1, 0.2]
+    assert found.values == pytest.approx([11.0 - 1.5, 12.0 - 2.5])
+
+
+@pytest.fixture(params=["normal", "address_claim"])
+def truck(request: pytest.FixtureRequest) -> Path:
+    path = SHARED / f"trucksentry_{request.param}.log"
+    if not path.exists():
+        pytest.skip("the shared logs are not beside the repository")
+    return path
+
+
+def test_a_truck_tells_its_reference_torque_by_bam(truck: Path) -> None:
+    channels = {(one.name, one.group): one for one in read_raw(truck).channels}
+    reference = channels["EngReferenceTorque", "EC1 from 0x00"]
+    assert set(reference.values) == {1109.0}
+    assert 3 <= reference.values.size <= 6  # one in 5 s, some of them broken off
+    rates = {
+        ("TransInputShaftSpeed", "ETC1 from 0x03"): 100.0,
+        ("EngSpeed", "EEC1 from 0x00"): 50.0,
+        ("TransCurrentGear", "ETC2 from 0x03"): 10.0,
+    }
+    for key, rate in rates.items():
+        assert channels[key].rate == pytest.approx(rate, rel=0.01)
+
+
+def test_a_truck_in_gear_runs_at_the_ratio_of_its_gear(truck: Path) -> None:
+    card = load_card(ROOT / "examples" / "vehicles" / "j1939_class6.toml")
+    started = perf_counter()
+    log = read_log(truck, card)
+    assert perf_counter() - started < 5.0
+    gear, inlet, outlet = log["gear"], log["input_speed"], log["output_speed"]
+    assert set(gear.values) <= {2.0, 3.0, 4.0}
+    assert 600.0 * RPM < outlet.values.max() < 1600.0 * RPM
+    locked = log["lockup_engaged"].at(inlet.time) == 1.0
+    driving = (log["shift_in_process"].at(inlet.time) == 0.0) & locked
+    ratio = inlet.values / outlet.at(inlet.time)
+    for name in ("2", "3"):
+        in_gear = driving & (gear.at(inlet.time) == float(name))
+        assert np.nanmedian(ratio[in_gear]) == pytest.approx(card.ratio(name), rel=2e-3)
+    assert log["engine_torque"].source_name == "EngNetTorque"
+    assert log["engine_torque"].values.max() < 1109.0

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Damaged MATLAB files are refused before SciPy reads them; sound ones of all classes pass."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+from scipy.sparse import csc_array
+
+from drivetwin.errors import FileFormatError
+from drivetwin.logs.formats.mat_integrity import check_blocks, is_version4
+
+CONTENT = {
+    "x": np.arange(40.0),
+    "small": np.int8(3),
+    "z": np.array([1.0 + 2.0j, 3.0]),
+    "text": "rpm",
+    "nested": {"a": np.eye(3), "b": {"c": "bar", "d": np.arange(5)}},
+    "cells": np.array([np.arange(3), "word"], dtype=object),
+    "thin": csc_array(np.diag([1.0, 0.0, 2.0])),
+    "flags": np.array([True, False]),
+    "nothing": np.empty((0, 0)),
+}
+
+
+@cache
+def written(compressed: bool) -> bytes:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "whole.mat"
+        savemat(path, CONTENT, do_compression=compressed)
+        return path.read_bytes()
+
+
+def check(folder: Path, data: bytes) -> None:
+    path = folder / "log.mat"
+    path.write_bytes(data)
+    check_blocks(path)
+
+
+@pytest.mark.parametrize("compressed", [True, False])
+def test_sound_files_of_every_class_pass(tmp_path: Path, compressed: bool) -> None:
+    check(tmp_path, written(compressed))
+
+
+def test_every_flipped_bit_of_a_compressed_variable_is_noticed(tmp_path: Path) -> None:
+    whole = written(compressed=True)
+    first = int.from_bytes(whole[132:136], "little")
+    for place in range(136, 136 + first, 7):
+        damaged = bytearray(whole)
+        damaged[place] ^= 4
+        with pytest.raises(FileFormatError, match="checksum"):
+            check(tmp_path, bytes(damaged))
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "says"),
+    [
+        (128, 77, "unknown type 77"),
+        (132, 255, "cut|parts"),
+        (136, 77, "parts of no known type"),
+        (145, 255, "parts of no known type"),  # says complex, has no imaginary part
+        (152, 200, "parts of no known type"),
+    ],
+)
+def test_damaged_structure_is_named(tmp_path: Path, place: int, value: int, says: str) -> None:
+    damaged = bytearray(written(compressed=False))
+    damaged[place] = value
+    with pytest.raises(FileFormatError, match=says) as caught:
+        check(tmp_path, bytes(damaged))
+    assert "export it again" in caught.value.remedy
+
+
+@pytest.mark.parametrize("compressed", [True, False])
+def test_cut_files_are_refused(tmp_path: Path, compressed: bool) -> None:
+    whole = written(compressed)
+    first = int.from_bytes(whole[132:136], "little")
+    for size in range(137, 136 + first, 7):
+        with pytest.raises(FileFormatError):
+            check(tmp_path, whole[:size])
+
+
+def written4(folder: Path) -> bytes:
+    path = folder / "whole4.mat"
+    savemat(path, {"x": np.arange(40.0), "text": "rpm", "z": CONTENT["z"]}, format="4")
+    return path.read_bytes()
+
+
+def test_version_4_is_told_by_its_first_variable(tmp_path: Path) -> None:
+    whole = written4(tmp_path)
+    check(tmp_path, whole)
+    assert is_version4(whole)
+    for head in (b"", bytes(200), b"time,x\n0.0,1\n" * 9, written(compressed=False), whole[:21]):
+        assert not is_version4(head)
+
+
+def test_cut_and_damaged_files_of_version_4_are_refused(tmp_path: Path) -> None:
+    whole = written4(tmp_path)
+    first = 20 + 2 + 40 * 8
+    for size in (first - 1, first + 7, len(whole) - 1):
+        with pytest.raises(FileFormatError, match=r"is cut|no sound head"):
+            check(tmp_path, whole[:size])
+    for place in (0, 1, 12, 16):  # type, rest of the type, complex, length of the name
+        damaged = bytearray(whole)
+        damaged[first + place] = 77
+        with pytest.raises(FileFormatError, match="variable 2"):
+            check(tmp_path, bytes(damaged))

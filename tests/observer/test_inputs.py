@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""What the course takes from a log, against the exact motion behind it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import drivetwin
+from drivetwin.cli.synth import write_run
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.observer.inputs import is_driving, recorded
+from tests.observer.conftest import brief
+
+
+@pytest.mark.parametrize("name", [ScenarioName.POWER_OFF_UP, ScenarioName.POWER_OFF_DOWN], ids=str)
+def test_power_flows_by_the_torque_at_the_gears(name: ScenarioName, tmp_path: Path) -> None:
+    """T_g = T_e - J1·ω_e': in a power-off upshift the engine drives although T_e is negative."""
+    bench = run(scenario_of(name), seed=1)
+    file, card_file, _ = write_run(tmp_path / "log.csv", bench)
+    card = drivetwin.load_card(card_file)
+    log = drivetwin.read_log(file, card)
+    shift = brief(log, card)
+    model, motion = bench.scenario.model, bench.trajectory
+    seen = recorded(log, shift, card.i_in)
+    found = is_driving(model, seen, bench.truth.parameters["te_delay"])
+    rate = np.gradient(motion.engine_speed, motion.time)
+    carried = bench.scenario.torque(motion.time) - model.J1 * rate
+    exact = np.interp(0.5 * (seen.time[1:] + seen.time[:-1]), motion.time, carried)
+    # Noise and the swings of the shaft may turn the sign where little flows.
+    clear = np.abs(exact) > 250.0
+    assert clear.mean() > 0.2
+    assert np.mean(found[clear] == (exact[clear] > 0.0)) > 0.98
+    inside = (seen.time[1:] > shift.inertia_phase[0]) & (seen.time[1:] < shift.lockup_time)
+    drives = float(name is ScenarioName.POWER_OFF_UP)
+    assert np.mean(found[inside]) == pytest.approx(drives, abs=0.1)

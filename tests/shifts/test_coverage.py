@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: MIT
+"""Gaps of the inputs cut the gears held around a shift, or refuse it; no sample is invented."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.errors import DamagedChannelError
+from drivetwin.shifts.coverage import (
+    AFTER,
+    BEFORE,
+    LEAST,
+    OLDEST,
+    YOUNGEST,
+    near,
+    parts_between,
+    recorded,
+)
+from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE
+from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.vehicle.spec import PriorValue
+
+FILLS = {"B2": PriorValue(8e4, 5e3), "B3": PriorValue(8e4, 5e3)}
+SHIFT = Shift(
+    start_gear="2",
+    end_gear="3",
+    offgoing="B2",
+    oncoming="B3",
+    kind=ShiftKind.POWER_ON_UP,
+    before=(0.0, 2.0),
+    torque_phase=(2.0, 2.2),
+    inertia_phase=(2.2, 2.5),
+    after=(2.5, 5.0),
+    lockup_time=2.5,
+)
+
+seconds = st.floats(0.0, 5.0, allow_nan=False)
+gap_lists = st.lists(st.tuples(seconds, seconds).map(sorted).map(tuple), max_size=6)
+
+
+def log(gap: tuple[float, float] | None = None, role: str = "") -> ShiftLog:
+    """5 s at 1 kHz: B2 lets go at 2.2 s and B3 takes hold at 2.0 s; `role` lacks the gap."""
+    return log_without([] if gap is None else [gap], role)
+
+
+def log_without(gaps: list[tuple[float, float]], role: str) -> ShiftLog:
+    """The same where `role` lacks several gaps."""
+    time = np.linspace(0.0, 5.0, 5001)
+    values = {
+        "engine_torque": 1000.0 + 200.0 * np.sin(9.0 * time),
+        "pressure.B2": np.where(time < 2.2, 1e6, 0.0),
+        "pressure.B3": np.where(time < 2.0, 0.0, 1e6),
+    }
+    channels = {}
+    for name, column in values.items():
+        quantity = Quantity.TORQUE if name == "engine_torque" else Quantity.PRESSURE
+        keep = np.ones(time.size, np.bool_)
+        for low, high in gaps if name == role else []:
+            keep &= (time < low) | (time > high)
+        channels[name] = Channel(name, quantity, time[keep], column[keep], name, "")
+    return ShiftLog(channels, "made", "")
+
+
+@given(span=st.tuples(seconds, seconds).map(sorted).map(tuple), gaps=gap_lists)
+def test_parts_and_gaps_make_up_the_span(
+    span: tuple[float, float], gaps: list[tuple[float, float]]
+) -> None:
+    parts = parts_between(span, tuple(gaps))
+    assert all(span[0] <= low < high <= span[1] for low, high in parts)
+    for time in np.linspace(*span, 97):
+        inside = sum(low < time < high for low, high in parts)
+        blocked = any(low < time < high for low, high in gaps)
+        border = any(time in pair for pair in (span, *gaps))
+        assert border or inside == (0 if blocked else 1)
+
+
+def test_a_whole_log_leaves_the_shift_as_it_is() -> None:
+    assert recorded(log(), SHIFT, FILLS) is SHIFT
+
+
+def test_gap_of_the_engine_torque_cuts_the_gear_before() -> None:
+    cut = recorded(log((1.0, 1.2), "engine_torque"), SHIFT, FILLS)
+    assert cut.before == pytest.approx((1.2 + YOUNGEST, 2.0), abs=2e-3)
+    assert cut.after == SHIFT.after
+    assert "no samples from 0.999 s to 1.201 s" in cut.warnings[0]
+    assert recorded(log((1.0, 1.2), "engine_torque"), cut, FILLS) is cut
+
+
+def test_gap_of_the_engine_torque_cuts_the_gear_after() -> None:
+    cut = recorded(log((4.0, 4.5), "engine_torque"), SHIFT, FILLS)
+    assert cut.after == pytest.approx((2.5, 4.0 - OLDEST), abs=2e-3)
+    assert cut.before == SHIFT.before
+
+
+def test_of_several_gaps_the_nearest_to_the_shift_cuts() -> None:
+    gaps = [(0.3, 0.5), (1.0, 1.2), (3.2, 3.4), (4.0, 4.5)]
+    cut = recorded(log_without(gaps, "engine_torque"), SHIFT, FILLS)
+    assert cut.before == pytest.approx((1.2 + YOUNGEST, 2.0), abs=2e-3)
+    assert cut.after == pytest.approx((2.5, 3.2 - OLDEST), abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("role", "reach"), [("engine_torque", (YOUNGEST, OLDEST)), ("pressure.B3", (0.0, 0.0))]
+)
+def test_input_that_starts_late_or_ends_early_cuts_as_a_gap_does(
+    role: str, reach: tuple[float, float]
+) -> None:
+    late = recorded(log((-1.0, 1.0), role), SHIFT, FILLS)
+    assert late.before == pytest.approx((1.001 + reach[0], 2.0))
+    assert f"{role!r} has no samples from 0.000 s to 1.001 s: gear 2 counts" in late.warnings[0]
+    early = recorded(log((4.0, 9.0), role), SHIFT, FILLS)
+    assert early.after == pytest.approx((2.5, 3.999 - reach[1]))
+    assert early.before == SHIFT.before
+
+
+@pytest.mark.parametrize("gap", [(-1.0, 2.1), (2.4, 9.0)])
+def test_input_that_starts_or_ends_in_the_shift_refuses_it(gap: tuple[float, float]) -> None:
+    with pytest.raises(DamagedChannelError, match="during the shift"):
+        recorded(log(gap, "pressure.B3"), SHIFT, FILLS)
+
+
+@pytest.mark.parametrize("role", ["engine_torque", "pressure.B2", "pressure.B3"])
+def test_gap_in_the_shift_refuses_it(role: str) -> None:
+    with pytest.raises(DamagedChannelError, match="during the shift"):
+        recorded(log((2.3, 2.4), role), SHIFT, FILLS)
+
+
+def test_refused_is_where_the_gap_begins_and_a_turbine_asks_for_its_clutch() -> None:
+    gapped = log((2.3, 2.4), "engine_torque")
+    with pytest.raises(DamagedChannelError, match="record the shift again") as refused:
+        recorded(gapped, SHIFT, FILLS)
+    assert refused.value.where.time == pytest.approx(2.299)
+    turbine = replace(gapped["engine_torque"], source_name=f"{TURBINE_TORQUE} from n_e")
+    driven = replace(gapped, channels={**gapped.channels, "engine_torque": turbine})
+    with pytest.raises(DamagedChannelError, match="keep the lock-up clutch open, or closed"):
+        recorded(driven, SHIFT, FILLS)
+
+
+@pytest.mark.parametrize("gap", [(2.0 - LEAST, 1.95), (2.51 + OLDEST, 2.7)])
+def test_too_short_a_rest_refuses_it(gap: tuple[float, float]) -> None:
+    with pytest.raises(DamagedChannelError, match="less than"):
+        recorded(log(gap, "engine_torque"), SHIFT, FILLS)
+
+
+@pytest.mark.parametrize("role", ["pressure.B2", "pressure.B3"])
+@pytest.mark.parametrize("gap", [(0.5, 1.5), (3.0, 4.0)])
+def test_pressure_of_an_element_that_stays_locked_or_open_decides_nothing(
+    role: str, gap: tuple[float, float]
+) -> None:
+    assert recorded(log(gap, role), SHIFT, FILLS) is SHIFT
+
+
+def test_pressure_that_crosses_the_fill_point_in_its_gap_cuts() -> None:
+    whole = log((3.0, 4.0), "pressure.B2")
+    channel = whole.pressure("B2")
+    risen = replace(channel, values=np.where(channel.time > 3.5, 1e6, channel.values))
+    cut = recorded(ShiftLog({**whole.channels, "pressure.B2": risen}, "made", ""), SHIFT, FILLS)
+    assert cut.after == pytest.approx((2.5, 3.0), abs=2e-3)
+
+
+def with_converter(opened: tuple[float, float]) -> ShiftLog:
+    """The log with speeds of engine and input that differ by 10 % in the span `opened`."""
+    time = np.linspace(0.0, 5.0, 501)
+    inlet = np.full(time.size, 150.0)
+    slips = (time >= opened[0]) & (time <= opened[1])
+    speeds = {"input_speed": inlet, "engine_speed": np.where(slips, 1.1, 1.0) * inlet}
+    channels = {k: Channel(k, Quantity.SPEED, time, v, k, "rad/s") for k, v in speeds.items()}
+    return ShiftLog({**log().channels, **channels}, "made", "")
+
+
+def test_a_gear_counts_while_the_converter_is_closed() -> None:
+    cut = recorded(with_converter((-1.0, 1.2)), SHIFT, FILLS)
+    assert cut.before == pytest.approx((1.2 + LETS_GO, 2.0), abs=0.06)
+    assert "the converter is open" in cut.warnings[-1]
+    cut = recorded(with_converter((3.8, 6.0)), SHIFT, FILLS)
+    assert cut.after == pytest.approx((2.5, 3.8 - LETS_GO), abs=0.06)
+
+
+def test_a_shift_with_the_converter_opening_is_refused() -> None:
+    with pytest.raises(DamagedChannelError, match=r"converter is open .* during the shift"):
+        recorded(with_converter((2.1, 4.0)), SHIFT, FILLS)
+
+
+def test_of_long_gears_what_is_near_the_shift_counts() -> None:
+    assert near(SHIFT) is SHIFT
+    cut = near(replace(SHIFT, before=(-60.0, 2.0), after=(2.5, 90.0)))
+    assert cut.before == (2.0 - BEFORE, 2.0)
+    assert cut.after == (2.5, 2.5 + AFTER)
+    cut = near(replace(SHIFT, before=(-60.0, 2.0), after=(2.5, 90.0)), (15.0, 20.0))
+    assert (cut.before, cut.after) == ((-13.0, 2.0), (2.5, 22.5))

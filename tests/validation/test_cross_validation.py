@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""Shifts held out of the fit: predicted, and judged against what their noise allows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.validation import HeldOut, Outcome
+from drivetwin.validation.cross_validation import hold_out
+from tests.estimation.asked import by_the_paper
+from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario, source, together
+
+
+def _held() -> HeldOut:
+    (one,) = together().found.evidence.held_out
+    return one
+
+
+def test_a_right_model_predicts_as_well_as_noise_allows() -> None:
+    one = _held()
+    assert one.outcome is Outcome.ALLOWED
+    assert one.validation is not None
+    fitted = together().found.fit
+    for signal, phases in one.validation.fit.items():
+        assert phases["all"].fit_percent > fitted[signal]["all"].fit_percent - 2.0
+
+
+def test_load_and_age_of_a_log_that_was_not_fitted_are_told_beside() -> None:
+    own = _held().own
+    assert set(own) == {"Tv_over_if", "te_delay"}
+    load = own["Tv_over_if"]
+    assert load.value == pytest.approx(LOADS[0], abs=5.0 * (load.std_noise or 0.0))
+    assert "before the shift" in load.method
+
+
+def test_a_vehicle_that_changed_is_predicted_worse_than_noise() -> None:
+    heavy = source(scenario(payload=1.1), 26)
+    (one,) = hold_out(together().found, card(), heavy.log, heavy.shifts.shifts, 3)
+    assert one.outcome is Outcome.WORSE
+    assert Outcome.WORSE in {one.outcome_of(signal) for signal in one.bounds}
+
+
+def test_one_with_wrong_friction_is_predicted_worse_than_noise() -> None:
+    found, log = together().found, pair()[0]
+    friction = {
+        name: replace(curve, stribeck=replace(curve.stribeck, mu_c=1.1 * curve.stribeck.mu_c))
+        for name, curve in found.friction.items()
+        if curve.stribeck is not None
+    }
+    wrong = replace(found, friction=friction)
+    (one,) = hold_out(wrong, card(), log.log, log.shifts.shifts, 1)
+    assert one.outcome is Outcome.WORSE
+
+
+def test_what_cannot_be_predicted_says_why() -> None:
+    log = pair()[0]
+    channels = {k: v for k, v in log.log.channels.items() if k != "engine_torque"}
+    blind = ShiftLog(channels, "blind.csv", "x")
+    (one,) = hold_out(together().found, card(), blind, log.shifts.shifts, 3)
+    assert one.outcome is Outcome.NOT_PREDICTED
+    assert one.validation is None
+    assert "engine_torque" in one.notes[0]
+    assert one.name == "blind.csv, shift 2→3"
+
+
+def test_another_method_predicts_its_own_log_without_a_judgement() -> None:
+    log = pair()[0]
+    found = by_the_paper()
+    (known,) = hold_out(found, card(), log.log, log.shifts.shifts, 0)
+    assert known.outcome is Outcome.NOT_JUDGED
+    (foreign,) = hold_out(found, card(), log.log, log.shifts.shifts, 1)
+    assert foreign.outcome is Outcome.NOT_PREDICTED
+    assert "likelihood" in foreign.notes[0]
+
+
+def test_a_law_of_another_element_is_said_and_not_judged() -> None:
+    found: Identification = together().found
+    (law,) = found.friction.values()
+    log = pair()[0]
+    fit, _ = likelihood_of(found)
+    names = tuple(name.replace("B3.", "B9.") for name in fit.point.names)
+    unseen = replace(fit, point=replace(fit.point, names=names))
+    evidence = replace(found.evidence, likelihood=unseen)
+    found = replace(found, friction={"B9": law}, evidence=evidence)
+    (one,) = hold_out(found, card(), log.log, log.shifts.shifts, 1)
+    assert one.outcome is Outcome.NOT_JUDGED
+    assert "friction law of B9 stands in for it" in one.notes[0]

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: MIT
+"""Validation: fit figures, start state, and a reference shift followed by its own parameters."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.errors import DamagedChannelError
+from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
+from drivetwin.estimation.result.method import Method
+from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.twin.twin import Twin, TwinElement, TwinGear
+from drivetwin.validation.initial_state import start_state
+from drivetwin.validation.simulate_log import compared, fit_of, validate, validated, with_fit
+from tests.report.sample import identification
+
+REFERENCE = Path(__file__).parents[2] / "shared" / "reference"
+CASE = "dual_clutch_upshift"
+_ROLES = {
+    "T_e_Nm": ("engine_torque", Quantity.TORQUE),
+    "T_o_Nm": ("output_torque", Quantity.TORQUE),
+    "omega_e_rad_s": ("input_speed", Quantity.SPEED),
+    "omega_out_rad_s": ("output_speed", Quantity.SPEED),
+    "omega_w_rad_s": ("wheel_speed", Quantity.SPEED),
+    "P_2_Pa": ("pressure.B2", Quantity.PRESSURE),
+    "P_3_Pa": ("pressure.B3", Quantity.PRESSURE),
+}
+
+
+@pytest.fixture(scope="module")
+def truth() -> dict[str, Any]:
+    path = REFERENCE / f"{CASE}.json"
+    if not path.exists():
+        pytest.skip("the reference cases are not beside the repository")
+    tree = json.loads(path.read_text(encoding="utf-8"))
+    assert isinstance(tree, dict)
+    return tree
+
+
+@pytest.fixture(scope="module")
+def log(truth: dict[str, Any]) -> ShiftLog:
+    path = REFERENCE / f"{CASE}.csv"
+    names = path.read_text(encoding="utf-8").split("\n", 1)[0].split(",")
+    rows = np.loadtxt(path, delimiter=",", skiprows=1, dtype=np.float64)
+    table = dict(zip(names, np.ascontiguousarray(rows.T), strict=True))
+    time = table["time_s"]
+    assert truth["inputs"].startswith("linear")
+    channels = {
+        role: Channel(role, quantity, time, table[name], name, "SI")
+        for name, (role, quantity) in _ROLES.items()
+    }
+    return ShiftLog(channels, path.name, "0" * 64)
+
+
+@pytest.fixture(scope="module")
+def shift(truth: dict[str, Any], log: ShiftLog) -> Shift:
+    inertia, lockup = (event["time"] for event in truth["events"])
+    end = float(log["output_torque"].time[-1])
+    return Shift(
+        start_gear="2",
+        end_gear="3",
+        offgoing="B2",
+        oncoming="B3",
+        kind=ShiftKind.POWER_ON_UP,
+        before=(0.0, 0.25),
+        torque_phase=(0.25, inertia),
+        inertia_phase=(inertia, lockup),
+        after=(lockup, end),
+        lockup_time=lockup,
+    )
+
+
+@pytest.fixture(scope="module")
+def twin(truth: dict[str, Any]) -> Twin:
+    given = truth["driveline"]
+    ratio = truth["clutches"][0]["i_c"] * truth["clutches"][0]["i_out"]
+    values = {
+        "eta": given["eta"],
+        "J_prime_2": given["J1"] * given["eta"] + given["J_out"] / ratio**2,
+        "J_out": given["J_out"],
+        "J_vehicle": given["J_v"],
+        "Tv_over_if": given["T_v_over_i_f"],
+        "k_o": given["k_o"],
+        "c_o": given["c_o"],
+        "te_delay": 0.0,
+    }
+    elements = dict(zip(("B2", "B3"), truth["clutches"], strict=True))
+    return Twin(
+        name="reference",
+        method=Method.INTEGRAL,
+        loss_law="paper",
+        i_in=given["i_in"],
+        final_drive=given["i_f"],
+        gears={
+            gear: TwinGear(elements[name]["i_c"] * elements[name]["i_out"], name)
+            for gear, name in (("2", "B2"), ("3", "B3"))
+        },
+        elements={
+            name: TwinElement("brake", c["i_c"], c["i_out"], c["gain_m3"], c["P0_Pa"], 1.0, 0.0)
+            for name, c in elements.items()
+        },
+        J_prime_range=(1.0, 100.0),
+        J_vehicle_range=(1e3, 1e4),
+        parameters={k: Estimate(k, v, 0.0, Verdict.IDENTIFIED, "given") for k, v in values.items()},
+        friction={name: _curve(clutch) for name, clutch in elements.items()},
+        validity={"slip": (0.0, 200.0), "speed": (0.0, 300.0)},
+        inputs={},
+        settings={},
+        assumptions=(),
+        version="test",
+    )
+
+
+def _curve(clutch: dict[str, float]) -> FrictionCurve:
+    flat: FloatArray = np.array([clutch["mu_c"]])
+    law = Stribeck(*(clutch[key] for key in ("mu_c", "mu_s", "v_s", "mu_v")))
+    return FrictionCurve(np.zeros(1), flat, flat, flat, flat, flat, law, "given")
+
+
+def test_true_parameters_follow_the_reference(twin: Twin, log: ShiftLog, shift: Shift) -> None:
+    result = validate(twin, log, shift)
+    assert result.status == "completed"
+    assert result.warnings == ()
+    for signal, phases in result.fit.items():
+        for phase, fit in phases.items():
+            assert fit.fit_percent > 99.0, (signal, phase)
+    assert result.fit["output_torque"]["all"].rmse < 2.0
+    locked = [event.time for event in result.trajectory.events if event.kind == "lock"]
+    assert locked[-1] == pytest.approx(shift.lockup_time, abs=2e-4)
+
+
+def test_a_wrong_parameter_shows(twin: Twin, log: ShiftLog, shift: Shift) -> None:
+    softer = twin.dual_clutch(shift, overrides={"k_o": 1.6e5})
+    good, bad = validate(twin, log, shift), validate(twin, log, shift, softer)
+    after_good, after_bad = (one.fit["output_torque"]["after"] for one in (good, bad))
+    assert after_bad.fit_percent < after_good.fit_percent - 10.0
+
+
+def test_late_engine_torque_is_moved_back(twin: Twin, log: ShiftLog, shift: Shift) -> None:
+    torque = log["engine_torque"]
+    late = replace(torque, time=torque.time + 0.02)
+    delayed = replace(log, channels={**log.channels, "engine_torque": late})
+    told = dict(twin.parameters)
+    told["te_delay"] = replace(told["te_delay"], value=0.02)
+    result = validate(replace(twin, parameters=told), delayed, shift)
+    assert result.fit["output_torque"]["all"].fit_percent > 99.8
+
+
+def test_leaving_the_validity_range_warns(twin: Twin, log: ShiftLog, shift: Shift) -> None:
+    narrow = replace(twin, validity={"slip": (0.0, 20.0), "speed": (0.0, 300.0)})
+    (warning,) = validate(narrow, log, shift).warnings
+    assert "range of slip" in warning
+
+
+def test_the_slip_of_an_open_element_leaves_no_range(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    run = validate(twin, log, shift).trajectory
+    seen = float(np.abs(run.slip[shift.oncoming]).max())
+    open_speed = 3.0 * seen
+    slip = {name: one.copy() for name, one in run.slip.items()}
+    slip[shift.offgoing][run.clutch_torque[shift.offgoing] == 0.0] = open_speed
+    assert (slip[shift.offgoing] == open_speed).any()
+    covered = replace(twin, validity={"slip": (0.0, seen)})
+    before = validate(covered, log, shift)
+    assert compared(before, covered, log, replace(run, slip=slip)).warnings == ()
+
+
+def test_the_log_behind_a_twin_leaves_no_range_of_it(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    narrow = replace(twin, validity={"slip": (0.0, 20.0)})
+    one = validate(narrow, log, shift)
+    assert one.warnings
+    assert with_fit(identification(), [one]).warnings == identification().warnings
+    failed = replace(one, trajectory=replace(one.trajectory, status="events too dense"))
+    assert "ended early" in with_fit(identification(), [failed]).warnings[-1]
+    speed = one.traces["input_speed"]
+    astray = {**one.traces, "input_speed": replace(speed, simulated=2.0 * speed.simulated)}
+    told = with_fit(identification(), [replace(one, traces=astray)]).warnings
+    shift = one.shift
+    name = f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s"
+    assert told[-1].startswith(f"{name}: the simulated input speed goes from")
+
+
+def test_start_state_keeps_the_gear_and_the_measured_twist(
+    truth: dict[str, Any], twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    model = twin.dual_clutch(shift)
+    state = start_state(model, log, shift, 0.0)
+    initial = truth["initial"]
+    assert state.engine_speed / state.output_speed == pytest.approx(twin.gear("2").ratio)
+    assert state.engine_speed == pytest.approx(initial["omega_e"], abs=5e-3)
+    assert state.wheel_speed == pytest.approx(initial["omega_w"], abs=1e-3)
+    assert state.twist == pytest.approx(initial["twist"], rel=1e-3)
+    without = replace(log, channels={k: c for k, c in log.channels.items() if k != "output_torque"})
+    guessed = start_state(model, without, shift, 0.0)
+    assert guessed.twist == pytest.approx(initial["twist"], rel=0.1)
+
+
+def _until(log: ShiftLog, role: str, end: float) -> ShiftLog:
+    """The log with one channel that stops at `end` [s]."""
+    one = log[role]
+    kept = one.time <= end
+    cut = replace(one, time=one.time[kept], values=one.values[kept])
+    return replace(log, channels={**log.channels, role: cut})
+
+
+def test_a_wheel_speed_that_stopped_before_the_shift_takes_no_part(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    late = replace(shift, before=(0.1, shift.before[1]))
+    without = replace(log, channels={k: c for k, c in log.channels.items() if k != "wheel_speed"})
+    told = validate(twin, _until(log, "wheel_speed", 0.05), late)
+    assert np.array_equal(
+        told.trajectory.shaft_torque, validate(twin, without, late).trajectory.shaft_torque
+    )
+
+
+def test_a_torque_that_stopped_before_the_shift_is_named(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    stopped = _until(log, "output_torque", 0.2)
+    with pytest.raises(DamagedChannelError, match=r"'T_o_Nm' .* 0\.000 s to 0\.200 s"):
+        validate(twin, stopped, shift)
+    told = validated(replace(identification(), shifts=(shift,)), twin, stopped)
+    assert told.fit == {}
+    assert "no validation: 'T_o_Nm'" in told.warnings[-1]
+
+
+def test_fit_percent_is_measured_against_the_mean_of_the_whole_log() -> None:
+    measured = np.array([1.0, 3.0])
+    fit = fit_of(measured, np.array([2.0, 3.0]), mean=0.0)
+    assert fit.rmse == pytest.approx(np.sqrt(0.5))
+    assert fit.fit_percent == pytest.approx(100.0 * (1.0 - 1.0 / np.sqrt(10.0)))
+    assert np.isnan(fit_of(np.empty(0), np.empty(0), 0.0).rmse)
+    assert np.isnan(fit_of(np.ones(3), np.ones(3), 1.0).fit_percent)
+
+
+def test_fits_of_several_shifts_are_pooled(twin: Twin, log: ShiftLog, shift: Shift) -> None:
+    one = validate(twin, log, shift)
+    found = with_fit(identification(), [one, one])
+    pooled = found.fit["output_torque"]["inertia"]
+    assert pooled.rmse == pytest.approx(one.fit["output_torque"]["inertia"].rmse)
+    assert len(found.evidence.validation) == 2
+
+
+def test_incomplete_model_leaves_a_warning_and_no_fit(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    told = {key: one for key, one in twin.parameters.items() if key != "k_o"}
+    found = replace(identification(), shifts=(shift,))
+    incomplete = validated(found, replace(twin, parameters=told), log)
+    assert incomplete.fit == {}
+    assert "no validation" in incomplete.warnings[-1]
+    assert "k_o" in incomplete.warnings[-1]
+    assert validated(found, twin, log).fit["output_torque"]["all"].fit_percent > 99.8

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""A folder with a synthetic log and its card, and a session that has identified it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli.synth import write_run
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.estimation.result.method import Method
+from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.workspace_folder import Folder
+
+LOG, CARD = "bench.csv", "bench.card.toml"
+
+
+@pytest.fixture(scope="session")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with `bench.csv` and its card."""
+    folder = tmp_path_factory.mktemp("workbench")
+    write_run(folder / LOG, run(paper_steps(), seed=1))
+    return folder
+
+
+@pytest.fixture
+def session(place: Path) -> Iterator[Session]:
+    """A session in which nothing is open."""
+    sessions = Sessions(Folder.at(place))
+    yield sessions.get(sessions.new())
+    sessions.close()
+
+
+@pytest.fixture(scope="session")
+def identified(place: Path) -> Iterator[Session]:
+    """A session that has identified the log by the paper's and the linear method."""
+    sessions = Sessions(Folder.at(place))
+    one = sessions.get(sessions.new())
+    one.open(one.in_folder(LOG), one.in_folder(CARD))
+    one.identify([Method.PAPER, Method.INTEGRAL])
+    finish(one)
+    yield one
+    sessions.close()
+
+
+def finish(session: Session) -> None:
+    """Wait for the job of a session."""
+    while session.job is not None:
+        session.poll()
+        time.sleep(0.02)

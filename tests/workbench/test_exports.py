@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""Every export button gives a file that its reader takes."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.errors import InputError
+from drivetwin.estimation.result.method import Method
+from drivetwin.export.parameters.files import ParameterFormat, read_parameters
+from drivetwin.export.targets import Target
+from drivetwin.twin.twin import Twin
+from drivetwin.workbench.exports import Record, produce
+from drivetwin.workbench.identifying import Outcome
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.session_state import Work
+from drivetwin.workbench.views.export import RECORDS, TARGETS
+
+
+@pytest.mark.parametrize("target", [Target(one.value) for one in ParameterFormat])
+def test_parameter_files_are_read_back(identified: Session, tmp_path: Path, target: Target) -> None:
+    product = produce(identified.work, target, tmp_path)
+    path = tmp_path / product.name
+    path.write_bytes(product.content)
+    assert any(entry.name.startswith("k_o") for entry in read_parameters(path).entries)
+
+
+def test_c_sources_come_as_an_archive(identified: Session, tmp_path: Path) -> None:
+    product = produce(identified.work, Target.C, tmp_path)
+    names = zipfile.ZipFile(io.BytesIO(product.content)).namelist()
+    assert {"dt_twin.c", "dt_model.h"} <= set(names)
+    assert produce(identified.work, Target.C, tmp_path) == product
+
+
+@pytest.mark.parametrize(
+    ("target", "says"), [(Target.MODELICA, b"Modelica."), (Target.FMU, b"modelDescription.xml")]
+)
+def test_models_of_the_shift(
+    identified: Session, tmp_path: Path, target: Target, says: bytes
+) -> None:
+    assert says in produce(identified.work, target, tmp_path).content
+
+
+def test_every_form_has_a_button() -> None:
+    assert set(TARGETS) == set(Target)
+    assert set(RECORDS) == set(Record)
+
+
+def test_own_files_are_read_back(identified: Session, tmp_path: Path) -> None:
+    twin = tmp_path / "twin.toml"
+    twin.write_bytes(produce(identified.work, Record.TWIN, tmp_path).content)
+    assert Twin.load(twin).parameters.keys() == identified.work.require_twin().parameters.keys()
+    result = json.loads(produce(identified.work, Record.RESULT, tmp_path).content)
+    assert "k_o" in result["parameters"]
+    mapping = tmp_path / "m.toml"
+    mapping.write_bytes(produce(identified.work, Record.MAPPING, tmp_path).content)
+    survey = identified.work.require_opened().survey
+    assert read_mapping(mapping).channels == dict(survey.mapping)
+
+
+def test_the_report_is_a_page(identified: Session, tmp_path: Path) -> None:
+    page = produce(identified.work, Record.REPORT, tmp_path)
+    assert page.content.startswith(b"<!DOCTYPE html>")
+    assert page.name == "bench.report.html"
+
+
+def test_nothing_to_export_is_told(tmp_path: Path) -> None:
+    for wanted in (*Target, *Record):
+        with pytest.raises(InputError):
+            produce(Work(), wanted, tmp_path)
+
+
+def test_a_twin_from_a_workspace_has_no_report(identified: Session, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    bare = Outcome(Method.INTEGRAL, identified.work.require_twin())
+    work = replace(identified.work, results={Method.INTEGRAL: bare})
+    with pytest.raises(InputError, match="identify again"):
+        produce(work, Record.REPORT, tmp_path)
+    assert produce(work, Record.TWIN, tmp_path).content

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""The server by its requests: bad uploads refused, strangers refused, nothing from outside."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from flask.testing import FlaskClient
+
+from drivetwin.errors import DrivetwinError
+from drivetwin.workbench.server import SESSION_HEADER, build
+from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.uploads import LIMITS
+from drivetwin.workbench.views.page import Start
+from drivetwin.workbench.workspace_folder import Folder
+from tests.workbench.bad_files import TABLE, bad_files
+from tests.workbench.conftest import CARD
+
+BAD = bad_files()
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A server without a socket, its sessions, and one of them."""
+
+    client: FlaskClient
+    sessions: Sessions
+    key: str
+
+    def upload(self, name: str, content: bytes, purpose: str = "log", **more: Any) -> Any:
+        return self.client.post(
+            f"/upload/{purpose}",
+            query_string={"name": name},
+            input_stream=BytesIO(content),
+            headers={SESSION_HEADER: self.key, **more.pop("headers", {})},
+            environ_overrides={"CONTENT_LENGTH": str(more.pop("content_length", len(content)))},
+            base_url=more.pop("base_url", "http://127.0.0.1:8050"),
+        )
+
+    def page(self) -> Any:
+        return self.client.get("/", base_url="http://127.0.0.1:8050")
+
+    @property
+    def session(self) -> Session:
+        return self.sessions.get(self.key)
+
+
+@pytest.fixture(scope="module")
+def bench(place: Path) -> Iterator[Bench]:
+    app, sessions = build(Folder.at(place), Start())
+    yield Bench(app.server.test_client(), sessions, sessions.new())
+    sessions.close()
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_a_bad_upload_is_refused_with_a_message_and_the_server_stays(
+    bench: Bench, kind: str
+) -> None:
+    bad = BAD[kind]
+    answer = bench.upload(bad.name, bad.content)
+    message = answer.json.get("error") or _opened(bench.session, answer.json["key"])
+    assert "->" in message
+    assert bench.page().status_code == 200
+
+
+def _opened(session: Session, key: str) -> str:
+    """What opening an upload is answered with."""
+    try:
+        session.open(session.uploaded(key), session.in_folder(CARD))
+    except DrivetwinError as error:
+        return str(error)
+    opened = session.work.require_opened()
+    assert opened.log is None
+    return opened.fault
+
+
+def test_a_claim_of_two_gigabytes_is_refused_unread(bench: Bench) -> None:
+    answer = bench.upload("log.csv", b"x", content_length=2 * 10**9)
+    assert answer.status_code == 400
+    assert "2000 MB" in answer.json["error"]
+    assert bench.page().status_code == 200
+
+
+def test_each_purpose_has_its_limit(bench: Bench) -> None:
+    answer = bench.upload("card.toml", b"x" * (LIMITS["card"] + 1), "card")
+    assert answer.status_code == 400
+    assert bench.upload("x", b"x", "anything").status_code == 404
+
+
+@pytest.mark.parametrize("key", ["", "x", "../x"])
+def test_an_upload_needs_a_session(bench: Bench, key: str) -> None:
+    answer = bench.upload("log.csv", TABLE, headers={SESSION_HEADER: key})
+    assert answer.status_code == 400
+    assert "session" in answer.json["error"]
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [{"Host": "evil.example"}, {"Origin": "http://evil.example"}, {"Sec-Fetch-Site": "cross-site"},
+     {"Origin": "null"}],
+)  # fmt: skip
+def test_strangers_are_refused(bench: Bench, headers: dict[str, str]) -> None:
+    answer = bench.upload("log.csv", TABLE, headers=headers)
+    assert answer.status_code in (403, 421)
+    assert answer.json["error"]
+
+
+def test_a_request_that_is_no_upload_is_bounded(bench: Bench) -> None:
+    answer = bench.client.post(
+        "/_dash-update-component",
+        data=b"{" + b" " * (5 * 2**20),
+        content_type="application/json",
+        base_url="http://127.0.0.1:8050",
+    )
+    assert answer.status_code == 413
+
+
+def test_the_page_loads_from_here_alone(bench: Bench) -> None:
+    answer = bench.page()
+    assert not re.findall(rb"""(?:src|href)=["'](?:https?:)?//""", answer.data)
+    policy = answer.headers["Content-Security-Policy"]
+    assert "default-src 'self'" in policy
+    assert "unsafe-eval" not in policy
+    assert "'unsafe-inline'" not in policy.split("script-src")[1].split(";")[0]
+
+
+@pytest.mark.parametrize(
+    "path", ["/assets/../server.py", "/assets/%2e%2e/server.py", "/upload/log"]
+)
+def test_files_of_the_program_are_not_served(bench: Bench, path: str) -> None:
+    answer = bench.client.get(path, base_url="http://127.0.0.1:8050")
+    assert b"SPDX" not in answer.data
+
+
+def test_uploads_of_one_session_are_unknown_to_another(bench: Bench) -> None:
+    key = bench.upload("log.csv", TABLE).json["key"]
+    other = bench.sessions.get(bench.sessions.new())
+    assert bench.session.uploaded(key).name == "log.csv"
+    with pytest.raises(DrivetwinError):
+        other.uploaded(key)

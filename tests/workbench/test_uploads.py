@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Uploads: counted while they come in, named by us, left on disk only where they are accepted."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivetwin.errors import RefusedError
+from drivetwin.workbench.uploads import label_of, receive, refuse_formulas
+
+LIMIT = 1000
+TABLE = b"time,n_in\ns,rpm\n0.0,-1.5\n0.1,+2\n0.2,-inf\n0.3,-nan\n"
+
+
+def test_an_upload_stands_whole_under_our_name(tmp_path: Path) -> None:
+    upload = receive(BytesIO(TABLE), "log 1.csv", len(TABLE), tmp_path / "key", LIMIT)
+    assert upload.path.read_bytes() == TABLE
+    assert upload.name == "log 1.csv"
+
+
+@pytest.mark.parametrize(
+    ("content", "claimed", "says"),
+    [(b"", 0, "empty"), (b"x" * 1001, None, "more"), (b"x", 10**10, "10000 MB"),
+     (b"x" * 5, 9, "5 of 9 bytes"), (b"x" * 1001, 3, "more")],
+)  # fmt: skip
+def test_sizes_that_do_not_fit_are_refused(
+    tmp_path: Path, content: bytes, claimed: int | None, says: str
+) -> None:
+    with pytest.raises(RefusedError, match=says):
+        receive(BytesIO(content), "log.csv", claimed, tmp_path / "key", LIMIT)
+    assert not (tmp_path / "key").exists()
+
+
+def test_a_claim_is_refused_before_anything_is_read(tmp_path: Path) -> None:
+    stream = BytesIO(b"x")
+    with pytest.raises(RefusedError):
+        receive(stream, "log.csv", 2 * 10**9, tmp_path / "key", LIMIT)
+    assert stream.tell() == 0
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../log.csv", "..\\log.csv", "/etc/passwd", "C:\\log.csv", ".bashrc", "", "  ", "a\0b.csv",
+     "a\nb.csv", "x" * 201, "\uff0e\uff0e\uff0flog.csv", "log\u202ecsv.exe", "a/b", "con|x"],
+)  # fmt: skip
+def test_names_that_are_paths_are_refused(name: str) -> None:
+    with pytest.raises(RefusedError):
+        label_of(name)
+
+
+@given(st.text())
+def test_an_accepted_name_is_one_part_of_a_path(name: str) -> None:
+    try:
+        label = label_of(name)
+    except RefusedError:
+        return
+    assert Path(label).name == label
+
+
+@pytest.mark.parametrize(
+    "cell",
+    ["=1+1", "=cmd|' /C calc'!A0", "@SUM(A1)", '"=HYPERLINK(1)"', "+cmd|' /C calc'!A0",
+     "-2+3+cmd|' /C calc'!A0", " =A1", "-A1", "'=A1"],
+)  # fmt: skip
+@pytest.mark.parametrize("where", ["{},n\n0,1\n", "time,n\ns,rpm\n0,{}\n", "t;n\n{};1\n"])
+def test_cells_that_a_spreadsheet_computes_are_refused(
+    tmp_path: Path, cell: str, where: str
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(where.format(cell))
+    with pytest.raises(RefusedError, match="formula"):
+        refuse_formulas(path, "log.csv")
+
+
+def test_numbers_and_names_are_no_formulas(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(TABLE + b"# a comment: x = 3\n1e-3,-1,5\n-.5;+.5\n")
+    refuse_formulas(path, "log.csv")
+    path.write_bytes(b"MDF     \0\0=1+1,=2\n")
+    refuse_formulas(path, "a measurement file")
