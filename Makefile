@@ -8,18 +8,28 @@ SHELL := bash
 venv := .venv
 bin := $(venv)/bin
 pip := $(bin)/python -m pip --disable-pip-version-check
+# Cargo profile of the native module: it links fast. The wheel and timed programs use `release`.
+profile := develop
+wheel_profile := release
+# Tests run on all cores. Each worker starts with a contiguous share of them, so that the tests of a
+# file stay together, and takes over from others at the end.
+pytest := $(bin)/pytest -q -n auto --dist worksteal
+# Suites that take long: a marker and a target each. `short` marks one short case of every suite.
+suites := statistical crosscompile fleet faults exhaustive
 rust_sources := Cargo.toml $(wildcard Cargo.lock) $(shell find crates -name '*.rs' -o -name Cargo.toml)
 
 # The binding crate looks for an interpreter when cargo builds it outside maturin.
 export PYO3_PYTHON := $(CURDIR)/$(bin)/python
 export PIP_REQUIRE_VIRTUALENV := 1
+# Compiled tests are kept: pytest rewrites their assertions, which takes as long as the imports.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 
 .PHONY: demo
-demo: $(venv)/.native ## build, identify a synthetic shift with known truth, name the report
+demo: native ## build, identify a synthetic shift with known truth, name the report
 	$(bin)/drivetwin demo -o out/demo
 
 .PHONY: test
@@ -31,14 +41,15 @@ lint-rust: $(venv)/.dev ## rustfmt and clippy
 	cargo clippy --locked --workspace --all-targets -- -D warnings
 
 .PHONY: lint-python
-lint-python: $(venv)/.native ## ruff, mypy --strict, and the native module against its stub
+lint-python: $(venv)/.dev native ## ruff, mypy --strict, and the native module against its stub
 	$(bin)/ruff check
 	$(bin)/ruff format --check
 	$(bin)/mypy
 	$(bin)/stubtest --concise --mypy-config-file pyproject.toml drivetwin._native
 
 .PHONY: tidy
-tidy: $(venv)/.dev ## the project's own rules (sizes, layers, paths named in the documents)
+tidy: $(venv)/.dev ## directions of imports, and the project's own rules (circles, names, sizes, paths)
+	PYTHONPATH=python $(bin)/lint-imports --no-cache --no-logo
 	$(bin)/python -m tools.tidy
 
 .PHONY: test-rust
@@ -46,71 +57,96 @@ test-rust: $(venv)/.dev ## tests of the core
 	cargo test --locked --quiet --package drivetwin-core
 
 .PHONY: test-python
-test-python: $(venv)/.native ## tests of the package
-	$(bin)/pytest -q
+test-python: $(venv)/.dev native ## tests of the package, without the suites that take long
+	$(pytest)
+
+.PHONY: test-short
+test-short: $(venv)/.dev native ## one short case of each suite that takes long
+	tools/browser.sh
+	$(pytest) -m short
+
+.PHONY: $(suites:%=test-%)
+test-statistical: ## coverage of intervals over many noise realisations
+test-crosscompile: ## libraries and FMUs for other platforms
+test-fleet: ## fleets of synthetic logs through the command line
+test-faults: ## killed workers and coordinators, a full disk, a lost scheduler (fault_logs=1000 logs each)
+test-exhaustive: ## many instances, many damaged files
+fault_logs ?= 40
+test-faults: export FLEET_FAULT_LOGS := $(fault_logs)
+$(suites:%=test-%): test-%: $(venv)/.dev native
+	$(pytest) --timeout 1800 -m $*
 
 .PHONY: test-browser
-test-browser: $(venv)/.native ## report and workbench in Chromium; pictures go to out/browser
+test-browser: $(venv)/.dev native ## report and workbench in Chromium; pictures go to out/browser
 	tools/browser.sh
-	$(bin)/pytest -q -m browser tests/browser
+	$(bin)/pytest -q -m browser
+
+.PHONY: nightly
+nightly: ## what takes hours: all suites, a fleet of 300, the wheel, short fuzzing of `identify`
+	$(MAKE) $(suites:%=test-%) fault_logs=1000
+	$(MAKE) fleet fleet_logs=300
+	$(MAKE) test-browser test-wheel docs
 
 .PHONY: wheel
-wheel: $(venv)/.dev ## the abi3 wheel, into dist/
+wheel: $(venv)/.base ## the abi3 wheel, into dist/
 	rm -f dist/drivetwin-*.whl
-	$(bin)/maturin build --quiet --release --locked --out dist
+	$(bin)/maturin build --quiet --profile $(wheel_profile) --locked --out dist
 	ls dist/drivetwin-*.whl
 
 .PHONY: test-wheel
 test-wheel: wheel ## run the demo from the wheel where there is no Rust
 	tools/try_wheel.sh $(bin)/python dist/drivetwin-*.whl
 
+.PHONY: docs
+docs: $(venv)/.dev native ## build the documentation site into out/docs, warnings are errors
+	$(pip) install --quiet --group docs
+	$(bin)/python -m sphinx --quiet --fail-on-warning --keep-going -E -b html docs out/docs
+	cp out/docs/README.html out/docs/index.html
+
 .PHONY: notices
 notices: $(venv)/.dev ## write the licences of the linked crates, after a change of Cargo.lock
 	$(bin)/python -m tools.notices
 
 .PHONY: reference
-reference: $(venv)/.native ## solve the reference problems anew with SciPy
+reference: $(venv)/.dev native ## solve the reference problems anew with SciPy
 	$(bin)/python -m reference
 
 .PHONY: bench
-bench: $(venv)/.native ## measure what has a stated limit
-	for program in benchmarks/*.py; do $(bin)/python "$$program"; done
+bench: $(venv)/.dev ## measure what has a stated limit
+	$(MAKE) native profile=release
+	$(bin)/python -m benchmarks.limits
+	$(bin)/python -m benchmarks.export_step # writes docs/export-cost.md
 	$(bin)/python -m benchmarks.speed # writes docs/benchmarks.md
 
 .PHONY: fuzz
-fuzz: $(venv)/.native ## 20,000 damaged files through each reader, for an hour or two
+fuzz: $(venv)/.dev native ## 20,000 damaged files through each reader, for an hour or two
 	$(bin)/python -m tests.fuzz.run --count 20000
 
 .PHONY: fuzz-identify
-fuzz-identify: $(venv)/.native ## 2,000 harmless and 2,000 damaged logs through `identify` by two methods, for some hours
+fuzz-identify: $(venv)/.dev native ## 2,000 harmless and 2,000 damaged logs through `identify` by two methods, for some hours
 	$(bin)/python -m tests.fuzz.identified --count 2000
 	$(bin)/python -m tests.fuzz.identified --count 2000 --method likelihood
 
 fleet_logs ?= 10000
 .PHONY: fleet
-fleet: $(venv)/.native ## a made fleet of fleet_logs=10000 logs, checked against its truth (an hour or two)
+fleet: $(venv)/.dev native ## a made fleet of fleet_logs=10000 logs, checked against its truth (an hour or two)
 	$(bin)/python -m benchmarks.fleet.acceptance $(fleet_logs) out/fleet
 
-fault_logs ?= 1000
-.PHONY: fleet-faults
-fleet-faults: $(venv)/.native ## killed workers and coordinators, a full disk, a lost scheduler: fault_logs=1000 logs each
-	FLEET_FAULT_LOGS=$(fault_logs) $(bin)/pytest -q --timeout 1800 tests/fleet/test_coordinator_faults.py tests/fleet/test_cluster.py
-
 .PHONY: fleet-scaling
-fleet-scaling: $(venv)/.native ## overhead, memory, two workers against one, Dask against processes
+fleet-scaling: $(venv)/.dev native ## overhead, memory, two workers against one, Dask against processes
 	$(bin)/python -m benchmarks.fleet.scaling
 
 .PHONY: picture
-picture: $(venv)/.native ## draw the pictures of the documents (needs Chromium)
+picture: $(venv)/.dev native ## draw the pictures of the documents (needs Chromium)
 	$(bin)/python -m tools.picture
 
 .PHONY: accuracy
-accuracy: $(venv)/.native ## Monte Carlo of the estimators against the bound, docs/accuracy.md (an hour)
+accuracy: $(venv)/.dev native ## Monte Carlo of the estimators against the bound, docs/accuracy.md (an hour)
 	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.estimation
 
 pairs ?= 40
 .PHONY: several
-several: $(venv)/.native ## pairs=40 of logs fitted together and predicted, over their noise (ten minutes)
+several: $(venv)/.dev native ## pairs=40 of logs fitted together and predicted, over their noise (ten minutes)
 	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.several $(pairs)
 
 .PHONY: fmt
@@ -121,27 +157,31 @@ fmt: $(venv)/.dev ## format Rust and Python sources
 
 .PHONY: clean
 clean: ## remove everything that was built
-	rm -rf $(venv) target dist out python/drivetwin/_native*.so
+	rm -rf $(venv) .pytest_cache target dist out python/drivetwin/_native*.so
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 .PHONY: prerequisites
 prerequisites:
 	@tools/prerequisites.sh > /dev/null
 
-# The environment with the tools; new when pyproject.toml is.
-$(venv)/.dev: pyproject.toml | prerequisites
+# The environment with the build tool; new when pyproject.toml is.
+$(venv)/.base: pyproject.toml | prerequisites
 	"$$(tools/prerequisites.sh)" -m venv $(venv)
 	$(pip) install --quiet --upgrade 'pip>=25.1'
+	$(pip) install --quiet --group build
+	touch $@
+
+# The tools of a developer.
+$(venv)/.dev: $(venv)/.base
 	$(pip) install --quiet --group dev
 	touch $@
 
-# The package, editable, with its native module; new when a Rust source is.
-$(venv)/.native: $(venv)/.dev $(rust_sources)
-	VIRTUAL_ENV=$(CURDIR)/$(venv) $(bin)/maturin develop --quiet --release --locked
+# The package, editable, with its run-time dependencies and its native module; new when a Rust
+# source is. The stamp has the name of the profile, of which one at a time is installed.
+$(venv)/.native-%: $(venv)/.base $(rust_sources)
+	rm -f $(venv)/.native-*
+	VIRTUAL_ENV=$(CURDIR)/$(venv) $(bin)/maturin develop --quiet --profile $* --locked
 	touch $@
 
-.PHONY: docs
-docs: $(venv)/.native ## build the documentation site into out/docs, warnings are errors
-	$(pip) install --quiet --group docs
-	$(bin)/python -m sphinx --quiet --fail-on-warning --keep-going -E -b html docs out/docs
-	cp out/docs/README.html out/docs/index.html
+.PHONY: native
+native: $(venv)/.native-$(profile)

@@ -1,31 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""Time of the exported C beside the core, on this machine and on a Cortex-M4F by instruction count.
+"""Cost of the exported C and of the core: time on this machine, instructions on a Cortex-M4F.
 
-`python benchmarks/export_step.py` runs the upshift of `reference/dual_clutch_upshift` and writes
-`docs/export-cost.md`. Without the ARM compiler and emulator it says so in place of those rows.
+`python -m benchmarks.export_step` runs the upshift of `reference/dual_clutch_upshift` and writes
+`docs/export-cost.md`. Without the ARM compiler and emulator a note replaces those rows.
 """
 
 from __future__ import annotations
 
 import shutil
 import subprocess
-import sys
 import tempfile
-import time
-from collections.abc import Callable
+import timeit
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from drivetwin.driveline import Accuracy, Signal, simulate
+from drivetwin.export.c.write import write_c
+from drivetwin.export.compiler import native_compiler
+from tests.export.cases import CASES, Case
+
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from drivetwin.driveline import Accuracy, Signal, simulate  # noqa: E402
-from drivetwin.export.c.write import write_c  # noqa: E402
-from drivetwin.export.compiler import native_compiler  # noqa: E402
-from tests.export.cases import CASES, Case  # noqa: E402
-
 HERE = Path(__file__).resolve().parent / "export"
 PAGE = ROOT / "docs" / "export-cost.md"
 STEPS = (1, 10)
@@ -52,13 +48,13 @@ class Cost:
     largest: float
 
 
-def costs(output: str) -> dict[str, Cost]:
-    """What `time_steps.c` printed, by name."""
+def read_costs(output: str) -> dict[str, Cost]:
+    """Parse the output of `time_steps.c`, by name."""
     rows = (line.split() for line in output.splitlines())
     return {name: Cost(float(mean), float(most)) for name, mean, most in rows}
 
 
-def program(folder: Path, case: Case, step: int, compiler: tuple[str, ...]) -> Path:
+def build_program(folder: Path, case: Case, step: int, compiler: tuple[str, ...]) -> Path:
     """Build `time_steps.c` with the model of a case and every `step`-th of its inputs."""
     sources = [p for p in write_c(case.subject, folder) if p.suffix == ".c"]
     rows = case.inputs[::step].tolist()
@@ -78,32 +74,32 @@ def program(folder: Path, case: Case, step: int, compiler: tuple[str, ...]) -> P
     return target
 
 
-def on_this_machine(case: Case, step: int, defines: tuple[str, ...]) -> dict[str, Cost]:
-    """Smallest means of several runs [ns]."""
+def measure_here(case: Case, step: int, defines: tuple[str, ...]) -> dict[str, Cost]:
+    """Return the smallest means of several runs [ns]."""
     with tempfile.TemporaryDirectory() as folder:
-        path = program(Path(folder), case, step, (*native_compiler(), *defines))
+        path = build_program(Path(folder), case, step, (*native_compiler(), *defines))
         runs = [
-            costs(subprocess.run([path], capture_output=True, text=True, check=True).stdout)
+            read_costs(subprocess.run([path], capture_output=True, text=True, check=True).stdout)
             for _ in range(REPEATS)
         ]
     return {name: min((run[name] for run in runs), key=lambda cost: cost.mean) for name in runs[0]}
 
 
-def on_cortex_m(case: Case, step: int, defines: tuple[str, ...]) -> dict[str, Cost] | None:
-    """Instructions; None without the tools."""
+def count_on_cortex_m(case: Case, step: int, defines: tuple[str, ...]) -> dict[str, Cost] | None:
+    """Count instructions; None without the tools."""
     if not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")):
         return None
     with tempfile.TemporaryDirectory() as folder:
         compiler = ("arm-none-eabi-gcc", *_CORTEX_M, *defines)
-        path = program(Path(folder), case, step, compiler)
+        path = build_program(Path(folder), case, step, compiler)
         done = subprocess.run(
             [*_EMULATOR, str(path)], capture_output=True, text=True, check=True, timeout=120
         )
-    return costs(done.stdout)
+    return read_costs(done.stdout)
 
 
-def of_core(case: Case, step: int, accuracy: Accuracy) -> float:
-    """Time of the core per step [ns], the call from Python included."""
+def measure_core(case: Case, step: int, accuracy: Accuracy) -> float:
+    """Return the time of the core per step [ns], with the call from Python."""
     time_grid, inputs = case.time[::step], case.inputs[::step]
     torque, off, on = (Signal(time_grid, np.ascontiguousarray(column)) for column in inputs.T)
     subject = case.subject
@@ -112,44 +108,34 @@ def of_core(case: Case, step: int, accuracy: Accuracy) -> float:
         pressures = {"B2": off, "B3": on}
         simulate(subject.model, torque, pressures, subject.start, time_grid, accuracy=accuracy)
 
-    return 1e9 * fastest(run) / (len(time_grid) - 1)
+    return 1e9 * min(timeit.repeat(run, number=1, repeat=5 * REPEATS)) / (len(time_grid) - 1)
 
 
-def fastest(run: Callable[[], None]) -> float:
-    """Smallest wall time of several runs [s]."""
-    times = []
-    for _ in range(5 * REPEATS):
-        start = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
-
-def page(case: Case) -> str:
-    """The document."""
+def format_page(case: Case) -> str:
+    """Measure everything and return the document."""
     host, arm = [], []
     for step in STEPS:
         for name, accuracy in (("exact", Accuracy(exact=True)), ("default", Accuracy())):
-            spent = of_core(case, step, accuracy)
+            spent = measure_core(case, step, accuracy)
             host.append(f"| {step} ms | core, {name} | {spent / 1e3:.2f} µs | |")
         for real, defines in (("double", ()), ("float", ("-DDT_FLOAT",))):
-            told = on_this_machine(case, step, defines)
+            told = measure_here(case, step, defines)
             for name, label in (("step", "model"), ("observer", "observer")):
                 cost = told[name]
                 host.append(
                     f"| {step} ms | C {label}, {real} | {cost.mean / 1e3:.2f} µs "
                     f"| {cost.largest / 1e3:.1f} µs |"
                 )
-        counted = on_cortex_m(case, step, ("-DDT_FLOAT",))
+        counted = count_on_cortex_m(case, step, ("-DDT_FLOAT",))
         for name, label in (("step", "model"), ("observer", "observer")):
             if counted is not None:
-                arm.append(_arm_row(step, label, counted[name]))
+                arm.append(_format_arm(step, label, counted[name]))
     if not arm:
         arm = ["| | not measured: arm-none-eabi-gcc or qemu-system-arm is missing | | | |"]
     return _TEXT.format(host="\n".join(host), arm="\n".join(arm))
 
 
-def _arm_row(step: int, label: str, cost: Cost) -> str:
+def _format_arm(step: int, label: str, cost: Cost) -> str:
     seconds = cost.largest * CYCLES_PER_INSTRUCTION / CLOCK
     return (
         f"| {step} ms | {label} | {cost.mean:,.0f} | {cost.largest:,.0f} "
@@ -187,7 +173,7 @@ What no input can exceed is stated in `dt_model.h`.
 
 def main() -> None:
     """Measure and write the page."""
-    text = page(CASES["dual_clutch_upshift"]())
+    text = format_page(CASES["dual_clutch_upshift"]())
     PAGE.write_text(text, encoding="utf-8")
     print(text)
 

@@ -34,7 +34,7 @@ Row = tuple[float, float, float]
 
 
 def measure(rounds: int) -> dict[tuple[str, str, str], list[Row]]:
-    """Rows of every round by case, torque and phase."""
+    """Measure every round; return the rows by case, torque and phase."""
     found: dict[tuple[str, str, str], list[Row]] = {}
     for seed in range(rounds):
         with tempfile.TemporaryDirectory() as folder:

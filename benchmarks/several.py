@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""`python -m benchmarks.several [COUNT]`: what two logs tell together, over many noises.
+"""Joint fits of two logs over many noise realisations: `python -m benchmarks.several [COUNT]`.
 
 Two logs of the paper's vehicle, the second at 85 % of the engine torque and with 13 % less load,
-are fitted as one; a third, like the first, is predicted. Told are, over all realisations: how
+are fitted as one; a third, like the first, is predicted. Printed are, over all realisations: how
 much narrower the common interval is than that of the first log alone, how often it holds the
 truth, how often the test of the logs against each other fires though they are of one vehicle, and
 how often a right prediction is called worse than noise.
@@ -51,37 +51,37 @@ class Outcomes:
     prediction: Outcome
 
 
-def lower() -> Scenario:
-    """The paper's vehicle at less torque and load."""
+def make_lower_load() -> Scenario:
+    """Return the paper's vehicle at less torque and load."""
     base = paper_steps()
     torque = Program(tuple((time, LEVEL * value) for time, value in base.engine_torque.knots))
     load = RoadLoad(constant=LOAD * base.model.i_f)
     return replace(base, engine_torque=torque, model=replace(base.model, load=load))
 
 
-def realised(seed: int) -> Outcomes:
+def measure_pair(seed: int) -> Outcomes:
     """Make three logs, fit two, predict the third. Jo′ of the card is drawn from its prior."""
     with tempfile.TemporaryDirectory() as folder:
-        made = [paper_steps(), lower(), paper_steps()]
+        made = [paper_steps(), make_lower_load(), paper_steps()]
         files = [
             write_run(Path(folder) / f"log{k}.csv", run(one, seed=3 * seed + k))
             for k, one in enumerate(made)
         ]
-        card = _known(drivetwin.load_card(files[0][1]), made[0], seed)
+        card = _draw_card(drivetwin.load_card(files[0][1]), made[0], seed)
         logs = [drivetwin.read_log(file, card) for file, _, _ in files]
     sources = [Source(log, usable_shifts(log, card)) for log in logs]
     sources[2] = replace(sources[2], held=frozenset({1}))
-    return _outcomes(identify_together(sources, card), _truth(made[0]))
+    return _compare_pair(identify_together(sources, card), _find_truth(made[0]))
 
 
-def _known(card: VehicleCard, made: Scenario, seed: int) -> VehicleCard:
-    """The card with a design value of Jo′ that errs as its standard deviation says."""
+def _draw_card(card: VehicleCard, made: Scenario, seed: int) -> VehicleCard:
+    """Draw a card whose design value of Jo′ errs by its standard deviation."""
     std = J_OUT_SPREAD * made.model.J_out
     value = made.model.J_out + std * float(np.random.default_rng(seed).standard_normal())
     return replace(card, J_out=PriorValue(value, std))
 
 
-def _truth(made: Scenario) -> dict[str, float]:
+def _find_truth(made: Scenario) -> dict[str, float]:
     model = made.model
     load = model.load.constant / model.i_f
     shared = {"eta": model.eta, "J_out": model.J_out, "J_vehicle": model.J_v}
@@ -89,7 +89,7 @@ def _truth(made: Scenario) -> dict[str, float]:
     return {**shared, "Tv_over_if.1": load, "Tv_over_if.2": LOAD, "te_delay.1": 0.010}
 
 
-def _outcomes(made: Together, truth: dict[str, float]) -> Outcomes:
+def _compare_pair(made: Together, truth: dict[str, float]) -> Outcomes:
     found: Identification = made.found
     several, held = found.evidence.several, found.evidence.held_out
     assert several is not None
@@ -105,7 +105,7 @@ def _outcomes(made: Together, truth: dict[str, float]) -> Outcomes:
     return Outcomes(z, narrower, several.consistency.p, held[0].outcome)
 
 
-def _rows(found: list[Outcomes]) -> Iterator[str]:
+def _format_rows(found: list[Outcomes]) -> Iterator[str]:
     yield "| parameter | σ together / σ alone | mean z | rms z | in 95 % |"
     yield "|---|---|---|---|---|"
     for name in found[0].z:
@@ -127,9 +127,9 @@ def main() -> int:
     parser.add_argument("count", type=int, nargs="?", default=COUNT, help="pairs of logs")
     found = []
     for seed in range(parser.parse_args().count):
-        found.append(realised(seed))
+        found.append(measure_pair(seed))
         print(f"{seed + 1} done", file=sys.stderr, flush=True)
-    print("\n".join(_rows(found)))
+    print("\n".join(_format_rows(found)))
     return 0
 
 

@@ -126,7 +126,7 @@ def test_values_that_change_what_holds_leave_the_outputs_their_names(nominal: fl
         np.testing.assert_array_equal(batch.values[i], columns)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.permutations(range(11)), st.integers(1, 3), st.integers(1, 11))
 def test_order_threads_and_company_do_not_matter(
     order: list[int], threads: int, count: int
@@ -170,7 +170,7 @@ def jumping(of: Scenario, at: float) -> Scenario:
     return dataclasses.replace(of, pressures=pressures)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     spread=st.sampled_from([0.02, 0.2, 1.0]),

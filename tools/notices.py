@@ -41,10 +41,10 @@ class Crate:
         return f"{self.name} {self.version}"
 
 
-def linked() -> tuple[Crate, ...]:
-    """The crates that a build for any platform links, by name.
+def find_crates() -> tuple[Crate, ...]:
+    """Return the crates that a build for any platform links, by name.
 
-    Raises subprocess.CalledProcessError where cargo cannot resolve them.
+    Raises subprocess.CalledProcessError if cargo cannot resolve them.
     """
     command = ["cargo", "metadata", "--locked", "--format-version", "1"]
     metadata = json.loads(
@@ -56,33 +56,33 @@ def linked() -> tuple[Crate, ...]:
     waiting = [id for id, package in packages.items() if package["name"] == MODULE]
     while waiting:
         id = waiting.pop()
-        if id in found or _runs_in_the_compiler(packages[id]):
+        if id in found or _is_procedural_macro(packages[id]):
             continue
         found.add(id)
         waiting += [each["pkg"] for each in nodes[id]["deps"] if _is_linked(each)]
     foreign = (packages[id] for id in found if packages[id]["source"] is not None)
-    return tuple(sorted(map(_crate, foreign), key=str))
+    return tuple(sorted(map(_read_crate, foreign), key=str))
 
 
-def _runs_in_the_compiler(package: dict[str, Any]) -> bool:
+def _is_procedural_macro(package: dict[str, Any]) -> bool:
     return any("proc-macro" in target["kind"] for target in package["targets"])
 
 
 def _is_linked(dependency: dict[str, Any]) -> bool:
-    """Whether it is more than a dependency of build script or tests."""
+    """Return whether a dependency is linked: not one of build scripts or tests only."""
     return any(kind["kind"] is None for kind in dependency["dep_kinds"])
 
 
-def _crate(package: dict[str, Any]) -> Crate:
-    texts = tuple(_texts(Path(package["manifest_path"]).parent))
+def _read_crate(package: dict[str, Any]) -> Crate:
+    texts = tuple(_read_texts(Path(package["manifest_path"]).parent))
     if not texts:
         by = ", ".join(package["authors"]) or package["repository"]
         texts = (_WITHOUT_TEXT.format(licence=package["license"], authors=by),)
     return Crate(package["name"], package["version"], texts)
 
 
-def _texts(folder: Path) -> Iterator[str]:
-    """The MIT licence of a crate, or all that it has, and those of the C sources it brings."""
+def _read_texts(folder: Path) -> Iterator[str]:
+    """Yield the MIT licence of a crate, or else all licences, and those of its C sources."""
     own = sorted(path for path in folder.iterdir() if path.name.upper().startswith(_NAMES))
     mit = [path for path in own if "MIT" in path.name.upper()]
     for path in (*(mit or own), *sorted(folder.glob("c_src/**/LICENSE"))):
@@ -90,8 +90,8 @@ def _texts(folder: Path) -> Iterator[str]:
         yield "\n".join(line.rstrip() for line in lines)
 
 
-def notices(crates: tuple[Crate, ...]) -> str:
-    """The notices as text: each licence once, below the crates that it belongs to."""
+def format_notices(crates: tuple[Crate, ...]) -> str:
+    """Return the notices as text: each licence once, below the crates that it belongs to."""
     owners: dict[tuple[str, ...], list[str]] = {}
     for crate in crates:
         owners.setdefault(tuple(dict.fromkeys(crate.texts)), []).append(str(crate))
@@ -103,7 +103,7 @@ def notices(crates: tuple[Crate, ...]) -> str:
 
 def main() -> int:
     """Write the file."""
-    NOTICES.write_text(notices(linked()), encoding="utf-8", newline="\n")
+    NOTICES.write_text(format_notices(find_crates()), encoding="utf-8", newline="\n")
     return 0
 
 

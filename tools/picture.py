@@ -27,25 +27,20 @@ PICTURES = Path(__file__).resolve().parents[1] / "docs" / "img"
 WIDTH, HEIGHT = 1000, 960
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 OPTIONS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--hide-scrollbars",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--virtual-time-budget=20000",
+    *("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run"),
+    *("--disable-background-networking", "--virtual-time-budget=20000"),
     f"--window-size={WIDTH},{HEIGHT}",
 )
 
 
-def identified(folder: Path) -> Outcome:
-    """Make the demo's log in `folder` and identify it."""
+def identify_demo(folder: Path) -> Outcome:
+    """Write the log of the demo into `folder` and identify it."""
     log, card, _ = write_run(folder / "shift.csv", run_dyno(paper_steps(), seed=0))
     return run(log, card, None, DEFAULT_METHOD)
 
 
-def figure_page(outcome: Outcome, folder: Path) -> Path:
-    """A page of the validation figure alone."""
+def write_figure(outcome: Outcome, folder: Path) -> Path:
+    """Write a page with the validation figure alone."""
     (validation,) = outcome.found.evidence.validation
     figure = validation_figure(validation)
     figure.update_layout(width=WIDTH, height=HEIGHT, paper_bgcolor="white", margin={"t": 30})
@@ -56,15 +51,15 @@ def figure_page(outcome: Outcome, folder: Path) -> Path:
     return path
 
 
-def report_page(outcome: Outcome, folder: Path) -> Path:
-    """The report itself."""
+def write_report(outcome: Outcome, folder: Path) -> Path:
+    """Write the report."""
     path = folder / "report.html"
     save_report(path, outcome.found, outcome.log)
     return path
 
 
 def main() -> int:
-    """Write the pictures; 1 where no browser is found."""
+    """Write the pictures; return 1 if no browser is found."""
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         print(f"no browser found: install one of {', '.join(BROWSERS)}", file=sys.stderr)
@@ -72,14 +67,14 @@ def main() -> int:
     PICTURES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        outcome = identified(folder)
-        for picture, page in (("validation.png", figure_page), ("report.png", report_page)):
-            shoot(browser, page(outcome, folder), PICTURES / picture)
+        outcome = identify_demo(folder)
+        for picture, page in (("validation.png", write_figure), ("report.png", write_report)):
+            draw_page(browser, page(outcome, folder), PICTURES / picture)
     return 0
 
 
-def shoot(browser: str, page: Path, picture: Path) -> None:
-    """Write what the browser shows of a page. Raises CalledProcessError where it fails."""
+def draw_page(browser: str, page: Path, picture: Path) -> None:
+    """Save a picture of a page in the browser. Raises CalledProcessError if that fails."""
     profile = f"--user-data-dir={page.parent / 'profile'}"
     command = [browser, *OPTIONS, profile, f"--screenshot={picture}", page.as_uri()]
     subprocess.run(command, check=True, capture_output=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`python -m benchmarks.estimation`: run the studies, each with its section of docs/accuracy.md."""
+"""Accuracy studies, each with a section of docs/accuracy.md: `python -m benchmarks.estimation`."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-from benchmarks.estimation.bench import Knowledge
-from benchmarks.estimation.mismatch import FAULTS, shift_of
+from benchmarks.estimation.mismatch import FAULTS, measure_shift
 from benchmarks.estimation.report import (
-    faults_section,
-    starts_section,
-    study_section,
-    unseen_section,
-    updated,
+    format_faults,
+    format_starts,
+    format_study,
+    format_unseen,
+    update_page,
 )
 from benchmarks.estimation.starts import count_outcomes
 from benchmarks.estimation.study import run_study
@@ -23,6 +22,7 @@ from benchmarks.estimation.unseen import identify_unseen
 from drivetwin.atomic import write_text
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
+from tests.support.bench import Knowledge
 
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
 COUNT, TRIES, FAULTY, VEHICLES = 200, 200, 20, 100
@@ -62,31 +62,31 @@ def main() -> int:
     for place, (name, know, text) in enumerate(CASES):
         if str(place + 1) in asked.only:
             seeds = range(place * APART, place * APART + asked.count)
-            _write(study_section(run_study(SCENARIOS[name](), know, seeds), text))
+            _write(format_study(run_study(SCENARIOS[name](), know, seeds), text))
     if STARTS in asked.only:
-        _write(starts_section(count_outcomes(asked.tries)))
+        _write(format_starts(count_outcomes(asked.tries)))
     if UNSEEN in asked.only:
-        _write(unseen_section(identify_unseen(range(asked.vehicles))))
+        _write(format_unseen(identify_unseen(range(asked.vehicles))))
     if FAULTS_TOO in asked.only:
-        shifts = [shift_of(fault, asked.faulty) for fault in FAULTS]
-        _write(faults_section(shifts, asked.faulty))
+        shifts = [measure_shift(fault, asked.faulty) for fault in FAULTS]
+        _write(format_faults(shifts, asked.faulty))
     return 0
 
 
 def _write(section: str) -> None:
-    """Bring the page up to date; the section says from what code it is."""
+    """Write a section into the page, with the commit of the code."""
     before = PAGE.read_text(encoding="utf-8")
-    write_text(PAGE, updated(before, f"{section}\nCode of commit {_commit()}.\n"))
+    write_text(PAGE, update_page(before, f"{section}\nCode of commit {_read_commit()}.\n"))
     print(f"{section.partition(chr(10))[0]}: written", flush=True)
 
 
-def _commit() -> str:
-    """The commit that runs, and whether its code was changed."""
-    changed = _git("status", "--porcelain", "--", "python", "crates", "benchmarks")
-    return _git("rev-parse", "--short=10", "HEAD") + (", changed" if changed else "")
+def _read_commit() -> str:
+    """Return the running commit, and whether its code was changed."""
+    changed = _run_git("status", "--porcelain", "--", "python", "crates", "benchmarks")
+    return _run_git("rev-parse", "--short=10", "HEAD") + (", changed" if changed else "")
 
 
-def _git(*words: str) -> str:
+def _run_git(*words: str) -> str:
     found = subprocess.run(
         ["git", *words], cwd=PAGE.parents[1], check=True, capture_output=True, text=True
     )

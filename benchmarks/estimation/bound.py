@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench
 from drivetwin.driveline import Signal
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import IndexArray
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import FloatArray
+from tests.support.bench import Bench
 
 STEPS = {"engine torque": 1.0}
 """Disturbance of one engine torque sample [N m]."""
@@ -30,14 +30,14 @@ BLOCK = 50
 """So many samples are tried together first: those of an element held fast do nothing."""
 
 
-def sensor_std(bench: Bench, role: str) -> float:
-    """White noise of a sensor with its rounding, as the scenario states it."""
+def compute_noise(bench: Bench, role: str) -> float:
+    """Return the noise of a sensor with its rounding, one standard deviation, from the scenario."""
     sensor = next(s for s in bench.run.scenario.sensors if s.role == role)
     return float(np.hypot(sensor.noise, sensor.resolution / np.sqrt(12.0)))
 
 
-def bound(bench: Bench, part: Part, truth: Point, prior: Prior) -> FloatArray:
-    """Least covariance (p, p) of the unknowns; `bench` and `part` are those without noise."""
+def compute_bound(bench: Bench, part: Part, truth: Point, prior: Prior) -> FloatArray:
+    """Compute the least covariance (p, p) of the unknowns; `bench` and `part` have no noise."""
     found = part.linearised(truth)
     assert found is not None
     slopes = found[1]
@@ -45,11 +45,11 @@ def bound(bench: Bench, part: Part, truth: Point, prior: Prior) -> FloatArray:
     names = {"engine_speed": "input_speed"}
     sigma = np.concatenate(
         [
-            np.full(out.values.size, sensor_std(bench, names.get(out.name, out.name)))
+            np.full(out.values.size, compute_noise(bench, names.get(out.name, out.name)))
             for out in outputs
         ]
     )
-    G = input_response(bench, part, truth) / sigma[:, None]
+    G = compute_response(bench, part, truth) / sigma[:, None]
     slopes = slopes / sigma[:, None]
     inner = np.eye(G.shape[1]) + G.T @ G
     through = G.T @ slopes
@@ -60,45 +60,48 @@ def bound(bench: Bench, part: Part, truth: Point, prior: Prior) -> FloatArray:
     return np.asarray(inverse / np.outer(scale, scale))
 
 
-def input_response(bench: Bench, part: Part, truth: Point) -> FloatArray:
-    """G·Q^½ (n, m): change of the outputs by one sigma of each input sample that acts."""
+def compute_response(bench: Bench, part: Part, truth: Point) -> FloatArray:
+    """Compute G·Q^½ (n, m): change of the outputs by one sigma of each input sample that acts."""
     base = part.run(truth)
     assert base is not None
     start = part.record.stacked(base)
     columns = []
-    for name, signal in _inputs(part).items():
+    for name, signal in _collect_inputs(part).items():
         role = "engine_torque" if name == "engine torque" else f"pressure.{name}"
-        std = sensor_std(bench, role)
-        acting = np.array([k for k, t in enumerate(signal.time) if _may_act(part, name, float(t))])
+        std = compute_noise(bench, role)
+        acting = np.array([k for k, t in enumerate(signal.time) if _can_act(part, name, float(t))])
         for first in range(0, acting.size, BLOCK):
             block = acting[first : first + BLOCK]
-            if _loud(std * _change(part, truth, start, name, block)):
-                found = [std * _change(part, truth, start, name, one) for one in block[:, None]]
-                columns += [one for one in found if _loud(one)]
+            if _is_seen(std * _compute_change(part, truth, start, name, block)):
+                found = [
+                    std * _compute_change(part, truth, start, name, one) for one in block[:, None]
+                ]
+                columns += [one for one in found if _is_seen(one)]
     return np.column_stack(columns)
 
 
-def _loud(change: FloatArray) -> bool:
+def _is_seen(change: FloatArray) -> bool:
     return bool(np.max(np.abs(change)) > SILENT)
 
 
-def _change(
+def _compute_change(
     part: Part, truth: Point, start: FloatArray, name: str, samples: IndexArray
 ) -> FloatArray:
-    """Change of the outputs (n,), which are `start` at the truth, per unit of samples of an input
-    that are all disturbed alike."""
+    """Compute the change of the outputs (n,) from `start`, which they are at the truth, per unit of
+    a common disturbance of samples of an input.
+    """
     step = STEPS.get(name, PRESSURE_STEP)
-    run = _disturbed(part, name, samples, step).run(truth)
+    run = _disturb(part, name, samples, step).run(truth)
     assert run is not None
     return (part.record.stacked(run) - start) / step
 
 
-def _inputs(part: Part) -> dict[str, Signal]:
+def _collect_inputs(part: Part) -> dict[str, Signal]:
     return {"engine torque": part.record.engine_torque} | dict(part.record.pressures)
 
 
-def _may_act(part: Part, name: str, stamp: float) -> bool:
-    """Whether a sample can act: pressures do so only where the element is not held fast."""
+def _can_act(part: Part, name: str, stamp: float) -> bool:
+    """Return whether a sample can act: a pressure does not while its element is fully engaged."""
     time = part.record.time
     if name == "engine torque":
         return bool(time[0] - 0.1 < stamp < time[-1] + 0.1)
@@ -108,9 +111,9 @@ def _may_act(part: Part, name: str, stamp: float) -> bool:
     return bool(time[0] < stamp < time[-1]) and value > low
 
 
-def _disturbed(part: Part, name: str, samples: IndexArray, step: float) -> Part:
+def _disturb(part: Part, name: str, samples: IndexArray, step: float) -> Part:
     record = part.record
-    signal = _inputs(part)[name]
+    signal = _collect_inputs(part)[name]
     values = signal.values.copy()
     values[samples] += step
     changed = Signal(signal.time, values)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What faults that nobody states do to the fit: shift of the mean against the same seeds without.
+"""Effect of unstated faults on the fit: shift of the mean against the same seeds without a fault.
 
-The fit is told nothing of the fault. Its chi2 hardly moves; that is the point of the table.
+The card does not state the fault, and chi2 hardly changes; that is the point of the table.
 """
 
 from __future__ import annotations
@@ -13,14 +13,13 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
-from benchmarks.estimation.study import START_INERTIA, best_fit, told
+from benchmarks.estimation.study import START_INERTIA, fit_likelihood, read_fit
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenarios import gearbox, throttle_steps
-from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.integral import identify_shift
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
+from tests.support.bench import Bench, Knowledge, record_bench
 
 SHOWN = ("eta", "J_prime_2", "J_out", "Tv_over_if", "J_vehicle", "k_o", "c_o", "mu at 30 rad/s")
 KNOW = Knowledge(J_out=0.1)
@@ -42,19 +41,16 @@ class Fault:
 
 @dataclass(frozen=True)
 class Shift:
-    """Mean shift by parameter [%], of the delay [ms], and chi2 without and with the fault.
-
-    `percent` is None where the fit with the fault finds no plausible minimum and says so.
-    """
+    """Mean shift by parameter [%], of the delay [ms], and chi2 without and with the fault."""
 
     fault: Fault
-    percent: dict[str, float] | None
+    percent: dict[str, float]
     delay: float
     chi2: tuple[float, float]
 
 
-def late_torque() -> Scenario:
-    """`throttle_steps` with an engine torque that is 15 ms old."""
+def delay_torque() -> Scenario:
+    """Return `throttle_steps` with an engine torque that is 15 ms old."""
     base = throttle_steps()
     sensors = [replace(s, delay=0.015) if s.role == "engine_torque" else s for s in base.sensors]
     return replace(base, sensors=tuple(sensors))
@@ -68,19 +64,15 @@ FAULTS = (
     Fault("drums of 0.05 kg m²", DRUMLESS, partial(gearbox, 0.05)),
     Fault("drums of 0.2 kg m²", DRUMLESS, partial(gearbox, 0.2)),
     Fault("pressure of B3 +20 kPa", throttle_steps, throttle_steps, PRESSURE),
-    Fault("engine torque 15 ms late", throttle_steps, late_torque),
+    Fault("engine torque 15 ms late", throttle_steps, delay_torque),
     Fault("engine torque +3 %", throttle_steps, throttle_steps, ENGINE_TORQUE),
     Fault("output torque +1 %", throttle_steps, throttle_steps, OUTPUT_TORQUE),
 )
 
 
-def shift_of(fault: Fault, count: int) -> Shift:
-    """The shift over `count` noise realisations."""
-    sound = _runs(fault.sound, count)
-    try:
-        faulty = _runs(fault.faulty, count, fault.disturb)
-    except IdentificationError:
-        return Shift(fault, None, 0.0, (sound[0]["chi2"], 0.0))
+def measure_shift(fault: Fault, count: int) -> Shift:
+    """Compute the shift over `count` noise realisations."""
+    sound, faulty = _fit_all(fault.sound, count), _fit_all(fault.faulty, count, fault.disturb)
     means = [
         {n: float(np.mean([one[n] for one in runs])) for n in runs[0]} for runs in (sound, faulty)
     ]
@@ -90,23 +82,23 @@ def shift_of(fault: Fault, count: int) -> Shift:
 
 
 @cache
-def _runs(
+def _fit_all(
     made: Callable[[], Scenario], count: int, disturb: tuple[str, SensorTolerance] = UNDISTURBED
 ) -> list[dict[str, float]]:
-    """What is told of `count` realisations; several faults are compared with the same ones."""
+    """Fit `count` realisations; several faults are compared with the same ones."""
     with ProcessPoolExecutor() as pool:
-        return list(pool.map(partial(_one, made, disturb), range(count)))
+        return list(pool.map(partial(_fit_one, made, disturb), range(count)))
 
 
-def _one(
+def _fit_one(
     made: Callable[[], Scenario], disturb: tuple[str, SensorTolerance], seed: int
 ) -> dict[str, float]:
-    bench = _drumless(realise(made(), seed, KNOW))
-    return _told(replace(bench, signals=disturbed(bench.signals, *disturb)))
+    bench = _remove_drums(record_bench(made(), seed, KNOW))
+    return _fit(replace(bench, signals=disturbed(bench.signals, *disturb)))
 
 
-def _drumless(bench: Bench) -> Bench:
-    """The bench with a card that knows of no drums."""
+def _remove_drums(bench: Bench) -> Bench:
+    """Return the bench with a card without drums."""
     driveline = bench.driveline
     bare = {n: replace(c, drum=PriorValue(0.0)) for n, c in driveline.couplings.items()}
     changed = replace(
@@ -118,6 +110,6 @@ def _drumless(bench: Bench) -> Bench:
     return replace(bench, driveline=changed)
 
 
-def _told(bench: Bench) -> dict[str, float]:
-    fit = best_fit(bench, identify_shift(bench.signals, bench.driveline, START_INERTIA))
-    return {**{n: value for n, (value, _) in told(fit, bench).items()}, "chi2": fit.chi2}
+def _fit(bench: Bench) -> dict[str, float]:
+    fit = fit_likelihood(bench, identify_shift(bench.signals, bench.driveline, START_INERTIA))
+    return {**{n: value for n, (value, _) in read_fit(fit, bench).items()}, "chi2": fit.chi2}

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.estimation.mismatch import SHOWN, Shift
 from benchmarks.estimation.starts import OFF, Outcome
 from benchmarks.estimation.study import Sample, Study
-from benchmarks.estimation.unseen import HALF, Told, by_parameter
+from benchmarks.estimation.unseen import HALF, Log, collect
 from drivetwin.identify.signals import FloatArray
 
 HEAD = """# Accuracy of the estimators
@@ -62,8 +62,16 @@ the engine torque in ms. `chi2` is Q per sample without and with the fault: it d
 """
 
 
-def updated(page: str, section: str) -> str:
-    """The `page` with `section` in place of the one of the same heading, else at its end."""
+def _format_row(*cells: str) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _format_header(*cells: str) -> list[str]:
+    return [_format_row(*cells), "|" + "---|" * len(cells)]
+
+
+def update_page(page: str, section: str) -> str:
+    """Return `page` with `section` in place of the one of the same heading, else at its end."""
     heading = section.partition("\n")[0]
     parts = [f"## {part}" for part in page.split("\n## ")[1:]]
     titles = [part.partition("\n")[0] for part in parts]
@@ -74,8 +82,8 @@ def updated(page: str, section: str) -> str:
     return "\n".join([HEAD, *(part.rstrip("\n") + "\n" for part in parts)])
 
 
-def starts_section(outcomes: Counter[Outcome]) -> str:
-    """What became of bad starts."""
+def format_starts(outcomes: Counter[Outcome]) -> str:
+    """Return the section on bad start values."""
     return STARTS.format(
         off=100 * OFF,
         tries=outcomes.total(),
@@ -85,23 +93,24 @@ def starts_section(outcomes: Counter[Outcome]) -> str:
     )
 
 
-def unseen_section(logs: Sequence[Told]) -> str:
-    """What became of vehicles drawn at random."""
+def format_unseen(logs: Sequence[Log]) -> str:
+    """Return the section on vehicles drawn at random."""
     lines = [UNSEEN.format(count=len(logs)).rstrip("\n")]
-    told = _with_all(by_parameter([log.deviates for log in logs]))
-    misread = _with_all(by_parameter([log.misread for log in logs]))
-    widths = _with_all(by_parameter([log.widths for log in logs]))
+    told = _add_all(collect([log.deviates for log in logs]))
+    misread = _add_all(collect([log.misread for log in logs]))
+    widths = _add_all(collect([log.widths for log in logs]))
     for name, deviates in told.items():
         median, most = np.quantile(widths[name], [0.5, 0.9])
-        cells = (
-            name,
-            f"{deviates.size}",
-            *_judged(deviates),
-            f"{median:.2f}",
-            f"{most:.2f}",
-            *_judged(misread[name]),
+        width = (f"{median:.2f}", f"{most:.2f}")
+        lines.append(
+            _format_row(
+                name,
+                f"{deviates.size}",
+                *_format_deviates(deviates),
+                *width,
+                *_format_deviates(misread[name]),
+            )
         )
-        lines.append(f"| {' | '.join(cells)} |")
     failures = [log.failure for log in logs if log.failure]
     refused = Counter(name for log in logs for name in log.refused)
     named = ", ".join(f"{name} {count}" for name, count in refused.items())
@@ -115,55 +124,50 @@ def unseen_section(logs: Sequence[Told]) -> str:
     return "\n".join(lines)
 
 
-def _with_all(by_name: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """The same with all parameters together as the last."""
+def _add_all(by_name: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Add the values of all parameters together, as the last entry."""
     return {**by_name, "all": np.concatenate(list(by_name.values()))}
 
 
-def _judged(deviates: FloatArray) -> tuple[str, str]:
-    """Root mean square and share within the 95 % interval."""
+def _format_deviates(deviates: FloatArray) -> tuple[str, str]:
+    """Return root mean square and share within the 95 % interval."""
     within = 100.0 * float(np.mean(np.abs(deviates) < HALF))
     return f"{np.sqrt(np.mean(deviates**2)):.2f}", f"{within:.0f} %"
 
 
-def faults_section(shifts: Sequence[Shift], count: int) -> str:
-    """What faults do, from `count` realisations of each."""
-    head = ("fault", *SHOWN, "te_delay", "chi2")
-    lines = [MISMATCH.format(count=count), f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+def format_faults(shifts: Sequence[Shift], count: int) -> str:
+    """Return the section on faults, from `count` realisations of each."""
+    lines = [MISMATCH.format(count=count), *_format_header("fault", *SHOWN, "te_delay", "chi2")]
     for one in shifts:
-        if one.percent is None:
-            lines.append(
-                f"| {one.fault.text} | refused: no plausible minimum |" + " |" * len(SHOWN)
-            )
-            continue
         cells = [f"{one.percent[name]:+.2f}" for name in SHOWN]
         chi2 = f"{one.chi2[0]:.3f} → {one.chi2[1]:.3f}"
-        lines.append(f"| {' | '.join([one.fault.text, *cells, f'{one.delay:+.2f}', chi2])} |")
+        lines.append(_format_row(one.fault.text, *cells, f"{one.delay:+.2f}", chi2))
     return "\n".join([*lines, ""])
 
 
-def study_section(study: Study, text: str) -> str:
-    """Every parameter of both methods; `text` says what the card knows."""
-    lines = [f"## {study.name}: {text}", ""]
+def format_study(study: Study, text: str) -> str:
+    """Return the section of a study; `text` describes the design data of the card."""
     head = ("parameter", "bound", "method", "bias", "std", "RMSE/bound", "coverage")
-    lines += [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    lines = [f"## {study.name}: {text}", "", *_format_header(*head)]
     for method, by_name in study.samples.items():
         for name, samples in by_name.items():
             if study.bounds.get(name, 0.0) > 0.0:
-                lines.append(_row(study, method, name, samples))
-    coverage = [_coverage(s) for n, s in study.samples["likelihood"].items() if n in study.bounds]
+                lines.append(_format_estimate(study, method, name, samples))
+    coverage = [
+        _compute_coverage(s) for n, s in study.samples["likelihood"].items() if n in study.bounds
+    ]
     lines += [
         "",
         f"Likelihood, {study.count} realisations: {study.failures['likelihood']} fits failed; "
-        f"RMSE/bound is {max(_ratios(study)):.2f} at most; coverage is "
+        f"RMSE/bound is {max(_compute_ratios(study)):.2f} at most; coverage is "
         f"{100 * np.mean(coverage):.1f} % on average, {100 * min(coverage):.1f} % at least.",
         "",
     ]
     return "\n".join(lines)
 
 
-def _ratios(study: Study) -> list[float]:
-    """RMSE over bound of every parameter of the likelihood."""
+def _compute_ratios(study: Study) -> list[float]:
+    """Return RMSE over bound of every parameter of the likelihood method."""
     told = {n: s for n, s in study.samples["likelihood"].items() if study.bounds.get(n, 0.0) > 0.0}
     return [
         float(np.sqrt(np.mean([one.error**2 for one in samples])) / study.bounds[name])
@@ -171,21 +175,20 @@ def _ratios(study: Study) -> list[float]:
     ]
 
 
-def _row(study: Study, method: str, name: str, samples: list[Sample]) -> str:
+def _format_estimate(study: Study, method: str, name: str, samples: list[Sample]) -> str:
     errors = np.array([s.error for s in samples])
     truth, bound = study.truth[name], study.bounds[name]
     scale, unit = (1e3, "ms") if name == "te_delay" else (100.0 / truth, "%")
-    cells = (
+    return _format_row(
         name,
         f"{scale * bound:.3f} {unit}",
         method,
         f"{scale * errors.mean():+.3f}",
         f"{scale * errors.std():.3f}",
         f"{np.sqrt(np.mean(errors**2)) / bound:.2f}",
-        f"{100 * _coverage(samples):.0f} %",
+        f"{100 * _compute_coverage(samples):.0f} %",
     )
-    return f"| {' | '.join(cells)} |"
 
 
-def _coverage(samples: list[Sample]) -> float:
+def _compute_coverage(samples: list[Sample]) -> float:
     return float(np.mean([abs(s.error) < 1.96 * s.std for s in samples]))

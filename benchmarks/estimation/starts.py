@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From bad start values, without the linear method: where does the likelihood method end?"""
+"""Outcomes of the likelihood method from bad start values, without the linear method."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from enum import StrEnum
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
-from benchmarks.estimation.study import guess_from_truth, told
+from benchmarks.estimation.study import build_guess, read_fit
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.variants import choose
+from tests.support.bench import Bench, Knowledge, record_bench
 
 OFF = 0.4
 """Start values lie so far beside the truth, at most, drawn evenly."""
@@ -31,7 +31,7 @@ DESIGN = ("P0", "drum")
 
 
 class Outcome(StrEnum):
-    """Where a try ended: at the minimum that is found from the truth, refused, or elsewhere."""
+    """End of a try: at the minimum that is found from the truth, refused, or elsewhere."""
 
     RIGHT = "right"
     REFUSED = "refused"
@@ -39,24 +39,24 @@ class Outcome(StrEnum):
 
 
 def count_outcomes(count: int) -> Counter[Outcome]:
-    """Outcomes of `count` tries, each with a noise realisation and start values of its own."""
+    """Count the outcomes of tries, each with a noise realisation and start values of its own."""
     with ProcessPoolExecutor() as pool:
-        return Counter(pool.map(outcome_of, range(count)))
+        return Counter(pool.map(try_start, range(count)))
 
 
-def outcome_of(seed: int, off: float = OFF) -> Outcome:
-    """Where the fit of the realisation `seed` ends from start values up to `off` beside it."""
-    bench = realise(SCENARIOS[TRIED[seed % len(TRIED)]](), seed, KNOW)
-    truth = guess_from_truth(bench)
+def try_start(seed: int, off: float = OFF) -> Outcome:
+    """Fit the realisation `seed` from start values up to `off` (relative) away from the truth."""
+    bench = record_bench(SCENARIOS[TRIED[seed % len(TRIED)]](), seed, KNOW)
+    truth = build_guess(bench)
     try:
-        found = _fit(bench, beside(truth, bench, seed, off))
+        found = _fit(bench, draw_start(truth, bench, seed, off))
     except IdentificationError:
         return Outcome.REFUSED
-    return Outcome.RIGHT if _same(found, _fit(bench, truth), bench) else Outcome.WRONG
+    return Outcome.RIGHT if _is_same(found, _fit(bench, truth), bench) else Outcome.WRONG
 
 
-def beside(truth: Mapping[str, float], bench: Bench, seed: int, off: float) -> dict[str, float]:
-    """Values up to `off` (relative) beside `truth`; v_s itself is moved, not its logarithm."""
+def draw_start(truth: Mapping[str, float], bench: Bench, seed: int, off: float) -> dict[str, float]:
+    """Draw values up to `off` (relative) from `truth`; v_s itself is moved, not its logarithm."""
     rng = np.random.default_rng([seed, 2])
     card = {
         f"{name}.{key}": getattr(coupling, key).value
@@ -75,11 +75,11 @@ def _fit(bench: Bench, guess: Mapping[str, float]) -> LikelihoodFit:
     return choose([bench.signals], [bench.driveline], law, guess)[0]
 
 
-def _same(one: LikelihoodFit, other: LikelihoodFit, bench: Bench) -> bool:
-    """Whether two fits agree in every parameter."""
-    reference = told(other, bench)
+def _is_same(one: LikelihoodFit, other: LikelihoodFit, bench: Bench) -> bool:
+    """Return whether two fits agree in every parameter."""
+    reference = read_fit(other, bench)
     return all(
         abs(value - reference[name][0]) <= SAME * reference[name][1]
-        for name, (value, _) in told(one, bench).items()
+        for name, (value, _) in read_fit(one, bench).items()
         if reference[name][1] > 0.0
     )

@@ -10,8 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
-from benchmarks.estimation.bound import bound
+from benchmarks.estimation.bound import compute_bound
 from drivetwin.driveline import Stribeck
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import IdentificationError
@@ -22,13 +21,15 @@ from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.guess import guess_of
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import LAW, Point
+from drivetwin.identify.likelihood.unknowns import LAW
 from drivetwin.identify.likelihood.variants import choose
-from drivetwin.identify.signals import FloatArray
+from drivetwin.identify.optimize.objective import Point
+from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.vehicle.spec import PriorValue
+from tests.support.bench import Bench, Knowledge, record_bench
 
-SLIPS = (10.0, 30.0, 50.0)
-"""Slips [rad/s] at which the friction coefficient is compared."""
+SLIPS = {f"mu at {slip:g} rad/s": slip for slip in (10.0, 30.0, 50.0)}
+"""Slips [rad/s] at which the friction coefficient is compared, by the name in the tables."""
 START_INERTIA = 10.0
 
 
@@ -55,56 +56,58 @@ class Study:
 
 def run_study(scenario: Scenario, know: Knowledge, seeds: Sequence[int]) -> Study:
     """Fit the noise realisations of `seeds` by the linear and the likelihood method."""
-    truth = truth_of(realise(scenario, 0, know, noise=0.0))
+    truth = build_truth(record_bench(scenario, 0, know, noise=0.0))
     samples: dict[str, dict[str, list[Sample]]] = {"integral": {}, "likelihood": {}}
     failures = dict.fromkeys(samples, 0)
     with ProcessPoolExecutor() as pool:
-        for linear, best in pool.map(partial(_fits, scenario, know), seeds):
+        for linear, best in pool.map(partial(_fit_both, scenario, know), seeds):
             _collect(samples["integral"], truth, linear)
             if best is None:
                 failures["likelihood"] += 1
             else:
                 _collect(samples["likelihood"], truth, best)
-    return Study(scenario.name, len(seeds), truth, bounds_of(scenario, know), samples, failures)
+    return Study(
+        scenario.name, len(seeds), truth, compute_bounds(scenario, know), samples, failures
+    )
 
 
-_Told = dict[str, tuple[float, float]]
+Estimates = dict[str, tuple[float, float]]
+"""Value and standard deviation by parameter."""
 
 
-def _fits(scenario: Scenario, know: Knowledge, seed: int) -> tuple[_Told, _Told | None]:
-    """What both methods tell of one realisation; None where the likelihood gives up."""
-    bench = realise(scenario, seed, know)
+def _fit_both(scenario: Scenario, know: Knowledge, seed: int) -> tuple[Estimates, Estimates | None]:
+    """Fit one realisation by both methods; None if the likelihood method fails."""
+    bench = record_bench(scenario, seed, know)
     linear = identify_shift(bench.signals, bench.driveline, START_INERTIA)
     try:
-        best = told(best_fit(bench, linear), bench)
+        best = read_fit(fit_likelihood(bench, linear), bench)
     except IdentificationError:
         best = None
-    return _told_linearly(linear), best
+    return _read_linear(linear), best
 
 
-def best_fit(bench: Bench, linear: IntegralShift) -> LikelihoodFit:
-    """The likelihood fit, started from the linear one, as the program makes it."""
+def fit_likelihood(bench: Bench, linear: IntegralShift) -> LikelihoodFit:
+    """Fit by the likelihood method, started from the linear fit, as `identify` does."""
     law = bench.run.scenario.model.loss_law
     guess = guess_of([linear], [bench.driveline])
     return choose([bench.signals], [bench.driveline], law, guess)[0]
 
 
-def truth_of(bench: Bench) -> dict[str, float]:
-    """Truth by id, with μ at the compared slips."""
-    name = bench.run.scenario.oncoming
-    law = bench.run.truth.friction[name]
-    mu = law.at(np.array(SLIPS))
-    return {**bench.truth, **{_mu(s): float(m) for s, m in zip(SLIPS, mu, strict=True)}}
+def build_truth(bench: Bench) -> dict[str, float]:
+    """Return the truth by id, with μ at the compared slips."""
+    law = bench.run.truth.friction[bench.run.scenario.oncoming]
+    mu = law.at(np.array(list(SLIPS.values()))).tolist()
+    return {**bench.truth, **dict(zip(SLIPS, mu, strict=True))}
 
 
-def told(fit: LikelihoodFit, bench: Bench) -> dict[str, tuple[float, float]]:
-    """Value and standard deviation of every parameter of a fit."""
-    return _with_std(fit.problem, fit.mean, fit.covariance, bench)
+def read_fit(fit: LikelihoodFit, bench: Bench) -> Estimates:
+    """Return value and standard deviation of every parameter of a fit."""
+    return propagate(fit.problem, fit.mean, fit.covariance, bench.signals)
 
 
-def bounds_of(scenario: Scenario, know: Knowledge) -> dict[str, float]:
-    """Cramér-Rao bound of every parameter, as a standard deviation."""
-    clean = realise(scenario, 0, Knowledge(), noise=0.0)
+def compute_bounds(scenario: Scenario, know: Knowledge) -> dict[str, float]:
+    """Compute the Cramér-Rao bound of every parameter, as a standard deviation."""
+    clean = record_bench(scenario, 0, Knowledge(), noise=0.0)
     couplings = {
         n: replace(c, P0=PriorValue(c.P0.value, know.P0), drum=PriorValue(c.drum.value, know.drum))
         for n, c in clean.driveline.couplings.items()
@@ -119,15 +122,15 @@ def bounds_of(scenario: Scenario, know: Knowledge) -> dict[str, float]:
     )
     bench = replace(clean, driveline=driveline)
     law = scenario.model.loss_law
-    problem, start = problem_of([bench.signals], [driveline], law, guess_from_truth(bench))
-    truth = at_truth(problem, start, bench)
-    covariance = bound(bench, problem.parts[0], truth, problem.prior)
-    found = _with_std(problem, truth, covariance, bench)
+    problem, start = problem_of([bench.signals], [driveline], law, build_guess(bench))
+    truth = build_point(problem, start, bench)
+    covariance = compute_bound(bench, problem.parts[0], truth, problem.prior)
+    found = propagate(problem, truth, covariance, bench.signals)
     return {name: std for name, (_, std) in found.items()}
 
 
-def guess_from_truth(bench: Bench) -> dict[str, float]:
-    """The truth by unknown of the fit."""
+def build_guess(bench: Bench) -> dict[str, float]:
+    """Return the truth by unknown of the fit."""
     model = bench.run.scenario.model
     values = {
         "eta": model.eta,
@@ -148,8 +151,8 @@ def guess_from_truth(bench: Bench) -> dict[str, float]:
     return values
 
 
-def at_truth(problem: Problem, start: Point, bench: Bench) -> Point:
-    """The point of the truth, its start state included."""
+def build_point(problem: Problem, start: Point, bench: Bench) -> Point:
+    """Return the point of the truth, its start state included."""
     run, time = bench.run.trajectory, problem.parts[0].record.time[0]
     k = int(np.searchsorted(run.time, time))
     state = {
@@ -162,35 +165,42 @@ def at_truth(problem: Problem, start: Point, bench: Bench) -> Point:
     )
 
 
-def _with_std(
-    problem: Problem, point: Point, covariance: FloatArray, bench: Bench
-) -> dict[str, tuple[float, float]]:
-    values = parameters(problem, point, [bench.signals])
-    matrix = slopes(problem, point, np.sqrt(np.diag(covariance)), [bench.signals])
+def propagate(
+    problem: Problem,
+    point: Point,
+    covariance: FloatArray,
+    signals: ShiftSignals,
+    slips: Mapping[str, float] = SLIPS,
+) -> Estimates:
+    """Return value and standard deviation of every parameter at `point`, and of μ at `slips`."""
+    values = parameters(problem, point, [signals])
+    matrix = slopes(problem, point, np.sqrt(np.diag(covariance)), [signals])
     variance = np.einsum("qp,pr,qr->q", matrix, covariance, matrix)
     pairs = zip(values.items(), variance, strict=True)
     found = {name: (value, float(np.sqrt(v))) for (name, value), v in pairs}
-    element = bench.driveline.oncoming.name
+    element = problem.parts[0].structure.driveline.oncoming.name
     index = [point.names.index(f"{element}.{key}") for key in LAW]
-    mu, by_law = stribeck(point.values[index], np.array(SLIPS))
-    inner = covariance[np.ix_(index, index)]
-    std = np.sqrt(np.einsum("pn,pq,qn->n", by_law, inner, by_law))
-    for slip, m, s in zip(SLIPS, mu, std, strict=True):
-        found[_mu(slip)] = (float(m), float(s))
+    found |= _propagate_friction(point.values[index], covariance[np.ix_(index, index)], slips)
     if "te_delay" not in point.names:
-        del found["te_delay"]
+        found.pop("te_delay", None)
     return found
 
 
-def _told_linearly(shift: IntegralShift) -> dict[str, tuple[float, float]]:
+def _propagate_friction(
+    law: FloatArray, covariance: FloatArray, slips: Mapping[str, float]
+) -> Estimates:
+    """Return μ and its standard deviation from a Stribeck law (4,) and its covariance (4, 4)."""
+    mu, by_law = stribeck(law, np.array(list(slips.values())))
+    std = np.sqrt(np.einsum("pn,pq,qn->n", by_law, covariance, by_law))
+    return dict(zip(slips, zip(mu.tolist(), std.tolist(), strict=True), strict=True))
+
+
+def _read_linear(shift: IntegralShift) -> Estimates:
     std = np.sqrt(np.diag(shift.covariance))
     found = {n: (float(v), float(s)) for n, v, s in zip(shift.ids, shift.values, std, strict=True)}
     if shift.friction is not None:
         fit = shift.friction.fit
-        mu, by_law = stribeck(fit.theta, np.array(SLIPS))
-        inner = fit.covariance[:4, :4]
-        spread = np.sqrt(np.einsum("pn,pq,qn->n", by_law, inner, by_law))
-        found |= {_mu(a): (float(m), float(s)) for a, m, s in zip(SLIPS, mu, spread, strict=True)}
+        found |= _propagate_friction(fit.theta, fit.covariance[:4, :4], SLIPS)
     return found
 
 
@@ -202,7 +212,3 @@ def _collect(
     for name, (value, std) in found.items():
         if name in truth and std > 0.0:
             into.setdefault(name, []).append(Sample(value - truth[name], std))
-
-
-def _mu(slip: float) -> str:
-    return f"mu at {slip:g} rad/s"

@@ -11,20 +11,29 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.estimation.unseen_bound import bounds_of, mu_name, slips_of
-from benchmarks.estimation.vehicles import sensor_errors, vehicle, with_tolerances
+from benchmarks.estimation.bound import compute_bound
+from benchmarks.estimation.study import build_guess, build_point, propagate
+from benchmarks.estimation.vehicles import add_tolerances, draw_errors, draw_vehicle
 from drivetwin.cli.synth import write_run
-from drivetwin.driveline import Stribeck
+from drivetwin.driveline import DualClutch, Stribeck
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.errors import DrivetwinError
+from drivetwin.identify.likelihood.kinds import SPEEDS
+from drivetwin.identify.likelihood.priors import spans
+from drivetwin.identify.likelihood.problem import Part
+from drivetwin.identify.likelihood.record import TORQUE, record_of
+from drivetwin.identify.likelihood.unknowns import AERO, LAW, TE_OFFSET
 from drivetwin.identify.method import DEFAULT_METHOD
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.pipeline import identify
-from drivetwin.identify.result import Identification
-from drivetwin.identify.signals import FloatArray
+from drivetwin.identify.profile import likelihood_of
+from drivetwin.identify.result import FrictionCurve, Identification
+from drivetwin.identify.signals import FloatArray, Sampled, ShiftSignals
 from drivetwin.identify.uncertainty import DELAY_IDENTIFIED
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.find import find_shifts
 from drivetwin.vehicle.card import load_card
+from tests.support.bench import Bench
 
 HALF = 1.96
 """Half width of a 95 % interval in standard deviations."""
@@ -36,11 +45,12 @@ CLEAR = 0.5
 
 
 @dataclass(frozen=True)
-class Told:
-    """What one log told, by parameter: errors over stated standard deviations, also where its
-    sensors have errors within the card's tolerances (`misread`), and stated standard deviations
-    from noise over their bound (`widths`); what it refused, what of that could have been told, and
-    what failed in words, if anything."""
+class Log:
+    """Result of one log, by parameter: errors over stated standard deviations, the same with sensor
+    errors within the card's tolerances (`misread`), and stated standard deviations from noise over
+    their bound (`widths`); ids that were refused, those of them that the bound would allow, and the
+    message of a fit that failed.
+    """
 
     deviates: Mapping[str, float]
     misread: Mapping[str, float]
@@ -50,37 +60,41 @@ class Told:
     failure: str = ""
 
 
-def identify_unseen(seeds: Sequence[int]) -> list[Told]:
-    """What the logs of the vehicles of `seeds` tell."""
+def identify_unseen(seeds: Sequence[int]) -> list[Log]:
+    """Identify the logs of the vehicles of `seeds`."""
     with ProcessPoolExecutor() as pool:
-        return list(pool.map(told_of, seeds))
+        return list(pool.map(identify_vehicle, seeds))
 
 
-def told_of(seed: int) -> Told:
-    """One vehicle: recorded, written, read, its shift found, identified by the default method."""
-    made = vehicle(seed)
+def identify_vehicle(seed: int) -> Log:
+    """Record, write, read and identify one vehicle by the default method."""
+    made = draw_vehicle(seed)
     recorded = run(made.scenario, seed)
     try:
-        found = _identified(recorded, made.card)
-        card = with_tolerances(made.card, made.scenario)
-        misread = _identified(_misread(recorded, seed), card)
+        found = _identify(recorded, made.card)
+        card = add_tolerances(made.card, made.scenario)
+        misread = _identify(_misread(recorded, seed), card)
     except DrivetwinError as fault:
-        return Told({}, {}, {}, (), (), fault.what)
+        return Log({}, {}, {}, (), (), fault.what)
     for one in (found, misread):
         if one.method is not DEFAULT_METHOD:
-            return Told({}, {}, {}, (), (), one.warnings[0])
-    least = bounds_of(found, recorded)
+            return Log({}, {}, {}, (), (), one.warnings[0])
+    least = compute_widths(found, recorded)
     refused = [one.id for one in found.estimates.values() if one.value is None]
-    return Told(
-        _deviates(found, recorded),
-        _deviates(misread, recorded),
-        {_plain(name): stated / bound for name, (stated, bound) in least.items() if bound > 0.0},
+    return Log(
+        _compute_deviates(found, recorded),
+        _compute_deviates(misread, recorded),
+        {
+            _strip_eta(name): stated / bound
+            for name, (stated, bound) in least.items()
+            if bound > 0.0
+        },
         tuple(refused),
-        tuple(name for name in refused if _tellable(name, found, recorded, least)),
+        tuple(name for name in refused if _is_needless(name, found, recorded, least)),
     )
 
 
-def _identified(recorded: DynoRun, card_text: str) -> Identification:
+def _identify(recorded: DynoRun, card_text: str) -> Identification:
     with tempfile.TemporaryDirectory() as folder:
         file, card_file, _ = write_run(Path(folder) / "log.csv", recorded)
         card_file.write_text(card_text, encoding="utf-8")
@@ -90,8 +104,8 @@ def _identified(recorded: DynoRun, card_text: str) -> Identification:
 
 
 def _misread(recorded: DynoRun, seed: int) -> DynoRun:
-    """The same run as read by sensors with errors of gain and offset."""
-    errors = sensor_errors(seed, recorded.scenario)
+    """Return the run as sensors with errors of gain and offset read it."""
+    errors = draw_errors(seed, recorded.scenario)
     channels = []
     for channel in recorded.channels:
         gain, offset = errors.get(channel.role, (0.0, 0.0))
@@ -99,55 +113,132 @@ def _misread(recorded: DynoRun, seed: int) -> DynoRun:
     return replace(recorded, channels=tuple(channels))
 
 
-def _tellable(
+def _is_needless(
     name: str,
     found: Identification,
     recorded: DynoRun,
     least: Mapping[str, tuple[float, float]],
 ) -> bool:
-    """Whether the bound leaves a refused parameter well below what is refused for its width."""
+    """Return whether the bound of a refused parameter is well below the width of a refusal."""
     if name not in least:
         return False
-    value = LIMIT if name == "te_delay" else abs(_true(name, found, recorded))
+    value = LIMIT if name == "te_delay" else abs(_find_truth(name, found, recorded))
     return 0.0 < HALF * least[name][1] < CLEAR * value
 
 
-def _deviates(found: Identification, recorded: DynoRun) -> dict[str, float]:
+def _compute_deviates(found: Identification, recorded: DynoRun) -> dict[str, float]:
     scale = 1.0 if found.estimates["eta"].value is not None else recorded.scenario.model.eta
     deviates = {}
     for name, one in found.estimates.items():
         if one.value is not None and one.std_total:
-            error = one.value - _true(name, found, recorded)
-            deviates[_plain(name)] = error / one.std_total
+            error = one.value - _find_truth(name, found, recorded)
+            deviates[_strip_eta(name)] = error / one.std_total
     for name, curve in found.friction.items():
         law = recorded.truth.friction[name]
         assert isinstance(law, Stribeck)
-        slips = slips_of(curve)
+        names, slips = zip(*find_slips(curve).items(), strict=True)
         mu, low, high = (
             np.interp(slips, curve.slip, one) for one in (curve.mu, curve.mu_lo, curve.mu_hi)
         )
-        far = (mu - law.at(slips) / scale) / ((high - low) / (2.0 * HALF))
-        deviates |= {mu_name(k): float(z) for k, z in enumerate(far)}
+        far = (mu - law.at(np.array(slips)) / scale) / ((high - low) / (2.0 * HALF))
+        deviates |= dict(zip(names, far.tolist(), strict=True))
     return deviates
 
 
-def _true(name: str, found: Identification, recorded: DynoRun) -> float:
-    """Truth of a parameter by its id, the load at the speed for which it is told."""
+def _find_truth(name: str, found: Identification, recorded: DynoRun) -> float:
+    """Return the truth of a parameter by its id, the load at the speed of its estimate."""
     model = recorded.scenario.model
     drums = {f"drum.{one.name}": one.drum_inertia for one in model.elements}
     truth = {**recorded.truth.parameters, **drums}
     if found.load is not None:
         truth["Tv_over_if"] += model.load.aero * found.load.mean_speed**2 / model.i_f
-    true = truth[_plain(name)]
+    true = truth[_strip_eta(name)]
     return true / model.eta if name.endswith(OVER_ETA) else true
 
 
-def _plain(name: str) -> str:
-    """Id without what says that it is over η."""
+def _strip_eta(name: str) -> str:
+    """Return the id without the suffix of values over η."""
     return name.removesuffix(OVER_ETA)
 
 
-def by_parameter(logs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
-    """What each of the logs says (n,), by parameter."""
+def collect(logs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
+    """Return the values of all logs (n,), by parameter."""
     names = dict.fromkeys(name for log in logs for name in log)
     return {name: np.array([log[name] for log in logs if name in log]) for name in names}
+
+
+SHARED_SCALE = ("J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", AERO)
+OF_ELEMENTS = (*LAW[:-1], "drum")
+"""Unknowns that are told over η where the log has no output torque; the latter of each element."""
+MU_PLACES = (0.1, 0.5, 0.9)
+"""Where in the slip range of a curve μ is compared."""
+
+
+def find_slips(curve: FrictionCurve) -> dict[str, float]:
+    """Return slips [rad/s] at `MU_PLACES` of a curve, by the name of μ there."""
+    slips = np.interp(MU_PLACES, (0.0, 1.0), (curve.slip[0], curve.slip[-1])).tolist()
+    names = (f"mu at {100 * place:.0f} % of the slip" for place in MU_PLACES)
+    return dict(zip(names, slips, strict=True))
+
+
+def compute_widths(found: Identification, recorded: DynoRun) -> dict[str, tuple[float, float]]:
+    """Return the stated standard deviation from noise and its bound, by parameter; 0 if known."""
+    fit, (signals,) = likelihood_of(found)
+    (curve,) = found.friction.values()
+    slips = find_slips(curve)
+    ideal = run(recorded.scenario, recorded.seed, noise=0.0)
+    exact = _read_exactly(signals, ideal)
+    old = fit.problem.parts[0]
+    bench = Bench(exact, old.structure.driveline, dict(recorded.truth.parameters), ideal)
+    sensors = {sensor.role: sensor for sensor in recorded.scenario.sensors}
+    means = SPEEDS if sensors["input_speed"].window > 0.0 else ()
+    curved = {TORQUE} & fit.problem.kinds
+    record = record_of(exact, spans([exact])[0]).of_kinds({*means, *curved})
+    part = Part.unweighted(old.structure, record)
+    start = fit.point.moved(_build_values(fit.point, part, bench))
+    truth = build_point(replace(fit.problem, parts=(part,)), start, bench)
+    least = compute_bound(bench, part, truth, fit.problem.prior)
+    here = propagate(fit.problem, fit.mean, fit.covariance, exact, slips)
+    there = propagate(fit.problem, truth, least, exact, slips)
+    return {name: (here[name][1], there[name][1]) for name in here}
+
+
+def _read_exactly(signals: ShiftSignals, ideal: DynoRun) -> ShiftSignals:
+    """Return the samples as ideal sensors would have read them."""
+    channels = {channel.role: channel for channel in ideal.channels}
+
+    def read(role: str, signal: Sampled) -> Sampled:
+        if signal.time.size == 0:
+            return signal
+        values = np.interp(signal.time, channels[role].time, channels[role].values)
+        return replace(signal, values=values)
+
+    assert signals.wheel_speed is not None
+    return replace(
+        signals,
+        engine_torque=read("engine_torque", signals.engine_torque),
+        output_torque=read("output_torque", signals.output_torque),
+        engine_speed=read("input_speed", signals.engine_speed),
+        output_speed=read("output_speed", signals.output_speed),
+        wheel_speed=read("wheel_speed", signals.wheel_speed),
+        pressures={n: read(f"pressure.{n}", p) for n, p in signals.pressures.items()},
+    )
+
+
+def _build_values(point: Point, part: Part, bench: Bench) -> FloatArray:
+    """Return the truth by unknown (p,), torques over η if the fit has them so; starts unchanged."""
+    model = bench.run.scenario.model
+    truth = {**build_guess(bench), TE_OFFSET: 0.0, AERO: model.load.aero}
+    truth["Tv_over_if"] += model.load.aero * part.structure.mean_speed**2 / model.i_f
+    if not part.scale_known:
+        truth = _scale(truth, model)
+    return np.array([truth.get(n, v) for n, v in zip(point.names, point.values, strict=True)])
+
+
+def _scale(truth: Mapping[str, float], model: DualClutch) -> dict[str, float]:
+    scaled = {
+        name: value / model.eta
+        for name, value in truth.items()
+        if name in SHARED_SCALE or name.rpartition(".")[2] in OF_ELEMENTS
+    }
+    return {**truth, **scaled, "eta": 1.0}

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Vehicles that no estimator was made with: driveline, pedal, shift and logger drawn at random.
+"""Vehicles drawn at random: driveline, pedal, shift and logger; no estimator was tuned on them.
 
 Inertias, ratios and noise go from a small truck to a heavy one; loggers from 1 kHz samples to means
-over 10 ms on a bus. The card knows what a drawing tells, each value drawn about the truth.
+over 10 ms on a bus. The card has design values drawn about the truth.
 """
 
 from __future__ import annotations
@@ -46,18 +46,17 @@ PRESSURE = (0.005, 2e3)
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A scenario with what its card knows: standard deviations of P0 [Pa] and drums [kg m^2], and
-    Jo′ relative; `card` is the text."""
+    """A scenario and the text of its vehicle card."""
 
     scenario: Scenario
     card: str
 
 
-def vehicle(seed: int) -> Vehicle:
-    """The vehicle of `seed`."""
+def draw_vehicle(seed: int) -> Vehicle:
+    """Draw the vehicle of `seed`."""
     rng = np.random.default_rng([seed, 77])
     torque = float(rng.uniform(400.0, 1800.0))
-    model = _model(rng, torque)
+    model = _draw_model(rng, torque)
     speed = float(rng.uniform(120.0, 190.0))
     shift = _Shift(model, torque, speed, rng)
     drive = Scenario(
@@ -66,18 +65,18 @@ def vehicle(seed: int) -> Vehicle:
         gears=GEARS,
         duration=round(SHIFT + FILL + HANDOVER + SLIPPING + TAIL, 1),
         engine_speed=speed,
-        engine_torque=_pedal(rng, torque),
-        actuators=shift.actuators(),
-        sensors=_sensors(rng, torque, model),
-        J_prime_range=_range(rng, model.J1 * model.eta),
-        J_vehicle_range=_range(rng, model.J_v),
+        engine_torque=_draw_pedal(rng, torque),
+        actuators=shift.draw_actuators(),
+        sensors=_draw_sensors(rng, torque, model),
+        J_prime_range=_draw_range(rng, model.J1 * model.eta),
+        J_vehicle_range=_draw_range(rng, model.J_v),
         reductions=(),
     )
-    return Vehicle(drive, _card(rng, drive))
+    return Vehicle(drive, _draw_card(rng, drive))
 
 
-def sensor_errors(seed: int, scenario: Scenario) -> dict[str, tuple[float, float]]:
-    """Gain and offset errors of the sensors of `seed` by role, drawn from their tolerances."""
+def draw_errors(seed: int, scenario: Scenario) -> dict[str, tuple[float, float]]:
+    """Draw gain and offset errors of the sensors by role, from their tolerances."""
     rng = np.random.default_rng([seed, 78])
     roles = (sensor.role for sensor in scenario.sensors)
     stated = {role: TORQUES.get(role, PRESSURE) for role in roles if not role.endswith("speed")}
@@ -87,8 +86,8 @@ def sensor_errors(seed: int, scenario: Scenario) -> dict[str, tuple[float, float
     }
 
 
-def with_tolerances(text: str, scenario: Scenario) -> str:
-    """The card `text` with the tolerances that sensor errors are drawn from."""
+def add_tolerances(text: str, scenario: Scenario) -> str:
+    """Add the tolerances that sensor errors are drawn from to the card `text`."""
     card = tomlkit.parse(text).unwrap()
     card["sensors"] = {
         role: {"gain_tolerance": gain, "offset_tolerance_Nm": offset}
@@ -100,14 +99,14 @@ def with_tolerances(text: str, scenario: Scenario) -> str:
     return tomlkit.dumps(card)
 
 
-def _range(rng: np.random.Generator, value: float) -> tuple[float, float]:
-    """A plausible range about a value."""
+def _draw_range(rng: np.random.Generator, value: float) -> tuple[float, float]:
+    """Draw a plausible range about a value."""
     low, high = rng.uniform(0.3, 0.7), rng.uniform(1.5, 2.5)
     return float(low * value), float(high * value)
 
 
-def _model(rng: np.random.Generator, torque: float) -> DualClutch:
-    """A driveline for an engine of this torque [N m]."""
+def _draw_model(rng: np.random.Generator, torque: float) -> DualClutch:
+    """Draw a driveline for an engine of this torque [N m]."""
     upper = float(rng.uniform(1.0, 2.0)) * 1.15
     lower = upper * float(rng.uniform(1.25, 1.5))
     final, eta = float(rng.uniform(3.5, 5.8)), float(rng.uniform(0.8, 0.96))
@@ -119,26 +118,26 @@ def _model(rng: np.random.Generator, torque: float) -> DualClutch:
     load = final * eta * torque * lower * float(rng.uniform(0.2, 0.6))
     aero = float(rng.choice([0.0, rng.uniform(0.5, 4.0)]))
     drum = float(rng.choice([0.0, 0.0, rng.uniform(0.02, 0.08)]))
-    law = [_law(rng), _law(rng)]
+    law = [_draw_law(rng), _draw_law(rng)]
     return DualClutch(
         J1=J_e / eta, J2e=0.0, eta=eta, loss_law="paper", i_in=1.0, J_out=J_out, i_f=final, J_v=J_v,
         k_o=J * omega**2, c_o=2.0 * zeta * omega * J, load=RoadLoad(constant=load, aero=aero),
         elements=tuple(
-            _brake(name, ratio, torque, law[k], (float(rng.uniform(0.5, 1.0)) * BAR, drum))
+            _make_brake(name, ratio, torque, law[k], (float(rng.uniform(0.5, 1.0)) * BAR, drum))
             for k, (name, ratio) in enumerate((("B2", lower), ("B3", upper)))
         ),
     )  # fmt: skip
 
 
-def _law(rng: np.random.Generator) -> Stribeck:
+def _draw_law(rng: np.random.Generator) -> Stribeck:
     level, drop = float(rng.uniform(0.09, 0.14)), float(rng.uniform(-0.01, 0.025))
     return Stribeck(level, level + drop, float(rng.uniform(5.0, 20.0)), float(rng.uniform(0, 3e-4)))
 
 
-def _brake(
+def _make_brake(
     name: str, ratio: float, torque: float, law: Stribeck, fill: tuple[float, float]
 ) -> ShiftElement:
-    """A brake that holds a gear of `ratio` with a third of its main pressure; P0 and drum."""
+    """Return a brake that needs a third of its main pressure in a gear; `fill`: P0 and drum."""
     gain = torque * (ratio - 1.0) / (0.3 * MAIN * law.mu_c)
     P0, drum = fill
     return ShiftElement(name, ratio - 1.0, ratio / (ratio - 1.0), gain, P0, law, drum_inertia=drum)
@@ -153,14 +152,16 @@ class _Shift:
     speed: float
     rng: np.random.Generator
 
-    def actuators(self) -> dict[str, Actuator]:
-        """Both brakes: the one vents while the other takes the torque, and a part of J' with it."""
+    def draw_actuators(self) -> dict[str, Actuator]:
+        """Draw the commands: one brake vents while the other takes over torque and inertia."""
         going, coming = self.model.elements
-        fall = self.speed * (1.0 - self._ratio(coming) / self._ratio(going)) * 1.5
+        fall = self.speed * (1.0 - self._find_ratio(coming) / self._find_ratio(going)) * 1.5
         length = float(self.rng.uniform(0.25, 0.6))
         more = self.model.J1 * fall / length
-        level = coming.P0 + (self.torque + more) * coming.i_c / (coming.gain * self._mu(coming))
-        holding = going.P0 + 1.3 * self.torque * going.i_c / (going.gain * self._mu(going))
+        level = coming.P0 + (self.torque + more) * coming.i_c / (
+            coming.gain * self._find_mu(coming)
+        )
+        holding = going.P0 + 1.3 * self.torque * going.i_c / (going.gain * self._find_mu(going))
         start, hand = SHIFT + FILL, HANDOVER
         off = Program(((start - 0.06, MAIN), (start, holding), (start + hand, 0.0)))
         kiss, end = 0.95 * coming.P0, start + hand + SLIPPING
@@ -179,18 +180,18 @@ class _Shift:
         }
 
     @staticmethod
-    def _ratio(one: ShiftElement) -> float:
+    def _find_ratio(one: ShiftElement) -> float:
         return one.i_c * one.i_out
 
     @staticmethod
-    def _mu(one: ShiftElement) -> float:
+    def _find_mu(one: ShiftElement) -> float:
         law = one.friction
         assert isinstance(law, Stribeck)
         return law.mu_c
 
 
-def _pedal(rng: np.random.Generator, torque: float) -> Program:
-    """Steps in the lower gear, as an engine follows them, back at `torque` [N m] for the shift."""
+def _draw_pedal(rng: np.random.Generator, torque: float) -> Program:
+    """Draw steps in the lower gear, as an engine follows them, that end at `torque` [N m]."""
     count = int(rng.choice(PEDALS))
     if count == 0:
         return Program(((0.0, torque),))
@@ -203,8 +204,8 @@ def _pedal(rng: np.random.Generator, torque: float) -> Program:
     return Program(tuple(zip(time.tolist(), values.tolist(), strict=True)))
 
 
-def _sensors(rng: np.random.Generator, torque: float, model: DualClutch) -> tuple[Sensor, ...]:
-    """A logger; speeds are samples or means over their period."""
+def _draw_sensors(rng: np.random.Generator, torque: float, model: DualClutch) -> tuple[Sensor, ...]:
+    """Draw a logger; speeds are samples or means over their period."""
     speed, pressure = Quantity.SPEED, Quantity.PRESSURE
     rate, inputs, shown = LOGGERS[int(rng.integers(len(LOGGERS)))]
     window = float(rng.choice([0.0, 1.0])) / rate
@@ -232,8 +233,8 @@ def _sensors(rng: np.random.Generator, torque: float, model: DualClutch) -> tupl
     return tuple(seen)
 
 
-def _card(rng: np.random.Generator, drive: Scenario) -> str:
-    """The card with design values drawn about the truth."""
+def _draw_card(rng: np.random.Generator, drive: Scenario) -> str:
+    """Draw a card with design values about the truth."""
     J_out, P0 = float(rng.choice([0.1, 0.15])), float(rng.choice([0.0, 5e3, 1e4]))
     model = drive.model
     value = model.J_out * (1.0 + J_out * float(rng.standard_normal()))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""`python -m benchmarks.fleet.acceptance COUNT [FOLDER]`: a made fleet through the local mode.
+"""Acceptance of a synthetic fleet: `python -m benchmarks.fleet.acceptance COUNT [FOLDER]`.
 
-Every healthy log must be done and every damaged one named; level, drift and spread over units of μ
-and P0 must lie in their 95 % intervals, and the one unit that was changed be found. The folder is
-kept where it is named, and a run in it goes on; else it is a temporary one.
+Every healthy log must be done and every damaged one reported; level, drift and spread over units of
+μ and P0 must lie in their 95 % intervals, and the one unit that was changed must be found. A run in
+the named folder is resumed; without a name it is a temporary one.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
-from benchmarks.fleet.made import ELEMENT, ODOMETER, UNITS, Ageing, Made, Truth, make_fleet, plan
 from drivetwin.cli.fleet_view import watching
 from drivetwin.fleet.events import Event, Settled
 from drivetwin.fleet.joint.estimate import joint_estimates
@@ -27,13 +26,23 @@ from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import State
 from drivetwin.identify.method import Method
+from tests.support.synthetic_fleet import (
+    ELEMENT,
+    ODOMETER,
+    UNITS,
+    Ageing,
+    Made,
+    Truth,
+    make_fleet,
+    plan,
+)
 
 LOGS_TO_SEE_A_CHANGE = 20
 """Logs of a unit from which its change must be found."""
 
 
-def settle(folder: Path, store: Path) -> dict[str, Settled]:
-    """Run the fleet; what became of each file, by its name."""
+def run_made_fleet(folder: Path, store: Path) -> dict[str, Settled]:
+    """Run the fleet; return the last event of each file, by its name."""
     settled: dict[str, Settled] = {}
     request = FleetRun(
         Sources([str(folder)]), read_rules(folder / "rules.toml"), store, Method.INTEGRAL
@@ -53,8 +62,8 @@ def settle(folder: Path, store: Path) -> dict[str, Settled]:
     return settled
 
 
-def named(planned: Sequence[Made], settled: dict[str, Settled]) -> list[str]:
-    """What is wrong with the states: healthy logs not done, damaged ones not named."""
+def check_states(planned: Sequence[Made], settled: dict[str, Settled]) -> list[str]:
+    """Return the faults of states: healthy logs not done, damaged ones without an error."""
     faults = []
     for made in planned:
         end = settled.get(Path(made.path).name)
@@ -64,7 +73,7 @@ def named(planned: Sequence[Made], settled: dict[str, Settled]) -> list[str]:
     return faults
 
 
-def _inside(label: str, true: float, ci95: Interval | None) -> list[str]:
+def _check_interval(label: str, true: float, ci95: Interval | None) -> list[str]:
     assert ci95 is not None
     held = ci95[0] <= true <= ci95[1]
     print(f"  {label}: true {true:.5g}, 95 % {ci95[0]:.5g} to {ci95[1]:.5g}"
@@ -77,9 +86,9 @@ def compare(one: JointEstimate, true: Ageing, planned: Sequence[Made], key: str)
     print(f"{one.parameter}: {one.logs} logs, scatter {one.excess:.2f} of what they state")
     (drift,) = one.drifts
     level = true.mean + true.drift * (drift.reference - 0.5 * ODOMETER)
-    found = _inside("level", level, one.ci95)
-    found += _inside("drift", true.drift, drift.ci95)
-    found += _inside("spread", true.spread, one.spread_ci95)
+    found = _check_interval("level", level, one.ci95)
+    found += _check_interval("drift", true.drift, drift.ci95)
+    found += _check_interval("spread", true.spread, one.spread_ci95)
     units = {made.unit: getattr(made, key) - true.drift * (made.odometer - 0.5 * ODOMETER)
              for made in reversed(planned)}  # fmt: skip
     first = [unit for unit in one.units if unit.since is None]
@@ -91,8 +100,8 @@ def compare(one: JointEstimate, true: Ageing, planned: Sequence[Made], key: str)
     return found + ([] if share >= 0.85 else [f"{one.parameter}: units {share:.2f}"])
 
 
-def changes(found: Sequence[JointEstimate], truth: Truth, count: int) -> list[str]:
-    """Whether the changed unit was found, and no other."""
+def check_changes(found: Sequence[JointEstimate], truth: Truth, count: int) -> list[str]:
+    """Return the faults of changes: the changed unit must be found, and no other."""
     seen = [(one.parameter, change) for one in found for change in one.changes]
     for parameter, change in seen:
         print(f"change of {parameter}: unit {change.unit} between {change.before:.1f} and "
@@ -108,20 +117,20 @@ def changes(found: Sequence[JointEstimate], truth: Truth, count: int) -> list[st
 
 
 def check(folder: Path, count: int) -> list[str]:
-    """Make, run, compare; what does not hold."""
+    """Make and run a fleet and return all faults."""
     truth, store = Truth(), folder / "store"
     planned = plan(count, truth)
     if not (folder / "truth.json").is_file():
         make_fleet(folder, count, truth)
-    settled = settle(folder, store)
-    faults = named(planned, settled)
+    settled = run_made_fleet(folder, store)
+    faults = check_states(planned, settled)
     print(Counter((made.damage or "healthy") for made in planned))
     with Store(store) as opened:
         found = joint_estimates(opened)
     by_name = {one.parameter: one for one in found}
     faults += compare(by_name[f"mu.{ELEMENT}"], truth.mu, planned, "mu")
     faults += compare(by_name[f"P0.{ELEMENT}"], truth.P0, planned, "P0")
-    return faults + changes(found, truth, count)
+    return faults + check_changes(found, truth, count)
 
 
 def main() -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions that take the place of identification where the fleet itself is measured."""
+"""Replacements of the identification for measurements of the fleet itself."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from functools import cache
 from pathlib import Path
 from time import process_time
 
-from benchmarks.fleet.made import make_fleet
 from drivetwin.fleet.identify import identify_log
 from drivetwin.fleet.rows import Found, Row, RowKind
 from drivetwin.fleet.task import Recipe, Task
+from tests.support.synthetic_fleet import make_fleet
 
 CLOCK = "processor_time"
 """Name of the row with the processor time [s] that identifying a log took."""
@@ -21,18 +21,18 @@ _MODEL = ".model.csv"
 """The one real log; a file whose name begins with a dot is no log of the fleet."""
 
 
-def timed(task: Task) -> Found:
-    """Identify a log, and say how much processor time that took."""
+def identify_timed(task: Task) -> Found:
+    """Identify a log, with a row for the processor time that it took."""
     start = process_time()
     found = identify_log(task)
     row = Row(RowKind.QUALITY, CLOCK, process_time() - start, shift=0)
     return Found([*found.rows, row], found.shifts)
 
 
-def real_rows(task: Task) -> Found:
-    """What a real log leaves, identified once in each worker; the numbers differ by file."""
+def copy_rows(task: Task) -> Found:
+    """Return the rows of a real log, identified once in each worker; numbers differ by file."""
     number = int(Path(task.path).read_text())
-    model = _model(task.recipe)
+    model = _identify_model(task.recipe)
     rows = [
         row if row.value is None else replace(row, value=row.value * (1.0 + 1e-6 * number))
         for row in model.rows
@@ -41,21 +41,21 @@ def real_rows(task: Task) -> Found:
 
 
 @cache
-def _model(recipe: Recipe) -> Found:
+def _identify_model(recipe: Recipe) -> Found:
     path = Path(recipe.vehicle).with_name(_MODEL)
     content = hashlib.sha256(path.read_bytes()).hexdigest()
     return identify_log(Task("", str(path), content, recipe, ""))
 
 
 def make_healthy_logs(folder: Path, count: int) -> None:
-    """`count` made logs without those that are damaged on purpose, with rules and card."""
+    """Write `count` synthetic logs without the damaged ones, with rules and card."""
     for made in make_fleet(folder, count):
         if made.damage:
             (folder / made.path).unlink()
 
 
 def make_small_files(folder: Path, count: int) -> None:
-    """`count` files that are all different, in folders of 500, with the model's rules and card."""
+    """Write `count` different files in folders of 500, with the rules and card of the model."""
     make_fleet(folder, 1)
     shutil.move(next(folder.glob("unit_*/*.csv")), folder / _MODEL)
     for number in range(count):

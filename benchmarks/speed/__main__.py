@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Run the comparison, print it and write docs/benchmarks.md with its picture.
+"""Run the comparison, print it and write docs/benchmarks.md.
 
 `python -m benchmarks.speed [--rounds N] [--no-build] [--no-write]`
 """
@@ -11,72 +11,60 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.speed import c_peer, cvode_peer, general, numba_peer, reference, scipy_peer, shift
-from benchmarks.speed.batch import batches, threads_curve
-from benchmarks.speed.core import ROOT, Example, Scenario
-from benchmarks.speed.growth import curves
-from benchmarks.speed.instructions import instruction_table
-from benchmarks.speed.limits import limit_table
-from benchmarks.speed.measure import Entry, Measured, Skipped, measure
-from benchmarks.speed.page import page
-from benchmarks.speed.picture import svg
-from benchmarks.speed.statement import Inputs, Problem, inputs, problem
+from benchmarks.speed import c_peer, general, shift
+from benchmarks.speed.batch import measure_batches
+from benchmarks.speed.core import ROOT, Example
+from benchmarks.speed.instructions import format_instructions
+from benchmarks.speed.measure import Entry, Measured, measure
+from benchmarks.speed.page import format_limits, format_page
+from tests.support.upshift import reference
+from tests.support.upshift.scenario import Scenario, build_scenario
+from tests.support.upshift.statement import Inputs, Problem, make_inputs, make_problem
 
 PAGE = ROOT / "docs" / "benchmarks.md"
-PICTURE = ROOT / "docs" / "img" / "benchmark-growth.svg"
 
 
 def main() -> int:
     """Measure and write."""
-    options = _options()
-    of, given = problem(), inputs()
+    options = _parse_options()
+    of, given = make_problem(), make_inputs()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _tell("building the example of the core")
+        _show_progress("building the example of the core")
         example = Example(folder, build=options.build)
-        stated = shift.scenario_of(of, given)
-        entries, skipped = _entries(of, given, example, stated)
-        measured = measure(entries, options.rounds, _tell)
+        stated = build_scenario(of, given)
+        entries = _collect_entries(of, given, example, stated)
+        measured = measure(entries, options.rounds, _show_progress)
         extra = {
-            "What was set out to be reached": limit_table(measured),
-            "Many runs": batches(of, given, folder),
-            "Instructions": instruction_table(of, given, example, stated, folder),
-            "Growth": "Time of one run inside Rust, network ready, over the number of samples of "
-            "inputs and outputs, of states, and of clutches that slip; and time per run in a "
-            "batch, called from Python, over threads.\n\n"
-            f"![Growth of the time of a run](img/{PICTURE.name})\n",
+            "What was set out to be reached": format_limits(measured),
+            "Many runs": measure_batches(of, given, folder),
+            "Instructions": format_instructions(of, given, example, stated, folder),
+            "Growth": general.format_growth(stated, example),
         }
-        text = page(measured, skipped, _base(measured), extra)
-        picture = svg([*curves(stated, example), threads_curve(of, given)])
-    _tell("")
+        text = format_page(measured, _find_base(measured), extra)
+    _show_progress("")
     print(text)
     if options.write:
         PAGE.write_text(text, encoding="utf-8")
-        PICTURE.write_text(picture, encoding="utf-8")
     return 0
 
 
-def _entries(
-    of: Problem, given: Inputs, example: Example, stated: Scenario
-) -> tuple[list[Entry], list[Skipped]]:
-    judge = shift.judge(reference.read())
-    found = [
-        c_peer.entries(of, given, judge, example.folder),
-        shift.entries(of, given, judge, example),
-        cvode_peer.entries(of, given, judge),
-        scipy_peer.entries(of, given, judge),
-        numba_peer.entries(of, given, judge),
-        general.entries(stated, example),
+def _collect_entries(of: Problem, given: Inputs, example: Example, stated: Scenario) -> list[Entry]:
+    judge = shift.compare_with(reference.read())
+    library = c_peer.load_library(example.folder)
+    return [
+        *(c_peer.make_entries(of, given, judge, library) if library is not None else ()),
+        *shift.make_entries(of, given, judge, example),
+        *shift.make_scipy_entries(of, given, judge),
+        *general.make_entries(stated, example),
     ]
-    skipped = [one for one in found if isinstance(one, Skipped)]
-    return [entry for one in found if not isinstance(one, Skipped) for entry in one], skipped
 
 
-def _base(measured: list[Measured]) -> Measured | None:
+def _find_base(measured: list[Measured]) -> Measured | None:
     return next((one for one in measured if one.entry.program == c_peer.PROGRAM), None)
 
 
-def _options() -> argparse.Namespace:
+def _parse_options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=25, help="how often to go round all entries")
     parser.add_argument(
@@ -88,7 +76,7 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _tell(text: str) -> None:
+def _show_progress(text: str) -> None:
     if sys.stderr.isatty():
         sys.stderr.write(f"\r\x1b[K{text}")
         sys.stderr.flush()

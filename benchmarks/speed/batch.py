@@ -1,32 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""Many parameter sets on the stated shift, within 5 % of the nominal ones."""
+"""Many parameter sets on the stated shift, within 5 % of the nominal ones.
+
+`python -m benchmarks.speed.batch KEEP RUNS` prints the largest memory [byte] of one batch.
+"""
 
 from __future__ import annotations
 
-import os
+import re
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
 from benchmarks.speed import c_peer, shift
-from benchmarks.speed.growth import Curve
-from benchmarks.speed.statement import BAR, Inputs, Problem, start
 from drivetwin.batch import Batch, Keep, Scenario, simulate_batch
-from drivetwin.driveline import (
-    ENGINE_TORQUE,
-    Accuracy,
-    FloatArray,
-    ShiftElement,
-    Stribeck,
-    Trajectory,
-    simulate,
-)
+from drivetwin.driveline import ENGINE_TORQUE, FloatArray
+from tests.support.upshift.scenario import build_model, build_signals, build_state
+from tests.support.upshift.statement import BAR, Inputs, Problem, make_inputs, make_problem, start
 
 RUNS = 1000
 _SPREAD = 0.05
@@ -41,8 +35,6 @@ _KEPT: dict[Keep, str] = {
     Keep.COLUMNS: "T_o at every sample",
     Keep.LAST: "T_o at the end; a misfit takes as much",
 }
-_USUAL_EVENTS = 4
-"""Runs with more are simulated once more at round-off: what that does not have is chatter."""
 
 
 @dataclass
@@ -57,122 +49,62 @@ class Rates:
         return RUNS / float(np.median(self.seconds[threads]))
 
 
-def parameter_sets(of: Problem, runs: int = RUNS) -> FloatArray:
-    """Parameters (runs, 21) of a fixed seed, in the order of the C program."""
+def draw_sets(of: Problem, runs: int = RUNS) -> FloatArray:
+    """Return parameters (runs, 21) of a fixed seed, in the order of the C program."""
     noise = np.random.default_rng(1)
-    numbers = np.tile(c_peer.parameters(of), (runs, 1))
+    numbers = np.tile(c_peer.list_parameters(of), (runs, 1))
     for column in _VARIED:
         numbers[:, column] *= 1.0 + _SPREAD * noise.standard_normal(runs)
     return numbers
 
 
-def simulated(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep | None, int]) -> Batch:
-    """All sets in drivetwin; `how` is what is kept (None: a misfit) and the number of threads."""
+def simulate_sets(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep, int]) -> Batch:
+    """Simulate all sets in drivetwin; `how` is what is kept and the number of threads."""
     keep, threads = how
-    model, signals, begin = shift.model_of(of), shift.signals_of(given), shift.state_of(of, given)
+    model, signals, begin = build_model(of), build_signals(given), build_state(of, given)
     torque = signals.pop(ENGINE_TORQUE)
     return simulate_batch(
         model,
         [Scenario(torque, signals, begin)],
         given.time,
-        _named(of, given, sets),
-        keep=keep or [np.zeros(given.time.size)],
+        _name_columns(of, given, sets),
+        keep=keep,
         threads=threads,
     )
 
 
-def batches(of: Problem, given: Inputs, folder: Path) -> str:
-    """Runs per second, errors and memory, the programs in turns."""
-    sets, library = parameter_sets(of), _library(folder)
+def measure_batches(of: Problem, given: Inputs, folder: Path) -> str:
+    """Measure runs per second, errors and memory, the programs in turns."""
+    sets, library = draw_sets(of), c_peer.load_library(folder)
     ours = Rates(shift.PROGRAM, {threads: [] for threads in _THREADS})
     theirs = Rates(c_peer.PROGRAM, {threads: [] for threads in _THREADS})
     # Once beforehand: the first calls of a process wait for its memory.
-    found = simulated(of, given, sets, (Keep.COLUMNS, max(_THREADS)))
+    found = simulate_sets(of, given, sets, (Keep.COLUMNS, max(_THREADS)))
     for _ in range(_ROUNDS):
         for threads in _THREADS:
             begin = time.perf_counter()
-            found = simulated(of, given, sets, (Keep.COLUMNS, threads))
+            found = simulate_sets(of, given, sets, (Keep.COLUMNS, threads))
             ours.seconds[threads].append(time.perf_counter() - begin)
             if library is not None:
                 begin = time.perf_counter()
-                rough = library.batch(sets, of, given, (threads, 1))
+                rough = library.run_batch(sets, of, given, (threads, 1))
                 theirs.seconds[threads].append(time.perf_counter() - begin)
     if library is None:
-        return "\n".join([_table([ours], None), _memory()])
-    exact = library.batch(sets, of, given, (max(_THREADS), _FINE_STEPS))
+        return "\n".join([_format_table([ours], None), _measure_memory()])
+    exact = library.run_batch(sets, of, given, (max(_THREADS), _FINE_STEPS))
     lines = [
         f"Errors of T_o over {RUNS} runs [N·m], against C at {_FINE_STEPS} steps per sample:\n",
-        "| program | median | 99 % | worst | failed | chattering |",
-        "|---|---|---|---|---|---|",
-        _errors(theirs.program, rough, exact, ""),
-        _errors(ours.program, found.values[:, 0], exact, str(_chattering(of, given, sets, found))),
+        "| program | median | 99 % | worst | failed |",
+        "|---|---|---|---|---|",
+        _format_errors(theirs.program, rough, exact),
+        _format_errors(ours.program, found.values[:, 0], exact),
         "",
     ]
-    return "\n".join([_table([theirs, ours], theirs), *lines, _memory()])
+    return "\n".join([_format_table([theirs, ours], theirs), *lines, _measure_memory()])
 
 
-def threads_curve(of: Problem, given: Inputs) -> Curve:
-    """Time per run in a batch over the number of threads."""
-    sets = parameter_sets(of)
-    points = []
-    for threads in range(1, (os.cpu_count() or 1) + 1):
-        seconds = []
-        for _ in range(_ROUNDS):
-            begin = time.perf_counter()
-            simulated(of, given, sets, (Keep.LAST, threads))
-            seconds.append((time.perf_counter() - begin) / RUNS)
-        points.append((float(threads), float(np.median(seconds))))
-    return Curve("threads, per run in a batch", tuple(points))
-
-
-def _chattering(of: Problem, given: Inputs, sets: FloatArray, found: Batch) -> int:
-    """Runs with more events than the same run at round-off accuracy has."""
-    suspects = np.flatnonzero(found.events > _USUAL_EVENTS)
-    exact = [len(_exactly(of, given, sets[run]).events) for run in suspects]
-    return int(np.count_nonzero(found.events[suspects] > np.array(exact)))
-
-
-def _exactly(of: Problem, given: Inputs, numbers: FloatArray) -> Trajectory:
-    model, signals = shift.model_of(of), shift.signals_of(given)
-    torque, begin = signals.pop(ENGINE_TORQUE), shift.state_of(of, given)
-    value = {name: float(values[0]) for name, values in _named(of, given, numbers[None]).items()}
-
-    def element(nominal: ShiftElement) -> ShiftElement:
-        own = {
-            key.partition(".")[2]: number
-            for key, number in value.items()
-            if key.startswith(f"{nominal.name}.")
-        }
-        gain = own.pop("gain")
-        friction = replace(cast("Stribeck", nominal.friction), **own)
-        return replace(nominal, gain=gain, friction=friction)
-
-    model = replace(
-        model,
-        J1=value["J1"],
-        J_v=value["J_v"],
-        eta=value["eta"],
-        k_o=value["k_o"],
-        c_o=value["c_o"],
-        load=replace(model.load, constant=value["load.constant"]),
-        elements=tuple(element(one) for one in model.elements),
-    )
-    begin = replace(begin, twist=value["start.twist"])
-    accuracy = Accuracy(exact=True)
-    return simulate(model, torque, signals, begin, given.time, accuracy=accuracy)
-
-
-def _library(folder: Path) -> c_peer.Library | None:
-    if not c_peer.SOURCE.exists():
-        return None
-    try:
-        return c_peer.Library(folder)
-    except (subprocess.CalledProcessError, FileNotFoundError):
-        return None
-
-
-def _named(of: Problem, given: Inputs, sets: FloatArray) -> dict[str, FloatArray]:
-    """The sets under drivetwin's names; all start with one torque of the shaft's spring."""
+def _name_columns(of: Problem, given: Inputs, sets: FloatArray) -> dict[str, FloatArray]:
+    """Map names of drivetwin to columns; all sets start with the same torque of the shaft."""
     column = dict(enumerate(sets.T))
     laws = {
         f"{clutch}.{field}": column[place]
@@ -193,7 +125,7 @@ def _named(of: Problem, given: Inputs, sets: FloatArray) -> dict[str, FloatArray
     }
 
 
-def _table(rates: Sequence[Rates], base: Rates | None) -> str:
+def _format_table(rates: Sequence[Rates], base: Rates | None) -> str:
     lines = [
         "| program | threads | runs per second | times C | of the shortest passes |",
         "|---|---|---|---|---|",
@@ -201,40 +133,53 @@ def _table(rates: Sequence[Rates], base: Rates | None) -> str:
     for one in rates:
         for threads in _THREADS:
             rate = one.rate(threads)
-            times = ["", ""] if base is None else _times(one, base, threads)
+            times = ["", ""] if base is None else _format_ratios(one, base, threads)
             lines.append(f"| {one.program} | {threads} | {rate:,.0f} | {' | '.join(times)} |")
     lines.append(f"\nSet out to be reached: {_LIMIT:g} times C on {max(_THREADS)} threads.")
     return "\n".join(lines) + "\n"
 
 
-def _times(one: Rates, base: Rates, threads: int) -> list[str]:
-    """Rates over those of another program, by medians and by the shortest passes."""
+def _format_ratios(one: Rates, base: Rates, threads: int) -> list[str]:
+    """Return the rates over those of another program, by medians and by the shortest passes."""
     medians = one.rate(threads) / base.rate(threads)
     shortest = min(base.seconds[threads]) / min(one.seconds[threads])
     return [f"{medians:.3g}", f"{shortest:.3g}"]
 
 
-def _errors(program: str, torques: FloatArray, exact: FloatArray, chattering: str) -> str:
+def _format_errors(program: str, torques: FloatArray, exact: FloatArray) -> str:
     worst = np.abs(torques - exact).max(axis=1)
     known = worst[np.isfinite(worst)]
     levels = (np.median(known), np.quantile(known, 0.99), known.max())
     shown = " | ".join(f"{level:.2g}" for level in levels)
-    return f"| {program} | {shown} | {worst.size - known.size} | {chattering} |"
+    return f"| {program} | {shown} | {worst.size - known.size} |"
 
 
-def _memory() -> str:
-    """Bytes per run, from the largest memory of processes with few and with many runs."""
+def _measure_memory() -> str:
+    """Measure bytes per run, from the largest memory of processes with few and with many runs."""
     if not Path("/proc/self/status").exists():
         return "Memory is measured on Linux only.\n"
     lines = ["Memory of a batch, per run:\n", "| kept | bytes per run |", "|---|---|"]
     for keep, what in _KEPT.items():
-        few, many = _peak(keep, _MEMORY_RUNS[0]), _peak(keep, _MEMORY_RUNS[1])
+        few, many = _measure_peak(keep, _MEMORY_RUNS[0]), _measure_peak(keep, _MEMORY_RUNS[1])
         per_run = (many - few) / (_MEMORY_RUNS[1] - _MEMORY_RUNS[0])
         lines.append(f"| {what} | {per_run:,.0f} |")
     return "\n".join(lines) + "\n"
 
 
-def _peak(keep: Keep | None, runs: int) -> int:
-    what = keep.value if keep else "misfit"
-    command = [sys.executable, "-m", "benchmarks.speed.memory", what, str(runs)]
+def _measure_peak(keep: Keep, runs: int) -> int:
+    command = [sys.executable, "-m", "benchmarks.speed.batch", keep.value, str(runs)]
     return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def main() -> None:
+    """Run one batch and print the largest memory of this process [byte]."""
+    of = make_problem()
+    keep, runs = Keep(sys.argv[1]), int(sys.argv[2])
+    simulate_sets(of, make_inputs(), draw_sets(of, runs), (keep, 2))
+    # The largest memory in the resource usage of a child includes that of its parent.
+    (kilobytes,) = re.findall(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text("utf-8"))
+    print(1024 * int(kilobytes))
+
+
+if __name__ == "__main__":
+    main()

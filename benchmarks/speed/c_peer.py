@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.speed.measure import Entry, Judge, Sample, Skipped
-from benchmarks.speed.statement import BAR, SAMPLES, STEP, Inputs, Problem, Solution, start
+from benchmarks.speed.measure import Entry, Judge, Sample
 from drivetwin.driveline import FloatArray
+from tests.support.upshift.statement import BAR, SAMPLES, STEP, Inputs, Problem, Solution, start
 
 SOURCE = Path(__file__).resolve().parents[3] / "shared" / "peers" / "shift.c"
 PROGRAM = "hand-written C"
@@ -41,15 +41,19 @@ class Library:
         os.environ.setdefault("OMP_WAIT_POLICY", "passive")
         self._library = ctypes.CDLL(str(self.path))
 
-    def seconds(self, of: Problem, given: Inputs, substeps: int, repeats: int) -> Sample:
-        """Times of single runs, and the solution."""
-        numbers, first, samples = parameters(of), np.array(start(of, given)), samples_of(given)
+    def time_runs(self, of: Problem, given: Inputs, substeps: int, repeats: int) -> Sample:
+        """Time single runs; return also the solution."""
+        numbers, first, samples = (
+            list_parameters(of),
+            np.array(start(of, given)),
+            stack_samples(given),
+        )
         columns, events = np.zeros((SAMPLES, 4)), np.zeros(_MOST_EVENTS)
         call = self._library.shift_sim
         arguments = (
-            *(_pointer(each) for each in (numbers, first, samples)),
+            *(_get_pointer(each) for each in (numbers, first, samples)),
             *(SAMPLES - 1, ctypes.c_double(STEP), substeps),
-            *(_pointer(columns), _pointer(events), _MOST_EVENTS),
+            *(_get_pointer(columns), _get_pointer(events), _MOST_EVENTS),
         )
         seconds = []
         for _ in range(repeats):
@@ -58,46 +62,45 @@ class Library:
             seconds.append(time.perf_counter() - begin)
         return Sample(seconds, Solution(columns.T.copy(), events[:count].copy()))
 
-    def batch(
+    def run_batch(
         self, sets: FloatArray, of: Problem, given: Inputs, how: tuple[int, int]
     ) -> FloatArray:
-        """Shaft torques (runs, samples) [N m] of parameter sets (runs, 21).
+        """Return shaft torques (runs, samples) [N m] of parameter sets (runs, 21).
 
         `how` is the number of threads and of steps per sample.
         """
         threads, substeps = how
         torques = np.zeros((len(sets), SAMPLES))
-        first, samples = np.array(start(of, given)), samples_of(given)
+        first, samples = np.array(start(of, given)), stack_samples(given)
         self._library.shift_batch(
-            _pointer(sets),
+            _get_pointer(sets),
             len(sets),
-            *(_pointer(first), _pointer(samples)),
+            *(_get_pointer(first), _get_pointer(samples)),
             *(SAMPLES - 1, ctypes.c_double(STEP), substeps),
-            *(_pointer(torques), threads),
+            *(_get_pointer(torques), threads),
         )
         return torques
 
 
-def entries(of: Problem, given: Inputs, judge: Judge, folder: Path) -> list[Entry] | Skipped:
-    """The program with one and two steps per sample."""
-    if not SOURCE.exists():
-        return Skipped(PROGRAM, f"{SOURCE.name} is not beside the repository")
-    try:
-        library = Library(folder)
-    except (subprocess.CalledProcessError, FileNotFoundError) as fault:
-        return Skipped(PROGRAM, f"it does not compile: {fault}")
+def load_library(folder: Path) -> Library | None:
+    """Compile the program into `folder`; return None if its source is not beside the repository."""
+    return Library(folder) if SOURCE.exists() else None
 
-    def entry(substeps: int) -> Entry:
+
+def make_entries(of: Problem, given: Inputs, judge: Judge, library: Library) -> list[Entry]:
+    """Return the program with one and two steps per sample."""
+
+    def make_entry(substeps: int) -> Entry:
         setting = f"RK4, {1.0 / substeps:g} ms, events located"
         return Entry(
-            PROGRAM, setting, lambda: library.seconds(of, given, substeps, _REPEATS), judge
+            PROGRAM, setting, lambda: library.time_runs(of, given, substeps, _REPEATS), judge
         )
 
-    return [entry(1), entry(2)]
+    return [make_entry(1), make_entry(2)]
 
 
-def parameters(of: Problem) -> FloatArray:
-    """The program's parameters in its order; pressures in bar."""
+def list_parameters(of: Problem) -> FloatArray:
+    """Return the parameters in the order of the program; pressures in bar."""
     gains = [BAR * gain for gain in of.gain]
     fills = [pressure / BAR for pressure in of.P0]
     return np.array(
@@ -109,11 +112,11 @@ def parameters(of: Problem) -> FloatArray:
     )
 
 
-def samples_of(given: Inputs) -> FloatArray:
-    """Inputs (samples, 3) as the program takes them; pressures in bar."""
+def stack_samples(given: Inputs) -> FloatArray:
+    """Return the inputs (samples, 3) in the order of the program; pressures in bar."""
     columns = (given.torque, *(pressure / BAR for pressure in given.pressures))
     return np.ascontiguousarray(np.column_stack(columns))
 
 
-def _pointer(array: FloatArray) -> ctypes._Pointer[ctypes.c_double]:
+def _get_pointer(array: FloatArray) -> ctypes._Pointer[ctypes.c_double]:
     return array.ctypes.data_as(_Double)

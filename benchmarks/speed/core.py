@@ -6,57 +6,18 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks.speed.measure import Sample
-from benchmarks.speed.statement import Solution
-from drivetwin.driveline import FloatArray, Signal
-from drivetwin.network import Element, Output, Sine, Start
+from tests.support.upshift.scenario import Scenario
+from tests.support.upshift.statement import Solution
 
 ROOT = Path(__file__).resolve().parents[2]
 _EXAMPLE = "one_shift"
 _WARMING = 50
 """Runs of a process before those that count: the other programs are warm as well."""
-
-
-@dataclass(frozen=True)
-class Scenario:
-    """A run of a network; the first outputs are the columns of its solution."""
-
-    elements: Sequence[Element]
-    inputs: Mapping[str, Signal | Sine]
-    start: Start
-    time: FloatArray
-    outputs: Sequence[Output]
-
-    def as_json(self) -> str:
-        """As the example reads it."""
-        samples = {
-            name: [one.time.tolist(), one.values.tolist()]
-            for name, one in self.inputs.items()
-            if isinstance(one, Signal)
-        }
-        sines = {
-            name: [one.offset, one.amplitude, one.frequency, one.phase]
-            for name, one in self.inputs.items()
-            if isinstance(one, Sine)
-        }
-        document: dict[str, Any] = {
-            "elements": list(self.elements),
-            "time": self.time.tolist(),
-            "samples": samples,
-            "sines": sines,
-            "speeds": list(self.start.speeds.items()),
-            "twists": list(self.start.twists.items()),
-            "locked": list(self.start.locked),
-            "outputs": [{kind: name} for kind, name in self.outputs],
-        }
-        return json.dumps(document)
 
 
 class Example:
@@ -77,13 +38,13 @@ class Example:
             raise FileNotFoundError(self.path)
 
     def store(self, name: str, scenario: Scenario) -> Path:
-        """Scenario as a file."""
+        """Write a scenario to a file."""
         path = self.folder / f"{name}.json"
-        path.write_text(scenario.as_json(), encoding="utf-8")
+        path.write_text(scenario.write_json(), encoding="utf-8")
         return path
 
     def run(self, scenario: Path, repeats: int, which: str) -> Sample:
-        """Seconds of `which` (`again`, `first` or `whole`) runs, and the solution."""
+        """Run a scenario; return seconds of `which` (`again`, `first`, `whole`) and solution."""
         command = [str(self.path), str(scenario), str(_WARMING + repeats)]
         done = subprocess.run(command, check=True, capture_output=True, text=True)
         result = json.loads(done.stdout)

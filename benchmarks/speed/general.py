@@ -8,10 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.speed.core import Example, Scenario
+from benchmarks.speed.core import Example
 from benchmarks.speed.measure import Entry, Group, Judge, Quality
-from benchmarks.speed.shift import OUTPUTS, PROGRAM
-from benchmarks.speed.statement import STEP, Solution
+from benchmarks.speed.shift import PROGRAM
 from drivetwin.driveline import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.export.modelica.dual_clutch import network_of, network_start
 from drivetwin.gearbox import load_gearbox
@@ -21,33 +20,42 @@ from drivetwin.gearbox.maneuver import plan, signals, time_grid
 from drivetwin.network import Element, Output, Start, simulate
 from reference import tables
 from reference.problem import ROOT, load
+from tests.support.upshift.scenario import OUTPUTS, Scenario
+from tests.support.upshift.statement import STEP, Solution
 
 EIGHT, TWELVE = "the shift with 8 states", "the shift with 12 states"
 COUPLED = "CoupledClutches, 1.5 s"
 WHOLE = "six-speed gearbox, all members, shift 2-3"
 FORM = "the same shift as a dual clutch"
-_REPEATS = 10
+_REPEATS, _GROWTH_REPEATS = 10, 15
 _ADDED_INERTIA, _ADDED_STIFFNESS, _ADDED_DAMPING = 50.0, 2e5, 200.0
 _ADDED_DRAG = {"gain": 1e-3, "p0": 0.0, "peak": 1.0, "drum_inertia": 0.0}
 _COUPLED_OUTPUTS: tuple[Output, ...] = tuple(("speed", f"w{n}") for n in range(1, 5))
+_GROWTH_HEAD = """\
+Time of one run inside Rust, network ready, over the number of samples of inputs and outputs, of
+states, and of clutches that slip; each new clutch brings two states.
+
+| what grows | size: time of a run [µs] |
+|---|---|
+"""
 
 
-def entries(shift: Scenario, example: Example) -> list[Entry]:
-    """Eight and twelve states, CoupledClutches, a six-speed gearbox and its dual-clutch form."""
+def make_entries(shift: Scenario, example: Example) -> list[Entry]:
+    """Return eight and twelve states, CoupledClutches, a gearbox and its dual-clutch form."""
     cases = {
-        EIGHT: with_shafts(shift, 2),
-        TWELVE: with_shafts(shift, 4),
-        COUPLED: coupled_clutches(),
-        **gearbox_shift(),
+        EIGHT: add_shafts(shift, 2),
+        TWELVE: add_shafts(shift, 4),
+        COUPLED: load_coupled_clutches(),
+        **plan_gearbox_shifts(),
     }
-    judges = {COUPLED: _coupled_judge()}
+    judges = {COUPLED: _compare_with_reference()}
     return [
-        _entry(example, number, name, scenario, judges.get(name))
+        _make_entry(example, number, name, scenario, judges.get(name))
         for number, (name, scenario) in enumerate(cases.items())
     ]
 
 
-def _entry(
+def _make_entry(
     example: Example, number: int, name: str, scenario: Scenario, judge: Judge | None
 ) -> Entry:
     path = example.store(f"general{number}", scenario)
@@ -55,13 +63,13 @@ def _entry(
         PROGRAM,
         name,
         lambda: example.run(path, _REPEATS, "again"),
-        judge or _against_exact(scenario),
+        judge or _compare_with_exact(scenario),
         Group.GENERAL,
     )
 
 
-def with_shafts(shift: Scenario, count: int) -> Scenario:
-    """The shift with `count` more inertias in a row behind the wheel: two states each."""
+def add_shafts(shift: Scenario, count: int) -> Scenario:
+    """Add `count` inertias in a row behind the wheel: two states each."""
     added: list[Element] = []
     speeds, twists = dict(shift.start.speeds), dict(shift.start.twists)
     last = "wheel"
@@ -83,9 +91,9 @@ def with_shafts(shift: Scenario, count: int) -> Scenario:
     return replace(shift, elements=[*shift.elements, *added], start=start)
 
 
-def with_brakes(shift: Scenario, count: int) -> Scenario:
-    """The shift with `count` masses behind the wheel, each dragged by a brake that slips."""
-    wide = with_shafts(shift, count)
+def add_brakes(shift: Scenario, count: int) -> Scenario:
+    """Add `count` masses behind the wheel, each dragged by a brake that slips."""
+    wide = add_shafts(shift, count)
     brakes: list[Element] = [
         {
             "type": "clutch",
@@ -102,20 +110,15 @@ def with_brakes(shift: Scenario, count: int) -> Scenario:
     return replace(wide, elements=[*wide.elements, *brakes], inputs={**wide.inputs, "drag": drag})
 
 
-def coupled_clutches() -> Scenario:
-    """The reference problem, its sources as sines, four speeds."""
+def load_coupled_clutches() -> Scenario:
+    """Return the reference problem, its sources as sines, four speeds."""
     problem = load("coupled_clutches")
-    return Scenario(
-        problem.elements,
-        problem.phases[0].inputs,
-        problem.start,
-        problem.time,
-        _COUPLED_OUTPUTS,
-    )
+    inputs = problem.phases[0].inputs
+    return Scenario(problem.elements, inputs, problem.start, problem.time, _COUPLED_OUTPUTS)
 
 
-def gearbox_shift() -> dict[str, Scenario]:
-    """Shift 2-3 of the six-speed gearbox at 1 kHz: all members, and its dual-clutch form."""
+def plan_gearbox_shifts() -> dict[str, Scenario]:
+    """Return shift 2-3 of the six-speed gearbox at 1 kHz: all members, and the dual clutch."""
     reduction = reduce_shift(load_gearbox("three-set-3000"), "2", "3")
     maneuver = plan(reduction, reduction.gearbox.require_drive())
     time = STEP * np.arange(int(time_grid(maneuver)[-1] / STEP) + 1, dtype=np.float64)
@@ -128,7 +131,7 @@ def gearbox_shift() -> dict[str, Scenario]:
     return {
         WHOLE: Scenario(
             whole.elements,
-            _sampled(whole.inputs, time),
+            _sample(whole.inputs, time),
             whole.start,
             time,
             [*speeds, ("shaft_torque", SHAFT)],
@@ -137,15 +140,15 @@ def gearbox_shift() -> dict[str, Scenario]:
     }
 
 
-def _sampled(signals: Mapping[str, Signal], time: FloatArray) -> dict[str, Signal]:
-    """The signals at instants (n,) [s], as a log has them."""
+def _sample(signals: Mapping[str, Signal], time: FloatArray) -> dict[str, Signal]:
+    """Sample the signals at instants (n,) [s], as a log has them."""
     return {
         name: Signal(time, np.interp(time, one.time, one.values)) for name, one in signals.items()
     }
 
 
-def _against_exact(scenario: Scenario) -> Judge:
-    """Largest deviation of the shaft torque from the same core at round-off."""
+def _compare_with_exact(scenario: Scenario) -> Judge:
+    """Return the largest deviation of the shaft torque from the core at round-off."""
     exact = simulate(
         scenario.elements,
         scenario.inputs,
@@ -166,7 +169,7 @@ def _against_exact(scenario: Scenario) -> Judge:
     return compare
 
 
-def _coupled_judge() -> Judge:
+def _compare_with_reference() -> Judge:
     expected = tables.read(ROOT / "coupled_clutches").table.columns
     speeds: FloatArray = np.array([expected[output] for output in _COUPLED_OUTPUTS])
 
@@ -174,3 +177,34 @@ def _coupled_judge() -> Judge:
         return Quality(float(np.abs(found.columns - speeds).max()), "rad/s")
 
     return compare
+
+
+def format_growth(shift: Scenario, example: Example) -> str:
+    """Measure one size after the other, inside Rust, network ready; return the table."""
+    cases = {
+        "samples": {
+            round(1.5 * rate) + 1: resample(shift, rate) for rate in (250, 500, 1000, 2000, 4000)
+        },
+        "states": {4 + 2 * count: add_shafts(shift, count) for count in range(6)},
+        "clutches": {2 + count: add_brakes(shift, count) for count in range(5)},
+    }
+    rows = []
+    for name, scenarios in cases.items():
+        texts = []
+        for size, scenario in scenarios.items():
+            path = example.store(f"{name}{size}", scenario)
+            seconds = example.run(path, _GROWTH_REPEATS, "again").seconds
+            texts.append(f"{size}: {1e6 * float(np.median(seconds)):.3g}")
+        rows.append(f"| {name} | {', '.join(texts)} |\n")
+    return _GROWTH_HEAD + "".join(rows)
+
+
+def resample(shift: Scenario, rate: float) -> Scenario:
+    """Return the shift with inputs and outputs at another rate [Hz]; inputs keep their shape."""
+    time = np.arange(round(shift.time[-1] * rate) + 1) / rate
+    inputs = {
+        name: Signal(time, np.interp(time, one.time, one.values))
+        for name, one in shift.inputs.items()
+        if isinstance(one, Signal)
+    }
+    return replace(shift, time=time, inputs=inputs)

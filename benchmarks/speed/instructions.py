@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Instructions of one run: a figure that does not depend on what else the machine does."""
+"""Instructions of one run: a figure that does not depend on the load of the machine."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.speed import c_peer
-from benchmarks.speed.core import Example, Scenario
-from benchmarks.speed.statement import SAMPLES, STEP, Inputs, Problem, start
+from benchmarks.speed.core import Example
+from tests.support.upshift.scenario import Scenario
+from tests.support.upshift.statement import SAMPLES, STEP, Inputs, Problem, start
 
 _TARGET = "haswell"
 """What both are counted for: valgrind knows instructions up to AVX2."""
@@ -28,13 +29,13 @@ int main(int count, char **names) {{
 """
 
 
-def instruction_table(
+def format_instructions(
     of: Problem, given: Inputs, example: Example, stated: Scenario, folder: Path
 ) -> str:
-    """Both counts with their ratio, or why there is none."""
+    """Return both counts with their ratio, or the reason why there is none."""
     if shutil.which("valgrind") is None:
         return "Not counted: valgrind is not installed.\n"
-    ours = count(
+    ours = count_instructions(
         [str(example.path), str(example.store("counted", stated)), "0"], "*Plan*run_again", folder
     )
     lines = [
@@ -43,7 +44,7 @@ def instruction_table(
         "|---|---|---|",
     ]
     if c_peer.SOURCE.exists():
-        theirs = count(_driver(of, given, folder), "shift_sim", folder)
+        theirs = count_instructions(_build_driver(of, given, folder), "shift_sim", folder)
         lines.append(f"| {c_peer.PROGRAM}, 1 ms | {theirs:,} | 1 |")
         lines.append(f"| drivetwin, first run of a network | {ours:,} | {ours / theirs:.3g} |")
     else:
@@ -51,10 +52,10 @@ def instruction_table(
     return "\n".join(lines) + "\n"
 
 
-def count(command: list[str], function: str, folder: Path) -> int:
-    """Instructions within a function of this very name and all that it calls.
+def count_instructions(command: list[str], function: str, folder: Path) -> int:
+    """Count instructions within a function of exactly this name and within its callees.
 
-    A closure of its own that the pattern also met would end the count on the way in.
+    A closure that also matches the pattern would end the count when it is entered.
     """
     out = folder / "callgrind.out"
     tool = ["valgrind", "--tool=callgrind", f"--toggle-collect={function}"]
@@ -65,9 +66,13 @@ def count(command: list[str], function: str, folder: Path) -> int:
     return int(next(line for line in lines if line.startswith(("totals:", "summary:"))).split()[1])
 
 
-def _driver(of: Problem, given: Inputs, folder: Path) -> list[str]:
-    """A program that runs the C peer once."""
-    parts = [c_peer.parameters(of), np.array(start(of, given)), c_peer.samples_of(given).ravel()]
+def _build_driver(of: Problem, given: Inputs, folder: Path) -> list[str]:
+    """Build a program that runs the C peer once; return its command."""
+    parts = [
+        c_peer.list_parameters(of),
+        np.array(start(of, given)),
+        c_peer.stack_samples(given).ravel(),
+    ]
     numbers = np.concatenate(parts)
     data, source, program = (folder / name for name in ("numbers", "driver.c", "driver"))
     data.write_bytes(numbers.tobytes())

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from benchmarks.speed.statement import Solution
+from tests.support.upshift.statement import Solution
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,6 @@ class Entry:
     rounds: int = 1000
 
 
-@dataclass(frozen=True)
-class Skipped:
-    """A program that is not there, and why."""
-
-    program: str
-    reason: str
-
-
 @dataclass
 class Measured:
     """All seconds of an entry."""
@@ -73,7 +65,7 @@ class Measured:
 
     @property
     def quality(self) -> Quality | None:
-        """How far the last solution is off."""
+        """Error of the last solution."""
         return None if self.solution is None else self.entry.judge(self.solution)
 
     @property
@@ -87,7 +79,7 @@ class Measured:
         return min(self.seconds)
 
 
-def timed(run: Callable[[], Solution], repeats: int) -> Sample:
+def time_runs(run: Callable[[], Solution], repeats: int) -> Sample:
     """Time `repeats` runs, the conversion of the last result to a Solution not among them."""
     seconds = []
     for _ in range(repeats):
@@ -98,7 +90,7 @@ def timed(run: Callable[[], Solution], repeats: int) -> Sample:
 
 
 def measure(entries: Sequence[Entry], rounds: int, tell: Callable[[str], None]) -> list[Measured]:
-    """Go round all entries `rounds` times, one after the other."""
+    """Run all entries in turns, `rounds` times."""
     found = [Measured(entry) for entry in entries]
     for number in range(rounds):
         for one in found:

@@ -1,28 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""The stated shift in drivetwin: inside Rust, through Python, with derivatives."""
+"""The stated shift in drivetwin (in Rust, from Python, with derivatives) and in SciPy."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.speed.core import Example, Scenario
-from benchmarks.speed.measure import Entry, Group, Judge, Quality, timed
-from benchmarks.speed.statement import Inputs, Problem, Solution, start
+from benchmarks.speed.core import Example
+from benchmarks.speed.measure import Entry, Group, Judge, Quality, time_runs
 from drivetwin.driveline import (
     ENGINE_TORQUE,
-    DualClutch,
-    RoadLoad,
     Sensitivities,
-    ShiftElement,
-    Signal,
-    State,
-    Stribeck,
     Trajectory,
     sensitivities,
     simulate,
 )
-from drivetwin.export.modelica.dual_clutch import SHAFT, network_of, network_start
-from drivetwin.network import Output
+from tests.support.upshift.equations import Equations
+from tests.support.upshift.scenario import (
+    build_model,
+    build_scenario,
+    build_signals,
+    build_state,
+)
+from tests.support.upshift.scipy_solution import Method, solve
+from tests.support.upshift.statement import Inputs, Problem, Solution
 
 PROGRAM = "drivetwin"
 READY = "in Rust, network ready"
@@ -30,11 +30,6 @@ FIRST = "in Rust, first run of a network"
 WHOLE = "in Rust, from the elements on"
 PYTHON = "called from Python, nine columns"
 _REPEATS = 20
-_CLUTCHES = ("2", "3")
-OUTPUTS: tuple[Output, ...] = (
-    *(("speed", "engine"), ("speed", "output"), ("speed", "wheel")),
-    ("shaft_torque", SHAFT),
-)
 PARAMETERS = (
     *("J1", "eta", "J_out", "J_v", "k_o", "c_o", "i_f", "load.constant"),
     *("2.gain", "3.gain", "2.P0", "3.P0", "3.mu_c", "3.mu_s", "3.v_s", "3.mu_v"),
@@ -43,8 +38,8 @@ PARAMETERS = (
 DERIVED = f"{len(PARAMETERS)} parameters, called from Python"
 
 
-def judge(reference: Solution) -> Judge:
-    """Largest deviation of T_o, and of an event where all are found."""
+def compare_with(reference: Solution) -> Judge:
+    """Return a judge: largest errors of T_o, and of an event if all are found."""
 
     def compare(found: Solution) -> Quality:
         error = float(np.abs(found.columns[3] - reference.columns[3]).max())
@@ -55,89 +50,57 @@ def judge(reference: Solution) -> Judge:
     return compare
 
 
-def model_of(of: Problem) -> DualClutch:
-    """The problem's parameters; J_e is all that can be told of J1·η + J2e."""
-    law = Stribeck(of.mu_c, of.mu_s, of.v_s, of.mu_v)
-    elements = tuple(
-        ShiftElement(name, of.i_c[n], of.i_out[n], of.gain[n], of.P0[n], law)
-        for n, name in enumerate(_CLUTCHES)
-    )
-    return DualClutch(
-        J1=of.J_e / of.eta,
-        J2e=0.0,
-        eta=of.eta,
-        loss_law="paper",
-        i_in=of.i_in,
-        J_out=of.J_out,
-        i_f=of.i_f,
-        J_v=of.J_v,
-        k_o=of.k,
-        c_o=of.c,
-        load=RoadLoad(constant=of.T_v),
-        elements=elements,
-    )
-
-
-def state_of(of: Problem, given: Inputs) -> State:
-    """The stated start."""
-    engine, output, wheel, torque = start(of, given)
-    return State(engine, output, wheel, torque / of.k, _CLUTCHES[:1])
-
-
-def signals_of(given: Inputs) -> dict[str, Signal]:
-    """Engine torque and pressures by name."""
-    columns = zip((ENGINE_TORQUE, *_CLUTCHES), (given.torque, *given.pressures), strict=True)
-    return {name: Signal(given.time, values) for name, values in columns}
-
-
-def scenario_of(of: Problem, given: Inputs) -> Scenario:
-    """The same for the network."""
-    return Scenario(
-        network_of(model_of(of)),
-        signals_of(given),
-        network_start(state_of(of, given)),
-        given.time,
-        OUTPUTS,
-    )
-
-
-def entries(of: Problem, given: Inputs, reference: Judge, example: Example) -> list[Entry]:
-    """Four outputs on the 1 ms grid, with default settings."""
-    path = example.store("shift", scenario_of(of, given))
-    model, signals, begin = model_of(of), signals_of(given), state_of(of, given)
+def make_entries(of: Problem, given: Inputs, reference: Judge, example: Example) -> list[Entry]:
+    """Return the entries: four outputs on the 1 ms grid, with default settings."""
+    path = example.store("shift", build_scenario(of, given))
+    model, signals, begin = build_model(of), build_signals(given), build_state(of, given)
     torque = signals.pop(ENGINE_TORQUE)
 
-    def simulated() -> Trajectory:
+    def simulate_once() -> Trajectory:
         return simulate(model, torque, signals, begin, given.time)
 
-    def derived() -> Sensitivities:
+    def derive_once() -> Sensitivities:
         return sensitivities(model, torque, signals, begin, given.time, PARAMETERS)
 
     return [
         Entry(PROGRAM, READY, lambda: example.run(path, _REPEATS, "again"), reference),
         Entry(PROGRAM, FIRST, lambda: example.run(path, _REPEATS, "first"), reference),
-        Entry(
-            PROGRAM,
-            WHOLE,
-            lambda: example.run(path, _REPEATS, "whole"),
-            reference,
-        ),
+        Entry(PROGRAM, WHOLE, lambda: example.run(path, _REPEATS, "whole"), reference),
         Entry(
             PROGRAM,
             PYTHON,
-            lambda: timed(lambda: _solution(simulated()), _REPEATS),
+            lambda: time_runs(lambda: _convert(simulate_once()), _REPEATS),
             reference,
         ),
         Entry(
             PROGRAM,
             DERIVED,
-            lambda: timed(lambda: _solution(derived().run), _REPEATS),
+            lambda: time_runs(lambda: _convert(derive_once().run), _REPEATS),
             reference,
             Group.DERIVATIVES,
         ),
     ]
 
 
-def _solution(run: Trajectory) -> Solution:
+def _convert(run: Trajectory) -> Solution:
     columns = (run.engine_speed, run.output_speed, run.wheel_speed, run.shaft_torque)
     return Solution(np.array(columns), np.array([event.time for event in run.events]))
+
+
+def make_scipy_entries(of: Problem, given: Inputs, judge: Judge) -> list[Entry]:
+    """Return RK45 and LSODA at a loose and a usual tolerance."""
+    equations = Equations(of, given)
+
+    def make_entry(method: Method, rtol: float, atol: float, max_step: float) -> Entry:
+        def run() -> Solution:
+            return solve(equations, given.time, method, (rtol, atol, max_step))
+
+        setting = f"{method}, rtol {rtol:g}, restart at events"
+        return Entry("SciPy", setting, lambda: time_runs(run, 1), judge, rounds=3)
+
+    return [
+        make_entry("RK45", 1e-3, 1e-6, np.inf),
+        make_entry("RK45", 1e-6, 1e-8, 1e-2),
+        make_entry("LSODA", 1e-3, 1e-6, np.inf),
+        make_entry("LSODA", 1e-6, 1e-8, 1e-2),
+    ]

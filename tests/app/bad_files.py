@@ -96,38 +96,44 @@ def mdf_bomb() -> bytes:
 
 @dataclass(frozen=True)
 class BadFile:
-    """Something to upload as a log: the name it comes under and its bytes."""
+    """Something to upload as a log: the name it comes under and the function that makes it."""
 
     name: str
-    content: bytes
+    make: Callable[[], bytes]
+
+    @property
+    def content(self) -> bytes:
+        """The bytes, made now: listing the files takes no time."""
+        return self.make()
 
 
 def bad_files() -> dict[str, BadFile]:
     """One file for each way; none may be opened, none may end the server."""
     table = TABLE.decode()
+    command = table.replace("100", "+cmd|' /C calc'!A0", 1).encode()
     return {
-        "empty": BadFile("empty.csv", b""),
-        "picture": BadFile("log.csv", b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 8),
-        "binary": BadFile("log.csv", np.random.default_rng(1).bytes(20_000)),
-        "program": BadFile("log.csv", b"\x7fELF\x02\x01\x01" + bytes(500)),
-        "pickle": BadFile("log.csv", pickle.dumps(_Runs())),
-        "web page": BadFile("log.csv", b"<html><script>alert(1)</script></html>\n" * 20),
-        "script": BadFile("log.py", b"import os\nos.system('true')\n"),
-        "gzip bomb": BadFile("log.csv.gz", gzip_bomb()),
-        "gzip": BadFile("log.csv.gz", gzip.compress(TABLE)),
-        "zip bomb": BadFile("log.xlsx", zip_bomb()),
-        "MATLAB bomb": BadFile("log.mat", mat_bomb()),
-        "HDF5 bomb": BadFile("log.mat", hdf5_bomb()),
-        "MDF bomb": BadFile("log.mf4", mdf_bomb()),
-        "cut MDF": BadFile("log.mf4", mdf_bomb()[:900]),
-        "formula": BadFile("log.csv", table.replace("100", "=1+1", 1).encode()),
-        "command": BadFile("log.csv", table.replace("100", "+cmd|' /C calc'!A0", 1).encode()),
-        "formula as name": BadFile("log.csv", table.replace("EngTrq", "@SUM(1)").encode()),
-        "ragged": BadFile("log.csv", TABLE + b"0.6,1\n0.7,1,2,3,4,5\n"),
-        "no numbers": BadFile("log.csv", b"time,a\ns,Nm\nx,y\nz,w\n"),
-        "traversal": BadFile("../../log.csv", TABLE),
-        "traversal of Windows": BadFile("..\\..\\log.csv", TABLE),
-        "path": BadFile("/etc/passwd", TABLE),
-        "control character": BadFile("log\n.csv", TABLE),
-        "endless name": BadFile("x" * 300 + ".csv", TABLE),
+        "empty": BadFile("empty.csv", lambda: b""),
+        "picture": BadFile("log.csv", lambda: b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 8),
+        "binary": BadFile("log.csv", lambda: np.random.default_rng(1).bytes(20_000)),
+        "program": BadFile("log.csv", lambda: b"\x7fELF\x02\x01\x01" + bytes(500)),
+        "pickle": BadFile("log.csv", lambda: pickle.dumps(_Runs())),
+        "web page": BadFile("log.csv", lambda: b"<html><script>alert(1)</script></html>\n" * 20),
+        "script": BadFile("log.py", lambda: b"import os\nos.system('true')\n"),
+        "gzip bomb": BadFile("log.csv.gz", gzip_bomb),
+        "gzip": BadFile("log.csv.gz", lambda: gzip.compress(TABLE)),
+        "zip bomb": BadFile("log.xlsx", zip_bomb),
+        "MATLAB bomb": BadFile("log.mat", mat_bomb),
+        "HDF5 bomb": BadFile("log.mat", hdf5_bomb),
+        "MDF bomb": BadFile("log.mf4", mdf_bomb),
+        "cut MDF": BadFile("log.mf4", lambda: mdf_bomb()[:900]),
+        "formula": BadFile("log.csv", lambda: table.replace("100", "=1+1", 1).encode()),
+        "command": BadFile("log.csv", lambda: command),
+        "formula as name": BadFile("log.csv", lambda: table.replace("EngTrq", "@SUM(1)").encode()),
+        "ragged": BadFile("log.csv", lambda: TABLE + b"0.6,1\n0.7,1,2,3,4,5\n"),
+        "no numbers": BadFile("log.csv", lambda: b"time,a\ns,Nm\nx,y\nz,w\n"),
+        "traversal": BadFile("../../log.csv", lambda: TABLE),
+        "traversal of Windows": BadFile("..\\..\\log.csv", lambda: TABLE),
+        "path": BadFile("/etc/passwd", lambda: TABLE),
+        "control character": BadFile("log\n.csv", lambda: TABLE),
+        "endless name": BadFile("x" * 300 + ".csv", lambda: TABLE),
     }

@@ -75,7 +75,7 @@ def test_the_torque_phase_may_be_empty_but_not_negative(identified: Session) -> 
 
 
 @given(st.lists(st.floats(-2.0, 12.0), min_size=5, max_size=5))
-@settings(deadline=None, max_examples=30, suppress_health_check=list(HealthCheck))
+@settings(max_examples=30, suppress_health_check=list(HealthCheck))
 def test_any_times_are_in_order_inside_the_log_or_refused(
     identified: Session, times: list[float]
 ) -> None:

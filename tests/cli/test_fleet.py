@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.fleet.made import make_fleet
 from drivetwin.cli import main
 from drivetwin.fleet.joint.observed import facts
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
+from tests.support.synthetic_fleet import make_fleet
 
 COUNT = 8
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from benchmarks.fleet.made import Truth, make_fleet, plan
 from drivetwin.cli import main
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
+from tests.support.synthetic_fleet import Truth, make_fleet, plan
 
 MOST = 4.0
 """Standard errors within which a truth must lie; beyond that is no chance."""

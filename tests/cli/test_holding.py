@@ -12,12 +12,12 @@ from drivetwin.errors import InputError
 from drivetwin.shifts.find import FoundShifts
 from tests.identify.several.made import pair
 
-TWO = FoundShifts(2 * pair()[0].shifts.shifts, ())
 LOGS = (Path("runs/a.csv"), Path("runs/b.mf4"))
 
 
 def _held(*wanted: str, logs: tuple[Path, ...] = LOGS) -> list[set[int]]:
-    return [set(one) for one in held_numbers(wanted, logs, [TWO] * len(logs))]
+    two = FoundShifts(2 * pair()[0].shifts.shifts, ())
+    return [set(one) for one in held_numbers(wanted, logs, [two] * len(logs))]
 
 
 @pytest.mark.parametrize("name", ["b", "b.mf4", "runs/b.mf4"])

@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import drivetwin.gearbox
@@ -44,7 +44,6 @@ def places(node: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return found + [deep for key, value in items for deep in places(value, (*path, key))]
 
 
-@settings(deadline=None)
 @given(st.data())
 def test_a_damaged_card_is_read_or_refused_by_key(data: st.DataObject) -> None:
     document = copy.deepcopy(data.draw(st.sampled_from(DOCUMENTS)))

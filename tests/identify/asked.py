@@ -6,7 +6,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,7 @@ from drivetwin.identify.method import Method
 from drivetwin.identify.pipeline import identify
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification
+from tests.support.shared_results import shared
 
 DURATION = 3.3
 RATE = 400.0
@@ -48,25 +48,25 @@ def _identified(
         return identify(log, card, drivetwin.find_shifts(log, card), method)
 
 
-@cache
+@shared
 def still() -> Identification:
     """A log at constant engine torque: it cannot tell the torque's age."""
     return _identified(paper, Method.LIKELIHOOD)
 
 
-@cache
+@shared
 def stepped() -> Identification:
     """The same driveline with throttle steps before the shift."""
     return _identified(paper_steps, Method.LIKELIHOOD)
 
 
-@cache
+@shared
 def uncertain_fills() -> Identification:
     """The log at constant engine torque, by a card that leaves P0 a tenth of a bar of spread."""
     return _identified(paper, Method.LIKELIHOOD, P0_std=1e4)
 
 
-@cache
+@shared
 def by_the_paper() -> Identification:
     """The same by a method without a likelihood."""
     return _identified(paper, Method.PAPER)

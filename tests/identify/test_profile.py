@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError, InputError
-from drivetwin.identify.likelihood.newton import minimise
+from drivetwin.identify.optimize.gauss_newton import minimise
 from drivetwin.identify.profile import likelihood_of, profile
 from tests.identify.asked import by_the_paper, slowed, stepped
 

@@ -24,6 +24,7 @@ from drivetwin.logs.shiftlog import FloatArray, ShiftLog
 from drivetwin.shifts.find import find_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.spec import VehicleCard
+from tests.support.shared_results import shared
 
 STEP = (1.0, 1.3)
 """A throttle step of the log lies in here: a straight line over it is far from the truth."""
@@ -48,7 +49,7 @@ def without(role: str, span: tuple[float, float]) -> ShiftLog:
     return replace(log, channels={**log.channels, role: cut})
 
 
-@cache
+@shared
 def undamaged(method: Method) -> Mapping[str, Estimate]:
     log, card = whole()
     return identify(log, card, find_shifts(log, card), method).estimates

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -33,7 +33,6 @@ def wave(count: int, rounding: float) -> FloatArray:
     return np.asarray(rounding * np.round(torque / rounding), dtype=np.float64)
 
 
-@settings(deadline=None)
 @given(period=st.integers(5, 40), data=st.data(), rounding=st.sampled_from([0.01, 1.0, 11.0, 25.0]))
 def test_every_update_is_found_and_no_other_sample(
     period: int, data: st.DataObject, rounding: float
@@ -69,7 +68,6 @@ def test_message_jitter_of_a_sample_does_not_hide_the_raster() -> None:
     assert_within_a_sample(fresh_samples(channel(values)).time, at * STEP)
 
 
-@settings(deadline=None)
 @given(st.integers(0, 1000), st.integers(10, 50), st.sampled_from([0.01, 11.0]))
 def test_messages_that_jitter_by_several_samples_of_the_table_are_updates(
     seed: int, period: int, rounding: float
@@ -154,7 +152,6 @@ def between(period: float, step: float, count: int, rounding: float) -> tuple[Ch
     return replace(channel(values), time=time), at
 
 
-@settings(deadline=None)
 @given(
     rates=st.sampled_from([(5, 2), (10, 4), (10, 3), (20, 8), (20, 6), (50, 20), (100, 8)]),
     rounding=st.sampled_from([0.01, 1.0, 11.0]),
@@ -172,7 +169,6 @@ def test_updates_between_the_samples_of_a_table_are_found(
     assert fresh.values.tolist() == wave(300, rounding)[near].tolist()
 
 
-@settings(deadline=None)
 @given(st.integers(0, 1000), st.sampled_from([2e-3, 4e-3]))
 def test_changes_by_chance_are_on_no_raster_between_samples(seed: int, step: float) -> None:
     gaps = np.random.default_rng(seed).integers(2, 6, 60)
@@ -182,7 +178,6 @@ def test_changes_by_chance_are_on_no_raster_between_samples(seed: int, step: flo
     assert find_raster(chance) is None
 
 
-@settings(deadline=None)
 @given(st.integers(0, 740), st.integers(1, 400))
 def test_a_gap_makes_no_two_updates_of_one(first: int, length: int) -> None:
     held, _ = between(10e-3, 4e-3, 300, 1.0)

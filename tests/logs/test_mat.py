@@ -207,9 +207,7 @@ VECTORS = st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=30)
     unit=st.sampled_from(["Nm", "1/min", ""]),
     compressed=st.booleans(),
 )
-@settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_round_trip(
     tmp_path: Path, channels: dict[str, list[float]], unit: str, compressed: bool
 ) -> None:

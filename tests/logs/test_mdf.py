@@ -202,9 +202,7 @@ def test_a_circle_of_blocks_is_told(tmp_path: Path) -> None:
     ),
     compressed=st.booleans(),
 )  # fmt: skip
-@settings(
-    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_round_trip(tmp_path: Path, rows: list[tuple[float, float, int]], compressed: bool) -> None:
     time = np.cumsum([row[0] for row in rows])
     numbers, gear = np.array([row[1] for row in rows]), np.array([row[2] for row in rows], np.uint8)

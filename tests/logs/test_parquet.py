@@ -128,9 +128,7 @@ def test_a_cut_file_is_told(tmp_path: Path, keep: int) -> None:
 
 
 @given(st.lists(st.one_of(st.none(), st.floats(allow_infinity=False)), min_size=1, max_size=40))
-@settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_round_trip(tmp_path: Path, rows: list[float | None]) -> None:
     time = [0.25 * k for k in range(len(rows))]
     raw = read(tmp_path, table({"t": "s", "x": "Nm"}, t=time, x=pa.array(rows, pa.float64())))

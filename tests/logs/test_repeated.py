@@ -7,14 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.logs.held import find_raster, fresh_samples
 from tests.logs.test_held import STEP, channel, hold, wave
 
 
-@settings(deadline=None)
 @given(st.integers(0, 1000), st.integers(2, 5), st.floats(0.1, 0.8))
 def test_messages_whose_stamps_jitter(seed: int, repeats: int, jitter: float) -> None:
     updates = wave(200, 0.01)
@@ -25,7 +24,6 @@ def test_messages_whose_stamps_jitter(seed: int, repeats: int, jitter: float) ->
     assert fresh.time == pytest.approx((held.time + late)[::repeats])
 
 
-@settings(deadline=None)
 @given(st.integers(0, 1000), st.integers(2, 4), st.floats(0.02, 0.2))
 def test_messages_of_which_some_are_lost(seed: int, repeats: int, share: float) -> None:
     rng = np.random.default_rng(seed)
@@ -54,7 +52,6 @@ def test_a_coarse_signal_on_uneven_stamps_repeats_nothing() -> None:
     assert find_raster(replace(channel(values), time=time)) is None
 
 
-@settings(deadline=None)
 @given(st.integers(0, 1000))
 def test_messages_whose_jitter_a_table_of_even_stamps_shows(seed: int) -> None:
     """Every 10 ms in a table of 1 ms, up to 3 ms off: too far for a raster."""

@@ -67,7 +67,7 @@ def _joint(process: Process) -> tuple[FloatArray, FloatArray, float]:
     return x + gain @ miss, P - gain @ H @ P, surprise
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.integers(1, 4), st.integers(2, 7))
 def test_equals_the_joint_gaussian(seed: int, size: int, count: int) -> None:
     process = _process(seed, size, count)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from drivetwin.report.decimate import MAX_POINTS, envelope, focused
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(size=st.integers(1, 3000), limit=st.integers(8, 400), seed=st.integers(0, 99))
 def test_envelope_is_a_subset_with_all_extremes(size: int, limit: int, seed: int) -> None:
     time = np.arange(size, dtype=float)

@@ -32,7 +32,7 @@ def _without(log: ShiftLog, *roles: str) -> ShiftLog:
     return replace(log, channels={r: c for r, c in log.channels.items() if r not in roles})
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40, derandomize=True)
 @given(
     ratio=st.floats(0.6, 4.0),
     ratio_step=st.floats(1.2, 1.9),

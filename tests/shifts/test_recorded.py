@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import DamagedChannelError
@@ -67,7 +67,6 @@ def log_without(gaps: list[tuple[float, float]], role: str) -> ShiftLog:
     return ShiftLog(channels, "made", "")
 
 
-@settings(deadline=None)
 @given(span=st.tuples(seconds, seconds).map(sorted).map(tuple), gaps=gap_lists)
 def test_parts_and_gaps_make_up_the_span(
     span: tuple[float, float], gaps: list[tuple[float, float]]

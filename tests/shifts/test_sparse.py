@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from drivetwin.shifts.sparse import begun, ended
@@ -13,7 +13,6 @@ from drivetwin.shifts.sparse import begun, ended
 STEP = 0.02
 
 
-@settings(deadline=None)
 @given(
     start=st.floats(1.0, 1.02),
     duration=st.floats(0.25, 0.6),
@@ -55,7 +54,6 @@ def test_a_slip_that_never_moves_or_never_rests_has_no_boundary() -> None:
     assert begun(time, np.full(time.size, 20.0), 0.2) is None
 
 
-@settings(deadline=None)
 @given(
     start=st.floats(1.0, 1.02),
     duration=st.floats(0.3, 1.0),
@@ -95,7 +93,6 @@ def test_one_sample_that_swings_after_lock_up_moves_it_little() -> None:
     assert found[1].time == pytest.approx(1.2, abs=STEP)
 
 
-@settings(deadline=None)
 @given(
     start=st.floats(1.0, 1.02),
     flare=st.floats(3.0, 10.0),

@@ -17,6 +17,7 @@ from drivetwin.logs.shiftlog import ShiftLog
 from drivetwin.shifts.usable import usable_shifts
 from drivetwin.twin import Twin
 from tests.identify.several.made import LOADS, card, pair, scenario
+from tests.support.shared_results import shared
 
 LATER = 60.0
 """Time between the starts of the two shifts [s]."""
@@ -37,7 +38,7 @@ def hilly() -> ShiftLog:
     return replace(first, channels=channels)
 
 
-@cache
+@shared
 def found(method: Method) -> Identification:
     log = hilly()
     return identify(log, card(), usable_shifts(log, card()), method)

@@ -6,17 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.speed import reference
-from benchmarks.speed.core import Scenario
-from benchmarks.speed.equations import Equations
-from benchmarks.speed.general import with_brakes, with_shafts
-from benchmarks.speed.growth import Curve
-from benchmarks.speed.measure import Quality
-from benchmarks.speed.picture import svg
-from benchmarks.speed.scipy_peer import solve
-from benchmarks.speed.shift import judge, scenario_of
-from benchmarks.speed.statement import Solution, inputs, problem
 from drivetwin.network import simulate
+from tests.support.upshift import reference
+from tests.support.upshift.equations import Equations
+from tests.support.upshift.scenario import Scenario, build_scenario
+from tests.support.upshift.scipy_solution import solve
+from tests.support.upshift.statement import Solution, make_inputs, make_problem
 
 
 def _solution(scenario: Scenario) -> Solution:
@@ -28,42 +23,28 @@ def _solution(scenario: Scenario) -> Solution:
     return Solution(columns, np.array([event.time for event in run.events]))
 
 
-def _quality(found: Solution) -> Quality:
-    quality = judge(reference.read())(found)
-    assert quality is not None
-    return quality
+def _compare(found: Solution) -> tuple[float, float]:
+    """Return the largest errors of T_o [N m] and of an event [s]."""
+    expected = reference.read()
+    torque = float(np.abs(found.columns[3] - expected.columns[3]).max())
+    assert found.events.size == expected.events.size
+    return torque, float(np.abs(found.events - expected.events).max())
 
 
 @pytest.fixture(scope="module")
 def stated() -> Scenario:
-    return scenario_of(problem(), inputs())
+    return build_scenario(make_problem(), make_inputs())
 
 
 def test_default_settings_reach_the_stated_accuracy(stated: Scenario) -> None:
-    quality = _quality(_solution(stated))
-    assert quality.error < 0.02
-    assert quality.events is not None
-    assert quality.events < 1e-7
+    torque, events = _compare(_solution(stated))
+    assert torque < 0.02
+    assert events < 1e-7
 
 
 def test_the_equations_of_the_peers_are_those_of_the_problem() -> None:
-    given = inputs()
-    found = solve(Equations(problem(), given), given.time, "LSODA", (1e-6, 1e-8, 1e-2))
-    quality = _quality(found)
-    assert quality.error < 2.0
-    assert quality.events is not None
-    assert quality.events < 1e-5
-
-
-def test_larger_drivelines_start_as_the_shift(stated: Scenario) -> None:
-    plain = _solution(stated)
-    for wide in (with_shafts(stated, 2), with_brakes(stated, 2)):
-        found = _solution(wide)
-        assert found.columns[:, 0] == pytest.approx(plain.columns[:, 0])
-        assert np.abs(found.columns[3] - plain.columns[3]).max() > 1.0
-
-
-def test_the_picture_holds_every_point() -> None:
-    text = svg([Curve("samples", ((1.0, 1e-6), (2.0, 2e-6))), Curve("states", ((4.0, 5e-6),))])
-    assert text.count("<circle") == 3
-    assert text.count("<polyline") == 2
+    given = make_inputs()
+    found = solve(Equations(make_problem(), given), given.time, "LSODA", (1e-6, 1e-8, 1e-2))
+    torque, events = _compare(found)
+    assert torque < 2.0
+    assert events < 1e-5

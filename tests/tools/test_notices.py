@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from tools.notices import NOTICES, Crate, notices
+from tools.notices import NOTICES, Crate, format_notices
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -41,7 +41,7 @@ def test_wheels_carry_them() -> None:
 
 
 def test_a_licence_stands_once_below_all_its_crates() -> None:
-    text = notices(
+    text = format_notices(
         (Crate("a", "1.0", ("T",)), Crate("b", "2.0", ("U", "U")), Crate("c", "3", ("T",)))
     )
     assert "a 1.0\nc 3\n\nT\n" in text

@@ -8,17 +8,15 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
-from tools import tidy
 from tools.tidy_rules.base import Fault, Rule, Source, Tree, read_tree
-from tools.tidy_rules.layers import (
-    core_is_pure,
-    core_layers,
-    python_layers,
-    units_at_the_edge,
-)
-from tools.tidy_rules.layout import tests_mirror_sources as mirror_rule
-from tools.tidy_rules.sizes import file_bytes, file_lines, python_functions, rust_functions
-from tools.tidy_rules.texts import licence_line, named_paths_exist, no_machine_paths
+from tools.tidy_rules.core import check_circles as check_core_circles
+from tools.tidy_rules.core import check_layers, check_purity
+from tools.tidy_rules.files import check_bytes, check_lines, check_tests
+from tools.tidy_rules.imports import MAX_CIRCLE, check_circles, describe_circles
+from tools.tidy_rules.prose import check_names, check_openers
+from tools.tidy_rules.texts import check_licence, check_machine_paths, check_named_paths
+from tools.tidy_rules.units import check_units
+from tools.tidy_rules.words import WORDS, check_words, read_words
 
 CORE = "crates/drivetwin-core/src"
 PACKAGE = "python/drivetwin"
@@ -34,121 +32,86 @@ def faults(rule: Rule, files: dict[str, str]) -> list[tuple[str, int]]:
     return [(str(fault.path), fault.line) for fault in rule(tree_of(files))]
 
 
-def python_function(body_lines: int, arguments: str = "", docstring: str = "") -> str:
-    body = "".join(f"    x{number} = {number}\n" for number in range(body_lines))
-    return f"def f({arguments}):\n{docstring}{body}"
-
-
 @pytest.mark.parametrize(
     ("rule", "good", "bad", "line"),
     [
-        (file_lines, {"a.py": "x\n" * 500}, {"a.py": "x\n" * 501}, 1),
-        (file_bytes, {"a.csv": "x" * 1_000_000}, {"a.csv": "x" * 1_000_001}, 1),
+        (check_lines, {"a.py": "x\n" * 500}, {"a.py": "x\n" * 501}, 1),
+        (check_bytes, {"a.csv": "x" * 1_000_000}, {"a.csv": "x" * 1_000_001}, 1),
         (
-            python_functions,
-            {"a.py": python_function(59, docstring='    """Long,\n    not counted."""\n')},
-            {"a.py": python_function(60)},
-            1,
-        ),
-        (
-            python_functions,
-            {"a.py": "def f(self, a, b, c, d, e, *f, g): ..."},
-            {"a.py": "def f(a, b, c, d, e, f, *, g, h): ..."},
-            1,
-        ),
-        (
-            python_functions,
-            {"tests/a.py": "def test_f(a, b, c, d, e, f, g, h): ..."},
-            {"tests/a.py": "def f(a, b, c, d, e, f, g, h): ..."},
-            1,
-        ),
-        (
-            rust_functions,
-            {"a.rs": "fn f<F: Fn(f64, f64) -> (u8, u8)>(&mut self, a: [f64; 7], g: F) {}"},
-            {"a.rs": "\nfn f(a: A, b: A, c: A, d: A, e: A, f: A, g: A, h: A) {}"},
-            2,
-        ),
-        (
-            core_is_pure,
+            check_purity,
             {f"{CORE}/a.rs": '// pyo3\nlet s = "std::fs println!";'},
             {f"{CORE}/a.rs": "\neprintln!();"},
             2,
         ),
-        (core_is_pure, {"other/a.rs": "use std::fs;"}, {f"{CORE}/a.rs": "use std::fs::File;"}, 1),
+        (check_purity, {"other/a.rs": "use std::fs;"}, {f"{CORE}/a.rs": "use std::fs::File;"}, 1),
         (
-            core_is_pure,
+            check_purity,
             {"crates/drivetwin-core/Cargo.toml": 'serde = "1"'},
             {"crates/drivetwin-core/Cargo.toml": "[dependencies]\npyo3.workspace = true"},
             2,
         ),
         (
-            core_layers,
-            {f"{CORE}/solve/a.rs": "use crate::network::Mode;"},
-            {f"{CORE}/solve/a.rs": "use crate::{network::Mode, model::Clutch};"},
+            check_layers,
+            {f"{CORE}/solver/a.rs": "use crate::network::Mode;"},
+            {f"{CORE}/solver/a.rs": "use crate::{network::Mode, model::Clutch};"},
             1,
         ),
         (
-            core_layers,
-            {f"{CORE}/simulate/a.rs": "use crate::solve::Status;"},
-            {f"{CORE}/network/a.rs": "use crate::solve::Status;"},
+            check_layers,
+            {f"{CORE}/simulate/a.rs": "use crate::solver::Status;"},
+            {f"{CORE}/network/a.rs": "use crate::solver::Status;"},
             1,
         ),
         (
-            python_layers,
-            {f"{PACKAGE}/shifts/a.py": "from drivetwin.logs.shiftlog import ShiftLog"},
-            {f"{PACKAGE}/shifts/a.py": "from drivetwin.identify.result import Estimate"},
-            1,
-        ),
-        (
-            python_layers,
-            {f"{PACKAGE}/__init__.py": "from drivetwin.cli import main"},
-            {f"{PACKAGE}/logs/a.py": "import os\nfrom drivetwin import report"},
-            2,
-        ),
-        (
-            units_at_the_edge,
+            check_units,
             {f"{PACKAGE}/logs/a.py": "x = p * 1e5", f"{PACKAGE}/shifts/b.py": "x = 2 * pi * f"},
             {f"{PACKAGE}/shifts/a.py": "x = p * 1e5"},
             1,
         ),
         (
-            units_at_the_edge,
-            {f"{PACKAGE}/identify/a.py": "x = 60 * dt"},
-            {f"{PACKAGE}/identify/a.py": "x = w * 60 / (2 * np.pi)"},
+            check_units,
+            {f"{PACKAGE}/estimation/a.py": "x = 60 * dt"},
+            {f"{PACKAGE}/estimation/a.py": "x = w * 60 / (2 * np.pi)"},
             1,
         ),
         (
-            units_at_the_edge,
+            check_units,
             {f"{PACKAGE}/vehicle/a.py": "x = 1e5"},
             {f"{PACKAGE}/of_no_layer_yet.py": "\nx = n * math.pi / 30"},
             2,
         ),
         (
-            licence_line,
+            check_licence,
             {"a.sh": "#!/bin/sh\n# SPDX-License-Identifier: MIT", "__init__.py": ""},
             {"a.rs": "//! SPDX is missing"},
             1,
         ),
         (
-            no_machine_paths,
+            check_machine_paths,
             {"Makefile": HOME, "a.md": "../home/x"},
             {"a.md": f"\nsee {HOME}x"},
             2,
         ),
         (
-            named_paths_exist,
+            check_named_paths,
             {"README.md": "`docs/a.md` [a](docs/a.md) `J/eta` [w](https://x.y)", "docs/a.md": ""},
             {"README.md": "\n`docs/b.md`"},
             2,
         ),
         (
-            named_paths_exist,
+            check_named_paths,
             {"docs/x/a.md": "[up](../b.md)", "docs/b.md": "`docs/x`"},
             {"docs/x/a.md": "[up](../c.md)"},
             1,
         ),
         (
-            mirror_rule,
+            check_openers,
+            {f"{PACKAGE}/a.py": '"""Note of what it is."""'},
+            {f"{PACKAGE}/a.py": '"""Names."""\n\nclass A:\n    """What it holds."""'},
+            4,
+        ),
+        (
+            check_tests,
             {
                 "tests/logs/test_csv_limits.py": "",
                 "tests/logs/test_given_logs.py": "",
@@ -158,7 +121,7 @@ def python_function(body_lines: int, arguments: str = "", docstring: str = "") -
             1,
         ),
         (
-            mirror_rule,
+            check_tests,
             {"tests/system/test_anything.py": ""},
             {"tests/tools/test_absent.py": "", "tools/tidy.py": ""},
             1,
@@ -172,46 +135,94 @@ def test_a_rule_tells_good_from_bad(
     assert [found for _, found in faults(rule, bad)][:1] == [line]
 
 
-@pytest.mark.parametrize(("statements", "found"), [(58, False), (59, True)])
-def test_rust_function_length_runs_from_fn_to_brace(statements: int, *, found: bool) -> None:
-    body = "    let a = '}'; // }\n" * statements
-    assert bool(faults(rust_functions, {"a.rs": f"fn f() -> [f64; 3] {{\n{body}}}\n"})) is found
-
-
 def test_unit_tests_of_a_rust_file_do_not_count_as_its_lines() -> None:
     text = "x\n" * 400 + "#[cfg(test)]\nmod tests {\n" + "x\n" * 400 + "}\n"
-    assert faults(file_lines, {"a.rs": text}) == []
+    assert faults(check_lines, {"a.rs": text}) == []
 
 
-def test_a_module_outside_the_layers_is_named() -> None:
-    assert faults(python_layers, {f"{PACKAGE}/somewhere.py": ""}) == [
-        (f"{PACKAGE}/somewhere.py", 1)
+def module(name: str, *imports: str) -> dict[str, str]:
+    """Return a source file of the package that imports modules in several ways."""
+    text = "".join(f"def f{k}():\n    from {one} import x\n" for k, one in enumerate(imports))
+    return {f"python/{name.replace('.', '/')}.py": text}
+
+
+def test_modules_of_one_package_may_form_a_small_circle() -> None:
+    pair = module("drivetwin.a.b", "drivetwin.a.c") | module("drivetwin.a.c", "drivetwin.a.b")
+    assert faults(check_circles, pair) == []
+    names = [f"drivetwin.a.m{k}" for k in range(MAX_CIRCLE + 1)]
+    ring = {
+        path: text
+        for name, after in zip(names, names[1:] + names[:1], strict=True)
+        for path, text in module(name, after).items()
+    }
+    assert len(faults(check_circles, ring)) == 1
+    assert describe_circles(tree_of(ring)).startswith(f"largest circle of modules {len(names)},")
+
+
+def test_packages_must_not_import_each_other() -> None:
+    there = module("drivetwin.a.x.b", "drivetwin.a.y.c") | module("drivetwin.a.y.c")
+    assert faults(check_circles, there) == []
+    back = module("drivetwin.a.y.d", "drivetwin.a.x.b")
+    assert faults(check_circles, there | back) == [("python/drivetwin/a/x", 1)]
+
+
+def test_type_only_imports_count_and_facades_do_not() -> None:
+    typed = "if TYPE_CHECKING:\n    from drivetwin.b.c import X\n"
+    files = module("drivetwin.b.c", "drivetwin.a.b") | {f"{PACKAGE}/a/b.py": typed}
+    assert len(faults(check_circles, files)) == 2
+    facade = {f"{PACKAGE}/a/__init__.py": "from drivetwin.b.c import X\n"}
+    assert faults(check_circles, facade | module("drivetwin.b.c", "drivetwin.a")) == []
+
+
+def test_circles_of_the_core_are_followed_through_groups_and_re_exports() -> None:
+    files = {
+        f"{CORE}/solver/mod.rs": "mod a;\nmod b;\nmod c;\npub use b::Step;\n",
+        f"{CORE}/solver/a.rs": "use super::Step;\n",
+        f"{CORE}/solver/b.rs": "use crate::{model::Clutch, solver::{c::{self, Run}}};\n",
+        f"{CORE}/solver/c.rs": "fn f() { super::a::g() }\n",
+        f"{CORE}/model/mod.rs": "pub struct Clutch;\n",
+    }
+    assert faults(check_core_circles, files) == [(CORE, 1)]
+    files[f"{CORE}/solver/c.rs"] = "// super::a\n#[cfg(test)]\nmod tests {\n use super::a;\n}\n"
+    assert faults(check_core_circles, files) == []
+
+
+def test_private_words_are_found_as_files_folders_and_definitions() -> None:
+    words = (
+        "# comment\n"
+        "python/drivetwin/*\tfolder\tapp\n"
+        "python/drivetwin/logs/*\tfile\theld damage\n"
+        "python/drivetwin/logs/*\tpython\ttold Work ENOUGH\n"
+        "crates/*\trust\tsprint Stuck\n"
+    )
+    files = {
+        WORDS: words,
+        f"{PACKAGE}/app/a.py": "",
+        f"{PACKAGE}/cli/app.py": "def told(): ...",
+        f"{PACKAGE}/logs/held.py": "def estimated(): ...",
+        f"{PACKAGE}/logs/a.py": "ENOUGH = 1\nclass A:\n    def told(self): ...\n",
+        "crates/a.rs": "// fn sprint\nenum A {\n    Stuck,\n    Open(u8),\n}\nfn sprint() {}\n",
+    }
+    assert sorted(faults(check_words, files)) == [
+        ("crates/a.rs", 3),
+        ("crates/a.rs", 6),
+        (f"{PACKAGE}/app", 1),
+        (f"{PACKAGE}/logs/a.py", 1),
+        (f"{PACKAGE}/logs/a.py", 3),
+        (f"{PACKAGE}/logs/held.py", 1),
     ]
 
 
-def long_file() -> Tree:
-    return tree_of({"a.py": "# SPDX-License-Identifier: MIT\n" * 501})
+def test_an_unknown_kind_of_word_is_refused() -> None:
+    with pytest.raises(ValueError, match="unknown kind"):
+        read_words("a\tb\tc\n")
 
 
-def test_an_exception_covers_its_fault() -> None:
-    exemptions = tidy.read_exemptions(
-        '[[exception]]\nrule = "file-lines"\npath = "a.py"\nreason = "one table"\n'
-    )
-    assert [fault.rule for fault in tidy.check(long_file(), ())] == ["file-lines"]
-    assert tidy.check(long_file(), exemptions) == []
-
-
-def test_a_stale_exception_is_a_fault() -> None:
-    exemptions = tidy.read_exemptions(
-        '[[exception]]\nrule = "file-lines"\npath = "b.py"\nreason = "gone"\n'
-    )
-    rules = [fault.rule for fault in tidy.check(long_file(), exemptions)]
-    assert rules == ["file-lines", "stale-exception"]
-
-
-def test_an_exception_without_reason_is_refused() -> None:
-    with pytest.raises(ValueError, match="gives no reason"):
-        tidy.read_exemptions('[[exception]]\nrule = "file-lines"\npath = "a.py"\n')
+def test_names_are_judged_as_a_whole() -> None:
+    verbs = "".join(f"def find_{k}(): ...\n" for k in range(5))
+    others = "def told(): ...\ndef x_of(): ...\ndef estimates(): ...\n"
+    assert faults(check_names, {f"{PACKAGE}/a.py": verbs}) == []
+    assert faults(check_names, {f"{PACKAGE}/a.py": verbs + others}) == [(PACKAGE, 1)]
 
 
 def test_the_tree_holds_new_files_but_no_ignored_or_deleted_ones(tmp_path: Path) -> None:

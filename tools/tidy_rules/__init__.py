@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The rules of `tools.tidy`, one file per subject: sizes, layers, texts, layout."""
+"""Rules of `tools.tidy`, one file per subject."""

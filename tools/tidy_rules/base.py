@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What every rule works on: the files of the repository, and the faults found in them."""
+"""Files of the repository as the rules read them, and the faults that rules report."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 
+PACKAGE = "python/drivetwin"
+
 
 @dataclass(frozen=True)
 class Fault:
-    """A broken rule at a place; `name` is the function or item meant, if any."""
+    """A broken rule at a place."""
 
     rule: str
     path: PurePosixPath
     line: int
     text: str
-    name: str = ""
 
     def __str__(self) -> str:
         return f"{self.path}:{self.line}: [{self.rule}] {self.text}"
@@ -33,7 +34,7 @@ class Source:
 
     @cached_property
     def text(self) -> str | None:
-        """The content as text, None where it is not UTF-8."""
+        """Content as text; None if it is not UTF-8."""
         try:
             return self.data.decode("utf-8")
         except UnicodeDecodeError:
@@ -41,7 +42,7 @@ class Source:
 
     @property
     def lines(self) -> list[str]:
-        """The lines of the text; empty for a binary file."""
+        """Lines of the text; empty for a binary file."""
         return (self.text or "").splitlines()
 
 
@@ -53,7 +54,7 @@ class Tree:
     sources: tuple[Source, ...]
 
     def below(self, folder: str, *suffixes: str) -> Iterator[Source]:
-        """Files under `folder` ("" is the root) with one of the suffixes (all without any)."""
+        """Yield files under `folder` ("" is the root) with one of the suffixes (default: all)."""
         for source in self.sources:
             inside = not folder or PurePosixPath(folder) in source.path.parents
             if inside and (not suffixes or source.path.suffix in suffixes):
@@ -61,12 +62,37 @@ class Tree:
 
 
 Rule = Callable[[Tree], Iterator[Fault]]
+Edges = set[tuple[str, str]]
+"""Pairs of the importing and the imported module."""
+
+
+def find_circles(edges: Edges) -> list[list[str]]:
+    """Return the strongly connected sets of more than one node, the largest first."""
+    after: dict[str, set[str]] = {}
+    for start, end in edges:
+        after.setdefault(start, set()).add(end)
+    reached: dict[str, set[str]] = {}
+    for start in after:
+        seen: set[str] = set()
+        ahead = [*after[start]]
+        while ahead:
+            name = ahead.pop()
+            if name not in seen:
+                seen.add(name)
+                ahead += after.get(name, ())
+        reached[start] = seen
+    circles = {
+        frozenset(other for other in reached[name] if name in reached.get(other, ()))
+        for name in reached
+        if name in reached[name]
+    }
+    return sorted((sorted(circle) for circle in circles), key=len, reverse=True)
 
 
 def read_tree(root: Path) -> Tree:
-    """Read what git knows below `root`: tracked files, and new ones that are not ignored.
+    """Read the tracked files below `root`, and new ones that are not ignored.
 
-    Raises subprocess.CalledProcessError where `root` is in no git repository.
+    Raises subprocess.CalledProcessError if `root` is in no git repository.
     """
     listing = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],

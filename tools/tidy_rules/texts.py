@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What files say: the licence line, no machine's own paths, documents that name what exists."""
+"""Rules on texts: licence lines, no paths of one machine, documents that name existing files."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _FOLDERS = frozenset(
 _PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)*/?")
 
 
-def licence_line(tree: Tree) -> Iterator[Fault]:
-    """The first line (after `#!`) of every source file that is not empty names the licence."""
+def check_licence(tree: Tree) -> Iterator[Fault]:
+    """Require the licence in the first line (after `#!`) of every source file with content."""
     for source in tree.below("", *_LICENSED):
         lines = source.lines
         if not lines:
@@ -34,8 +34,8 @@ def licence_line(tree: Tree) -> Iterator[Fault]:
             yield Fault("licence-line", source.path, first + 1, f"does not say {SPDX}")
 
 
-def no_machine_paths(tree: Tree) -> Iterator[Fault]:
-    """No file speaks of the machine it was written on."""
+def check_machine_paths(tree: Tree) -> Iterator[Fault]:
+    """Reject absolute paths of the machine on which a file was written."""
     for source in tree.sources:
         if source.path.parts[0] in _MAY_NAME_MACHINES:
             continue
@@ -47,7 +47,7 @@ def no_machine_paths(tree: Tree) -> Iterator[Fault]:
 
 
 def _is_path(span: str) -> bool:
-    """Whether a code span names a file of the repository: a known folder, or a file of the root."""
+    """Return whether a code span names a file in a known folder, or a file of the root."""
     if not _PATH.fullmatch(span):
         return False
     folder, slash, _ = span.partition("/")
@@ -56,28 +56,28 @@ def _is_path(span: str) -> bool:
     )
 
 
-def _named_paths(source: Source) -> Iterator[tuple[int, str]]:
+def _find_paths(source: Source) -> Iterator[tuple[int, str]]:
     for number, text in enumerate(source.lines, start=1):
         yield from ((number, span) for span in _CODE_SPAN.findall(text) if _is_path(span))
         for link in _LINK.findall(text):
             yield number, (source.path.parent / link).as_posix()
 
 
-def named_paths_exist(tree: Tree) -> Iterator[Fault]:
-    """Every path that a document names is in the repository."""
+def check_named_paths(tree: Tree) -> Iterator[Fault]:
+    """Require that every path named in a document exists."""
     files = {source.path for source in tree.sources}
     known = files.union(*(path.parents for path in files))
     for document in tree.below("", ".md"):
         if document.path.parts[0] not in DOCUMENTS:
             continue
-        for line, name in _named_paths(document):
-            path = PurePosixPath(_normal(name))
+        for line, name in _find_paths(document):
+            path = PurePosixPath(_normalize(name))
             if path not in known:
                 yield Fault("named-path", document.path, line, f"{name} does not exist")
 
 
-def _normal(name: str) -> str:
-    """The path with its `..` resolved, as far as it stays in the repository."""
+def _normalize(name: str) -> str:
+    """Resolve `..` in a path, as far as it stays in the repository."""
     parts: list[str] = []
     for part in PurePosixPath(name).parts:
         if part == ".." and parts:

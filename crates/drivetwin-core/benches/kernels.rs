@@ -11,7 +11,7 @@ use drivetwin_core::network::{ModeKey, Network};
 use drivetwin_core::simulate::{
     Keep, Plan, dual_clutch_batch, dual_clutch_outputs, dual_clutch_sensitivities,
 };
-use drivetwin_core::solve::{Known, Settings, Signal};
+use drivetwin_core::solver::{Settings, Signal, SolverCache};
 use std::hint::black_box;
 
 /// Time [s], engine torque [N·m] and pressures [Pa] of a shift from second to third.
@@ -59,22 +59,27 @@ fn kernels(criterion: &mut Criterion) {
     });
     criterion.bench_function("one shift", |b| b.iter(|| plan.run(&network, black_box(&state))));
     criterion.bench_function("one shift, modes known", |b| {
-        let mut known = Known::of(&network);
+        let mut known = SolverCache::new(&network);
         b.iter(|| plan.run_again(&mut known, black_box(&state)));
     });
     let sampled = [("engine torque", &torque), ("B2", &off), ("B3", &on)]
         .map(|(n, v)| (n, &time[..], &v[..], 0.0));
     let names = ["eta", "J1", "k_o", "B3.P0", "B3.mu_c", "B3.mu_s", "start.twist", "delay.B3"];
     criterion.bench_function("8 derivatives", |b| {
-        let settings = (Settings::default(), &names[..]);
-        b.iter(|| dual_clutch_sensitivities(&model, &sampled, &begin, black_box(&time), settings));
+        let (settings, time) = (Settings::default(), &time);
+        b.iter(|| {
+            let time = black_box(time);
+            dual_clutch_sensitivities(&model, &sampled, &begin, time, settings, &names)
+        });
     });
     let scenarios = [(plan.clone(), begin.clone())];
     let sets: Vec<f64> = (0..64).map(|i| 0.80 + 0.001 * f64::from(i)).collect();
     criterion.bench_function("64 runs, one thread", |b| {
-        let sets = (&["eta"][..], &sets[..]);
-        let (how, mut ends) = ((Keep::Last, 1), vec![0.0; sets.1.len()]);
-        b.iter(|| dual_clutch_batch(&model, black_box(&scenarios), sets, how, &mut ends));
+        let mut ends = vec![0.0; sets.len()];
+        b.iter(|| {
+            let scenarios = black_box(&scenarios);
+            dual_clutch_batch(&model, scenarios, &["eta"], &sets, Keep::Last, 1, &mut ends)
+        });
     });
 }
 

@@ -7,7 +7,7 @@
 use drivetwin_core::model::{Driveline, Element};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{Output, Plan, Start};
-use drivetwin_core::solve::{Known, Settings, Signal};
+use drivetwin_core::solver::{Settings, Signal, SolverCache};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::hint::black_box;
@@ -56,7 +56,7 @@ fn main() {
         (network, plan.expect("a scenario"), state)
     };
     let (network, plan, state) = prepare();
-    let mut known = Known::of(&network);
+    let mut known = SolverCache::new(&network);
     let mut run = plan.run_again(&mut known, &state);
     let (mut again, mut first, mut whole) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..repeats {

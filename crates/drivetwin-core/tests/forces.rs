@@ -20,7 +20,7 @@ use drivetwin_core::model::torque_map::TorqueMap;
 use drivetwin_core::network::{CompileError, Network};
 use drivetwin_core::number::{Dual, Number as _};
 use drivetwin_core::simulate::{Output, Start, run};
-use drivetwin_core::solve::{Settings, Signal, Status};
+use drivetwin_core::solver::{Settings, Signal, Status};
 use std::marker::PhantomData;
 
 fn speed(node: &str) -> Output {

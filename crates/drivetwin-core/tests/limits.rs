@@ -12,7 +12,7 @@ use drivetwin_core::model::elements::{Clutch, Element, Gear, GearLoss};
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::{FrictionLaw, Stribeck};
 use drivetwin_core::simulate::Output;
-use drivetwin_core::solve::{Settings, Status};
+use drivetwin_core::solver::{Settings, Status};
 
 fn friction_torque(name: &str) -> Output {
     Output::FrictionTorque(name.into())

@@ -9,7 +9,7 @@ use drivetwin_core::model::elements::{Clutch, Element, OneWayClutch};
 use drivetwin_core::model::{FrictionLaw, Stribeck};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{Output, Start, Trajectory, run};
-use drivetwin_core::solve::{EventKind, Settings, Signal, Status};
+use drivetwin_core::solver::{EventKind, Settings, Signal, Status};
 
 type Column = (&'static str, Vec<f64>);
 
@@ -86,7 +86,7 @@ fn a_holding_torque_that_changes_sign_breaks_away_when_its_own_bound_is_reached(
     ];
     let begin = start(&[("a", 0.0), ("b", 0.0)], &["C"]);
     for run in both(&compile(elements), &time, &columns, &begin, &Output::Slip("C".into())) {
-        assert_eq!(kinds(&run), [EventKind::BreakAway, EventKind::Vent]);
+        assert_eq!(kinds(&run), [EventKind::BreakAway, EventKind::ClutchVented]);
         assert!(
             (run.events[0].time - (0.020 + 1e-3 * 15.0 / 26.0)).abs() < 1e-12,
             "{:?}",

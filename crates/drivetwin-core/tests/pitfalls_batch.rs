@@ -12,7 +12,7 @@ use drivetwin_core::number::{Lane, Pack};
 use drivetwin_core::simulate::{
     Batch, Keep, Outcome, Output, Plan, dual_clutch_batch, dual_clutch_outputs, run,
 };
-use drivetwin_core::solve::{Settings, Signal, Status, WIDTH};
+use drivetwin_core::solver::{LANES, Settings, Signal, Status};
 use proptest::prelude::*;
 use std::ops::Deref;
 
@@ -34,12 +34,13 @@ impl Deref for Kept {
 fn columns_of(
     model: &DualClutch<f64>,
     plan: Plan<f64>,
-    (names, sets): (&[&str], &[f64]),
+    names: &[&str],
+    sets: &[f64],
     size: usize,
 ) -> Kept {
     let mut values = vec![f64::INFINITY; sets.len() / names.len() * size];
     let (scenarios, how) = ([(plan, second_gear())], (Keep::Columns, 1));
-    let batch = dual_clutch_batch(model, &scenarios, (names, sets), how, &mut values);
+    let batch = dual_clutch_batch(model, &scenarios, names, sets, how.0, how.1, &mut values);
     Kept { values, batch: batch.expect("names") }
 }
 
@@ -53,7 +54,7 @@ fn shifts_of(names: &[&str], sets: &[f64], settings: Settings) -> Kept {
     let outputs = &dual_clutch_outputs(&model)[4..5];
     let grid = &columns[0].1;
     let plan = Plan::new(&network, &signals, grid, outputs, (settings, false)).expect("a plan");
-    columns_of(&model, plan, (names, sets), grid.len())
+    columns_of(&model, plan, names, sets, grid.len())
 }
 
 /// The same under several efficiencies.
@@ -72,11 +73,11 @@ proptest! {
         a in prop::array::uniform8(-5.0..5.0_f64),
         b in prop::array::uniform8(-5.0..5.0_f64),
     ) {
-        prop_assert_eq!(size_of::<Pack<WIDTH>>(), WIDTH * size_of::<f64>());
-        let (x, y) = (Pack::<WIDTH>(a), Pack::<WIDTH>(b));
+        prop_assert_eq!(size_of::<Pack<LANES>>(), LANES * size_of::<f64>());
+        let (x, y) = (Pack::<LANES>(a), Pack::<LANES>(b));
         let lanes = (x.fma::<true>(y, x) - y).exponential::<true>().grown::<true>(y);
         let lanes = lanes.with(0b0110, x);
-        for i in 0..WIDTH {
+        for i in 0..LANES {
             let alone = (a[i].fma::<true>(b[i], a[i]) - b[i]).exponential::<true>();
             let alone = alone.grown::<true>(b[i]).with(0b0110 >> i, a[i]);
             prop_assert_eq!(lanes.0[i].to_bits(), alone.to_bits());
@@ -106,10 +107,10 @@ fn ten_thousand_samples_keep_double_precision() {
 /// 8: a second group of lanes changes nothing in the first, nor does a group that is not full.
 #[test]
 fn groups_of_lanes_do_not_see_each_other() {
-    let eta = efficiencies(2 * WIDTH + 3);
+    let eta = efficiencies(2 * LANES + 3);
     let all = shifts(&eta, Settings::default());
     let points = all.values.len() / eta.len();
-    for count in [1, WIDTH - 1, WIDTH, WIDTH + 1] {
+    for count in [1, LANES - 1, LANES, LANES + 1] {
         let some = shifts(&eta[..count], Settings::default());
         assert!(some.values == all.values[..count * points], "{count} runs");
         assert_eq!(some.last_lock, all.last_lock[..count]);
@@ -119,11 +120,11 @@ fn groups_of_lanes_do_not_see_each_other() {
 /// 9: all lanes have their events within the same few samples; each is located by itself.
 #[test]
 fn events_of_all_lanes_within_few_samples_are_located_one_by_one() {
-    let eta = efficiencies(WIDTH);
+    let eta = efficiencies(LANES);
     let [fast, exact] = [Settings::default(), Settings::exact()].map(|s| shifts(&eta, s));
-    assert_eq!(fast.outcomes, vec![Outcome::Ran(Status::Completed); WIDTH]);
+    assert_eq!(fast.outcomes, vec![Outcome::Ran(Status::Completed); LANES]);
     assert_eq!(fast.events, exact.events);
-    let spread = fast.last_lock[0] - fast.last_lock[WIDTH - 1];
+    let spread = fast.last_lock[0] - fast.last_lock[LANES - 1];
     assert!(spread.abs() > 1e-5 && spread.abs() < 20e-3, "{spread}");
     for (a, b) in fast.last_lock.iter().zip(&exact.last_lock) {
         assert!((a - b).abs() < 1e-6, "{a} {b}");
@@ -143,14 +144,14 @@ fn runs_that_decide_otherwise_are_as_they_would_be_alone() {
             noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         1.0 + by * ((noise >> 11) as f64 / (1_u64 << 52) as f64 - 1.0)
     };
-    let runs = 2 * WIDTH + 5;
+    let runs = 2 * LANES + 5;
     let mut sets: Vec<Vec<f64>> = (0..runs)
         .map(|run| {
             nominal.iter().map(|v| v * scatter(if run % 3 == 0 { 0.5 } else { 0.05 })).collect()
         })
         .collect();
     // Locks never, is refused, slips from the start.
-    (sets[2][3], sets[WIDTH + 1][1], sets[WIDTH + 3][2]) = (0.0, -1.0, nominal[2] * 1e-3);
+    (sets[2][3], sets[LANES + 1][1], sets[LANES + 3][2]) = (0.0, -1.0, nominal[2] * 1e-3);
     let of = |order: &[usize]| {
         let flat: Vec<f64> = order.iter().flat_map(|&run| sets[run].iter().copied()).collect();
         shifts_of(&names, &flat, Settings::default())
@@ -159,12 +160,12 @@ fn runs_that_decide_otherwise_are_as_they_would_be_alone() {
     let shuffled: Vec<usize> = (0..runs).map(|i| (i * 8 + 3) % runs).collect();
     let (one, other) = (of(&forward), of(&shuffled));
     let points = one.values.len() / runs;
-    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    let lane_mask = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     for (place, &run) in shuffled.iter().enumerate() {
         let alone = of(&[run]);
         for (batch, at) in [(&one, run), (&other, place)] {
             let values = &batch.values[at * points..][..points];
-            assert!(bits(values) == bits(&alone.values), "run {run}");
+            assert!(lane_mask(values) == lane_mask(&alone.values), "run {run}");
             assert_eq!(batch.outcomes[at], alone.outcomes[0], "run {run}");
             assert_eq!(batch.events[at], alone.events[0], "run {run}");
             assert_eq!(batch.last_lock[at].to_bits(), alone.last_lock[0].to_bits(), "run {run}");
@@ -193,9 +194,9 @@ fn jumps_between_samples_are_met_together_and_alone() {
     let run = |settings, eta: &[f64]| {
         let plan =
             Plan::new(&network, &signals, &grid, outputs, (settings, false)).expect("a plan");
-        columns_of(&model, plan, (&["eta"], eta), grid.len())
+        columns_of(&model, plan, &["eta"], eta, grid.len())
     };
-    let eta = efficiencies(WIDTH);
+    let eta = efficiencies(LANES);
     let (fast, exact) = (run(Settings::default(), &eta), run(Settings::exact(), &eta));
     assert_eq!(fast.events, exact.events);
     assert!(exact.events.iter().all(|&events| events >= 3), "{:?}", exact.events);
@@ -225,7 +226,7 @@ fn a_coarse_grid_is_met_at_its_points() {
         let grid: Vec<f64> = columns[0].1.iter().copied().step_by(every).collect();
         let plan = Plan::new(&network, &signals, &grid, outputs, (Settings::default(), false));
         let (plan, size) = (plan.expect("a plan"), outputs.len() * grid.len());
-        let batch = columns_of(&model, plan, (&["eta"], &efficiencies(WIDTH)), size);
+        let batch = columns_of(&model, plan, &["eta"], &efficiencies(LANES), size);
         (batch.values, grid.len())
     };
     let (fine, points) = run(1);

@@ -14,7 +14,7 @@ use drivetwin_core::model::elements::{
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::{FrictionLaw, Name, Stribeck};
 use drivetwin_core::simulate::{Output, Start, Trajectory, run};
-use drivetwin_core::solve::{EventKind, Settings, Signal, Status};
+use drivetwin_core::solver::{EventKind, Settings, Signal, Status};
 use proptest::prelude::*;
 
 const NODES: [&str; 5] = ["a", "b", "c", "d", "ground"];

@@ -9,7 +9,7 @@ use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::number::Dual;
 use drivetwin_core::number::Real;
 use drivetwin_core::simulate::{DualClutchRun, simulate_dual_clutch};
-use drivetwin_core::solve::{EventKind, Settings, Signal, Status};
+use drivetwin_core::solver::{EventKind, Settings, Signal, Status};
 
 const SHAFT_TORQUE: usize = 4;
 
@@ -46,7 +46,7 @@ fn events_of_an_upshift_come_in_order() {
     let kinds: Vec<EventKind> = run.events.iter().map(|e| e.kind).collect();
     assert_eq!(
         kinds,
-        [EventKind::Fill, EventKind::BreakAway, EventKind::Vent, EventKind::Lock],
+        [EventKind::ClutchFilled, EventKind::BreakAway, EventKind::ClutchVented, EventKind::Lock],
         "{:?}",
         run.events
     );

@@ -6,7 +6,7 @@ use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{
     Batch, Keep, Outcome, Output, Plan, Sampled, dual_clutch_batch, dual_clutch_batch_sensitivities,
 };
-use drivetwin_core::solve::{Settings, Signal, Status};
+use drivetwin_core::solver::{Settings, Signal, Status};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -57,7 +57,7 @@ pub fn simulate_batch<'py>(
     let keep = keep_of(&wanted.1, &measured)?;
     let values = values.as_slice_mut()?;
     let batch = py
-        .detach(|| dual_clutch_batch(&model, &plans, (&names, sets), (keep, threads), values))
+        .detach(|| dual_clutch_batch(&model, &plans, &names, sets, keep, threads, values))
         .map_err(|e| refused(&e))?;
     Ok(ends(py, batch))
 }

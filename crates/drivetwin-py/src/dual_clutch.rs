@@ -4,9 +4,9 @@
 use crate::plain::{Audit, Event, as_tuple, events_of};
 use drivetwin_core::model::DualClutch;
 use drivetwin_core::simulate::{
-    DualClutchStart, Trajectory, dual_clutch_sensitivities, simulate_dual_clutch,
+    DualClutchStart, Trajectory, dual_clutch_sensitivities, run_dual_clutch,
 };
-use drivetwin_core::solve::{Settings, Signal};
+use drivetwin_core::solver::{Settings, Signal};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -41,9 +41,9 @@ pub fn simulate<'py>(
         .collect::<PyResult<Vec<_>>>()?;
     let start = start_of(start);
     let (tolerance, max_step, order, sprint, audit) = options;
-    let settings = Settings { tolerance, max_step, order, sprint };
+    let settings = Settings { tolerance, max_step, order, exponential_steps: sprint };
     let run = py
-        .detach(|| simulate_dual_clutch(&model, &signals, &start, grid, (settings, audit)))
+        .detach(|| run_dual_clutch(&model, &signals, &start, grid, (settings, audit)))
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     let columns = PyArray2::from_vec2(py, &run.columns)?;
     let events = events_of(&run);
@@ -85,7 +85,7 @@ pub fn sensitivities<'py>(
     let names: Vec<&str> = parameters.iter().map(String::as_str).collect();
     let settings = Settings { tolerance, ..Settings::default() };
     let found = py
-        .detach(|| dual_clutch_sensitivities(&model, &signals, &start, grid, (settings, &names)))
+        .detach(|| dual_clutch_sensitivities(&model, &signals, &start, grid, settings, &names))
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     // Handed over as they are, the memory of the core.
     let handed = |slopes: Vec<f64>| {

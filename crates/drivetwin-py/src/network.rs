@@ -4,8 +4,8 @@
 use crate::plain::{Audit, Event, as_tuple, events_of};
 use drivetwin_core::model::{Driveline, Element};
 use drivetwin_core::network::Network;
-use drivetwin_core::simulate::{Output, Start, run};
-use drivetwin_core::solve::{Settings, Signal};
+use drivetwin_core::simulate::{Output, Start, run_network};
+use drivetwin_core::solver::{Settings, Signal};
 use numpy::{PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -51,11 +51,11 @@ pub fn simulate_network<'py>(
     let (speeds, twists, locked) = start;
     let start = Start { speeds, twists, locked };
     let (tolerance, max_step, order, sprint, audit) = options;
-    let settings = Settings { tolerance, max_step, order, sprint };
+    let settings = Settings { tolerance, max_step, order, exponential_steps: sprint };
     let trajectory = py
         .detach(|| {
             let network = Network::compile(&driveline)?;
-            run(&network, &inputs, &start, grid, &outputs, (settings, audit))
+            run_network(&network, &inputs, &start, grid, &outputs, (settings, audit))
         })
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     let columns = PyArray2::from_vec2(py, &trajectory.columns)?;

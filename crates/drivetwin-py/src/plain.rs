@@ -2,7 +2,7 @@
 //! Results as plain tuples for Python.
 
 use drivetwin_core::simulate::{EnergyAudit, Trajectory};
-use drivetwin_core::solve::EventKind;
+use drivetwin_core::solver::EventKind;
 
 /// Time [s], element, kind.
 pub type Event = (f64, String, &'static str);
@@ -25,7 +25,7 @@ fn kind_name(kind: EventKind) -> &'static str {
         EventKind::Lock => "lock",
         EventKind::BreakAway => "break_away",
         EventKind::Reverse => "reverse",
-        EventKind::Fill => "fill",
-        EventKind::Vent => "vent",
+        EventKind::ClutchFilled => "fill",
+        EventKind::ClutchVented => "vent",
     }
 }

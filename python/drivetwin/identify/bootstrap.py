@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Parametric bootstrap: the log made again from the fit with other noise, and fitted again.
+"""Parametric bootstrap: refits of synthetic logs drawn from the fit.
 
 Outputs, engine torque and pressures get noise of the levels found in the log, design priors are
 drawn like measurements. Each search starts at the fit, where it is known to end nearby. The spread
-of the fits is that of the estimator itself, bounds, locks and all; it tells where the covariance is
-too small, and shows a bias. It knows no effect that is not in the model.
+of the fits is that of the estimator itself, bounds, locks and all; it shows
+where the covariance is too small, and a bias. Effects outside the model are not covered.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Bootstrap:
 
 
 def bootstrap(found: Identification, count: int, seed: int) -> Bootstrap:
-    """Fit `count` logs made from a likelihood identification; equal seeds give equal results.
+    """Fit `count` logs drawn from a likelihood identification; equal seeds give equal results.
 
     Raises InputError for fewer than `FEWEST`, IdentificationError where the identification is by
     another method or most refits fail.
@@ -95,7 +95,7 @@ def bootstrap(found: Identification, count: int, seed: int) -> Bootstrap:
 
 
 def _made(base: LikelihoodFit, rng: np.random.Generator) -> Problem:
-    """The problem of a log that the fit would have given, with other noise and other priors."""
+    """Draw the problem of a synthetic log, with new noise and new priors."""
     parts = tuple(_made_part(part, base, rng) for part in base.problem.parts)
     problem = base.problem
     prior = _drawn(problem.prior, base.point.values, rng)
@@ -103,7 +103,7 @@ def _made(base: LikelihoodFit, rng: np.random.Generator) -> Problem:
 
 
 def _made_part(part: Part, base: LikelihoodFit, rng: np.random.Generator) -> Part:
-    """One shift made again: exact outputs of the expected inputs, then noise on all."""
+    """Draw one synthetic shift: exact outputs of the expected inputs, then noise on all."""
     run = part.run(base.point)
     assert run is not None
     record = part.record
@@ -114,8 +114,7 @@ def _made_part(part: Part, base: LikelihoodFit, rng: np.random.Generator) -> Par
 def _noisy(
     record: Record, exact: FloatArray, noise: FloatArray, rng: np.random.Generator
 ) -> Record:
-    """The record with outputs `exact` (n,) plus `noise` (n,), and noise on its inputs, as its
-    sensors have it."""
+    """Add `noise` (n,) to the outputs `exact` (n,), and the sensors' noise to the inputs."""
     ends = np.cumsum([out.values.size for out in record.outputs])[:-1]
     outputs = tuple(
         replace(out, values=values)
@@ -145,7 +144,7 @@ def _noisy(
 
 
 def _drawn(prior: Prior, truth: FloatArray, rng: np.random.Generator) -> Prior:
-    """The prior as another design office would have stated it about the `truth` (p,)."""
+    """Draw the means of the prior about the `truth` (p,)."""
     scale = np.sqrt(np.diag(prior.precision))
     known = np.flatnonzero(scale > 0.0)
     block = prior.precision[np.ix_(known, known)] / np.outer(scale[known], scale[known])

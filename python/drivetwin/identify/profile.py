@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Profile likelihood of one parameter: least Q over all others while it is held.
+"""Profile likelihood of one parameter: minimum of Q over all others while it is fixed.
 
     Q_p(v) = min over θ with q(θ) = v of Q(θ)
 
@@ -18,27 +18,32 @@ import numpy as np
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.identify.likelihood.derived import parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.newton import minimise
 from drivetwin.identify.likelihood.noise_power import noise_power
-from drivetwin.identify.likelihood.problem import Normal, Problem
-from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import REMEDY
+from drivetwin.identify.optimize.gauss_newton import minimise, minimise_constrained
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.result import Z95, Identification
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.progress import tell
 
-REACH = 3.0
-"""Values go this many standard deviations to either side, and on as long as Q has not risen."""
-STEP = 0.5
-"""Distance of neighbouring values in standard deviations."""
-FURTHEST = 10.0
-"""Standard deviations at which a side that does not close is given up: the interval is open."""
-RISE = 3.841
-"""Rise of Q at the ends of a 95 % interval: chi-squared of one degree of freedom."""
-SETTLED = 1e-2
-"""Fall of Q that ends the search at one value."""
-SEARCHES = 8
-"""Most steps at one value."""
+
+@dataclass(frozen=True)
+class ProfileSettings:
+    """Settings of the profile likelihood."""
+
+    min_reach: float = 3.0
+    """Distance to either side that is always covered, in standard deviations [-]."""
+    spacing: float = 0.5
+    """Distance of neighbouring values, in standard deviations [-]."""
+    max_reach: float = 10.0
+    """Distance at which a side that does not close is given up, in standard deviations [-]."""
+    rise: float = 3.841
+    """Rise of Q at the ends of a 95 % interval: chi-squared of one degree of freedom [-]."""
+    tolerance: float = 1e-3
+    """Largest error of the fixed parameter, in standard deviations [-]."""
+
+
+PROFILE = ProfileSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +64,7 @@ class Profile:
 
 
 def profile(found: Identification, parameter: str) -> Profile:
-    """The profile of a parameter of a likelihood identification.
+    """Compute the profile of a parameter of a likelihood identification.
 
     Raises InputError for a parameter that the fit does not have or that is known from design, and
     IdentificationError where the identification is by another method.
@@ -90,7 +95,7 @@ def profile(found: Identification, parameter: str) -> Profile:
 
 
 def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftSignals]]:
-    """The fit behind an identification and the signals it used.
+    """Return the fit behind an identification and its signals.
 
     Raises IdentificationError where it is by another method, or the likelihood method gave up.
     """
@@ -110,7 +115,7 @@ def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftS
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """A fit with one parameter to be held, by its place among the reported ones and its name."""
+    """Fit with one parameter to be fixed, by its index among the reported ones and its name."""
 
     fit: LikelihoodFit
     signals: Sequence[ShiftSignals]
@@ -118,11 +123,11 @@ class _Held:
     parameter: str
 
     def value(self, point: Point) -> float:
-        """The parameter at `point`."""
+        """Compute the parameter at `point`."""
         return list(parameters(self.fit.problem, point, self.signals).values())[self.place]
 
     def row(self, point: Point) -> FloatArray:
-        """Its derivative (p,) by the unknowns."""
+        """Compute its derivative (p,) by the unknowns."""
         std = np.sqrt(np.diag(self.fit.covariance))
         return np.asarray(slopes(self.fit.problem, point, std, self.signals)[self.place])
 
@@ -145,16 +150,18 @@ class _Held:
 
 
 def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
-    """(distance in standard deviations, rise of Q) from the minimum outwards."""
+    """Compute (distance in standard deviations, rise of Q) from the minimum outwards."""
     fit = held.fit
     lowest, unit = fit.normal.cost, held.unit
     estimate, std, point = held.estimate, held.std, fit.point
     found: list[tuple[float, float]] = []
     distance = 0.0
-    while distance < FURTHEST and (distance < REACH or found[-1][1] < RISE):
-        distance += STEP
+    while distance < PROFILE.max_reach and (
+        distance < PROFILE.min_reach or found[-1][1] < PROFILE.rise
+    ):
+        distance += PROFILE.spacing
         value = estimate + sign * distance * std
-        reached = _polished(held, _least(held, point, value), value)
+        reached = _minimise_at(held, point, value)
         if reached is None:
             break
         point, cost = reached
@@ -162,28 +169,20 @@ def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
     return found
 
 
-def _least(held: _Held, start: Point, value: float) -> tuple[Point, float] | None:
-    """The point of least Q at which the parameter has `value`; None where simulations fail."""
-    problem, point = held.fit.problem, start
-    cost = float("inf")
-    for _ in range(SEARCHES):
-        normal = problem.normal(point)
-        if normal is None:
-            return None
-        if cost - normal.cost < SETTLED and abs(held.value(point) - value) < 1e-3 * held.std:
-            return point, normal.cost
-        cost = normal.cost
-        step = _constrained(normal, held.row(point), value - held.value(point))
-        point = _within(problem, point, step)
-    return point, problem.cost(point)
+def _minimise_at(held: _Held, start: Point, value: float) -> tuple[Point, float] | None:
+    """Minimise Q with the parameter fixed at `value`; None if the simulation fails.
 
-
-def _polished(
-    held: _Held, reached: tuple[Point, float] | None, value: float
-) -> tuple[Point, float] | None:
-    """The same or a lower point, where the parameter is itself an unknown of the fit: locks make
-    kinks in Q, at which the plain steps can stop early."""
+    If the parameter is itself an unknown of the fit, the damped search goes on from the constrained
+    one, which may stop early at a kink of Q.
+    """
     problem = held.fit.problem
+    reached = minimise_constrained(
+        problem,
+        start,
+        lambda point: value - held.value(point),
+        held.row,
+        PROFILE.tolerance * held.std,
+    )
     if reached is None or held.parameter not in held.fit.point.names:
         return reached
     place = held.fit.point.names.index(held.parameter)
@@ -196,28 +195,13 @@ def _polished(
     return (point, cost) if cost < reached[1] else reached
 
 
-def _constrained(normal: Normal, row: FloatArray, wanted: float) -> FloatArray:
-    """Gauss-Newton step (p,) that moves the parameter by `wanted` and is else the best."""
-    scale = np.sqrt(np.maximum(np.diag(normal.information), 1e-300))
-    unit = normal.information / np.outer(scale, scale)
-    free = np.linalg.lstsq(unit, -normal.gradient / scale, rcond=1e-13)[0]
-    along = np.linalg.lstsq(unit, row / scale, rcond=1e-13)[0]
-    short = wanted - float(row / scale @ free)
-    return np.asarray((free + along * (short / float(row / scale @ along))) / scale)
-
-
-def _within(problem: Problem, point: Point, step: FloatArray) -> Point:
-    """The point after `step`, unknowns held within their bounds."""
-    return point.moved(np.clip(point.values + step, problem.lower, problem.upper))
-
-
 def _crossing(values: FloatArray, rise: FloatArray) -> float:
-    """Value at which the rise passes `RISE` outwards; infinite where it does not."""
+    """Find the value at which the rise passes `PROFILE.rise` outwards; infinite if it does not."""
     outwards = float(np.sign(float(values[-1]) - float(values[0])))
     start = int(np.argmin(np.abs(rise)))
     for k in range(start, values.size - 1):
-        if rise[k] < RISE <= rise[k + 1]:
-            share = (np.sqrt(RISE) - np.sqrt(max(rise[k], 0.0))) / (
+        if rise[k] < PROFILE.rise <= rise[k + 1]:
+            share = (np.sqrt(PROFILE.rise) - np.sqrt(max(rise[k], 0.0))) / (
                 np.sqrt(rise[k + 1]) - np.sqrt(max(rise[k], 0.0))
             )
             return float(values[k] + share * (values[k + 1] - values[k]))

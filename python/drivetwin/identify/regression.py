@@ -23,10 +23,10 @@ from scipy.linalg import cho_solve_banded, cholesky_banded, solve_banded
 
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.modulating import Quadrature
+from drivetwin.identify.optimize.gauss_newton import minimise_with_line_search
+from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.signals import FloatArray
 
-MAX_PASSES = 20
-MAX_HALVINGS = 8
 NUGGET = 1e-9
 """Added to S relative to its diagonal: strongly overlapping windows are nearly dependent."""
 
@@ -144,7 +144,9 @@ def _unweighable() -> IdentificationError:
 
 
 @dataclass(frozen=True, eq=False)
-class _Point:
+class _Evaluation:
+    """Residual (m,) of the equations at one θ, its weighted square and the derivatives of both."""
+
     residual: FloatArray
     q: float
     gradient: FloatArray
@@ -153,8 +155,49 @@ class _Point:
     variance: FloatArray
 
     @property
-    def hessian(self) -> FloatArray:
+    def information(self) -> FloatArray:
+        """Information (p, p) of the equations, with the noise left in the regressors."""
         return np.asarray(self.regressors.T @ self.factor.solve(self.regressors), dtype=float)
+
+
+class _Equations:
+    """Objective of the equations with a prior and without bounds; holds the last evaluation."""
+
+    log_determinant = 0.0
+
+    def __init__(
+        self, assemble: Callable[[FloatArray], Sequence[Term]], size: int, prior: Prior
+    ) -> None:
+        self.assemble, self.prior = assemble, prior
+        self.lower, self.upper = np.full(size, -np.inf), np.full(size, np.inf)
+        self._last: tuple[FloatArray, _Evaluation] | None = None
+
+    def evaluate(self, theta: FloatArray) -> _Evaluation:
+        """Evaluate the equations at θ (p,)."""
+        if self._last is None or self._last[0] is not theta:
+            self._last = theta, _evaluate(self.assemble(theta), theta.size)
+        return self._last[1]
+
+    def cost(self, point: Point) -> float:
+        """Compute Q(θ)."""
+        return self.evaluate(point.values).q + self.prior.cost(point.values)
+
+    def normal(self, point: Point) -> Normal:
+        """Compute the Gauss-Newton expansion of Q at θ."""
+        result = self.evaluate(point.values)
+        data = result.information
+        return Normal(
+            self.cost(point),
+            result.gradient + self.prior.pull(point.values),
+            data + self.prior.precision,
+            data,
+            (result.residual,),
+            (result.regressors,),
+        )
+
+    def retract(self, point: Point, step: FloatArray) -> FloatArray:
+        """Compute the values (p,) after a straight `step` (p,)."""
+        return point.values + step
 
 
 def _covariance(terms: Sequence[Term]) -> FloatArray:
@@ -181,7 +224,7 @@ def regressors(terms: Sequence[Term], size: int) -> FloatArray:
     return columns
 
 
-def _evaluate(terms: Sequence[Term], size: int) -> _Point:
+def _evaluate(terms: Sequence[Term], size: int) -> _Evaluation:
     count = terms[0].factor.size
     residual = np.zeros(count)
     for t in terms:
@@ -198,10 +241,10 @@ def _evaluate(terms: Sequence[Term], size: int) -> _Point:
         for index, (slope, quadrature) in t.slopes.items():
             columns[:, index] += slope * (quadrature.matrix @ clean)
     gradient = columns.T @ multiplier
-    return _Point(residual, float(residual @ multiplier), gradient, columns, factor, variance)
+    return _Evaluation(residual, float(residual @ multiplier), gradient, columns, factor, variance)
 
 
-def _spurious(terms: Sequence[Term], point: _Point, size: int) -> FloatArray:
+def _spurious(terms: Sequence[Term], point: _Evaluation, size: int) -> FloatArray:
     """Expected part of the information (p, p) that the noise left in the regressors feigns."""
     inverse = point.factor.solve(np.eye(point.residual.size))
     cross = np.zeros((size, point.residual.size, point.residual.size))
@@ -226,26 +269,16 @@ def solve(
 ) -> Fit:
     """Minimise Q(θ) from `start` (p,) by Gauss-Newton; stop at `tolerance` standard errors.
 
-    A step that raises Q is halved; where no halving helps, the search ends at the point before it.
     Raises IdentificationError where the equations leave a direction of θ undetermined.
     """
-    theta = np.asarray(start, dtype=float).copy()
-    point = _evaluate(assemble(theta), theta.size)
-    for _ in range(MAX_PASSES):
-        hessian = point.hessian + prior.precision
-        step = -_inverse(hessian) @ (point.gradient + prior.pull(theta))
-        cost = point.q + prior.cost(theta)
-        for _ in range(MAX_HALVINGS):
-            trial = _evaluate(assemble(theta + step), theta.size)
-            if trial.q + prior.cost(theta + step) <= cost * (1.0 + 1e-9):
-                break
-            step = 0.5 * step
-        else:
-            break
-        theta, point = theta + step, trial
-        if float(np.sqrt(step @ hessian @ step)) < tolerance:
-            break
-    information = point.hessian - _spurious(assemble(theta), point, theta.size)
+    values = np.asarray(start, dtype=float).copy()
+    equations = _Equations(assemble, values.size, prior)
+    names = tuple(str(k) for k in range(values.size))
+    theta = minimise_with_line_search(
+        equations, Point(names, values), lambda m, gradient: _inverse(m) @ gradient, tolerance
+    ).point.values
+    point = equations.evaluate(theta)
+    information = point.information - _spurious(assemble(theta), point, theta.size)
     chi2 = point.q / max(point.residual.size - theta.size, 1)
     # More residual than the stated noise lowers what the data tell, not what the design tells.
     covariance = _inverse(_positive(information) / max(1.0, chi2) + prior.precision)

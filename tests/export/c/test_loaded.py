@@ -177,7 +177,7 @@ def cut(core: Trajectory, rows: NDArray[np.bool_]) -> Trajectory:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_driveline_agrees_with_the_core(loaded: CModel, seed: int) -> None:
     model, start, time, inputs = random_case(seed)
     core = stepped_run(model, start, time, inputs, InputKind.LINEAR)
@@ -251,7 +251,7 @@ def test_one_long_step_meets_the_stiction_that_starts_below_any_tolerance(
     st.floats(0.02, 0.5),
     st.floats(10.0, 1e4),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_one_long_step_meets_any_stiction(
     loaded: CModel, decays: float, at_end: float, mu_c: float, mu_s: float, normal: float
 ) -> None:
@@ -323,7 +323,7 @@ STUCK = 1
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_other_parameters_go_on_as_the_core_starts_with_them(loaded: CModel, seed: int) -> None:
     """Any two drivelines, one after the other in one run, and the core from where they change."""
     rng = np.random.default_rng(seed)

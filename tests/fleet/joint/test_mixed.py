@@ -94,7 +94,7 @@ def test_equal_units_have_no_spread() -> None:
     assert found.sigma_ci[0, 0] == 0.0
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.floats(1e-6, 1e8), st.floats(-10.0, 10.0))
 def test_another_unit_of_measure_changes_nothing(scale: float, shift: float) -> None:
     seen, base = made(4, 120, 12), fit(made(4, 120, 12), intervals=False)

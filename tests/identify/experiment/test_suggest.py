@@ -21,7 +21,8 @@ from drivetwin.identify.experiment.suggest import (
 )
 from drivetwin.identify.likelihood.derived import of_log
 from drivetwin.identify.likelihood.noise_power import noise_power
-from drivetwin.identify.likelihood.unknowns import LAW, Point, own_of
+from drivetwin.identify.likelihood.unknowns import LAW, own_of
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification, Verdict
 from tests.identify.asked import by_the_paper, slowed, stepped, still, uncertain_fills

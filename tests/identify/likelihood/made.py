@@ -3,24 +3,23 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.identify.likelihood.fit import LikelihoodFit, fit
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
+from tests.support.bench import Bench, Knowledge, record_bench
+from tests.support.shared_results import shared
 
 ROUGH = Knowledge(J_out=0.1, P0=5e3)
 
 
-@cache
+@shared
 def bench(seed: int = 0, noise: float = 1.0, know: Knowledge = ROUGH) -> Bench:
-    return realise(SCENARIOS[ScenarioName.THROTTLE_STEPS](), seed, know, noise)
+    return record_bench(SCENARIOS[ScenarioName.THROTTLE_STEPS](), seed, know, noise)
 
 
 def truth_of(made: Bench) -> dict[str, float]:
@@ -59,7 +58,7 @@ def problem(made: Bench, off: float = 0.0) -> tuple[Problem, Point]:
     return problem_of([made.signals], [made.driveline], made.run.scenario.model.loss_law, guess)
 
 
-@cache
+@shared
 def fitted(seed: int = 0) -> LikelihoodFit:
     made = bench(seed)
     posed, start = problem(made)

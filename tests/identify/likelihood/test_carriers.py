@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.identify.likelihood.carriers import SLIDES, all_carriers, carriers
+from drivetwin.identify.likelihood.carriers import SLIPPING, all_carriers, carriers
 from drivetwin.identify.signals import Sampled, ShiftSignals
 from tests.identify.synthetic import Run
 
@@ -23,12 +23,12 @@ def _held(signals: ShiftSignals, seconds: float) -> ShiftSignals:
 def test_the_on_coming_element_alone_where_the_other_vents(stepped: Run) -> None:
     signals, driveline = stepped.signals(), stepped.truth.driveline()
     assert carriers(signals, driveline) == ("B3",)
-    assert carriers(_held(signals, 0.5 * SLIDES), driveline) == ("B3",)
+    assert carriers(_held(signals, 0.5 * SLIPPING.min_filled), driveline) == ("B3",)
 
 
 def test_both_where_the_off_going_one_slips_under_pressure(stepped: Run) -> None:
     signals, driveline = stepped.signals(), stepped.truth.driveline()
-    slow = _held(signals, 2.0 * SLIDES)
+    slow = _held(signals, 2.0 * SLIPPING.min_filled)
     assert carriers(slow, driveline) == ("B3", "B2")
     assert all_carriers([signals, slow], [driveline, driveline]) == ("B3", "B2")
 
@@ -41,6 +41,8 @@ def test_noise_about_the_fill_pressure_does_not_make_an_element_slip_under_load(
     off, sigma = signals.pressures["B2"], 7e3
     noise = sigma * np.random.default_rng(0).standard_normal(off.time.size)
     near = driveline.offgoing.P0.value + 2.0 * sigma + noise
-    values = np.where(off.time < signals.shift.inertia_phase[0] + 3.0 * SLIDES, near, 0.0)
+    values = np.where(
+        off.time < signals.shift.inertia_phase[0] + 3.0 * SLIPPING.min_filled, near, 0.0
+    )
     pressures = {**signals.pressures, "B2": Sampled(off.time, values, sigma)}
     assert carriers(replace(signals, pressures=pressures), driveline) == ("B3",)

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Knowledge
 from drivetwin.identify.inputs import disturbed
 from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import nearest
 from drivetwin.identify.result import Estimate, Verdict
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.identify.likelihood.made import bench, fitted, problem
+from tests.support.bench import Knowledge
 
 CLOSE = Knowledge(J_out=0.02)
 """A card that knows Jo′ better than the log does."""

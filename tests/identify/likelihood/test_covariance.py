@@ -13,7 +13,7 @@ from drivetwin.identify.likelihood.covariance import sensor_noise, with_input_no
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import TORQUE, Output
 from drivetwin.identify.likelihood.response import observed, response_of
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray, TorqueOfSpeeds
 from tests.identify.likelihood.made import bench, fitted, problem
 

@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Knowledge, realise
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import SCENARIOS
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood import fit as fitting
-from drivetwin.identify.likelihood.fit import DOUBTFUL, NEAR, Hopeless, fit, nearest
-from drivetwin.identify.likelihood.newton import Found
+from drivetwin.identify.likelihood.fit import MULTI_START, Hopeless, fit, nearest
 from drivetwin.identify.likelihood.output_error import in_lower_gear
+from drivetwin.identify.optimize.gauss_newton import Found
 from tests.identify.likelihood.made import ROUGH, bench, fitted, problem, truth_of
+from tests.support.bench import Knowledge, record_bench
 
 DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 
@@ -68,11 +68,11 @@ def test_a_minimum_is_one_over_unknowns_and_inputs_alike() -> None:
         ),
     }
     actuators = {name: replace(base.actuators[name], command=programs[name]) for name in programs}
-    posed, start = problem(realise(replace(base, actuators=actuators, duration=4.6), 1, ROUGH))
+    posed, start = problem(record_bench(replace(base, actuators=actuators, duration=4.6), 1, ROUGH))
     found = nearest(posed, start)
     assert found is not None
     again = posed.weighted_by(found.point).with_expected_inputs(found.point)
-    assert again.cost(found.point) > found.normal.cost - fitting.FALLS
+    assert again.cost(found.point) > found.normal.cost - MULTI_START.min_input_decrease
 
 
 def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
@@ -92,12 +92,12 @@ def test_two_starts_that_lead_nowhere_are_enough(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(fitting, "staged", lambda *given: seen.append(given))
     heavy = [5.0 if name == "J_e" else 1.0 for name in start.names]
     far = start.moved(start.values * np.array(heavy))
-    assert posed.cost(far) > NEAR * posed.size
+    assert posed.cost(far) > MULTI_START.direct_chi2 * posed.size
     with pytest.raises(Hopeless):
         fit(posed, far, [made.signals.shift])
-    assert len(seen) == fitting.ENOUGH
+    assert len(seen) == MULTI_START.min_starts
     with pytest.raises(IdentificationError) as one:
-        fit(posed, far, [made.signals.shift], restarts=fitting.RESTARTS[:1])
+        fit(posed, far, [made.signals.shift], restarts=MULTI_START.shaft_factors[:1])
     assert not isinstance(one.value, Hopeless)
 
 
@@ -106,7 +106,7 @@ def test_input_noise_that_stages_leave_out_is_no_doubt() -> None:
     posed, start = problem(bench(noise=0.02))
     normal = posed.normal(start)
     assert normal is not None
-    assert normal.cost > DOUBTFUL * posed.size
+    assert normal.cost > MULTI_START.doubtful_chi2 * posed.size
     assert not fitting._is_doubtful(posed, Found(posed, start, normal, True, 0))
     posed, start = problem(bench(noise=0.02), off=0.05)
     normal = posed.normal(start)

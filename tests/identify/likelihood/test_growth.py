@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -12,14 +11,16 @@ import pytest
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.growth import _moments, allowed_for
 from drivetwin.identify.likelihood.priors import problem_of
-from drivetwin.identify.likelihood.unknowns import AERO, Point
+from drivetwin.identify.likelihood.unknowns import AERO
+from drivetwin.identify.optimize.objective import Point
 from tests.identify.likelihood.made import bench, truth_of
+from tests.support.shared_results import shared
 
 MOVED = "J_vehicle"
 DRAWS = 400
 
 
-@cache
+@shared
 def _fits() -> tuple[LikelihoodFit, LikelihoodFit]:
     """Fits of a log of constant load: without the growing part, and with it."""
     made = bench()

@@ -12,7 +12,7 @@ import pytest
 
 from drivetwin.identify.likelihood.hills import departures_of, with_one_load
 from drivetwin.identify.likelihood.priors import problem_of
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import Sampled, ShiftSignals, Span
 from drivetwin.vehicle.spec import PriorValue
 from tests.identify.likelihood.made import bench, truth_of

@@ -9,11 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import realise
 from drivetwin.dyno.scenarios import paper_steps, throttle_steps
 from drivetwin.identify.likelihood import kinds as of_signals
 from drivetwin.identify.likelihood.covariance import Whiteness
-from drivetwin.identify.likelihood.fit import FAR, NEAR, LikelihoodFit, nearest
+from drivetwin.identify.likelihood.fit import MULTI_START, LikelihoodFit, nearest
 from drivetwin.identify.likelihood.kinds import (
     SPEEDS,
     averaged_over_kinds,
@@ -24,10 +23,12 @@ from drivetwin.identify.likelihood.kinds import (
 )
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import ROUGH, problem, truth_of
+from tests.support.bench import record_bench
+from tests.support.shared_results import shared
 
 MEANS = frozenset({"output_torque"})
 UNDECIDED = 78
@@ -39,12 +40,12 @@ AS_READ = 2
 
 @cache
 def _posed() -> Problem:
-    return problem(realise(throttle_steps(), UNDECIDED, ROUGH))[0]
+    return problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))[0]
 
 
-@cache
+@shared
 def _fit(kinds: frozenset[str]) -> LikelihoodFit:
-    _, start = problem(realise(throttle_steps(), UNDECIDED, ROUGH))
+    _, start = problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))
     found = nearest(_posed().of_kinds(kinds), start)
     assert found is not None
     return found
@@ -63,7 +64,7 @@ def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> N
     told, doubts = averaged_over_kinds(_posed(), _fit(MEANS))
     value, std = _age(told)
     assert all(abs(age - value) < 1.96 * std for age in ages)
-    truth = realise(throttle_steps(), UNDECIDED, ROUGH).truth["te_delay"]
+    truth = record_bench(throttle_steps(), UNDECIDED, ROUGH).truth["te_delay"]
     assert abs(truth - value) < 1.96 * std
     assert len(doubts) == 1
     assert doubts[0].endswith("output torque")
@@ -79,7 +80,7 @@ def test_it_does_not_matter_from_which_kind_one_comes() -> None:
 
 
 def test_a_clear_log_is_left_as_it_is() -> None:
-    posed, start = problem(realise(paper_steps(), 0, ROUGH))
+    posed, start = problem(record_bench(paper_steps(), 0, ROUGH))
     fit = nearest(posed, start)
     assert fit is not None
     told, doubts = averaged_over_kinds(posed, fit)
@@ -120,10 +121,10 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
     assert told(8.0) == pytest.approx(told(0.0), abs=0.02 * std)
 
 
-@cache
+@shared
 def _without_torque() -> tuple[Problem, Point, LikelihoodFit]:
     """A problem of samples without an output torque, where its search starts, and its minimum."""
-    made = realise(throttle_steps(), 0, ROUGH)
+    made = record_bench(throttle_steps(), 0, ROUGH)
     signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
     eta = made.truth["eta"]
     scaled = ("J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -168,9 +169,11 @@ def test_from_far_off_signals_are_taken_as_read() -> None:
     weighted = posed.weighted_by(far)
     normal = weighted.normal(far)
     assert normal is not None
-    assert FAR < normal.cost / posed.size < NEAR
+    assert MULTI_START.far_chi2 < normal.cost / posed.size < MULTI_START.direct_chi2
     assert of_signals._promising(weighted, far, normal)  # wrong: there are samples alone
-    likely, other = likely_kinds(posed, far, [realise(throttle_steps(), 0, ROUGH).signals.shift])
+    likely, other = likely_kinds(
+        posed, far, [record_bench(throttle_steps(), 0, ROUGH).signals.shift]
+    )
     assert likely.kinds == frozenset()
     assert other.kinds == frozenset(SPEEDS)
 
@@ -182,9 +185,9 @@ def test_from_far_off_the_lower_gear_tells_kinds() -> None:
         replace(one, rate=100.0, window=0.01) if one.quantity is Quantity.SPEED else one
         for one in base.sensors
     ]
-    made = realise(replace(base, sensors=tuple(sensors)), 0, ROUGH)
+    made = record_bench(replace(base, sensors=tuple(sensors)), 0, ROUGH)
     posed, start = problem(made, off=0.1)
-    assert posed.weighted_by(start).cost(start) > FAR * posed.size
+    assert posed.weighted_by(start).cost(start) > MULTI_START.far_chi2 * posed.size
     likely, _ = likely_kinds(posed, start, [made.signals.shift])
     assert frozenset(SPEEDS) <= likely.kinds
 
@@ -210,7 +213,7 @@ def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
     assert with_either_kind(_posed(), fit) == (fit, [])
 
 
-@cache
+@shared
 def _at_50_hertz(window: float) -> tuple[Problem, LikelihoodFit]:
     """A problem of outputs every 20 ms that are means over the `window` [s], and its minimum with
     the kinds that an expansion tells."""
@@ -221,7 +224,7 @@ def _at_50_hertz(window: float) -> tuple[Problem, LikelihoodFit]:
         else one
         for one in base.sensors
     ]
-    posed, start = problem(realise(replace(base, sensors=tuple(sensors)), AS_READ, ROUGH))
+    posed, start = problem(record_bench(replace(base, sensors=tuple(sensors)), AS_READ, ROUGH))
     fit = nearest(posed, start)
     assert fit is not None
     return posed, with_best_kinds(posed, fit)

@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import FrictionTable, Stribeck
 from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.identify.likelihood.conclude import conclude
@@ -18,14 +16,16 @@ from drivetwin.identify.likelihood.left_out import late_torque, left_out
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.result import Verdict
 from tests.identify.likelihood.made import fitted, problem, truth_of
+from tests.support.bench import Bench, Knowledge, record_bench
+from tests.support.shared_results import shared
 
 
-@cache
+@shared
 def _with_delay(delay: float, role: str = "output_torque") -> tuple[Bench, LikelihoodFit]:
     """A log with one sensor late, and its fit."""
     base = paper_steps()
     sensors = [replace(one, delay=delay) if one.role == role else one for one in base.sensors]
-    made = realise(replace(base, sensors=tuple(sensors)), 0, Knowledge())
+    made = record_bench(replace(base, sensors=tuple(sensors)), 0, Knowledge())
     posed, start = problem(made)
     found = nearest(posed, start)
     assert found is not None
@@ -96,8 +96,8 @@ def test_friction_of_another_shape_is_told_and_its_band_holds_the_truth() -> Non
     mu = coming.friction.at(slip) + 0.01 * np.exp(-(((slip - 25.0) / 10.0) ** 2))
     humped = replace(coming, friction=FrictionTable(tuple(slip), tuple(mu)))
     model = replace(base.model, elements=(leaving, humped))
-    usual = realise(base, 0, Knowledge())
-    made = realise(replace(base, model=model), 0, Knowledge())
+    usual = record_bench(base, 0, Knowledge())
+    made = record_bench(replace(base, model=model), 0, Knowledge())
     law = base.model.loss_law
     posed, start = problem_of([made.signals], [made.driveline], law, truth_of(usual))
     found = nearest(posed, start)

@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import LossLaw
 from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.identify.likelihood import other_law
@@ -17,6 +16,8 @@ from drivetwin.identify.likelihood.conclude import conclude
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.priors import problem_of
 from tests.identify.likelihood.made import bench, fitted, truth_of
+from tests.support.bench import Bench, Knowledge, record_bench
+from tests.support.shared_results import shared
 
 LAWS: tuple[LossLaw, ...] = ("paper", "dissipative")
 
@@ -25,10 +26,10 @@ LAWS: tuple[LossLaw, ...] = ("paper", "dissipative")
 def _made(law: LossLaw) -> Bench:
     """A log whose lock-up oscillation reverses the torque through the gears."""
     base = paper_steps()
-    return realise(replace(base, model=replace(base.model, loss_law=law)), 0, Knowledge())
+    return record_bench(replace(base, model=replace(base.model, loss_law=law)), 0, Knowledge())
 
 
-@cache
+@shared
 def _fit(true: LossLaw, card: LossLaw) -> LikelihoodFit:
     made = _made(true)
     found = nearest(*problem_of([made.signals], [made.driveline], card, truth_of(made)))

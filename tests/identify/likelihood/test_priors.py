@@ -5,10 +5,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from drivetwin.identify.likelihood.priors import BOUNDS
-from tests.identify.likelihood.made import bench, problem
+from drivetwin.errors import InputError
+from drivetwin.identify.likelihood.derived import parameters
+from drivetwin.identify.likelihood.fit import fit
+from drivetwin.identify.likelihood.priors import BOUNDS, problem_of
+from drivetwin.identify.likelihood.problem import Problem
+from drivetwin.identify.optimize.objective import Point
+from drivetwin.vehicle.spec import PriorValue
+from tests.identify.likelihood.made import bench, fitted, problem, truth_of
 
 
 def test_output_inertia_is_sought_about_its_design_value() -> None:
@@ -21,3 +28,70 @@ def test_output_inertia_is_sought_about_its_design_value() -> None:
     unknown = replace(made, driveline=replace(made.driveline, J_out=None))
     free, _ = problem(unknown)
     assert (free.lower[place], free.upper[place]) == BOUNDS["J_out"]
+
+
+STEP = 1e-6
+
+
+def _posed(known: dict[str, PriorValue]) -> tuple[Problem, Point]:
+    made = bench()
+    driveline = replace(made.driveline, known=known)
+    loss_law = made.run.scenario.model.loss_law
+    return problem_of([made.signals], [driveline], loss_law, truth_of(made))
+
+
+def _first_gear() -> str:
+    return bench().signals.shift.start_gear
+
+
+def test_a_fixed_gear_inertia_is_met_exactly() -> None:
+    known = {f"J_prime_{_first_gear()}": PriorValue(16.9)}
+    problem, start = _posed(known)
+    assert "J_e" not in start.names
+    best = fit(problem, start, [bench().signals.shift])
+    told = parameters(best.problem, best.point, [bench().signals])
+    assert told[f"J_prime_{_first_gear()}"] == pytest.approx(16.9, rel=1e-12)
+    free = parameters(fitted().problem, fitted().point, [bench().signals])
+    assert told["eta"] != pytest.approx(free["eta"], rel=1e-4)
+
+
+def test_the_core_is_told_how_a_tied_inertia_moves() -> None:
+    problem, start = _posed({f"J_prime_{_first_gear()}": PriorValue(16.9)})
+    structure = problem.parts[0].structure
+    names, matrix = structure.slopes(start)
+    for unknown in ("J_out", "eta"):
+        k = start.names.index(unknown)
+        step = np.zeros_like(start.values)
+        step[k] = STEP * start.values[k]
+        models = [structure.model(start.moved(start.values + s)) for s in (step, -step)]
+        by_difference = (models[0].J1 - models[1].J1) / (2.0 * step[k])
+        assert matrix[names.index("J1"), k] == pytest.approx(by_difference, rel=1e-6)
+
+
+def test_a_prior_on_a_gear_inertia_is_one_on_the_sum() -> None:
+    gear, ratio = _first_gear(), bench().driveline.i_before
+    known = {f"J_prime_{gear}": PriorValue(17.0, 0.1)}
+    (with_sum, start), (without, _) = _posed(known), _posed({})
+    J_e, J_out = start["J_e"], start["J_out"]
+    for step in (0.0, 0.3, -0.2):
+        values = start.values.copy()
+        values[start.names.index("J_e")] = J_e + step
+        difference = with_sum.prior.cost(values) - without.prior.cost(values)
+        miss = (J_e + step + J_out / ratio**2 - 17.0) / 0.1
+        if step == 0.0:
+            offset = difference - miss**2
+        assert difference - miss**2 == pytest.approx(offset, abs=1e-8 * max(1.0, miss**2))
+
+
+@pytest.mark.parametrize("name", ["k_o", "eta", "te_delay", "J_vehicle"])
+def test_what_is_fixed_is_no_unknown(name: str) -> None:
+    problem, start = _posed({name: PriorValue(0.5)})
+    assert name not in start.names
+    assert problem.parts[0].structure.value(start, name) == 0.5
+
+
+def test_two_fixed_gear_inertias_are_refused() -> None:
+    shift = bench().signals.shift
+    known = {f"J_prime_{g}": PriorValue(17.0) for g in (shift.start_gear, shift.end_gear)}
+    with pytest.raises(InputError, match="one inertia"):
+        _posed(known)

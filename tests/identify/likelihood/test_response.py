@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import realise
 from drivetwin.driveline import LossLaw, Signal
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenarios import scenario_of
 from tests.identify.likelihood.made import ROUGH, bench, problem
+from tests.support.bench import record_bench
 
 
 @pytest.mark.parametrize("name", ["engine torque", "B3"])
@@ -57,7 +57,7 @@ def test_the_engine_torque_acts_by_the_loss_law(name: ScenarioName, law: LossLaw
     """The engine torque moves the run by 1/η where power flows back and the law says so."""
     scenario = scenario_of(name)
     scenario = replace(scenario, model=replace(scenario.model, loss_law=law))
-    made = realise(scenario, 0, ROUGH, 0.0)
+    made = record_bench(scenario, 0, ROUGH, 0.0)
     posed, point = problem(made)
     part, shift = posed.parts[0], made.signals.shift
     base = part.run(point)

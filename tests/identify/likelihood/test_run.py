@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import RoadLoad
 from drivetwin.dyno.scenarios import throttle_steps
 from drivetwin.errors import IdentificationError
@@ -15,6 +14,7 @@ from drivetwin.identify.conclude import conclude
 from drivetwin.identify.integral import IntegralShift, identify_shift
 from drivetwin.identify.likelihood.run import DISAGREE, likelihood
 from drivetwin.vehicle.spec import VehicleCard
+from tests.support.bench import Bench, Knowledge, record_bench
 
 CARD = VehicleCard("truck", "paper", 1.0, 5.0, (), {}, (3.0, 9.0), (1000.0, 9000.0))
 GROWTH = 40.0
@@ -24,7 +24,7 @@ GROWTH = 40.0
 def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> None:
     base = throttle_steps()
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
-    made = realise(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
+    made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     signals, drivelines = [made.signals], [made.driveline]
     shifts = [identify_shift(made.signals, made.driveline, 5.0)]
     linear = conclude(shifts, signals, drivelines, {})
@@ -43,7 +43,7 @@ def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> N
 def test_a_vehicle_that_cannot_be_is_no_start(
     factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = realise(throttle_steps(), 0, Knowledge())
+    made = record_bench(throttle_steps(), 0, Knowledge())
     found = identify_shift(made.signals, made.driveline, 5.0)
     values = found.values.copy()
     values[found.ids.index("J_vehicle")] *= factor

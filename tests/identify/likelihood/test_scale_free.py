@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.estimation.bench import Knowledge, realise
 from drivetwin.dyno.files import card_text
 from drivetwin.dyno.scenarios import paper
 from drivetwin.identify.likelihood.priors import PLAUSIBLE_ETA
 from drivetwin.identify.likelihood.scale_free import guess_without_torque
 from drivetwin.identify.signals import Sampled
 from drivetwin.vehicle.card import load_card
+from tests.support.bench import Knowledge, record_bench
 
 NOISY = 4.0
 """Noise of the speeds, a multiple of the scenario's."""
@@ -27,7 +27,7 @@ def test_noise_of_the_speeds_does_not_make_the_vehicle_light(tmp_path: Path) -> 
         replace(one, noise=NOISY * one.noise) if one.role.endswith("speed") else one
         for one in scenario.sensors
     )
-    made = realise(replace(scenario, sensors=loud), 0, Knowledge())
+    made = record_bench(replace(scenario, sensors=loud), 0, Knowledge())
     file = tmp_path / "card.toml"
     file.write_text(card_text(scenario), encoding="utf-8")
     signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
@@ -39,7 +39,7 @@ def test_noise_of_the_speeds_does_not_make_the_vehicle_light(tmp_path: Path) -> 
 
 def test_a_gear_held_too_briefly_leaves_the_start_to_the_other(tmp_path: Path) -> None:
     scenario = paper()
-    made = realise(scenario, 0, Knowledge())
+    made = record_bench(scenario, 0, Knowledge())
     file = tmp_path / "card.toml"
     file.write_text(card_text(scenario), encoding="utf-8")
     shift = made.signals.shift

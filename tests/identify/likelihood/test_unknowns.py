@@ -7,10 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from drivetwin.identify.friction import stribeck
 from drivetwin.identify.inputs import driveline_of
 from drivetwin.identify.likelihood.derived import oscillation, parameters
 from drivetwin.identify.likelihood.priors import problem_of
+from drivetwin.identify.likelihood.unknowns import LAW, RETRACTION_SLIPS, retract
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import Coupling
 from drivetwin.vehicle.spec import PriorValue
 from tests.identify.likelihood.made import bench, truth_of
@@ -56,3 +61,27 @@ def test_an_element_breaks_away_at_the_peak_that_the_card_states() -> None:
     posed, point = problem_of([made.signals], [driveline], "paper", truth_of(made))
     model = posed.parts[0].structure.model(point)
     assert {one.name: one.peak for one in model.elements} == {"B2": 1.0, "B3": 1.25}
+
+
+NAMES = ("eta", *(f"B3.{key}" for key in LAW), "B2.mu_c")
+START = np.array([0.9, 0.11, 0.02, 1e-4, np.log(12.0), 0.12])
+
+
+@given(
+    st.lists(st.floats(-0.02, 0.02), min_size=3, max_size=3),
+    st.floats(-np.log(12.0), np.log(5.0)),
+)
+def test_the_law_takes_the_step_in_its_values(mu: list[float], by_scale: float) -> None:
+    step = np.array([0.01, mu[0], mu[1], 1e-2 * mu[2], by_scale, 0.003])
+    before, slopes = stribeck(START[1:5], RETRACTION_SLIPS)
+    found = retract(Point(NAMES, START), step)
+    assert stribeck(found[1:5], RETRACTION_SLIPS)[0] == pytest.approx(
+        before + slopes.T @ step[1:5], abs=1e-9
+    )
+    assert found[4] == START[4] + by_scale
+    assert found[[0, 5]] == pytest.approx([0.91, 0.123])
+
+
+def test_without_a_change_of_v_s_the_step_is_straight() -> None:
+    step = np.array([0.0, 1e-3, -2e-3, 1e-5, 0.0, 0.0])
+    assert retract(Point(NAMES, START), step) == pytest.approx(START + step)

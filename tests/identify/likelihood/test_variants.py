@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
 
-from benchmarks.estimation.bench import Bench, Knowledge, realise
 from drivetwin.driveline import RoadLoad
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
@@ -23,6 +22,7 @@ from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.signals import Sampled
 from drivetwin.logs.shiftlog import Quantity
 from tests.identify.likelihood.made import truth_of
+from tests.support.bench import Bench, Knowledge, record_bench
 
 GROWTH = 4.0
 
@@ -49,7 +49,7 @@ def _deviation(fit: LikelihoodFit, name: str, truth: float) -> float:
 def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
     base = throttle_steps()
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
-    made = realise(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
+    made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     fit, notes = _chosen(made)
     assert any("grows with the square of the speed" in note for note in notes)
     speed = fit.problem.parts[0].structure.mean_speed
@@ -61,7 +61,7 @@ def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
 def test_a_growing_load_that_is_left_out_is_allowed_for(monkeypatch: pytest.MonkeyPatch) -> None:
     base = throttle_steps()
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
-    made = realise(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
+    made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     monkeypatch.setattr(growth, "grows", lambda *_: False)
     fit, notes = _chosen(made)
     assert AERO not in fit.point.names
@@ -75,8 +75,8 @@ def test_a_growing_load_that_is_left_out_is_allowed_for(monkeypatch: pytest.Monk
 def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    made = realise(paper_steps(), 0, Knowledge())
-    monkeypatch.setattr(variants, "LESS_WORK", 0.0)
+    made = record_bench(paper_steps(), 0, Knowledge())
+    monkeypatch.setattr(variants, "SELECTION", replace(variants.SELECTION, max_restricted_work=0.0))
     fit, _ = _chosen(made)
     names, truth = fit.point.names, truth_of(made)
     assert AERO not in names
@@ -93,7 +93,7 @@ def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search
 @pytest.mark.parametrize("rate", [100.0, 500.0, 1000.0])
 @pytest.mark.parametrize("means", [True, False])
 def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
-    made = realise(_sent(paper_steps(), rate, means), 0, Knowledge())
+    made = record_bench(_sent(paper_steps(), rate, means), 0, Knowledge())
     fit, notes = _chosen(made)
     assert any("means over their period" in note for note in notes) == means
     assert fit.problem.kinds == (frozenset(SPEEDS) if means else frozenset())
@@ -105,7 +105,7 @@ def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
 
 
 def test_without_an_output_torque_speeds_are_told_apart_all_the_same() -> None:
-    made = realise(_sent(paper_steps(), 100.0, True), 0, Knowledge(J_out=0.1))
+    made = record_bench(_sent(paper_steps(), 100.0, True), 0, Knowledge(J_out=0.1))
     nothing = Sampled(np.empty(0), np.empty(0))
     fit, _ = _chosen(replace(made, signals=replace(made.signals, output_torque=nothing)))
     assert fit.problem.kinds == frozenset(SPEEDS)
@@ -122,7 +122,7 @@ def test_an_engine_torque_that_comes_rarely_is_taken_for_a_curve() -> None:
         for one in base.sensors
     ]
     scenario = replace(base, engine_torque=pedal, sensors=tuple(sensors))
-    made = realise(scenario, 0, Knowledge())
+    made = record_bench(scenario, 0, Knowledge())
     fit, _ = _chosen(made)
     assert fit.problem.kinds == frozenset({TORQUE})
     assert fit.chi2 == pytest.approx(1.0, abs=0.05)

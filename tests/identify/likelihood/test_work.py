@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from drivetwin.errors import IdentificationError
@@ -44,7 +46,9 @@ def test_runs_and_expansions_are_work() -> None:
 
 
 def test_a_search_that_has_no_work_to_do_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(variants, "WORK", 2.0 * EXPANSION)
+    monkeypatch.setattr(
+        variants, "SELECTION", replace(variants.SELECTION, max_work=2.0 * EXPANSION)
+    )
     with pytest.raises(IdentificationError, match="given up without a plausible minimum"):
         _chosen()
 
@@ -52,7 +56,9 @@ def test_a_search_that_has_no_work_to_do_is_refused(monkeypatch: pytest.MonkeyPa
 def test_what_a_wider_model_found_stands_where_there_is_no_work_left(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(variants, "LESS_WORK", 2.0 * EXPANSION)
+    monkeypatch.setattr(
+        variants, "SELECTION", replace(variants.SELECTION, max_restricted_work=2.0 * EXPANSION)
+    )
     # In this log's noise the load grows a little; where it ends at zero there is nothing to search.
     assert _chosen(seed=1).point[AERO] > 0.0
 

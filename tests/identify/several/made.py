@@ -19,6 +19,7 @@ from drivetwin.shifts.usable import usable_shifts
 from drivetwin.together import Source, Together, identify_together
 from drivetwin.vehicle.spec import VehicleCard
 from tests.identify.asked import DURATION
+from tests.support.shared_results import shared
 
 LEVEL = 0.85
 """Engine torque of the second log over that of the first."""
@@ -53,20 +54,20 @@ def card() -> VehicleCard:
         return drivetwin.load_card(file)
 
 
-@cache
+@shared
 def pair() -> tuple[Source, Source]:
     """Two logs at two torque levels and loads."""
     return source(scenario(), 21), source(scenario(LEVEL, LOADS[1]), 22)
 
 
-@cache
+@shared
 def together() -> Together:
     """Both fitted as one, and a third one predicted."""
     third = source(scenario(), 23, frozenset({1}))
     return identify_together([*pair(), third], card())
 
 
-@cache
+@shared
 def loaded() -> Together:
     """Two logs of which the second has a payload that the first has not."""
     return identify_together([pair()[0], source(scenario(payload=1.03), 24)], card())

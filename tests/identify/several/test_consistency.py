@@ -42,7 +42,7 @@ def _pulls(rng: np.random.Generator, logs: int, size: int, rank: int) -> list[Pu
     ]
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(st.integers(2, 4), st.integers(2, 5), st.integers(0, 10**6))
 def test_of_logs_that_agree_it_is_chi_squared(logs: int, size: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

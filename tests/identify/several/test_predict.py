@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
@@ -12,9 +11,10 @@ from drivetwin.identify.inputs import signals_of
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.several.predict import Expected, expected
 from tests.identify.several.made import LOADS, card, pair, together
+from tests.support.shared_results import shared
 
 
-@cache
+@shared
 def _of_second() -> Expected:
     """The second log of the pair as if it were unknown to a fit that it took part in."""
     second = pair()[1]

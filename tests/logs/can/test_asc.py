@@ -39,7 +39,7 @@ _FRAME = st.builds(
 )
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(_FRAME, min_size=1, max_size=20))
 def test_frames_are_those_that_another_program_wrote(
     tmp_path: Path, sent: list[can.Message]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.identify.likelihood.sensitivity import Sensitivity
+from drivetwin.identify.likelihood.tolerance import Sensitivity
 from drivetwin.report.figures.sensitivity import sensitivity_figure
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
@@ -17,9 +16,10 @@ from drivetwin.report.sections.likelihood import likelihood_sections
 from drivetwin.report.sections.trust import residual_score, trust_section
 from tests.identify.likelihood.made import bench, fitted
 from tests.report.sample import identification, log
+from tests.support.shared_results import shared
 
 
-@cache
+@shared
 def found() -> Identification:
     fit, signals = fitted(), bench().signals
     return replace(

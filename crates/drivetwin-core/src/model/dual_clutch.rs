@@ -87,7 +87,7 @@ pub const SHAFT: &str = "output shaft";
 pub const ENGINE_TORQUE: &str = "engine torque";
 
 impl<T: Number> DualClutch<T> {
-    /// The same driveline as elements of the network.
+    /// Convert the driveline to elements of the network.
     pub fn driveline(&self) -> Driveline<T> {
         let [engine, output, wheel] =
             const { [Name::new_inline(ENGINE), Name::new_inline(OUTPUT), Name::new_inline(WHEEL)] };
@@ -216,8 +216,8 @@ impl<T> DualClutch<T> {
 }
 
 impl DualClutch<f64> {
-    /// The same driveline over another number type.
-    pub fn lifted<T: Number>(&self) -> DualClutch<T> {
+    /// Convert the driveline to another number type.
+    pub fn promote<T: Number>(&self) -> DualClutch<T> {
         self.map(&|&value| T::of(value))
     }
 }

@@ -18,7 +18,7 @@ pub enum ModelError {
         field: &'static str,
         /// The offending value, SI.
         value: f64,
-        /// What would be accepted.
+        /// Accepted values.
         requirement: &'static str,
     },
     /// A friction table or map has unequal lengths or does not increase.
@@ -26,9 +26,9 @@ pub enum ModelError {
     Table {
         /// Name of the element.
         element: String,
-        /// Which table.
+        /// Name of the table.
         table: &'static str,
-        /// What is wrong with it.
+        /// Fault of the table.
         problem: &'static str,
     },
     /// Two elements carry one name.

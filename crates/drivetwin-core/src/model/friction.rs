@@ -27,7 +27,7 @@ pub struct FrictionTable<T> {
     pub slip: Vec<f64>,
     /// μ at each slip.
     pub mu: Vec<T>,
-    /// Whether the last piece goes on beyond the last point.
+    /// True if the last piece continues beyond the last point.
     #[serde(default)]
     pub extend: bool,
 }
@@ -82,7 +82,7 @@ impl<T: Number> Decay<T> {
 }
 
 impl<T> FrictionLaw<T> {
-    /// The same law over another number type.
+    /// Convert the law to another number type.
     pub(crate) fn map<U>(&self, f: &impl Fn(&T) -> U) -> FrictionLaw<U> {
         match self {
             Self::Stribeck(law) => FrictionLaw::Stribeck(Stribeck {

@@ -14,7 +14,7 @@ use smallvec::SmallVec;
 /// entries, which stand in place.
 pub type Row<T> = SmallVec<[(usize, T); 2]>;
 
-/// How gear losses depend on the direction of power (THEORY section 3).
+/// Dependence of gear losses on the direction of power (THEORY section 3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LossLaw {
@@ -27,7 +27,7 @@ pub enum LossLaw {
 /// Loss of a constraint: the driven entries of its force row carry the efficiency.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loss<T> {
-    /// Which law holds.
+    /// Loss law.
     pub law: LossLaw,
     /// Efficiency with power from the driving to the driven side.
     pub eta: T,
@@ -85,7 +85,7 @@ pub enum SpringLaw<T> {
 pub struct Stop<T> {
     /// N·m/rad.
     pub stiffness: T,
-    /// Where it begins, rad.
+    /// Start, rad.
     pub at: T,
     /// Direction in which it is pressed, ±1.
     pub side: f64,
@@ -122,7 +122,7 @@ pub struct Spring<T> {
     pub law: SpringLaw<T>,
 }
 
-/// What presses the surfaces of a friction element together: capacity = μ · normal, N·m.
+/// Normal load of a friction element: capacity = μ · normal, N·m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Normal<T> {
     /// `gain · max(0, P - P0)` with P an input.
@@ -147,7 +147,7 @@ pub struct Friction<T> {
     pub row: Row<T>,
     /// μ over |slip|.
     pub law: FrictionLaw<T>,
-    /// What μ is multiplied by.
+    /// Factor of μ.
     pub normal: Normal<T>,
     /// Static over kinetic capacity at zero slip, ≥ 1.
     pub peak: T,
@@ -155,7 +155,7 @@ pub struct Friction<T> {
     pub one_way: bool,
 }
 
-/// Which account of the energy audit a torque belongs to.
+/// Account of the energy balance that a torque belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Account {
     /// Brought in by an engine or motor.
@@ -197,7 +197,7 @@ pub enum ForceLaw<T> {
         turbine: usize,
         /// Its map.
         map: ConverterMap,
-        /// Whether the turbine's torque is meant.
+        /// True for the torque of the turbine.
         at_turbine: bool,
     },
 }
@@ -213,7 +213,7 @@ pub struct Force<T> {
     pub law: ForceLaw<T>,
     /// Time constant of a first-order lag between law and torque, s.
     pub lag: Option<T>,
-    /// Where its work is booked.
+    /// Account of its work.
     pub account: Account,
 }
 

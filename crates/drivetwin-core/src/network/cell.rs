@@ -69,7 +69,7 @@ impl<T: Number> Channel<T> {
                 Cell::Converter { index: s.decide_with(r, index), sign }
             }
             Law::Regions(regions) => {
-                let (s, r) = (T::lifted(s), T::lifted(r));
+                let (s, r) = (T::promote(s), T::promote(r));
                 let left = |(border, _): &(TwistForm<T>, usize)| border.at(s, r).re();
                 let inside = |region: &Region<T>| {
                     region.borders.iter().all(|border| left(border).decide(|left| left >= 0.0))

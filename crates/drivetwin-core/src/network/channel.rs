@@ -19,7 +19,7 @@ pub enum Law<T> {
     Friction {
         /// μ over |slip|.
         mu: FrictionLaw<T>,
-        /// What μ is multiplied by.
+        /// Factor of μ.
         normal: Normal<T>,
         /// Static over kinetic capacity.
         peak: T,
@@ -106,21 +106,21 @@ impl<T: Number> Normal<T> {
     }
 
     /// What is left of the load [N·m] by round-off where the pressure is the fill pressure; above zero.
-    pub fn nothing(&self) -> T {
+    pub fn load_tolerance(&self) -> T {
         let size = match self {
             Self::Pressure { gain, p0, .. } => (*gain * *p0).re().magnitude(),
             Self::Constant(_) => T::Values::zero_(),
         };
-        T::lifted(size * ROUND_OFF + T::Values::of(f64::MIN_POSITIVE))
+        T::promote(size * ROUND_OFF + T::Values::of(f64::MIN_POSITIVE))
     }
 
     /// Runs, as bits, of which the load is gone from an instant on, by the values of inputs there and their
     /// rates.
-    pub fn is_gone(&self, inputs: impl Fn(usize) -> [T::Values; 2]) -> u32 {
+    pub fn is_unloaded(&self, inputs: impl Fn(usize) -> [T::Values; 2]) -> u32 {
         let Self::Pressure { input, gain, p0 } = self else { return 0 };
         let [pressure, rate] = inputs(*input).map(|value| value * gain.re());
-        let left = pressure - (*gain * *p0 + self.nothing()).re();
-        left.those(|left| left <= 0.0) & rate.those(|rate| rate <= 0.0)
+        let left = pressure - (*gain * *p0 + self.load_tolerance()).re();
+        left.mask_where(|left| left <= 0.0) & rate.mask_where(|rate| rate <= 0.0)
     }
 
     /// All coefficients of the normal load.

@@ -29,7 +29,7 @@ pub struct FrictionRow<T> {
     pub nodes: Row<T>,
     /// μ over |slip|.
     pub law: FrictionLaw<T>,
-    /// What μ is multiplied by.
+    /// Factor of μ.
     pub normal: Normal<T>,
     /// Static over kinetic capacity.
     pub peak: T,
@@ -73,7 +73,7 @@ pub struct Lag<T> {
 /// A compiled mechanism; immutable.
 #[derive(Clone, Debug)]
 pub struct Network<T> {
-    /// What it was compiled from.
+    /// Mechanism the network was compiled from.
     pub mechanism: Mechanism<T>,
     /// See [`Network::states`].
     states: usize,
@@ -100,7 +100,7 @@ pub struct Network<T> {
     /// Node torques of everything but rigid couplings and stuck friction, over the basis: nodes ×
     /// basis.
     pub node_torques: Matrix<T>,
-    /// What all modes share where no gear's loss depends on its state.
+    /// Matrices shared by all modes if no gear loss depends on its state.
     pub(super) motion: Option<Motion<T>>,
 }
 
@@ -231,7 +231,7 @@ impl<T: Number> Network<T> {
     /// Members without mass between friction elements get a negligible one; whether there are any. Behind one
     /// element alone there is nothing to follow while it is open.
     fn give_mass_between_frictions(&mut self) -> bool {
-        let floor = T::lifted(self.inertia.max_abs() * MASSLESS);
+        let floor = T::promote(self.inertia.max_abs() * MASSLESS);
         let mut given = false;
         for j in (0..self.speeds()).filter(|&j| is_nothing(self.mass[(j, j)])) {
             let node = self.coordinates.independent[j];

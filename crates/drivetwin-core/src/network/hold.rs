@@ -17,7 +17,7 @@ pub struct Hold<'a, T> {
     pub acting: Option<Matrix<T>>,
     /// G: what is held, over the speeds, rows × speeds; those prescribed come last.
     pub rows: Matrix<T>,
-    /// How many of the rows are at rest rather than prescribed.
+    /// Number of rows at rest; the others are prescribed.
     pub resting: usize,
 }
 
@@ -98,7 +98,7 @@ impl<T: Number> Hold<'_, T> {
         driving.subtract(&self.inertia.select_columns(&left.dependent).times(&given));
         let mut acceleration = left.speeds.times(&solve(mass, forces.times(&driving)).ok()?);
         for (i, &speed) in left.dependent.iter().enumerate() {
-            acceleration.subtract_from_row(speed, (given.row(i), T::of(-1.0)));
+            acceleration.subtract_from_row(speed, given.row(i), T::of(-1.0));
         }
         Some((left, acceleration))
     }

@@ -62,7 +62,7 @@ impl<T: Number> Matrix<T> {
     }
 
     /// Subtract a multiple of `other` from row `i`.
-    pub fn subtract_from_row(&mut self, i: usize, (other, factor): (&[T], T)) {
+    pub fn subtract_from_row(&mut self, i: usize, other: &[T], factor: T) {
         self.row_mut(i).iter_mut().zip(other).for_each(|(v, &o)| *v -= o * factor);
     }
 
@@ -188,8 +188,8 @@ pub fn solve<T: Number>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usi
             if r != c && !is_zero(entry) {
                 let factor = entry * inverse;
                 // What stands before column c is not read again.
-                subtract_row(&mut a, (r, c), c, factor);
-                subtract_row(&mut x, (r, c), 0, factor);
+                subtract_row(&mut a, r, c, c, factor);
+                subtract_row(&mut x, r, c, 0, factor);
             }
         }
         a.row_mut(c)[c..].iter_mut().for_each(|v| *v *= inverse);
@@ -220,7 +220,7 @@ pub fn eliminate<T: Number>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
         for r in 0..a.rows {
             let entry = a[(r, column)];
             if r != row && !is_zero(entry) {
-                subtract_row(a, (r, row), 0, entry * inverse);
+                subtract_row(a, r, row, 0, entry * inverse);
             }
         }
         a.row_mut(row).iter_mut().for_each(|v| *v *= inverse);
@@ -346,7 +346,8 @@ fn largest_of<V: Values>(size: impl Fn(usize) -> V, rows: Range<usize>) -> usize
 /// Subtract a multiple of row `source` from row `target`, from column `from` on.
 fn subtract_row<T: Number>(
     a: &mut Matrix<T>,
-    (target, source): (usize, usize),
+    target: usize,
+    source: usize,
     from: usize,
     factor: T,
 ) {
@@ -359,7 +360,7 @@ fn subtract_row<T: Number>(
 /// Whether a number is zero in every run and with all its derivatives, so that its products may be left
 /// out.
 pub fn is_zero<T: Number>(value: T) -> bool {
-    value.re().those(|v| v != 0.0) == 0 && value.is_constant()
+    value.re().mask_where(|v| v != 0.0) == 0 && value.is_constant()
 }
 
 /// Whether the value is zero, which is decided.

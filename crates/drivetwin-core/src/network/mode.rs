@@ -12,18 +12,18 @@ use crate::number::{Number, Values};
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
-/// How a lossy gear moves.
+/// State of a lossy gear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GearState {
     /// Turning, its loss set by direction of motion and of power.
-    Rolling {
+    Meshing {
         /// Sign of the driving side's speed.
         sign: f64,
         /// Power flows from the driven to the driving side.
-        backward: bool,
+        power_reversed: bool,
     },
     /// At rest, held by its own loss.
-    Held,
+    Locked,
 }
 
 /// Something that keeps a speed at zero: friction element or lossy gear, by index.
@@ -35,12 +35,12 @@ pub enum Row {
     Gear(usize),
 }
 
-/// Which friction elements are stuck and how the lossy gears move, as bits.
+/// Key of a mode: sticking friction elements and states of lossy gears, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ModeKey {
     stuck: u32,
     held: u32,
-    backward: u32,
+    power_reversed: u32,
     reverse: u32,
 }
 
@@ -51,9 +51,9 @@ impl ModeKey {
         stuck.for_each(|j| key.stuck |= 1 << j);
         for (i, gear) in gears.iter().enumerate() {
             match *gear {
-                GearState::Held => key.held |= 1 << i,
-                GearState::Rolling { sign, backward } => {
-                    key.backward |= u32::from(backward) << i;
+                GearState::Locked => key.held |= 1 << i,
+                GearState::Meshing { sign, power_reversed } => {
+                    key.power_reversed |= u32::from(power_reversed) << i;
                     key.reverse |= u32::from(sign < 0.0) << i;
                 }
             }
@@ -70,7 +70,7 @@ impl ModeKey {
 /// Linear maps over the basis.
 #[derive(Clone, Debug)]
 pub struct Mode<T> {
-    /// What it was compiled for.
+    /// Key the mode was compiled for.
     pub key: ModeKey,
     /// State derivatives, states × basis.
     pub derivative: Matrix<T>,
@@ -90,7 +90,7 @@ pub struct Mode<T> {
     pub redundant: bool,
 }
 
-/// What all modes with the same states of the lossy gears share.
+/// Matrices shared by all modes with the same states of the lossy gears.
 #[derive(Clone, Debug)]
 pub struct Motion<T> {
     /// Generalised forces per node torque, speeds × nodes.
@@ -121,8 +121,8 @@ impl<T: Number> Loss<T> {
 
     /// Factor between the torque that enters at the driving side and what the driven side gets, and
     /// the drag that is taken off before (with the sign of motion).
-    fn factor(&self, sign: f64, backward: bool) -> (T, T) {
-        match (self.law, backward) {
+    fn factor(&self, sign: f64, power_reversed: bool) -> (T, T) {
+        match (self.law, power_reversed) {
             (LossLaw::Paper, _) => (self.eta, T::zero_()),
             (LossLaw::Dissipative, false) => (self.eta, self.drag * sign),
             (LossLaw::Dissipative, true) => (self.eta_backward.recip(), self.drag_backward * sign),
@@ -130,8 +130,8 @@ impl<T: Number> Loss<T> {
     }
 
     /// Torque lost at the driving side of a rolling gear that `torque` enters.
-    pub fn loss_torque(&self, torque: T, sign: f64, backward: bool) -> T {
-        let (factor, drag) = self.factor(sign, backward);
+    pub fn loss_torque(&self, torque: T, sign: f64, power_reversed: bool) -> T {
+        let (factor, drag) = self.factor(sign, power_reversed);
         torque * (-factor + 1.0) + drag
     }
 
@@ -144,9 +144,12 @@ impl<T: Number> Loss<T> {
     /// Bounds at rest.
     pub fn bounds(&self) -> GearBounds<T> {
         let forward = (-self.eta + 1.0, self.drag);
-        let backward = (-self.eta_backward.recip() + 1.0, self.drag_backward);
+        let power_reversed = (-self.eta_backward.recip() + 1.0, self.drag_backward);
         let mirrored = |(slope, drag): (T, T)| (slope, -drag);
-        GearBounds { upper: [forward, backward], lower: [mirrored(forward), mirrored(backward)] }
+        GearBounds {
+            upper: [forward, power_reversed],
+            lower: [mirrored(forward), mirrored(power_reversed)],
+        }
     }
 }
 
@@ -177,7 +180,7 @@ impl<T: Number> Network<T> {
             Held { acceleration, torque, redundant: false }
         } else {
             let (speeds, nodes) = self.held_speeds(&stuck);
-            let hold = self.hold(&motion, (speeds, &nodes), stuck.len());
+            let hold = self.hold(&motion, speeds, &nodes, stuck.len());
             let rates = self.rates(stuck.len());
             hold.solve((&motion.forces, rates.as_ref()), || self.weights(&stuck, capacity))?
         };
@@ -185,7 +188,7 @@ impl<T: Number> Network<T> {
         Some(Mode {
             key,
             rates: SparseRows::of(&derivative),
-            radius: T::lifted(radius(&derivative)),
+            radius: T::promote(radius(&derivative)),
             derivative,
             gear_torque: OnceLock::new(),
             stuck_torque: found.torque,
@@ -198,7 +201,8 @@ impl<T: Number> Network<T> {
     fn hold<'m>(
         &self,
         motion: &'m Motion<T>,
-        (rows, nodes): (Matrix<T>, &[mechanism::Row<T>]),
+        rows: Matrix<T>,
+        nodes: &[mechanism::Row<T>],
         resting: usize,
     ) -> Hold<'m, T> {
         let acting = (!self.losses.is_empty()).then(|| motion.force_map.times_columns(nodes));
@@ -241,8 +245,8 @@ impl<T: Number> Network<T> {
         constraint_matrix(&self.mechanism, |constraint| {
             let i = self.losses.iter().position(|loss| loss.constraint == constraint)?;
             let held = key.held >> i & 1 == 1;
-            let backward = key.backward >> i & 1 == 1;
-            (!held).then(|| self.losses[i].loss.factor(1.0, backward).0)
+            let power_reversed = key.power_reversed >> i & 1 == 1;
+            (!held).then(|| self.losses[i].loss.factor(1.0, power_reversed).0)
         })
     }
 
@@ -254,7 +258,7 @@ impl<T: Number> Network<T> {
                 continue;
             }
             let sign = if key.reverse >> i & 1 == 1 { -1.0 } else { 1.0 };
-            let (_, drag) = gear.loss.factor(sign, key.backward >> i & 1 == 1);
+            let (_, drag) = gear.loss.factor(sign, key.power_reversed >> i & 1 == 1);
             if is_zero(drag) {
                 continue;
             }
@@ -290,13 +294,13 @@ impl<T: Number> Network<T> {
     fn weights(&self, stuck: &[Row], capacity: &[T]) -> Vec<T> {
         let one = T::Values::of(1.0);
         let largest = capacity.iter().fold(one, |largest, c| c.re().larger(largest));
-        let unbounded = T::lifted(largest * 1e2);
+        let unbounded = T::promote(largest * 1e2);
         let weight = |&row: &Row| match row {
             Row::Friction(j) if !self.frictions[j].one_way => {
                 let least = largest * 1e-3;
                 let enough =
                     capacity[j].re().decide_with(least, |capacity, least| capacity > least);
-                if enough { capacity[j] } else { T::lifted(least) }
+                if enough { capacity[j] } else { T::promote(least) }
             }
             Row::Friction(_) => unbounded,
             Row::Gear(_) => T::of(1.0),
@@ -326,7 +330,7 @@ impl<T: Number> Network<T> {
     ) -> Option<(Matrix<T>, Matrix<T>)> {
         let motion = self.motion_of(key)?;
         let (speeds, nodes) = self.held_speeds(rows);
-        let hold = self.hold(&motion, (speeds, &nodes), rows.len());
+        let hold = self.hold(&motion, speeds, &nodes, rows.len());
         let change = hold.stop(excess)?;
         let mut residual = Matrix::zeros(self.inertia.rows, 1);
         residual.subtract(&self.inertia.times(&self.coordinates.speeds).times(&change));
@@ -387,7 +391,7 @@ fn subtract_held<T: Number>(
 ) {
     for (i, held) in nodes.iter().enumerate() {
         for &(node, direction) in held {
-            node_torques.subtract_from_row(node, (torques.row(i), direction));
+            node_torques.subtract_from_row(node, torques.row(i), direction);
         }
     }
 }

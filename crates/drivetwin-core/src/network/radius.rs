@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! How fast a linear motion is.
+//! Bound of the spectral radius of a linear motion.
 
 use super::linalg::Matrix;
 use crate::number::{Number, Values};

@@ -164,7 +164,7 @@ where
 
 impl<const P: usize> Number for Dual<P> {
     #[inline(always)]
-    fn lifted(value: f64) -> Self {
+    fn promote(value: f64) -> Self {
         Self::of(value)
     }
     fn gathered(value: impl Fn(usize) -> f64) -> Self {

@@ -12,7 +12,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 pub trait Lane:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// Whether a value carries derivatives, so that inputs may jump in these alone.
+    /// True if a value carries derivatives, so that inputs may jump in these alone.
     const DERIVATIVES: bool;
 
     /// All runs, as bits.
@@ -21,7 +21,7 @@ pub trait Lane:
     /// The values alone.
     type Values: Values;
 
-    /// The same value in every run.
+    /// Set all lanes to one value.
     fn all(value: f64) -> Self;
 
     /// `self · a + b`.
@@ -91,7 +91,7 @@ pub trait Values: Number + Lane<Values = Self> {
     fn decide_with<R: PartialEq>(self, other: Self, say: impl Fn(f64, f64) -> R) -> R;
 
     /// Runs for whose value `say` holds, as bits.
-    fn those(self, say: impl Fn(f64) -> bool) -> u32;
+    fn mask_where(self, say: impl Fn(f64) -> bool) -> u32;
 
     /// The value of the run that decides, for messages.
     fn leading(self) -> f64;
@@ -119,7 +119,7 @@ pub trait Values: Number + Lane<Values = Self> {
 
     /// Runs whose value is infinite or no number, as bits.
     fn unbounded(self) -> u32 {
-        self.those(|value| !value.is_finite())
+        self.mask_where(|value| !value.is_finite())
     }
 }
 
@@ -261,7 +261,7 @@ impl Values for f64 {
         say(self, other)
     }
     #[inline(always)]
-    fn those(self, say: impl Fn(f64) -> bool) -> u32 {
+    fn mask_where(self, say: impl Fn(f64) -> bool) -> u32 {
         u32::from(say(self))
     }
     #[inline(always)]

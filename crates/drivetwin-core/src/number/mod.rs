@@ -54,7 +54,7 @@ pub trait Number:
     }
 
     /// Values without derivatives.
-    fn lifted(values: Self::Values) -> Self;
+    fn promote(values: Self::Values) -> Self;
 
     /// A value of every run by its number; that of run 0 where there is but one.
     fn gathered(value: impl Fn(usize) -> f64) -> Self;
@@ -64,7 +64,7 @@ pub trait Number:
         self.values()
     }
 
-    /// Whether it has no derivatives other than zero.
+    /// Return true if all derivatives are zero.
     fn is_constant(&self) -> bool;
 
     /// Its magnitude and those of its derivatives.
@@ -105,7 +105,7 @@ pub trait Real: Number + Factor<Self, Values = f64> {
 
 impl Number for f64 {
     #[inline(always)]
-    fn lifted(value: f64) -> Self {
+    fn promote(value: f64) -> Self {
         value
     }
     fn gathered(value: impl Fn(usize) -> f64) -> Self {

@@ -147,7 +147,7 @@ where
 
 impl<const K: usize> Number for Pack<K> {
     #[inline(always)]
-    fn lifted(values: Self) -> Self {
+    fn promote(values: Self) -> Self {
         values
     }
     fn gathered(value: impl Fn(usize) -> f64) -> Self {
@@ -281,7 +281,7 @@ impl<const K: usize> Values for Pack<K> {
         vote(|run| say(self.0[run % K], other.0[run % K]))
     }
     #[inline(always)]
-    fn those(self, say: impl Fn(f64) -> bool) -> u32 {
+    fn mask_where(self, say: impl Fn(f64) -> bool) -> u32 {
         self.bits(|a| u32::from(say(a)))
     }
     fn leading(self) -> f64 {

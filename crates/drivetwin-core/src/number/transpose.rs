@@ -20,25 +20,28 @@ pub const FOUR: usize = 4;
 #[inline(always)]
 pub fn transpose<const K: usize, const N: usize>(
     rows: impl Fn(usize) -> [Pack<K>; FOUR],
-    (columns, count): (&mut [[f64; N]; K], usize),
+    columns: &mut [[f64; N]; K],
+    count: usize,
 ) {
     #[cfg(target_arch = "x86_64")]
     if let Some(simd) = V3::try_new() {
         return by_fours(
             rows,
-            (columns, count),
+            columns,
+            count,
             #[inline(always)]
             |block| shuffled(simd, block),
         );
     }
-    by_fours(rows, (columns, count), plain);
+    by_fours(rows, columns, count, plain);
 }
 
 /// Columns by squares of four rows and runs.
 #[inline(always)]
 fn by_fours<const K: usize, const N: usize>(
     rows: impl Fn(usize) -> [Pack<K>; FOUR],
-    (columns, count): (&mut [[f64; N]; K], usize),
+    columns: &mut [[f64; N]; K],
+    count: usize,
     transposed: impl Fn([[f64; FOUR]; FOUR]) -> [[f64; FOUR]; FOUR],
 ) {
     for at in (0..count).step_by(FOUR) {
@@ -82,8 +85,8 @@ mod tests {
         let rows = |at: usize| std::array::from_fn(|k| row(at + k));
         for count in [0, 1, 4, 6, 12] {
             let (mut columns, mut expected) = ([[0.0; 12]; 8], [[0.0; 12]; 8]);
-            transpose(rows, (&mut columns, count));
-            by_fours(rows, (&mut expected, count), plain);
+            transpose(rows, &mut columns, count);
+            by_fours(rows, &mut expected, count, plain);
             assert_eq!(columns, expected);
             for (run, column) in columns.iter().enumerate() {
                 let there = column[..count].iter().enumerate();

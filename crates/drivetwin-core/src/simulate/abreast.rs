@@ -4,15 +4,16 @@
 use super::trajectory::{Column, Entry, Target, passing_terms, value};
 use crate::network::Network;
 use crate::number::{FOUR, Lane, Number, transpose};
-use crate::solve::{
-    BLOCK, Inputs, Lanes, NO_POINT, Record, Regime, Samples, Stretch, Task, WIDTH, dispatch,
+use crate::solver::{
+    BLOCK, HybridState, Inputs, Kernel, LANES, LaneSink, Lanes, NO_POINT, SampleBlock, Samples,
+    dispatch_simd,
 };
 use smallvec::SmallVec;
 
 /// Fills columns while runs advance, each at its own samples.
 pub(super) struct Recorder<'p, 'v> {
     /// Inputs of every run.
-    inputs: [&'p Inputs<f64>; WIDTH],
+    inputs: [&'p Inputs<f64>; LANES],
     /// Point of the grid at every knot, or [`NO_POINT`]; number of points.
     points: (&'p [usize], usize),
     columns: Vec<Column<Lanes>>,
@@ -29,40 +30,40 @@ impl<'p, 'v> Recorder<'p, 'v> {
     pub fn new(
         network: &Network<Lanes>,
         targets: &[Target],
-        (inputs, points): ([&'p Inputs<f64>; WIDTH], (&'p [usize], usize)),
+        (inputs, points): ([&'p Inputs<f64>; LANES], (&'p [usize], usize)),
         values: Vec<&'v mut [f64]>,
     ) -> Self {
         let columns = targets.iter().map(|&target| Column::of(network, target)).collect();
-        let (basis, block) = (Vec::new(), [[0.0; BLOCK + FOUR]; WIDTH]);
+        let (basis, block) = (Vec::new(), [[0.0; BLOCK + FOUR]; LANES]);
         Self { inputs, points, columns, values, basis, block }
     }
 }
 
-impl Record for Recorder<'_, '_> {
-    fn passed(
+impl LaneSink for Recorder<'_, '_> {
+    fn write_block(
         &mut self,
-        regime: &Regime<'_, Lanes>,
+        state: &HybridState<'_, Lanes>,
         active: &[usize],
         samples: Samples<'_, Lanes>,
-        stretch: &Stretch,
+        stretch: &SampleBlock,
     ) {
-        dispatch(Passed { recorder: self, regime, active, samples, stretch });
+        dispatch_simd(Passed { recorder: self, state, active, samples, stretch });
     }
 
-    fn reached(
+    fn write_sample(
         &mut self,
-        regime: &Regime<'_, Lanes>,
-        (runs, knots): (u32, &[usize; WIDTH]),
+        state: &HybridState<'_, Lanes>,
+        (runs, knots): (u32, &[usize; LANES]),
         h: Lanes,
     ) {
-        regime.expansion.basis_at(regime.network, h, &mut self.basis);
+        state.expansion.basis_at(state.network, h, &mut self.basis);
         let (points, count) = self.points;
         for (output, column) in self.columns.iter().enumerate() {
-            let now = value(column, regime, &self.basis);
+            let now = value(column, state, &self.basis);
             for (run, values) in self.values.iter_mut().enumerate() {
-                let point = points[knots[run % WIDTH]];
+                let point = points[knots[run % LANES]];
                 if runs >> run & 1 == 1 && point != NO_POINT {
-                    values[output * count + point] = now.0[run % WIDTH];
+                    values[output * count + point] = now.0[run % LANES];
                 }
             }
         }
@@ -72,26 +73,26 @@ impl Record for Recorder<'_, '_> {
 /// Samples to be added to the columns, with the widest instructions.
 struct Passed<'r, 'p, 'v, 'a> {
     recorder: &'r mut Recorder<'p, 'v>,
-    regime: &'r Regime<'a, Lanes>,
+    state: &'r HybridState<'a, Lanes>,
     active: &'r [usize],
     samples: Samples<'r, Lanes>,
-    stretch: &'r Stretch,
+    stretch: &'r SampleBlock,
 }
 
-impl Task for Passed<'_, '_, '_, '_> {
+impl Kernel for Passed<'_, '_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run<const F: bool>(self) {
-        let Self { recorder, regime, active, samples, stretch } = self;
+        let Self { recorder, state, active, samples, stretch } = self;
         let Recorder { inputs, points, columns, values, block, .. } = recorder;
         let (points, per_output) = (&points.0[stretch.first..][..stretch.count], points.1);
         if points.iter().all(|&point| point == NO_POINT) {
             return;
         }
         for (output, column) in columns.iter().enumerate() {
-            let terms = &*passing_terms(column, regime);
-            let entry = |position| Entry::at(position, regime.network, active);
+            let terms = &*passing_terms(column, state);
+            let entry = |position| Entry::at(position, state.network, active);
             let given: Vec<Vec<Lanes>> = terms
                 .iter()
                 .filter_map(|&(position, _)| other_entry(entry(position), inputs, stretch))
@@ -109,19 +110,20 @@ impl Task for Passed<'_, '_, '_, '_> {
             transpose(
                 #[inline(always)]
                 |at| total(&sum, at),
-                (block, stretch.count),
+                block,
+                stretch.count,
             );
             for (run, values) in values.iter_mut().enumerate() {
                 let (from, to) = stretch.spans[run];
                 let values = &mut values[output * per_output..][..per_output];
-                hand_out(&block[run % WIDTH][from..to], &points[from..to], values);
+                hand_out(&block[run % LANES][from..to], &points[from..to], values);
             }
         }
     }
 }
 
 /// One output over a block of samples, of every run.
-type Block = [[f64; BLOCK + FOUR]; WIDTH];
+type Block = [[f64; BLOCK + FOUR]; LANES];
 
 /// What an output is a sum of: entries of the basis over samples, in whole fours, and factors.
 type Terms<'s> = SmallVec<[(&'s [Lanes], Lanes); 8]>;
@@ -129,8 +131,8 @@ type Terms<'s> = SmallVec<[(&'s [Lanes], Lanes); 8]>;
 /// An entry of the basis over a stretch, in whole fours, unless it is a state or a torque.
 fn other_entry(
     entry: Entry,
-    inputs: &[&Inputs<f64>; WIDTH],
-    &Stretch { first, count, .. }: &Stretch,
+    inputs: &[&Inputs<f64>; LANES],
+    &SampleBlock { first, count, .. }: &SampleBlock,
 ) -> Option<Vec<Lanes>> {
     let fours = count.next_multiple_of(FOUR);
     match entry {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-//! Where the energy of a run went.
+//! Energy balance of a run.
 
 use crate::model::mechanism::{Account, ForceLaw, SpringLaw, Stop};
 use crate::network::channel::form;
 use crate::network::{GearState, Network};
 use crate::number::Real;
-use crate::solve::{Integrator, Step};
+use crate::solver::{Integrator, Step};
 
 /// Work over a run, J: `source = stored + friction + gear_loss + shaft + load + converter + error`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,7 +26,7 @@ pub struct EnergyAudit {
     pub converter: f64,
     /// Energy that gears created, as a positive number; part of `gear_loss`.
     pub created: f64,
-    /// What is missing in the balance.
+    /// Residual of the balance.
     pub error: f64,
 }
 
@@ -54,13 +54,13 @@ impl Auditor {
     pub fn add<T: Real>(&mut self, run: &Integrator<'_, T>, step: &Step<T>) {
         let mut basis = Vec::new();
         for (node, weight) in GAUSS {
-            run.regime.expansion.basis_at(run.regime.network, step.length * node, &mut basis);
+            run.state.expansion.basis_at(run.state.network, step.length * node, &mut basis);
             self.add_powers(run, &basis, weight * step.length.re());
         }
     }
 
     fn add_powers<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
-        let network = run.regime.network;
+        let network = run.state.network;
         let n = &network.coordinates.speeds;
         let audit = &mut self.audit;
         for (j, row) in network.frictions.iter().enumerate() {
@@ -100,20 +100,20 @@ impl Auditor {
         }
         for (i, (speed, _)) in network.prescribed.iter().enumerate() {
             let reaction =
-                form(run.regime.mode.stuck_torque.row(run.regime.mode.stuck.len() + i), basis);
+                form(run.state.mode.stuck_torque.row(run.state.mode.stuck.len() + i), basis);
             audit.source -= (reaction * form(speed, basis)).re() * width;
         }
         self.add_gear_losses(run, basis, width);
     }
 
     fn add_gear_losses<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
-        for (i, gear) in run.regime.network.losses.iter().enumerate() {
-            let torque = form(run.regime.mode.gear_torque(run.regime.network).row(i), basis);
+        for (i, gear) in run.state.network.losses.iter().enumerate() {
+            let torque = form(run.state.mode.gear_torque(run.state.network).row(i), basis);
             let speed = form(&gear.speed, basis);
-            let lost = match run.regime.gears[i] {
-                GearState::Held => 0.0,
-                GearState::Rolling { sign, backward } => {
-                    (gear.loss.loss_torque(torque, sign, backward) * speed).re() * width
+            let lost = match run.state.gears[i] {
+                GearState::Locked => 0.0,
+                GearState::Meshing { sign, power_reversed } => {
+                    (gear.loss.loss_torque(torque, sign, power_reversed) * speed).re() * width
                 }
             };
             self.audit.gear_loss += lost;

@@ -10,12 +10,12 @@ use super::threads::share_out;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::{Number, Real, together};
-use crate::solve::{
-    Event, EventKind, Inputs, Known, Lanes, NO_POINT, Status, WIDTH, bits, run_together,
+use crate::solver::{
+    Event, EventKind, Inputs, LANES, Lanes, NO_POINT, SolverCache, Status, lane_mask, run_lockstep,
 };
 use std::borrow::Cow;
 
-/// What is kept of every run.
+/// Output kept of every run.
 #[derive(Clone, Copy, Debug)]
 pub enum Keep<'m> {
     /// Every output on the grid: runs × outputs × grid.
@@ -27,7 +27,7 @@ pub enum Keep<'m> {
     Misfit(&'m [Vec<f64>]),
 }
 
-/// How one run of a batch ended.
+/// Outcome of one run of a batch.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// It ran; its status.
@@ -36,10 +36,10 @@ pub enum Outcome {
     Refused(SimulateError),
 }
 
-/// What has become of the runs of a batch, in their order.
+/// Outcomes of the runs of a batch, in their order.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// How each run ended.
+    /// Outcome of each run.
     pub outcomes: Vec<Outcome>,
     /// Number of events of each run.
     pub events: Vec<u32>,
@@ -60,12 +60,14 @@ pub struct Batch {
 pub fn dual_clutch_batch(
     model: &DualClutch<f64>,
     scenarios: &[(Plan<f64>, DualClutchStart<f64>)],
-    (parameters, sets): (&[&str], &[f64]),
-    (keep, threads): (Keep<'_>, usize),
+    parameters: &[&str],
+    sets: &[f64],
+    keep: Keep<'_>,
+    threads: usize,
     values: &mut [f64],
 ) -> Result<Batch, SensitivityError> {
     if let Some((_, start)) = scenarios.first() {
-        check_names(model, start, (parameters, sets))?;
+        check_names(model, start, parameters, sets)?;
     }
     let starts = scenarios.iter().map(|(_, start)| start).collect();
     let plans: Vec<&Plan<f64>> = scenarios.iter().map(|(plan, _)| plan).collect();
@@ -74,14 +76,15 @@ pub fn dual_clutch_batch(
     let size = plans.first().map_or(0, |plan| keep.size(plan.targets.len(), plan.grid.len()));
     let work = Work { sets, plans, keep, threads };
     assert_eq!(values.len(), count * size, "places for what is kept");
-    Ok(work.result((count, size), values))
+    Ok(work.result(count, size, values))
 }
 
 /// Refuse names that are no parameters.
 pub(super) fn check_names(
     model: &DualClutch<f64>,
     start: &DualClutchStart<f64>,
-    (parameters, sets): (&[&str], &[f64]),
+    parameters: &[&str],
+    sets: &[f64],
 ) -> Result<(), SensitivityError> {
     let (mut model, mut start) = (model.clone(), start.clone());
     let unknown = |name: &&&str| place(&mut model, &mut start, name).is_none();
@@ -126,7 +129,7 @@ impl Sets<'_> {
     /// that it has more. The names must be parameters.
     pub fn placed<T: Number>(&self, runs: &[usize]) -> (DualClutch<T>, DualClutchStart<T>) {
         let of = |place: usize| runs.get(place).map_or(runs[0], |&run| run);
-        let mut model = self.model.lifted();
+        let mut model = self.model.promote();
         let mut start = DualClutchStart::gathered(|place| self.start(of(place)));
         let width = self.parameters.len();
         for (i, name) in self.parameters.iter().enumerate() {
@@ -152,7 +155,7 @@ pub(super) fn last_lock<T: Real>(events: &[Event<T>]) -> Option<T> {
 /// A run of a batch.
 struct Job<'v> {
     run: usize,
-    /// What is kept of it.
+    /// Output kept of the run.
     values: &'v mut [f64],
     outcome: Option<Outcome>,
     events: Vec<Event<f64>>,
@@ -176,7 +179,7 @@ impl Work<'_> {
     }
 
     /// Do so many runs, of each of which `size` numbers are kept.
-    fn result(&self, (count, size): (usize, usize), values: &mut [f64]) -> Batch {
+    fn result(&self, count: usize, size: usize, values: &mut [f64]) -> Batch {
         let mut rest = values;
         let job = |run| {
             let (values, others) = std::mem::take(&mut rest).split_at_mut(size);
@@ -199,7 +202,7 @@ impl Work<'_> {
     fn do_all(&self, jobs: &mut [Job<'_>]) {
         let mut open: Vec<&mut Job<'_>> = jobs.iter_mut().collect();
         for _ in 0..ATTEMPTS {
-            share_out(self.threads, open.chunks_mut(WIDTH), |group| self.do_together(group));
+            share_out(self.threads, open.chunks_mut(LANES), |group| self.do_together(group));
             open.retain(|job| job.outcome.is_none());
         }
         share_out(self.threads, open.iter_mut(), |job| self.do_alone(job));
@@ -230,14 +233,14 @@ impl Work<'_> {
         let runs: Vec<usize> = group.iter().map(|job| job.run).collect();
         let (plan, locked) = (self.plan(runs[0]), &self.sets.start(runs[0]).locked);
         // Fewer are done as fast alone.
-        let enough = runs.len() > WIDTH / 2 && plan.settings.sprint;
+        let enough = runs.len() > LANES / 2 && plan.settings.exponential_steps;
         let Some(points) = plan.points.as_deref().filter(|_| enough) else { return };
         let alike = |&run: &usize| {
             let (knots, others) = (plan.inputs.knots(), self.plan(run).inputs.knots());
             (std::ptr::eq(knots, others) || knots == others)
                 && self.sets.start(run).locked == *locked
         };
-        let alike = bits(runs.iter().map(alike));
+        let alike = lane_mask(runs.iter().map(alike));
         let (prepared, parting) = together(alike, || self.sets.prepared::<Lanes>(&runs));
         let Ok((network, State { x, locked })) = prepared else { return };
         if plan.check(&network).is_err() {
@@ -245,7 +248,7 @@ impl Work<'_> {
         }
         let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &self.plan(run).inputs).collect();
         let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
-        let (known, how) = (Known::of(&network), (plan.settings, alike & !parting));
+        let (cache, mask) = (SolverCache::new(&network), alike & !parting);
         let (points, count) = self.keep.recorded(points, plan.grid.len());
         let columns = plan.targets.len() * count;
         let mut spare = Vec::new();
@@ -257,7 +260,7 @@ impl Work<'_> {
         };
         let shared = (all, (&*points, count));
         let mut recorder = abreast::Recorder::new(&network, &plan.targets, shared, values);
-        let events = run_together(known, &inputs, how, (x, &locked), &mut recorder);
+        let events = run_lockstep(cache, &inputs, plan.settings, mask, x, &locked, &mut recorder);
         for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
             let Some(events) = events else { continue };
             if !spare.is_empty() {

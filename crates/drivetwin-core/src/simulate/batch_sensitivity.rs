@@ -10,7 +10,7 @@ use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::Dual;
-use crate::solve::{Settings, Status};
+use crate::solver::{Settings, Status};
 
 /// A number with its derivatives by the parameters of one pass.
 type Derived = Dual<LANES>;
@@ -18,7 +18,7 @@ type Derived = Dual<LANES>;
 /// Inputs and start of a run.
 pub type Stated<'a> = (Vec<Sampled<'a>>, DualClutchStart<f64>);
 
-/// What is kept of a batch with its derivatives, NaN for runs that failed.
+/// Output of a batch with its derivatives; NaN for failed runs.
 #[derive(Clone, Debug)]
 pub struct BatchDerivatives {
     /// What was kept: runs × kept.
@@ -42,7 +42,7 @@ pub fn dual_clutch_batch_sensitivities(
     (keep, threads): (Keep<'_>, usize),
 ) -> Result<(Batch, BatchDerivatives), SensitivityError> {
     if let Some((_, start)) = scenarios.first() {
-        check_names(model, start, (parameters, sets))?;
+        check_names(model, start, parameters, sets)?;
     }
     let groups: Vec<&[&str]> = by.chunks(LANES).collect();
     let mut plans = Vec::with_capacity(scenarios.len());
@@ -86,7 +86,7 @@ fn plan(
     Ok(Plan::new(&network, &inputs, grid, outputs, (Settings::default(), false))?)
 }
 
-/// What is left of one pass of a run.
+/// Result of one pass of a run.
 struct Kept {
     values: Vec<f64>,
     /// Parameters of the pass × kept.

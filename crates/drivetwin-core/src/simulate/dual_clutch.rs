@@ -7,7 +7,7 @@ use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};
 use crate::network::Network;
 use crate::number::{Number, Real};
-use crate::solve::{Settings, Signal};
+use crate::solver::{Settings, Signal};
 
 /// Start of a dual-clutch run.
 #[derive(Clone, Debug)]
@@ -41,6 +41,17 @@ pub fn simulate_dual_clutch<T: Real>(
     Ok(plan.run(&network, &start.state(&network)?))
 }
 
+/// [`simulate_dual_clutch`] over plain numbers, compiled once for all callers.
+pub fn run_dual_clutch(
+    model: &DualClutch<f64>,
+    signals: &[(&str, Signal<'_, f64>)],
+    start: &DualClutchStart<f64>,
+    grid: &[f64],
+    options: (Settings, bool),
+) -> Result<DualClutchRun<f64>, SimulateError> {
+    simulate_dual_clutch(model, signals, start, grid, options)
+}
+
 /// The usual outputs, see [`DualClutchRun`].
 pub fn dual_clutch_outputs<T>(model: &DualClutch<T>) -> Vec<Output> {
     let mut outputs = vec![
@@ -62,13 +73,13 @@ impl<T: Number> DualClutchStart<T> {
     pub fn state(&self, network: &Network<T>) -> Result<State<T>, StartError> {
         let speeds =
             [(ENGINE, self.engine_speed), (OUTPUT, self.output_speed), (WHEEL, self.wheel_speed)];
-        state_of(network, (&speeds, &[(SHAFT, self.twist)]), &self.locked)
+        state_of(network, &speeds, &[(SHAFT, self.twist)], &self.locked)
     }
 }
 
 impl DualClutchStart<f64> {
-    /// The same start over another number type.
-    pub fn lifted<T: Number>(&self) -> DualClutchStart<T> {
+    /// Convert the start to another number type.
+    pub fn promote<T: Number>(&self) -> DualClutchStart<T> {
         Self::gathered(|_| self)
     }
 

@@ -2,7 +2,7 @@
 //! Numbers on a grid by their parts: values, and derivatives by the parameters.
 
 use crate::number::Real;
-use crate::solve::BLOCK;
+use crate::solver::BLOCK;
 use std::borrow::Borrow;
 
 /// Values of outputs on a grid with their derivatives, filled as a run comes along.
@@ -102,11 +102,11 @@ impl Picked {
         if grid.get(..knots.len()) == Some(knots) {
             return Self::all(knots.len());
         }
-        let mut bits = 0_u64;
+        let mut lane_mask = 0_u64;
         for (k, knot) in knots.iter().enumerate() {
-            bits |= u64::from(grid.get(bits.count_ones() as usize) == Some(knot)) << k;
+            lane_mask |= u64::from(grid.get(lane_mask.count_ones() as usize) == Some(knot)) << k;
         }
-        Self(bits)
+        Self(lane_mask)
     }
 
     /// Take the next out: how many samples are left out before it.

@@ -6,8 +6,9 @@ use super::start::{Start, StartError, State};
 use super::trajectory::{Output, Recorder, Target, Trajectory};
 use crate::network::{CompileError, Mode, ModeKey, Network};
 use crate::number::Real;
-use crate::solve::{
-    InputError, Inputs, Integrator, Known, MAX_SLIPPING, Settings, Signal, Status, can_march,
+use crate::solver::{
+    InputError, Inputs, Integrator, MAX_SPECTRAL_STEP_SLIPPING, Settings, Signal, SolverCache,
+    Status, supports_fixed_step,
 };
 use thiserror::Error;
 
@@ -65,14 +66,14 @@ impl<T: Real> Plan<T> {
         let targets = outputs.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         // Between samples only the expansion knows the motion.
         let motion = |target: &Target| matches!(target, Target::Angle(_));
-        let sprint = settings.sprint && !audit && !targets.iter().any(motion);
+        let sprint = settings.exponential_steps && !audit && !targets.iter().any(motion);
         let sampled = |(_, signal): &(_, _)| matches!(signal, Signal::Samples { .. });
-        let fine = sprint && can_march(network) && signals.iter().all(sampled);
+        let fine = sprint && supports_fixed_step(network) && signals.iter().all(sampled);
         let span = (grid[0], grid[grid.len() - 1]);
         let inputs = join(network, signals, (span, if fine { grid } else { &[] }))?;
         let inputs = if fine { divided(network, inputs) } else { inputs };
         let points = inputs.points(grid);
-        let settings = Settings { sprint: sprint && points.is_some(), ..settings };
+        let settings = Settings { exponential_steps: sprint && points.is_some(), ..settings };
         let (grid, outputs) = (grid.to_vec(), outputs.to_vec());
         Ok(Self { inputs, grid, points, outputs, targets, settings, audit })
     }
@@ -85,7 +86,7 @@ impl<T: Real> Plan<T> {
 
     fn integrator<'r>(
         &'r self,
-        known: Known<'r, T>,
+        known: SolverCache<'r, T>,
         start: &State<T>,
     ) -> Result<Integrator<'r, T>, Status> {
         Integrator::start(known, &self.inputs, self.settings, (start.x.clone(), &start.locked))
@@ -93,29 +94,34 @@ impl<T: Real> Plan<T> {
 
     /// One run. If it fails on the way it ends with its status, and with NaN from there on.
     pub fn run(&self, network: &Network<T>, start: &State<T>) -> Trajectory<T> {
-        self.run_again(&mut Known::of(network), start)
+        self.run_again(&mut SolverCache::new(network), start)
     }
 
-    /// The same, with what runs before have compiled of the network.
-    pub fn run_again<'r>(&'r self, known: &mut Known<'r, T>, start: &State<T>) -> Trajectory<T> {
+    /// Run with the modes and propagators that earlier runs have compiled.
+    pub fn run_again<'r>(
+        &'r self,
+        known: &mut SolverCache<'r, T>,
+        start: &State<T>,
+    ) -> Trajectory<T> {
         let network = known.network;
         let mut recorder = Recorder::new(network, &self.targets, &self.grid);
         let mut events = Vec::new();
         let (mut balance, mut grazing) = (None, None);
         let mut integrate = || -> Result<(), Status> {
-            let mut run = self.integrator(std::mem::replace(known, Known::of(network)), start)?;
+            let mut run =
+                self.integrator(std::mem::replace(known, SolverCache::new(network)), start)?;
             let outcome = if self.audit {
-                let mut auditor = Auditor::new(network, &run.regime.x);
+                let mut auditor = Auditor::new(network, &run.state.x);
                 let outcome =
                     recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
-                balance = Some(auditor.close(network, &run.regime.x));
+                balance = Some(auditor.close(network, &run.state.x));
                 outcome
             } else {
                 recorder.run_to_end(&mut run)
             };
-            events = std::mem::take(&mut run.regime.events);
+            events = std::mem::take(&mut run.state.events);
             grazing = run.grazing.take();
-            *known = run.regime.known;
+            *known = run.into_cache();
             outcome
         };
         let status = integrate().err().unwrap_or(Status::Completed);
@@ -141,6 +147,18 @@ pub fn run<T: Real>(
     Ok(plan.run(network, &start.state(network)?))
 }
 
+/// [`run`] over plain numbers, compiled once for all callers.
+pub fn run_network(
+    network: &Network<f64>,
+    signals: &[(&str, Signal<'_, f64>)],
+    start: &Start<f64>,
+    grid: &[f64],
+    outputs: &[Output],
+    options: (Settings, bool),
+) -> Result<Trajectory<f64>, SimulateError> {
+    run(network, signals, start, grid, outputs, options)
+}
+
 /// `ρ(A) h` to which too long segments are divided: a cubic then leaves a few 1e-3 N·m.
 const FINE: f64 = 0.4;
 /// Most parts of a segment.
@@ -155,7 +173,7 @@ fn divided<T: Real>(network: &Network<T>, inputs: Inputs<T>) -> Inputs<T> {
     };
     let radius = radius.re();
     inputs.divided(|length| match (radius * length, (radius * length / FINE).ceil()) {
-        (reach, _) if reach <= MAX_SLIPPING => 1,
+        (reach, _) if reach <= MAX_SPECTRAL_STEP_SLIPPING => 1,
         (_, parts) if parts <= MAX_PARTS as f64 => parts as usize,
         _ => 1,
     })

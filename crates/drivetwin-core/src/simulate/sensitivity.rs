@@ -6,7 +6,7 @@ use super::run::SimulateError;
 use super::trajectory::Trajectory;
 use crate::model::dual_clutch::DualClutch;
 use crate::number::{Dual, Number};
-use crate::solve::{Event, Settings, Signal};
+use crate::solver::{Event, Settings, Signal};
 use thiserror::Error;
 
 /// Most parameters that one pass differentiates for.
@@ -64,7 +64,8 @@ pub fn dual_clutch_sensitivities(
     signals: &[Sampled<'_>],
     start: &DualClutchStart<f64>,
     grid: &[f64],
-    (settings, parameters): (Settings, &[&str]),
+    settings: Settings,
+    parameters: &[&str],
 ) -> Result<Sensitivities, SensitivityError> {
     check_corners(parameters, model)?;
     let mut found: Option<Sensitivities> = None;
@@ -143,8 +144,8 @@ pub(super) fn variables<const P: usize>(
     start: &DualClutchStart<f64>,
     parameters: &[&str],
 ) -> Result<Variables<P>, SensitivityError> {
-    let mut model = model.lifted::<Dual<P>>();
-    let mut start = start.lifted::<Dual<P>>();
+    let mut model = model.promote::<Dual<P>>();
+    let mut start = start.promote::<Dual<P>>();
     let mut delays: Vec<Dual<P>> = signals.iter().map(|s| Dual::of(s.3)).collect();
     for (lane, &name) in parameters.iter().enumerate() {
         let place = match name.split_once('.') {

@@ -34,11 +34,11 @@ pub enum StartError {
     /// A name that the network does not have.
     #[error("{kind} {name:?} is unknown; known are {known}")]
     Unknown {
-        /// What kind of name.
+        /// Kind of the name.
         kind: &'static str,
         /// The name.
         name: String,
-        /// What would be accepted.
+        /// Accepted names.
         known: String,
     },
     /// A speed or twist that is no number.
@@ -77,7 +77,7 @@ impl<T: Number> Start<T> {
     /// The state of a network.
     pub fn state(&self, network: &Network<T>) -> Result<State<T>, StartError> {
         let (speeds, twists) = (by_name(&self.speeds), by_name(&self.twists));
-        state_of(network, (&speeds, &twists), &self.locked)
+        state_of(network, &speeds, &twists, &self.locked)
     }
 }
 
@@ -91,7 +91,8 @@ fn by_name<T: Copy>(values: &[(String, T)]) -> Vec<(&str, T)> {
 /// The state of a network from speeds of nodes, twists of shafts and elements without slip, see [`Start`].
 pub(super) fn state_of<T: Number>(
     network: &Network<T>,
-    (speeds, twists): (&Stated<'_, T>, &Stated<'_, T>),
+    speeds: &Stated<'_, T>,
+    twists: &Stated<'_, T>,
     locked: &[String],
 ) -> Result<State<T>, StartError> {
     let elements = network.frictions.iter().map(|f| &f.element);

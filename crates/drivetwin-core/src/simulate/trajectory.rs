@@ -9,8 +9,9 @@ use crate::network::channel::form;
 use crate::network::linalg::is_zero;
 use crate::network::{Network, Row};
 use crate::number::{Number, Real};
-use crate::solve::{
-    Event, Integrator, Regime, RowState, Samples, Sink, Status, Step, Task, dispatch,
+use crate::solver::{
+    Event, FrictionState, HybridState, Integrator, Kernel, SampleSink, Samples, Status, Step,
+    dispatch_simd,
 };
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -111,7 +112,7 @@ pub struct Trajectory<T: Real> {
     pub elements: Vec<String>,
     /// Events of friction elements.
     pub events: Vec<Event<T>>,
-    /// How the run ended.
+    /// Status at the end of the run.
     pub status: Status,
     /// Time [s] and element of the first event that only grazed its guard: no derivatives after it.
     pub grazing: Option<(f64, String)>,
@@ -147,12 +148,12 @@ impl<'g, T: Real> Recorder<'g, T> {
                 break;
             }
             let h = if t >= start { -step.start + t } else { T::zero_() };
-            let regime = &run.regime;
-            regime.expansion.basis_at(regime.network, h, &mut self.basis);
+            let state = &run.state;
+            state.expansion.basis_at(state.network, h, &mut self.basis);
             for (output, column) in self.columns.iter().enumerate() {
                 let value = match column {
-                    Column::Angle(row, angle) => *angle + integral(regime, row, h),
-                    other => value(other, regime, &self.basis),
+                    Column::Angle(row, angle) => *angle + integral(state, row, h),
+                    other => value(other, state, &self.basis),
                 };
                 self.recorded.push(output, value);
             }
@@ -160,7 +161,7 @@ impl<'g, T: Real> Recorder<'g, T> {
         }
         for column in &mut self.columns {
             if let Column::Angle(row, angle) = column {
-                *angle += integral(&run.regime, row, step.length);
+                *angle += integral(&run.state, row, step.length);
             }
         }
     }
@@ -189,8 +190,8 @@ impl<'g, T: Real> Recorder<'g, T> {
     }
 }
 
-impl<T: Real> Sink<T> for Recorder<'_, T> {
-    fn passed(
+impl<T: Real> SampleSink<T> for Recorder<'_, T> {
+    fn write_block(
         &mut self,
         run: &Integrator<'_, T>,
         active: &[usize],
@@ -206,7 +207,7 @@ impl<T: Real> Sink<T> for Recorder<'_, T> {
         };
         self.next += picked.count();
         let (columns, recorded, block) = (&self.columns[..], &mut self.recorded, &mut self.block);
-        dispatch(Passed { columns, recorded, block, run, active, samples, picked, first });
+        dispatch_simd(Passed { columns, recorded, block, run, active, samples, picked, first });
     }
 }
 
@@ -222,7 +223,7 @@ struct Passed<'p, 'a, T: Real> {
     first: usize,
 }
 
-impl<T: Real> Task for Passed<'_, '_, T> {
+impl<T: Real> Kernel for Passed<'_, '_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -230,7 +231,7 @@ impl<T: Real> Task for Passed<'_, '_, T> {
         let count = self.picked.count();
         for (output, column) in self.columns.iter().enumerate() {
             let from = self.recorded.length(output);
-            for &(position, factor) in &*passing_terms(column, &self.run.regime) {
+            for &(position, factor) in &*passing_terms(column, &self.run.state) {
                 self.add::<F>(output, position, factor);
             }
             self.recorded.take(output, self.block);
@@ -245,7 +246,7 @@ impl<T: Real> Passed<'_, '_, T> {
     fn add<const F: bool>(&mut self, output: usize, position: usize, factor: T) {
         let (recorded, picked) = (&mut *self.recorded, self.picked);
         let to = (output, &mut *self.block);
-        match Entry::at(position, self.run.regime.network, self.active) {
+        match Entry::at(position, self.run.state.network, self.active) {
             Entry::State(i) => {
                 recorded.add::<F>(to, (self.samples.states[i].iter(), picked), factor);
             }
@@ -264,7 +265,7 @@ impl<T: Real> Passed<'_, '_, T> {
     }
 }
 
-/// What stands at a position of the basis while samples are passed.
+/// Source of an entry of the basis while samples are passed.
 pub(super) enum Entry {
     /// State.
     State(usize),
@@ -297,23 +298,23 @@ impl Entry {
 /// What a column is a sum of while the mode lasts: positions in the basis and coefficients.
 pub(super) fn passing_terms<'c, T: Number>(
     column: &'c Column<T>,
-    regime: &Regime<'_, T>,
+    state: &HybridState<'_, T>,
 ) -> Cow<'c, [(usize, T)]> {
     match column {
         Column::Linear(terms) => Cow::Borrowed(terms),
         Column::Angle(..) => unreachable!("angles need the motion between samples"),
-        Column::Friction(j) => Cow::Owned(match regime.rows[*j] {
-            RowState::Open => Vec::new(),
-            RowState::Stuck => terms(holding_row(regime, *j)),
-            RowState::Slipping { .. } | RowState::Saturated { .. } => {
-                vec![(regime.network.first_channel() + j, T::of(1.0))]
+        Column::Friction(j) => Cow::Owned(match state.rows[*j] {
+            FrictionState::Open => Vec::new(),
+            FrictionState::Sticking => terms(holding_row(state, *j)),
+            FrictionState::Slipping { .. } | FrictionState::Saturated { .. } => {
+                vec![(state.network.first_channel() + j, T::of(1.0))]
             }
         }),
     }
 }
 
 impl<T: Number> Column<T> {
-    /// That of a target.
+    /// Return the column of a target.
     pub fn of(network: &Network<T>, target: Target) -> Self {
         let speed = |node| network.over_speeds(&[(node, T::of(1.0))]);
         match target {
@@ -350,35 +351,35 @@ fn shaft_torque<T: Number>(network: &Network<T>, i: usize) -> Column<T> {
 }
 
 /// Value of a column from the basis at an instant; an angle is that at the start of the step.
-pub(super) fn value<T: Number>(column: &Column<T>, regime: &Regime<'_, T>, basis: &[T]) -> T {
+pub(super) fn value<T: Number>(column: &Column<T>, state: &HybridState<'_, T>, basis: &[T]) -> T {
     match column {
         Column::Linear(terms) => {
             terms.iter().fold(T::zero_(), |sum, &(position, c)| sum + c * basis[position])
         }
         Column::Angle(_, angle) => *angle,
-        Column::Friction(j) => match regime.rows[*j] {
-            RowState::Open => T::zero_(),
-            RowState::Slipping { .. } | RowState::Saturated { .. } => {
-                basis[regime.network.first_channel() + j]
+        Column::Friction(j) => match state.rows[*j] {
+            FrictionState::Open => T::zero_(),
+            FrictionState::Slipping { .. } | FrictionState::Saturated { .. } => {
+                basis[state.network.first_channel() + j]
             }
-            RowState::Stuck => form(holding_row(regime, *j), basis),
+            FrictionState::Sticking => form(holding_row(state, *j), basis),
         },
     }
 }
 
 /// Torque of a stuck element over the basis.
-fn holding_row<'r, T: Number>(regime: &'r Regime<'_, T>, j: usize) -> &'r [T] {
-    let position = regime.mode.stuck.iter().position(|&s| s == Row::Friction(j));
-    regime.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode"))
+fn holding_row<'r, T: Number>(state: &'r HybridState<'_, T>, j: usize) -> &'r [T] {
+    let position = state.mode.stuck.iter().position(|&s| s == Row::Friction(j));
+    state.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode"))
 }
 
 /// Angle turned within the first `h` seconds of the present step.
-fn integral<T: Real>(regime: &Regime<'_, T>, row: &[T], h: T) -> T {
+fn integral<T: Real>(state: &HybridState<'_, T>, row: &[T], h: T) -> T {
     let mut sum = T::zero_();
-    for (&c, series) in row.iter().zip(&regime.expansion.states) {
+    for (&c, series) in row.iter().zip(&state.expansion.states) {
         if !is_zero(c) {
             let mut value = T::zero_();
-            for k in (0..=regime.expansion.order).rev() {
+            for k in (0..=state.expansion.order).rev() {
                 value = value * h + series[k] / (k + 1) as f64;
             }
             sum += c * value * h;

@@ -12,7 +12,7 @@ use drivetwin_core::model::{Driveline, FrictionLaw, Stribeck};
 use drivetwin_core::network::Network;
 use drivetwin_core::number::Real;
 use drivetwin_core::simulate::{DualClutchStart, Output, Start, Trajectory, run};
-use drivetwin_core::solve::{Settings, Signal as Input};
+use drivetwin_core::solver::{Settings, Signal as Input};
 use std::marker::PhantomData;
 
 /// A signal: input name, times, values.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Which further recording would tell best what a log leaves open."""
+"""Ranking of further recordings by the parameter uncertainty that they would leave."""

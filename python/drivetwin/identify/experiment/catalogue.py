@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Experiments that may follow a log: each as the log's own shift with other inputs.
+"""Candidate experiments: each is the shift of the log with other inputs.
 
 An experiment needs no new description of vehicle or sensors: rates, noise and start are those of
 the log, only engine torque, pressures and duration differ.
@@ -16,7 +16,7 @@ import numpy as np
 from drivetwin.driveline import Signal
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import LATEST, Output, Record
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray
 
 STEPS = (1.0, 1.3, 0.5, 1.2, 0.4, 1.1, 0.8, 1.0)
@@ -32,7 +32,7 @@ FIRMER, SOFTER = 1.3, 0.85
 
 
 class Experiment(StrEnum):
-    """What may be recorded next."""
+    """Kinds of recordings that can follow a log."""
 
     AGAIN = "the same shift again"
     THROTTLE_STEPS = "throttle steps in the lower gear"
@@ -45,7 +45,7 @@ class Experiment(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """The shift that an experiment starts from: its part of the fit at the minimum, its lock-up."""
+    """Shift that an experiment starts from: its part of the fit at the minimum, its lock-up [s]."""
 
     part: Part
     point: Point
@@ -53,7 +53,7 @@ class Base:
 
     @property
     def record(self) -> Record:
-        """What was recorded."""
+        """Recorded data of the shift."""
         return self.part.record
 
     @property
@@ -72,7 +72,7 @@ class Planned:
 
 
 def planned(experiment: Experiment, base: Base) -> Planned:
-    """The experiment with a start like that of the log; nothing is read of it yet."""
+    """Build an experiment that starts like the log; its outputs hold no measurements."""
     part, point = base.part, base.point
     label = "next"
     starts = [name for name in point.names if name.startswith(f"{part.structure.label}.")]
@@ -140,7 +140,7 @@ def _samples(signal: Signal) -> tuple[FloatArray, FloatArray]:
 
 
 def _scaled(base: Base, factors: Mapping[str, float]) -> Record:
-    """The record with the pressures above P0 of some elements multiplied."""
+    """Multiply the pressures above P0 of some elements."""
     pressures = dict(base.record.pressures)
     for name, factor in factors.items():
         P0 = base.part.structure.value(base.point, f"{name}.P0")
@@ -151,7 +151,7 @@ def _scaled(base: Base, factors: Mapping[str, float]) -> Record:
 
 
 def _with_torque(record: Record, change: Callable[[FloatArray, FloatArray], FloatArray]) -> Record:
-    """The record with its engine torque changed, as a function of time [s] and torque [N m]."""
+    """Change the engine torque by a function of time [s] and torque [N m]."""
     torque, steady = (
         Signal(signal.time, change(signal.time, signal.values))
         for signal in (record.engine_torque, record.steady_torque)
@@ -160,7 +160,7 @@ def _with_torque(record: Record, change: Callable[[FloatArray, FloatArray], Floa
 
 
 def _in_gear(base: Base, demand: Signal, length: float) -> Record:
-    """A record of the off-going element's gear alone, with the rates and noise of the log."""
+    """Build a record of the off-going element's gear alone, with the rates and noise of the log."""
     record, driveline = base.record, base.part.structure.driveline
     step = float(np.median(np.diff(record.time)))
     time = step * np.arange(int(length / step), dtype=np.float64)
@@ -191,7 +191,7 @@ def _held(time: FloatArray, level: float) -> Signal:
 
 
 def _blank(out: Output, before: FloatArray, time: FloatArray) -> Output:
-    """The same sensor on another grid, with nothing read yet."""
+    """Build the same sensor on another grid, without measurements."""
     period = float(np.median(np.diff(before[out.place])))
     stride = max(1, round(period / float(time[1] - time[0])))
     place = np.arange(0, time.size, stride)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The experiment that would narrow a weak parameter most, with the interval to expect.
+"""Expected interval of each weak parameter after each candidate experiment.
 
 An experiment adds its own information to that of the log:
 
@@ -22,9 +22,9 @@ from drivetwin.identify.likelihood.derived import of_log, parameters, slopes
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.noise_power import noise_power
 from drivetwin.identify.likelihood.null_space import reduced
-from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.method import Method
 from drivetwin.identify.momentum import MomentumSettings
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Z95, Estimate, Identification, Verdict
 from drivetwin.identify.signals import FloatArray, ShiftSignals
@@ -36,7 +36,7 @@ AGE = "te_delay"
 REPEATS = (1, 2, 4)
 """How often the best experiment is repeated at most, in steps."""
 LEAST_KNOWN = 3
-"""How many identified parameters are told how to narrow."""
+"""Number of identified parameters that are ranked beside the open ones."""
 NARROWER = 0.9
 """Share of the present interval to which an experiment must narrow it to be worth recording."""
 NONE_HELPS = "none of the known experiments narrows it by a tenth or more"
@@ -45,7 +45,7 @@ NO_SCALE = "an output-shaft torque sensor alone gives torques their scale"
 
 @dataclass(frozen=True)
 class Prospect:
-    """What an experiment would make of a parameter: half width of its 95 % interval, SI.
+    """Precision expected from an experiment: half width of the 95 % interval of a parameter, SI.
 
     `shift` says by its gears on which shift of the log the experiment is built; empty where the log
     has shifts between the same gears only.
@@ -60,7 +60,7 @@ class Prospect:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """What would tell a parameter: all experiments in order of worth, helpful or not.
+    """Experiments for one parameter, in order of worth, helpful or not.
 
     `half_width` is that of the present 95 % interval (noise and sensors), infinite without one.
     `limit` names what no experiment mends; empty where there is no such thing.
@@ -74,7 +74,7 @@ class Suggestion:
 
     @property
     def best(self) -> Prospect | None:
-        """The first experiment that narrows the interval by more than next to nothing."""
+        """First experiment that narrows the interval to `NARROWER` of its present width or less."""
         for one in self.prospects:
             told = one.verdict is not Verdict.NOT_IDENTIFIABLE
             if told and one.half_width <= NARROWER * self.half_width:
@@ -83,7 +83,7 @@ class Suggestion:
 
     @property
     def text(self) -> str:
-        """The suggestion in a sentence; without units, which are those of the parameter."""
+        """Suggestion as a sentence, without units (those of the parameter)."""
         best = self.best
         if best is None:
             return self.limit or NONE_HELPS
@@ -93,7 +93,7 @@ class Suggestion:
 
 
 def suggest(found: Identification) -> tuple[Suggestion, ...]:
-    """The best experiments for every weak or not identifiable parameter of a likelihood fit.
+    """Rank the experiments for every weak or not identifiable parameter of a likelihood fit.
 
     After these come the `LEAST_KNOWN` others of widest relative interval.
     Raises IdentificationError where the identification is not by the likelihood method.
@@ -116,8 +116,8 @@ def suggest(found: Identification) -> tuple[Suggestion, ...]:
 
 
 def _places(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
-    """Numbers of the shifts whose experiments may tell a parameter: the last one, and of what
-    belongs to an element the last ones of the same log that bring it in and let it go."""
+    """Find the shifts whose experiments inform a parameter: the last one and, for an element's
+    parameter, the last ones of the same log in which the element engages and disengages."""
     parts = fit.problem.parts
     last, element = len(parts) - 1, name.partition(".")[2]
     with_it: dict[bool, int] = {}
@@ -131,7 +131,7 @@ def _places(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
 
 
 def examined(found: Identification) -> Identification:
-    """The identification with the experiments that would tell what its log leaves open.
+    """Attach the experiments that would identify what the log leaves open.
 
     `evidence.suggestions` holds them, as `suggest` gives them; unchanged where nothing is open,
     or by another method than the likelihood.
@@ -143,7 +143,8 @@ def examined(found: Identification) -> Identification:
 
 
 def _relative_width(one: Estimate) -> float:
-    """Standard deviation over the value; that of a delay over what counts as known of one."""
+    """Compute the standard deviation over the value; for a delay, over what counts as
+    identified."""
     if one.value is None or one.std_total is None:
         return 0.0
     whole = DELAY_IDENTIFIED if spec_of(one.id).stem == AGE else abs(one.value)
@@ -164,7 +165,7 @@ class _Gain:
 
 
 def _gains(fit: LikelihoodFit, signals: Sequence[ShiftSignals], k: int) -> list[_Gain]:
-    """What each experiment on shift number k adds; one whose simulation fails is left out."""
+    """Compute the information of each experiment on shift k; failed simulations are left out."""
     point = _with_age(fit)
     base = Base(fit.problem.parts[k], point, signals[k].shift.lockup_time)
     names = [f"{one.shift.start_gear}→{one.shift.end_gear}" for one in signals]
@@ -179,12 +180,13 @@ def _gains(fit: LikelihoodFit, signals: Sequence[ShiftSignals], k: int) -> list[
 
 
 def _age_of(fit: LikelihoodFit) -> str:
-    """Unknown for the age of the engine torque in the last log, whose sensors experiments have."""
+    """Return the name of the torque-delay unknown of the last log, whose sensors experiments
+    share."""
     return fit.problem.parts[-1].structure.unknown(AGE)
 
 
 def _with_age(fit: LikelihoodFit) -> Point:
-    """The minimum with the torque's age among the unknowns, though the log may not show it."""
+    """Extend the minimum by the torque delay, even if the log does not show it."""
     point, name = fit.point, _age_of(fit)
     if name in point.names:
         return point
@@ -205,8 +207,8 @@ def _gain(plan: Planned, shift: str) -> _Gain | None:
 def _covariance(
     fit: LikelihoodFit, names: tuple[str, ...], gain: _Gain | None, repeats: int
 ) -> FloatArray:
-    """Covariance over `names` with an experiment made so many times, each with its own start, if
-    noise were what the sensors show."""
+    """Compute the covariance over `names` after `repeats` experiments, each with its own start,
+    for noise at the level of the sensors."""
     size = len(names)
     information = np.zeros((size, size))
     own = len(fit.point.names)
@@ -220,7 +222,7 @@ def _covariance(
 
 
 def _without_start(gain: _Gain, size: int) -> FloatArray:
-    """Information (size, size) of an experiment whose start is unknown."""
+    """Compute the information (size, size) of an experiment whose start is unknown."""
     own, start = list(range(size)), list(range(size, len(gain.information)))
     return reduced(gain.information, own, start)
 
@@ -240,7 +242,7 @@ def _suggestion(
         return Suggestion(one.id, one.verdict, half, (), CALIBRATE)
     names = _with_age(fit).names
     row = _row(one.id, fit, signals, names)
-    if not row.any():  # what another log has of its own
+    if not row.any():  # specific to another log
         return Suggestion(one.id, one.verdict, half, ())
     loud = np.sqrt(_noise_power(fit, row))
     best: dict[Experiment, Prospect] = {}
@@ -264,14 +266,15 @@ def _suggestion(
 
 
 def _noise_power(fit: LikelihoodFit, row: FloatArray) -> float:
-    """That of this log, with its slow errors, along a parameter's derivative (r,): an experiment
-    has the same sensors."""
+    """Compute the noise power of this log along a parameter's derivative (r,), slow errors
+    included: an experiment has the same sensors."""
     own = row[: len(fit.point.names)]
     return noise_power(fit, own[None, :]) if own.any() else max(fit.chi2, 1.0)
 
 
 def _worth(prospect: Prospect) -> tuple[bool, float]:
-    """What settles a parameter comes first, by how little of it has to be recorded."""
+    """Return the sort key: experiments that settle the parameter first, then by recording
+    effort."""
     settles = prospect.verdict is Verdict.IDENTIFIED
     return (not settles, prospect.half_width * np.sqrt(prospect.repeats))
 
@@ -279,7 +282,7 @@ def _worth(prospect: Prospect) -> tuple[bool, float]:
 def _row(
     name: str, fit: LikelihoodFit, signals: Sequence[ShiftSignals], names: tuple[str, ...]
 ) -> FloatArray:
-    """Derivative (r,) of a parameter by the unknowns `names`."""
+    """Compute the derivative (r,) of a parameter by the unknowns `names`."""
     row = np.zeros(len(names))
     if name == of_log(AGE, fit.problem.parts[-1].structure.log):
         row[names.index(_age_of(fit))] = 1.0

@@ -1,42 +1,51 @@
 # SPDX-License-Identifier: MIT
-"""Which elements of a shift slip under load so long that the log shows their friction over slip.
+"""Elements of a shift whose friction law is identifiable, because they slip under load long enough.
 
-The one that comes on always does. One that lets go does where it holds the engine back while the
+The on-coming element always does. An off-going element does if it holds the engine back while the
 speed passes to the other gear: in a power-on downshift and a power-off upshift.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from drivetwin.identify.likelihood.smooth import local_mean
 from drivetwin.identify.signals import Driveline, ShiftSignals
 
-SLIDES = 0.15
-"""Time [s] for which an off-going element must be filled in the inertia phase."""
-ABOVE = 3.0
-"""Pressure above P0, in its noise, from which an element is filled: nearer to it, noise seems to
-tell μ from P0."""
+
+@dataclass(frozen=True)
+class SlippingElementSettings:
+    """Settings of the search for elements with an identifiable friction law."""
+
+    min_filled: float = 0.15
+    """Time for which an off-going element must be filled in the inertia phase [s]."""
+    filled_sigma: float = 3.0
+    """Pressure above P0 from which an element is filled, in its noise: closer to P0, noise feigns
+    information on μ [-]."""
+
+
+SLIPPING = SlippingElementSettings()
 
 
 def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
-    """Names of the elements of one shift whose law is free, the on-coming one first."""
+    """Find the elements of one shift whose law is free, the on-coming one first."""
     coming, leaving = driveline.oncoming, driveline.offgoing
     pressure = signals.pressures[leaving.name]
     start, end = signals.shift.inertia_phase
-    steady = local_mean(pressure)  # noise alone lifts single samples far above P0
+    steady = local_mean(pressure)  # noise lifts single samples above P0
     inside = (pressure.time > start) & (pressure.time < end)
-    limit = leaving.P0.value + 2.0 * leaving.P0.std + ABOVE * pressure.sigma
+    limit = leaving.P0.value + 2.0 * leaving.P0.std + SLIPPING.filled_sigma * pressure.sigma
     filled = np.count_nonzero(inside & (steady > limit))
-    slides = filled * float(np.median(np.diff(pressure.time))) > SLIDES
+    slides = filled * float(np.median(np.diff(pressure.time))) > SLIPPING.min_filled
     return (coming.name, leaving.name) if slides else (coming.name,)
 
 
 def all_carriers(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]
 ) -> tuple[str, ...]:
-    """The same over all shifts, each once."""
+    """Find the elements whose law is free over all shifts, without repetition."""
     pairs = zip(signals, drivelines, strict=True)
     return tuple(dict.fromkeys(name for s, d in pairs for name in carriers(s, d)))

@@ -15,8 +15,7 @@ from drivetwin.identify.likelihood.derived import absolute_ids, of_log, paramete
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.hills import loads_of
 from drivetwin.identify.likelihood.left_out import left_out
-from drivetwin.identify.likelihood.limits import at_limits
-from drivetwin.identify.likelihood.null_space import null_directions
+from drivetwin.identify.likelihood.null_space import at_limits, null_directions
 from drivetwin.identify.likelihood.other_law import other_law_in_words
 from drivetwin.identify.likelihood.priors import over_eta
 from drivetwin.identify.likelihood.residuals import against, residual_tests, unweighted
@@ -118,8 +117,8 @@ def _of_what_is_fixed(
     drivelines: Sequence[Driveline],
     estimates: Mapping[str, Estimate],
 ) -> dict[str, Estimate]:
-    """Estimates of what the fit holds: the scale of torques no output torque shows, and with it
-    all absolute values, and the age of an engine torque that hardly moves."""
+    """Build the estimates of quantities that the fit holds fixed: absolute values of torque-like
+    parameters without an output torque, and the delay of an engine torque that hardly moves."""
     found: dict[str, Estimate] = {}
     if not signals[0].scale_known:
         eta = drivelines[0].known.get("eta")
@@ -134,7 +133,7 @@ def _of_what_is_fixed(
 
 
 def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
-    """How the load grows with speed; None where the fit has it constant."""
+    """Build the load law with its growth with speed; None if the fit has a constant load."""
     if AERO not in fit.point.names:
         return None
     k, part = fit.point.names.index(AERO), fit.problem.parts[0]
@@ -146,7 +145,7 @@ def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
 def _estimate(
     told: tuple[str, float, float], design: PriorValue | None, systematic: float | None, note: str
 ) -> Estimate:
-    """Verdict on (id, value, standard deviation from noise)."""
+    """Assess (id, value, standard deviation from noise)."""
     if design is not None:
         return judge_with_design(told, design, WITH_PRIOR, systematic, note)
     name, value, std = told
@@ -156,10 +155,10 @@ def _estimate(
 def _without_scale(
     name: str, eta: PriorValue | None, ratio: Estimate | None, design: PriorValue | None
 ) -> Estimate:
-    """A torque-like parameter of a log without an output torque.
+    """Estimate a torque-like parameter of a log without an output torque.
 
-    Told only where η is known from design: the ratio times it, the spread of η as a systematic
-    part.
+    Identifiable only if η is known from design: the ratio times η, with the spread of η as a
+    systematic part.
     """
     if eta is None:
         return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
@@ -179,7 +178,7 @@ def _without_scale(
 
 
 def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
-    """What is known beforehand of a parameter itself, where anything is."""
+    """Return the prior of a reported parameter; None if it has none."""
     spec = spec_of(name)
     ending = OVER_ETA if name.endswith(OVER_ETA) else ""
     known = drivelines[0].known.get(spec.stem + ending if spec.suffix == "log" else name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What presses and slips in one element of a simulated shift."""
+"""Pressure, slip and friction torque of one element in a simulated shift."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from drivetwin.driveline import Trajectory
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.response import direction
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray
 
 SLIPPING = 1e-6
@@ -39,7 +39,7 @@ class Contact:
 
 
 def contact_of(part: Part, point: Point, run: Trajectory, name: str) -> Contact:
-    """What `run`, that of the part at `point`, shows of element `name`."""
+    """Evaluate element `name` along `run`, the simulation of the part at `point`."""
     middle = 0.5 * (run.time[1:] + run.time[:-1])
     model = part.structure.model(point)
     one = next((e for e in model.elements if e.name == name), None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Covariance of the residuals, R + G·U·Gᵀ, without ever forming it.
+"""Covariance of the residuals, R + G·U·Gᵀ, in factored form.
 
 A residual is sensor noise R plus what the noise U of the inputs, sent through the simulation (G),
 does to its outputs. The driveline has four states, so G·U·Gᵀ is that of a Markov process z driven
@@ -42,7 +42,7 @@ the random walk over a log stays below what the sensors show of the state."""
 
 @dataclass(frozen=True, eq=False)
 class NoisePath:
-    """How input noise reaches the outputs.
+    """Propagation of input noise to the outputs.
 
     `seen` is H, `factor` the banded Cholesky factor, `inverse` (N, 4, 4) the inverse process noise
     of each step, `power` (N-1,) the variance of an input's noise over a step, by name; `share` is
@@ -57,7 +57,8 @@ class NoisePath:
     share: csr_array | None = None
 
     def freed(self, columns: FloatArray) -> FloatArray:
-        """Residual columns (n, q) without what the outputs' noise does through an input."""
+        """Remove from residual columns (n, q) the effect of output noise through a computed
+        torque."""
         if self.share is None:
             return columns
         push = self.response.drive[TORQUE][:, :, None] * (self.share @ columns)[:, None, :]
@@ -65,7 +66,7 @@ class NoisePath:
         return np.asarray(columns + self.seen @ z.reshape(-1, columns.shape[1]))
 
     def bound(self, columns: FloatArray) -> FloatArray:
-        """The transpose of `freed` on columns (n, q)."""
+        """Apply the transpose of `freed` to columns (n, q)."""
         if self.share is None:
             return columns
         pull = self.seen.T @ columns
@@ -94,7 +95,7 @@ class Whiteness:
         return total + 2.0 * float(np.sum(np.log(self.path.factor[0]))) - float(np.sum(of_steps))
 
     def weighted(self, columns: FloatArray) -> FloatArray:
-        """Σ⁻¹·columns, (n,) or (n, q)."""
+        """Compute Σ⁻¹·columns, (n,) or (n, q)."""
         each = columns.reshape(len(columns), -1)
         weighted = (each - self.driven(each)) / self.variance[:, None]
         if self.path is not None:
@@ -102,7 +103,7 @@ class Whiteness:
         return weighted.reshape(columns.shape)
 
     def driven(self, columns: FloatArray) -> FloatArray:
-        """The part of residual columns (n,) or (n, q) that input noise explains best."""
+        """Compute the part of residual columns (n,) or (n, q) that input noise explains best."""
         if self.path is None:
             return np.zeros_like(columns)
         each = columns.reshape(len(columns), -1)
@@ -111,7 +112,8 @@ class Whiteness:
         return np.asarray(driven.reshape(columns.shape))
 
     def input_noise(self, residual: FloatArray) -> dict[str, FloatArray]:
-        """Expected noise (N-1,) of every input per step, by name, given the residual (n,).
+        """Compute the expected noise (N-1,) of every input per step, by name, given the residual
+        (n,).
 
         The run was driven by input plus noise, so the residual shows the noise with minus sign.
         """
@@ -138,12 +140,12 @@ class Whiteness:
 
 
 def sensor_noise(record: Record) -> Whiteness:
-    """Weighting by the sensors' noise alone."""
+    """Build the weighting by the sensors' noise alone."""
     return Whiteness(record.sigma**2)
 
 
 def with_input_noise(model: DualClutch, record: Record, response: Response) -> Whiteness:
-    """Weighting with the noise of engine torque and pressures in it."""
+    """Build the weighting that includes the noise of engine torque and pressures."""
     share = record.torque_share()
     if share is not None:
         response = response.fed_back(np.asarray(share.sum(axis=1)))
@@ -160,7 +162,7 @@ def with_input_noise(model: DualClutch, record: Record, response: Response) -> W
 
 
 def _power(record: Record, response: Response) -> dict[str, FloatArray]:
-    """Variance (N-1,) of an input's noise as constant over each step, by name."""
+    """Compute the variance (N-1,) of an input's noise, constant over each step, by name."""
     found = {}
     middle = 0.5 * (record.time[1:] + record.time[:-1])
     for name in response.drive:
@@ -174,7 +176,8 @@ def _power(record: Record, response: Response) -> dict[str, FloatArray]:
 def _process(
     model: DualClutch, record: Record, response: Response, power: dict[str, FloatArray]
 ) -> FloatArray:
-    """Process noise (N, 4, 4) that enters between a grid point and the one before; first: start.
+    """Compute the process noise (N, 4, 4) between successive grid points; the first is that of the
+    start.
 
     Where the log has no output torque, its noise counts as that which the shaft turns the noise of
     the output speed into.
@@ -193,7 +196,7 @@ def _process(
 
 
 def _inverse(noise: FloatArray) -> FloatArray:
-    """Inverses (N, 4, 4) of process noise (N, 4, 4), the first of which is the quiet one.
+    """Invert process noise (N, 4, 4), whose first entry is the quiet one.
 
     Formed in units of that: where states are counted in units of so different size, the digits of
     the one direction that an input's noise drives are lost beside the quiet ones.
@@ -207,7 +210,7 @@ def _inverse(noise: FloatArray) -> FloatArray:
 def _information(
     inverse: FloatArray, transition: FloatArray, model: DualClutch, record: Record
 ) -> FloatArray:
-    """P⁻¹ + Hᵀ R⁻¹ H in lower banded storage (8, 4N)."""
+    """Compute P⁻¹ + Hᵀ R⁻¹ H in lower banded storage (8, 4N)."""
     count = record.time.size
     through = inverse[1:] @ transition
     diagonal = inverse.copy()
@@ -225,7 +228,7 @@ def _information(
 
 
 def _seen(model: DualClutch, record: Record) -> csr_array:
-    """What the sensors see of the state: (compared samples, 4N)."""
+    """Build the observation matrix H (compared samples, 4N)."""
     data, columns, count = [], [], 0
     for out in record.outputs:
         data.append(np.tile(observed(model, out.name), out.centre.size))

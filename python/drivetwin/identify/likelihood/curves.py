@@ -23,7 +23,7 @@ POINTS = 60
 def curves_of(
     fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], systematic: FloatArray
 ) -> dict[str, FrictionCurve]:
-    """Curve of every element whose law is free (carriers.py).
+    """Compute the curve of every element whose law is free (carriers.py).
 
     `linear` are the curves of the linear method: their points and slip range are shown. Its
     place is taken by the slips of the simulation where there is none. `systematic` (p, p) is the
@@ -57,7 +57,8 @@ def curves_of(
 
 
 def _seen(fit: LikelihoodFit, name: str) -> FrictionCurve:
-    """An empty curve over the slips at which the element carried torque in any simulated shift."""
+    """Build an empty curve over the slips at which the element transmits torque in a simulated
+    shift."""
     slip = np.concatenate([carried_slip(part, fit.point, name) for part in fit.problem.parts])
     grid = np.linspace(float(slip.min()), float(slip.max()), POINTS)
     nothing, empty = np.zeros(POINTS), np.empty(0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From the unknowns of the fit to the parameters that are reported.
+"""Reported parameters as functions of the unknowns of the fit.
 
 J′_g = Je + Jo′/i_g²                                 (THEORY section 4)
 J4 = (Je + Σ I_drum·(a - b/i)²)·i² + Jo′,  J5 = J_v/i_f²,  1/J = 1/J4 + 1/J5
@@ -14,7 +14,8 @@ import numpy as np
 
 from drivetwin.driveline import in_series
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import OWN, Point, Structure
+from drivetwin.identify.likelihood.unknowns import OWN, Structure
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.parameters import OVER_ETA, spec_of
 
@@ -25,7 +26,7 @@ DIRECT = ("J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 
 
 def parameters(problem: Problem, point: Point, signals: Sequence[ShiftSignals]) -> dict[str, float]:
-    """Every parameter by id at `point`, in the order in which they are reported."""
+    """Compute every reported parameter by id at `point`, in reporting order."""
     structures = [part.structure for part in problem.parts]
     first = structures[0]
     values = {"eta": first.value(point, "eta")}
@@ -47,12 +48,13 @@ def parameters(problem: Problem, point: Point, signals: Sequence[ShiftSignals]) 
 
 
 def of_log(name: str, log: int) -> str:
-    """Id of a parameter in one of several logs, numbered from 1; the `name` itself if shared."""
+    """Return the id of a parameter in one of several logs, numbered from 1; `name` if shared."""
     return f"{name}.{log}" if log and name in OWN else name
 
 
 def _over_eta(values: dict[str, float]) -> dict[str, float]:
-    """The same parameters told without an output torque, where the model has η = 1."""
+    """Rename the parameters to ratios over η, for a log without an output torque (η = 1 in the
+    model)."""
     return {
         name + OVER_ETA if spec_of(name).stem in TORQUE_LIKE else name: value
         for name, value in values.items()
@@ -61,7 +63,7 @@ def _over_eta(values: dict[str, float]) -> dict[str, float]:
 
 
 def absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
-    """Ids that a log without an output torque cannot tell."""
+    """Return the ids that are not identifiable without an output torque."""
     gears = dict.fromkeys(g for s in signals for g in (s.shift.start_gear, s.shift.end_gear))
     logs = dict.fromkeys(s.log for s in signals)
     others = [of_log(stem, log) for stem in TORQUE_LIKE if stem in DIRECT for log in logs]
@@ -69,7 +71,7 @@ def absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
 
 
 def oscillation(structure: Structure, point: Point) -> tuple[float, float]:
-    """Damped frequency [Hz] and damping ratio of the lock-up oscillation."""
+    """Compute the damped frequency [Hz] and damping ratio of the lock-up oscillation."""
     d = structure.driveline
     inertia = structure.value(point, "J_e")
     for one in (*structure.elements, *structure.spinning):
@@ -85,7 +87,8 @@ def oscillation(structure: Structure, point: Point) -> tuple[float, float]:
 def slopes(
     problem: Problem, point: Point, std: FloatArray, signals: Sequence[ShiftSignals]
 ) -> FloatArray:
-    """Derivative (q, p) of the parameters by the unknowns, central over a part of `std` (p,)."""
+    """Compute the derivative (q, p) of the parameters by central differences over a part of
+    `std` (p,)."""
     columns = []
     for k, width in enumerate(0.01 * std):
         shift = np.zeros_like(std)

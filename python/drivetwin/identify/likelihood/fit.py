@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Maximum likelihood: from start values to the minimum of Q with input noise in the covariance."""
+"""Maximum likelihood from several starts, with input noise in the covariance."""
 
 from __future__ import annotations
 
@@ -10,42 +10,51 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin.errors import IdentificationError
-from drivetwin.identify.likelihood.newton import Found, minimise
 from drivetwin.identify.likelihood.output_error import staged
-from drivetwin.identify.likelihood.problem import Normal, Problem
+from drivetwin.identify.likelihood.problem import Problem
 from drivetwin.identify.likelihood.slow import beyond_white
-from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import REMEDY, OutOfWork, at_most
+from drivetwin.identify.optimize.gauss_newton import Found, minimise
+from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.signals import FloatArray
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
-NEAR = 120.0
-"""Q per sample with input noise at the start below which the direct way is tried first."""
-GOOD = 1.03
-"""Q per sample from which on no other start is tried."""
-SAME = 1e-3
-"""Difference of Q per sample below which two starts have led to the same minimum."""
-RESTARTS = (1.0, 0.6, 1.6)
-"""Factors on shaft stiffness: a wrong minimum hangs on it, and on the level of friction, which the
-stages look for."""
-DOUBTFUL, DOUBTFUL_WITH_INPUTS = 3.0, 10.0
-"""Q per sample after the stages above which every other start comes first, and only the best of
-these is fitted. Where the stages end well, input noise that they leave out makes it a little more
-than one, and hundreds where the outputs are much quieter than the inputs: so it must be above the
-second too, which is with input noise."""
-ENOUGH = 2
-"""First starts after which no other is tried where none of them is promising: this driveline has no
-such log."""
-PLAUSIBLE = 2.0
-"""Q per sample above which a minimum is taken for a wrong one."""
-FAR = 2.0 * PLAUSIBLE
-"""Q per sample from which no search with input noise has come down to a plausible one."""
-FALLS = 10.0
-"""Fall of Q at a minimum by the inputs expected there from which another minimum is sought: as a
-rule they change Q by less than 5 either way, and no unknown by half a standard deviation."""
-ROUNDS = 5
-"""Most minima one after the other: the fall halves from each to the next."""
+
+@dataclass(frozen=True)
+class MultiStartSettings:
+    """Settings of the search for the global minimum; `chi2` is Q per sample [-]."""
+
+    direct_chi2: float = 120.0
+    """Q per sample with input noise at the start below which the direct search comes first [-]."""
+    accept_chi2: float = 1.03
+    """Q per sample at or below which no other start is tried [-]."""
+    same_chi2: float = 1e-3
+    """Difference of Q per sample below which two starts have led to the same minimum [-]."""
+    shaft_factors: tuple[float, ...] = (1.0, 0.6, 1.6)
+    """Factors on the shaft stiffness of the starts, the first 1: the minimum reached depends on
+    the stiffness and on the friction level, which the staged start scales by itself [-]."""
+    doubtful_chi2: float = 3.0
+    """Q per sample after the stages above which a start is doubtful: every other start comes first,
+    and of the doubtful ones only the best is fitted. Input noise, which the stages leave out, may
+    raise it to hundreds if the outputs are much quieter than the inputs; so `doubtful_input_chi2`
+    must be exceeded too [-]."""
+    doubtful_input_chi2: float = 10.0
+    """The same bound for Q with input noise [-]."""
+    min_starts: int = 2
+    """Number of starts after which the search ends if none of them is promising [-]."""
+    plausible_chi2: float = 2.0
+    """Q per sample above which a minimum is rejected as a wrong one [-]."""
+    far_chi2: float = 4.0
+    """Q per sample above which a search with input noise is given up [-]."""
+    min_input_decrease: float = 10.0
+    """Decrease of Q by the expected inputs at a minimum from which another minimum is sought: as a
+    rule they change Q by less than 5, and no unknown by half a standard deviation [-]."""
+    max_input_rounds: int = 5
+    """Largest number of successive minima over the inputs: the decrease halves each time [-]."""
+
+
+MULTI_START = MultiStartSettings()
 _FAILED = (
     "the simulation could not be brought onto the measurement",
     REMEDY,
@@ -53,14 +62,14 @@ _FAILED = (
 
 
 class Hopeless(IdentificationError):
-    """No start leads anywhere near the measurement, whatever its signals are taken for."""
+    """No start leads near the measurement, for any sampling mode of the signals."""
 
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodFit:
-    """The minimum of Q at `point`, and what is told of the unknowns: `mean`, `covariance` (p, p).
+    """Minimum of Q at `point` with the estimate of the unknowns: `mean`, `covariance` (p, p).
 
-    `mean` is the minimum, or the average with minima that the log hardly tells from it (kinds.py).
+    `mean` is the minimum, or the average over minima that the log hardly distinguishes (kinds.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
     the expansion of Q there. The covariance is that of `spread_of`.
     """
@@ -75,7 +84,7 @@ class LikelihoodFit:
 
     @cached_property
     def deviance(self) -> float:
-        """Q + log|Σ|: -2 log of likelihood times prior, but for a constant of the samples.
+        """Q + log|Σ|: -2 log of likelihood times prior, up to a constant of the samples.
 
         Σ is formed anew at the minimum: that of the search is of the point before, where noise
         about P0 opened an element at other instants, and log|Σ| was another by up to a thousand.
@@ -91,9 +100,9 @@ def fit(
     start: Point,
     shifts: Sequence[Shift],
     thorough: bool = True,
-    restarts: Sequence[float] = RESTARTS,
+    restarts: Sequence[float] = MULTI_START.shaft_factors,
 ) -> LikelihoodFit:
-    """Fit from `start`: directly where it is near, by stages and from other starts where not.
+    """Fit from `start`: directly if it is near, else by stages and from other starts.
 
     Unless `thorough` the first plausible minimum is taken, good or not. `restarts` are factors on
     the shaft's stiffness, the first of them 1.
@@ -108,7 +117,7 @@ def fit(
 def checked(
     known: LikelihoodFit, problem: Problem, start: Point, shifts: Sequence[Shift]
 ) -> LikelihoodFit:
-    """The fit that is `known`, or a better one, by starts other than the one that led to it."""
+    """Try other starts than the one that led to `known`; return the best fit."""
     return _best_of(_other_attempts(problem, start, shifts), known) or known
 
 
@@ -117,16 +126,16 @@ def _best_of(
     best: LikelihoodFit | None = None,
     thorough: bool = True,
 ) -> LikelihoodFit | None:
-    """The best of the attempts and of what is known: a good one, or one that is found twice."""
+    """Return the best attempt, `best` included: a good one, or one that is found twice."""
     try:
         for found in _told(attempts):
             if found is None:
                 continue
-            if best is not None and abs(found.chi2 - best.chi2) < SAME:
+            if best is not None and abs(found.chi2 - best.chi2) < MULTI_START.same_chi2:
                 return min(best, found, key=lambda one: one.chi2)
             if best is None or found.chi2 < best.chi2:
                 best = found
-            if best.chi2 < GOOD or not thorough:
+            if best.chi2 < MULTI_START.accept_chi2 or not thorough:
                 return best
     except OutOfWork:
         if best is None:
@@ -135,7 +144,8 @@ def _best_of(
 
 
 def _told(attempts: Iterator[LikelihoodFit | None]) -> Iterator[LikelihoodFit | None]:
-    """The same fits; each counts as half of what is left, for how many it takes is not known."""
+    """Report progress over the attempts; each counts as half of the remaining work, because
+    their number is not known in advance."""
     done = 0.0
     while True:
         with part(done, 0.5 + 0.5 * done):
@@ -150,7 +160,7 @@ def _told(attempts: Iterator[LikelihoodFit | None]) -> Iterator[LikelihoodFit | 
 def _attempts(
     problem: Problem, start: Point, shifts: Sequence[Shift], restarts: Sequence[float]
 ) -> Iterator[LikelihoodFit | None]:
-    """Fits from `start` and from points beside it, the most promising first.
+    """Yield fits from `start` and from points near it, the most promising first.
 
     Raises Hopeless where the first of these show that none will do.
     """
@@ -159,28 +169,30 @@ def _attempts(
         yield direct
         restarts = restarts if direct is None else restarts[:1]
     led = yield from _by_stages(problem, start, shifts, restarts)
-    if not led and len(restarts) >= ENOUGH:
+    if not led and len(restarts) >= MULTI_START.min_starts:
         raise Hopeless(*_FAILED)
 
 
 def _other_attempts(
     problem: Problem, start: Point, shifts: Sequence[Shift]
 ) -> Iterator[LikelihoodFit | None]:
-    """Fits by stages; not the first where that is what `_attempts` began with."""
-    restarts = RESTARTS[:1] if _is_near(problem, start) else RESTARTS[1:]
+    """Yield fits by stages, without the start that `_attempts` began with."""
+    restarts = (
+        MULTI_START.shaft_factors[:1] if _is_near(problem, start) else MULTI_START.shaft_factors[1:]
+    )
     yield from _by_stages(problem, start, shifts, restarts)
 
 
 def _is_near(problem: Problem, start: Point) -> bool:
-    """Whether the direct way is tried first."""
-    return problem.weighted_by(start).cost(start) < NEAR * problem.size
+    """Return whether the direct search comes first."""
+    return problem.weighted_by(start).cost(start) < MULTI_START.direct_chi2 * problem.size
 
 
 def _by_stages(
     problem: Problem, start: Point, shifts: Sequence[Shift], restarts: Sequence[float]
 ) -> Generator[LikelihoodFit | None, None, bool]:
-    """Fits from where stages lead; whether any of them came near the measurement."""
-    doubtful: list[Found] = []
+    """Yield fits from staged starts; return whether any of them came near the measurement."""
+    doubtful: list[Found[Problem]] = []
     promising = 0
     for tried, shaft in enumerate(restarts, 1):
         factor = [shaft if name == "k_o" else 1.0 for name in start.names]
@@ -192,23 +204,25 @@ def _by_stages(
         else:
             promising += 1
             yield nearest(problem, near.point)
-        if tried == ENOUGH and promising == 0:
+        if tried == MULTI_START.min_starts and promising == 0:
             break
     if doubtful:
         yield nearest(problem, min(doubtful, key=lambda one: one.normal.cost).point)
     return promising > 0 or bool(doubtful)
 
 
-def _is_doubtful(problem: Problem, near: Found) -> bool:
-    """Whether stages that ended at `near` have hardly led to the right minimum."""
-    if near.normal.cost <= DOUBTFUL * problem.size:
+def _is_doubtful(problem: Problem, near: Found[Problem]) -> bool:
+    """Return whether a staged start ended too far from the measurement for the right minimum."""
+    if near.normal.cost <= MULTI_START.doubtful_chi2 * problem.size:
         return False
     with_inputs = problem.weighted_by(near.point)
-    return with_inputs.cost(near.point) > DOUBTFUL_WITH_INPUTS * problem.size
+    return with_inputs.cost(near.point) > MULTI_START.doubtful_input_chi2 * problem.size
 
 
-def nearest(problem: Problem, start: Point, most: float = FAR) -> LikelihoodFit | None:
-    """Minimum of Q with input noise; None where Q per sample stays above `most`.
+def nearest(
+    problem: Problem, start: Point, most: float = MULTI_START.far_chi2
+) -> LikelihoodFit | None:
+    """Find the local minimum of Q with input noise; None if Q per sample stays above `most`.
 
     First with the inputs as measured, the weighting following the point; then from there with the
     inputs expected at the minimum. Formed elsewhere they would explain a wrong model away.
@@ -221,35 +235,35 @@ def nearest(problem: Problem, start: Point, most: float = FAR) -> LikelihoodFit 
     if found is None:
         return None
     chi2 = (found.normal.cost - problem.prior.cost(found.point.values)) / problem.size
-    if chi2 > PLAUSIBLE:
+    if chi2 > MULTI_START.plausible_chi2:
         return None
     covariance = spread_of(found.problem, found.normal, chi2)
     point, count = found.point, found.iterations
     return LikelihoodFit(found.problem, point, point, covariance, found.normal, chi2, count)
 
 
-def _over_inputs(problem: Problem, found: Found, limit: float) -> Found | None:
-    """The joint minimum over unknowns and inputs, from the one with the inputs as measured.
+def _over_inputs(problem: Problem, found: Found[Problem], limit: float) -> Found[Problem] | None:
+    """Find the joint minimum over unknowns and inputs, from the one with the measured inputs.
 
     Where an element slips at a pressure that is steady but for its noise, that noise seems to tell
     μ from P0: the inputs expected at one minimum then lead to another, and so on. None where the
     first search does not end. `iterations` counts those of all searches.
     """
-    joint: Found | None = None
+    joint: Found[Problem] | None = None
     expected = found.problem.with_expected_inputs(found.point)
-    for _ in range(ROUNDS):
+    for _ in range(MULTI_START.max_input_rounds):
         following = minimise(expected, found.point, limit=limit)
         if following is None or not following.converged:
             break
         joint = found = replace(following, iterations=found.iterations + following.iterations)
         expected = problem.weighted_by(found.point).with_expected_inputs(found.point)
-        if found.normal.cost - expected.cost(found.point) < FALLS:
+        if found.normal.cost - expected.cost(found.point) < MULTI_START.min_input_decrease:
             break
     return joint
 
 
 def spread_of(problem: Problem, normal: Normal, chi2: float) -> FloatArray:
-    """Covariance (p, p) of the unknowns at a minimum, with what its residual has beyond noise.
+    """Compute the covariance (p, p) at a minimum, widened by residual power beyond sensor noise.
 
     The whole is widened where `chi2` exceeds 1, and by slow errors where an output shows them, as
     far as the unknowns hang on that output.
@@ -259,7 +273,7 @@ def spread_of(problem: Problem, normal: Normal, chi2: float) -> FloatArray:
 
 
 def covariance_of(matrix: FloatArray) -> FloatArray:
-    """Inverse of an information matrix (p, p), formed after scaling to a unit diagonal."""
+    """Invert an information matrix (p, p) after scaling to a unit diagonal."""
     scale = np.sqrt(np.diag(matrix))
     inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-14, hermitian=True)
     return np.asarray(inverse / np.outer(scale, scale))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whether the load grows with the square of the speed; what is allowed for where it hardly shows.
+"""Growth of the load with the square of the speed.
 
 Every vehicle meets air drag, a load on a dynamometer none. Left out where it is not significant it
 still moves J3 and T_v/i_f, in a short log by several of the standard deviations that the model
@@ -17,21 +17,22 @@ from scipy.stats import truncnorm
 from drivetwin.identify.conclude import growth_told
 from drivetwin.identify.likelihood.fit import LikelihoodFit, spread_of
 from drivetwin.identify.likelihood.hills import with_one_load
-from drivetwin.identify.likelihood.newton import step_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import AERO, Point
+from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.load import SIGNIFICANT
+from drivetwin.identify.optimize.gauss_newton import step_of
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray
 
 
 def grows(point: Point, covariance: FloatArray) -> bool:
-    """Whether the growing part of the load differs from none by more than its noise."""
+    """Return whether the growing part of the load is significant against its noise."""
     k = point.names.index(AERO)
     return bool(point[AERO] > SIGNIFICANT * np.sqrt(covariance[k, k]))
 
 
 def told(best: LikelihoodFit) -> list[str]:
-    """What is said of a load that grows with speed; nothing where it does not."""
+    """Describe a load that grows with speed; empty if it does not."""
     if AERO not in best.point.names:
         return []
     k = best.point.names.index(AERO)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Start values of the fit: from the linear method where it told them, else plausible ones."""
+"""Initial values of the fit: from the linear method if it estimated them, else typical ones."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ TYPICAL_MODE = (2.0 * np.pi * 10.0, 0.06)
 
 
 def _load(shift: IntegralShift, growth: float | None, i_f: float) -> float:
-    """T_v/i_f [N m] of a shift if its load grows as that of all: it is well told at its own speed,
-    and at the mean speed of the log as badly as its own growth."""
+    """Compute T_v/i_f [N m] of a shift under the common growth of the load: it is accurate at
+    the shift's own speed, and at the mean speed of the log as inaccurate as the shift's own
+    growth."""
     found = shift.load
     if growth is None or found.holds_at is None:
         return found.load
@@ -31,9 +32,9 @@ def _load(shift: IntegralShift, growth: float | None, i_f: float) -> float:
 
 
 def guess_of(shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]) -> dict[str, float]:
-    """A value for every unknown of the driveline and every law, from the linear fits.
+    """Compute an initial value of every driveline unknown and friction law from the linear fits.
 
-    The median of the shifts: one alone may tell next to nothing, or something wrong.
+    The median over the shifts is used, because a single shift may be uninformative or wrong.
     """
     told = {
         name: float(np.median([dict(zip(s.ids, s.values, strict=True))[name] for s in having]))
@@ -66,7 +67,7 @@ def _typical_shaft(found: Mapping[str, float], driveline: Driveline) -> dict[str
 
 
 def _laws(shifts: Sequence[IntegralShift], drivelines: Sequence[Driveline]) -> dict[str, float]:
-    """Law, P0 and drum of every element; one without a curve takes its partner's.
+    """Compute law, P0 and drum of every element; one without a curve takes its partner's.
 
     Of several curves the one that reaches the largest slip: beyond its slips a law may be anything,
     even below zero.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whether the load differs from shift to shift of a log, as it does on hills.
+"""Variation of the load between the shifts of a log, as on hills.
 
 Grade moves the load by hundreds of N m from one minute to the next and no channel tells it. One
 load for all shifts would put what it moves into J3 and η; one for each where all are the same would
@@ -13,8 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.unknowns import DEPARTURE, Point
+from drivetwin.identify.likelihood.unknowns import DEPARTURE
 from drivetwin.identify.load import are_one
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import FloatArray
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What kind of signals a log holds: samples or means, an engine torque of lines or of curves.
+"""Sampling modes of the signals: samples or means, engine torque linear or curved.
 
 An output may be the mean over the time since the sample before, as encoders on a bus send it. That
 is half a sample late, and half a millisecond between torque and speed moves k_o and c_o by several
@@ -29,14 +29,14 @@ from itertools import product
 
 import numpy as np
 
-from drivetwin.identify.likelihood.fit import FAR, LikelihoodFit, nearest
-from drivetwin.identify.likelihood.newton import step_of
+from drivetwin.identify.likelihood.fit import MULTI_START, LikelihoodFit, nearest
+from drivetwin.identify.likelihood.left_out import score_of
 from drivetwin.identify.likelihood.output_error import in_lower_gear
-from drivetwin.identify.likelihood.problem import Normal, Part, Problem
+from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import OUTPUTS, TORQUE, columns_of
-from drivetwin.identify.likelihood.score import score_of
-from drivetwin.identify.likelihood.unknowns import Point
 from drivetwin.identify.likelihood.work import OutOfWork
+from drivetwin.identify.optimize.gauss_newton import step_of
+from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.result import Z95
 from drivetwin.identify.signals import FloatArray
 from drivetwin.shifts.shift import Shift
@@ -109,7 +109,7 @@ def _told_near(problem: Problem, point: Point) -> frozenset[str] | None:
     """The kinds that promise least from `point`; None where it is far from the measurement."""
     weighted = problem.weighted_by(point)
     normal = weighted.normal(point)
-    if normal is None or normal.cost > FAR * problem.size:
+    if normal is None or normal.cost > MULTI_START.far_chi2 * problem.size:
         return None
     return _promising(weighted, point, normal)
 
@@ -199,8 +199,8 @@ def with_either_kind(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodF
 
 
 def _start_of_other_outputs(best: LikelihoodFit) -> Point:
-    """Where to look for the minimum with the outputs of the other kind: at that of `best`, with
-    ages of the torque by which they show nearly the same."""
+    """Build the initial point for the other sampling mode of the outputs: the minimum of `best`,
+    with torque delays by which both modes give nearly the same samples."""
     values = best.point.values.copy()
     ages = {part.structure.unknown("te_delay"): part.record for part in best.problem.parts}
     for name, record in ages.items():
@@ -262,8 +262,8 @@ def _rise(problem: Problem, one: LikelihoodFit, other: LikelihoodFit) -> float:
 
 
 def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[str]:
-    """What is said of signals whose kind hardly shows and moves an unknown against its `std` (p,);
-    `weight` (q,) is that of each choice."""
+    """Return warnings for signals whose mode is uncertain and moves an unknown against its `std`
+    (p,); `weight` (q,) is that of each choice."""
     single = np.sum(choices.flips, axis=1) == 1.0
     moves = choices.flips[single].T @ np.abs(choices.steps[single]) / std
     share = weight @ choices.flips
@@ -273,7 +273,7 @@ def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[str]
 
 
 def in_words(kinds: frozenset[str]) -> list[str]:
-    """What is said of signals that are not as read."""
+    """Describe the signals that are not as read."""
     means = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in kinds)
     return [f"samples are means over their period, which fits better: {means}"] if means else []
 
@@ -290,7 +290,8 @@ def _flipped(kinds: frozenset[str], flips: FloatArray) -> frozenset[str]:
 
 
 def _price(problem: Problem, kinds: frozenset[str]) -> float:
-    """What kinds other than read cost: twice the logarithm of the odds against them."""
+    """Compute the penalty of modes other than read: twice the logarithm of the odds against
+    them."""
     speeds = _shown(problem).intersection(SPEEDS)
     means = len(kinds & speeds)
     common = int(means > 0) + int(TORQUE in kinds)
@@ -328,7 +329,8 @@ def _choices(problem: Problem, point: Point, normal: Normal) -> _Choices:
 
 
 def _changes(part: Part, point: Point) -> FloatArray:
-    """What a run shows more (n, m) where each of `SIGNALS` is of the other kind: a column each."""
+    """Compute the change (n, m) of a run by the other mode of each of `SIGNALS`, one column
+    each."""
     run = part.run(point)
     assert run is not None, "a fit can be simulated"
     record = part.record

@@ -9,8 +9,8 @@ one step of Gauss and Newton from the minimum.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -21,11 +21,11 @@ from drivetwin.identify.conclude import with_systematic_band
 from drivetwin.identify.friction import stribeck
 from drivetwin.identify.likelihood.contact import carried_slip, contact_of
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of, spread_of
-from drivetwin.identify.likelihood.newton import step_of
-from drivetwin.identify.likelihood.problem import Part
-from drivetwin.identify.likelihood.score import score_of
+from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.smooth import local_mean
 from drivetwin.identify.likelihood.unknowns import LAW
+from drivetwin.identify.optimize.gauss_newton import step_of
+from drivetwin.identify.optimize.objective import Normal
 from drivetwin.identify.result import Z95, Estimate, FrictionCurve
 from drivetwin.identify.signals import FloatArray, Sampled
 from drivetwin.identify.uncertainty import doubted
@@ -46,7 +46,7 @@ GRID = 200
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What q columns would be if they were free: `amounts` (q,) with their `covariance` (q, q).
+    """Estimate of q effects if they were free: `amounts` (q,) with their `covariance` (q, q).
 
     `moves` (p,) is where the unknowns of the fit would follow, `fall` how much Q would fall.
     """
@@ -63,7 +63,7 @@ class Step:
 
     @property
     def significant(self) -> bool:
-        """Whether noise and slow errors of the sensors hardly make as much."""
+        """True if noise and slow errors of the sensors do not explain the amounts."""
         size = float(self.amounts @ np.linalg.pinv(self.covariance, hermitian=True) @ self.amounts)
         return size > chi2.isf(2.0 * norm.sf(SIGNIFICANT), self.amounts.size)
 
@@ -138,7 +138,7 @@ def left_out(fit: LikelihoodFit) -> Iterator[LeftOut]:
 
 
 def late_torque(fit: LikelihoodFit) -> Step:
-    """How late the output torque is against the speeds [s]: none in a log without one."""
+    """Estimate the delay of the output torque against the speeds [s]; empty without a sensor."""
 
     def columns(part: Part, run: Trajectory) -> FloatArray:
         rate = np.gradient(run.shaft_torque, run.time)
@@ -152,7 +152,7 @@ def late_torque(fit: LikelihoodFit) -> Step:
 
 
 def late_pressure(fit: LikelihoodFit, name: str) -> Step:
-    """How late the measured pressure of an element is against the torque that it makes [s]."""
+    """Estimate the delay of the measured pressure of an element against its torque [s]."""
 
     def columns(part: Part, run: Trajectory) -> FloatArray:
         response, record = part.response(fit.point, run), part.record
@@ -167,7 +167,7 @@ def late_pressure(fit: LikelihoodFit, name: str) -> Step:
 
 
 def other_shape(fit: LikelihoodFit, name: str, shapes: Shapes) -> Step:
-    """How much of each of `shapes` the friction of an element has beside its Stribeck law."""
+    """Estimate the amount of each of `shapes` in the friction of an element."""
 
     def columns(part: Part, run: Trajectory) -> FloatArray:
         response = part.response(fit.point, run)
@@ -268,3 +268,55 @@ def _shape_told(found: Step, name: str, shapes: Shapes) -> Iterator[LeftOut]:
         name,
         lambda slip: np.asarray(shapes.at(slip) @ found.amounts),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """Sums over all parts for q columns Z of the outputs, with J and r those of the fit.
+
+    `own` (q, q) is ZᵀΣ⁻¹Z, `cross` (p, q) JᵀΣ⁻¹Z and `pull` (q,) ZᵀΣ⁻¹r; `weighted` (n, q) is
+    Σ⁻¹Z of each part. With an amount s (q,) of the effects the residual is r - Z·s, and Q changes
+    by sᵀ·own·s - 2·pull·s before the unknowns follow.
+    """
+
+    own: FloatArray
+    cross: FloatArray
+    pull: FloatArray
+    weighted: tuple[FloatArray, ...]
+
+    def beside(
+        self, minimum: Normal, precision: FloatArray, known: FloatArray | float = 0.0
+    ) -> Normal:
+        """The expansion at a `minimum` with the effects as q more unknowns, behind its own.
+
+        Of these `precision` (q,) is known beforehand, about zero, from which they are `known` (q,)
+        away already.
+        """
+        information = np.block(
+            [[minimum.information, self.cross], [self.cross.T, self.own + np.diag(precision)]]
+        )
+        data = np.block([[minimum.data, self.cross], [self.cross.T, self.own]])
+        pairs = zip(minimum.regressors, self.weighted, strict=True)
+        return replace(
+            minimum,
+            gradient=np.concatenate([np.zeros(len(self.cross)), precision * known - self.pull]),
+            information=information,
+            data=data,
+            regressors=tuple(np.column_stack(both) for both in pairs),
+        )
+
+
+def score_of(problem: Problem, normal: Normal, columns: Sequence[FloatArray]) -> Score:
+    """Score of `columns` (n, q) of each part at the point of the expansion `normal`."""
+    size = columns[0].shape[1]
+    own, cross = np.zeros((size, size)), np.zeros((normal.gradient.size, size))
+    pull, every = np.zeros(size), []
+    for part, z, residual, regressors in zip(
+        problem.parts, columns, normal.residuals, normal.regressors, strict=True
+    ):
+        weighted = part.weighting.weighted(z)
+        own += z.T @ weighted
+        cross += regressors.T @ z
+        pull += weighted.T @ residual
+        every.append(weighted)
+    return Score(own, cross, pull, tuple(every))

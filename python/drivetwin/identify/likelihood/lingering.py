@@ -18,9 +18,9 @@ from drivetwin.identify.likelihood.contact import SLIPPING, contact_of
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.kinds import TIE, WORSE
 from drivetwin.identify.likelihood.problem import Part, Problem
-from drivetwin.identify.likelihood.smooth import ABOUT
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.likelihood.smooth import SMOOTHING
 from drivetwin.identify.likelihood.work import OutOfWork
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.result import Z95
 from drivetwin.progress import part as share_of
 
@@ -87,5 +87,5 @@ def _time_about(part: Part, point: Point, name: str) -> float:
     contact, signal = contact_of(part, point, run, name), part.record.pressures[name]
     P0 = part.structure.value(point, f"{name}.P0")
     away = np.abs(np.interp(contact.middle, signal.time, signal.values) - P0)
-    near = away < ABOUT * part.record.input_sigma[name]
+    near = away < SMOOTHING.fill_sigma * part.record.input_sigma[name]
     return float(np.sum(np.diff(run.time)[near & (np.abs(contact.slip) > SLIPPING)]))

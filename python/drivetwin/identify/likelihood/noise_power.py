@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""By how much the residuals of a fit exceed the noise that its sensors show."""
+"""Ratio of residual power to sensor noise."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from drivetwin.identify.signals import FloatArray
 
 
 def noise_power(fit: LikelihoodFit, rows: FloatArray) -> float:
-    """How many times the noise that the sensors show the residuals have, slow errors counted: the
-    mean over the directions of the unknowns that `rows` (k, p) span, which are independent."""
+    """Compute the ratio of residual power, slow errors included, to sensor noise: the mean over
+    the independent directions of the unknowns that `rows` (k, p) span."""
     covariance = rows @ covariance_of(fit.normal.information) @ rows.T
     spread = rows @ spread_of(fit.problem, fit.normal, fit.chi2) @ rows.T
     scale = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Combinations of parameters that the measurements alone cannot tell, in words.
+"""Combinations of parameters that the measurements do not identify, and parameters at a bound.
 
 A direction of the information matrix without priors along which all parameters may move by
 several per cent at no cost is named by the parameters that make it up.
@@ -11,12 +11,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from drivetwin.display import in_units
 from drivetwin.identify.likelihood.fit import LikelihoodFit
 from drivetwin.identify.likelihood.unknowns import LAW
 from drivetwin.identify.signals import FloatArray
+from drivetwin.parameters import spec_of
 
 LOOSE = 0.2
 """Relative standard deviation along a direction from which it counts as not told."""
+AT = 1e-3
+"""Distance from a bound, in standard deviations, within which an unknown stands on it."""
 SHARE = 0.3
 """Share of a parameter in a direction from which it is named."""
 NAMED = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "mu_c", "P0", "drum")
@@ -24,7 +28,7 @@ SHOWN = {"eta": "η", "J_e": "J′", "J_out": "Jo′", "J_vehicle": "J3", "Tv_ov
 
 
 def null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
-    """One sentence for each direction that the log leaves open without its priors."""
+    """Return one sentence for each direction that is not identifiable without the priors."""
     names = fit.point.names
     keep = [k for k, name in enumerate(names) if _is_told(name, names)]
     rest = [k for k in range(len(names)) if k not in keep]
@@ -46,13 +50,14 @@ def null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
 
 
 def _is_told(name: str, names: Sequence[str]) -> bool:
-    """Whether a result tells this unknown: of μ that of elements whose whole law is free."""
+    """Return whether an unknown is reported; μ only of elements whose whole law is free."""
     element, _, key = name.rpartition(".")
     return key in NAMED and (key != LAW[0] or f"{element}.{LAW[-1]}" in names)
 
 
 def reduced(matrix: FloatArray, keep: list[int], rest: list[int]) -> FloatArray:
-    """Information on `keep` with the `rest` unknown (Schur complement), scaled on the way."""
+    """Compute the information on `keep` with the `rest` unknown (Schur complement), after
+    scaling."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     unit = matrix / np.outer(scale, scale)
     inner = np.linalg.pinv(unit[np.ix_(rest, rest)], rcond=1e-13, hermitian=True)
@@ -65,3 +70,21 @@ def _shown(name: str) -> str:
     element, _, key = name.rpartition(".")
     symbol = SHOWN.get(key, {"mu_c": "μ", "drum": "drum inertia"}.get(key, key))
     return f"{symbol} of {element}" if element else symbol
+
+
+def at_limits(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -> dict[str, str]:
+    """Return a warning by id for each parameter that is an unknown on one of its bounds.
+
+    `slopes` (q, p) is the derivative of the parameters `ids` by the unknowns of the fit.
+    """
+    values, near = fit.point.values, AT * np.sqrt(np.diag(fit.covariance))
+    below, above = values <= fit.problem.lower + near, values >= fit.problem.upper - near
+    found = {}
+    for name, row in zip(ids, slopes, strict=True):
+        (acting,) = np.nonzero(row)
+        if acting.size != 1 or not (below | above)[acting[0]]:
+            continue
+        side = "more" if above[acting[0]] else "less"
+        limit = in_units(float(values[acting[0]]), spec_of(name).unit)
+        found[name] = f"{limit} is the limit of the search: the log speaks for {side}"
+    return found

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the log would tell with the other loss law, and which of the two it speaks for.
+"""Fit under the other loss law, and the choice between both.
 
 They differ only while the torque through the gears is reversed, so the minimum of the other is
 near: one expansion of Q at that of the first shows where it lies and how deep (a fit from there
@@ -13,7 +13,7 @@ from dataclasses import replace
 from drivetwin.display import in_units
 from drivetwin.driveline import LossLaw
 from drivetwin.identify.likelihood.fit import LikelihoodFit
-from drivetwin.identify.likelihood.newton import step_of
+from drivetwin.identify.optimize.gauss_newton import step_of
 from drivetwin.identify.result import Z95
 from drivetwin.identify.signals import FloatArray
 from drivetwin.parameters import spec_of
@@ -26,7 +26,7 @@ RULED_OUT = 10.0
 def other_law_in_words(
     fit: LikelihoodFit, values: dict[str, float], slopes: FloatArray, std: FloatArray
 ) -> list[str]:
-    """What is said where the other law, which the log does not rule out, gives other parameters.
+    """Return warnings if the other law, which the log does not exclude, gives other parameters.
 
     Others are those whose intervals under the two laws do not meet. `values` are the parameters by
     id, `slopes` (q, p) their derivatives by the unknowns, `std` (q,) their standard deviations.

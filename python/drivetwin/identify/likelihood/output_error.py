@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Staged output error: what to do where the start values are far off.
+"""Staged output-error start for initial values that are far off.
 
 The simulation of a whole shift with wrong parameters locks at the wrong time, and Q has local
 minima. Fitted piece by piece it has none in practice: first the lower gear alone, which fixes
@@ -11,41 +11,55 @@ looked for by simulation alone before the search goes on from the best.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.identify.likelihood.newton import Found, minimise
 from drivetwin.identify.likelihood.problem import Part, Problem
-from drivetwin.identify.likelihood.unknowns import Point
+from drivetwin.identify.optimize.gauss_newton import Found, minimise
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.shifts.shift import Shift
 
-CLEAR = 0.02
-"""Distance kept from the phase boundary at which a stage ends [s]."""
 SOUGHT = ("J_e", "J_out", "J_vehicle", "k_o", "c_o")
-"""Unknowns that a stage seeks about its start only: a short span hardly tells some of them, and
+"""Unknowns that a stage seeks about its start only: a short span hardly shows some of them, and
 far off the driveline is so stiff that one run takes as long as a whole fit."""
-ABOUT = 10.0
-"""Factor on either side of the start within which they are sought."""
-HOPELESS = 20.0
-"""Q per sample with input noise after a stage above which no other follows."""
 LEVEL = "mu_c"
-LEVELS = np.geomspace(0.5, 2.0, 13)
-"""Factors on the level of an element's friction that are looked at."""
-LOOKS = 2
-"""How often each element is looked at: the instant at which one lets go hangs on the other."""
 
 
-def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found | None:
-    """Output error over growing spans, weighted by sensor noise.
+@dataclass(frozen=True)
+class StagedStartSettings:
+    """Settings of the staged output-error start."""
 
-    None where a run fails, and where a stage ends far from the measurement.
+    clearance: float = 0.02
+    """Distance kept from the phase boundary at which a stage ends [s]."""
+    search_factor: float = 10.0
+    """Factor to either side of the start within which the unknowns `SOUGHT` are sought [-]."""
+    max_chi2: float = 20.0
+    """Q per sample with input noise after a stage above which no other follows [-]."""
+    min_friction_factor: float = 0.5
+    """Smallest factor on the friction level that is tried [-]."""
+    max_friction_factor: float = 2.0
+    """Largest factor on the friction level that is tried [-]."""
+    friction_factors: int = 13
+    """Number of factors on the friction level, evenly spaced in the logarithm [-]."""
+    friction_passes: int = 2
+    """Number of passes over the elements: the instant at which one breaks away depends on the
+    other [-]."""
+
+
+STAGED_START = StagedStartSettings()
+
+
+def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found[Problem] | None:
+    """Fit the output error over growing spans, weighted by sensor noise.
+
+    Returns None if a run fails, or if a stage ends far from the measurement.
     """
     problem = _about(problem, start)
     found = in_lower_gear(problem, start, shifts)
     if found is None or _hopeless(found):
         return None
-    slipping = problem.until([s.lockup_time - CLEAR for s in shifts])
+    slipping = problem.until([s.lockup_time - STAGED_START.clearance for s in shifts])
     found = minimise(slipping, _levelled(slipping, found.point), rough=True)
     if found is None or _hopeless(found):
         return None
@@ -56,20 +70,22 @@ def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found | N
     return None if found is None or _hopeless(found) else found
 
 
-def in_lower_gear(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found | None:
-    """Output error over the gear before each shift alone; None where a run fails."""
+def in_lower_gear(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found[Problem] | None:
+    """Fit the output error over the gear before each shift alone; None if a run fails."""
     gear = _without_friction(_about(problem, start), start)
-    return minimise(gear.until([s.before[1] - CLEAR for s in shifts]), start, rough=True)
+    return minimise(
+        gear.until([s.before[1] - STAGED_START.clearance for s in shifts]), start, rough=True
+    )
 
 
-def _hopeless(found: Found) -> bool:
-    """Whether input noise, which the stages leave out, cannot be what is left by one."""
+def _hopeless(found: Found[Problem]) -> bool:
+    """Return whether a stage ended too far from the measurement for input noise to explain it."""
     problem = found.problem.weighted_by(found.point)
-    return problem.cost(found.point) > HOPELESS * problem.size
+    return problem.cost(found.point) > STAGED_START.max_chi2 * problem.size
 
 
 def _without_friction(problem: Problem, start: Point) -> Problem:
-    """The problem with all that belongs to the elements held at the start."""
+    """Fix all parameters of the elements at the start."""
     prior = problem.prior
     elements = {one.name for part in problem.parts for one in part.structure.elements}
     for k, name in enumerate(start.names):
@@ -79,11 +95,16 @@ def _without_friction(problem: Problem, start: Point) -> Problem:
 
 
 def _levelled(problem: Problem, point: Point) -> Point:
-    """The point with the friction levels, of those looked at, that leave least."""
+    """Scale the friction levels to the tried factors with the smallest Q."""
+    factors = np.geomspace(
+        STAGED_START.min_friction_factor,
+        STAGED_START.max_friction_factor,
+        STAGED_START.friction_factors,
+    )
     levels = [k for k, name in enumerate(point.names) if name.endswith(f".{LEVEL}")]
-    for k in levels * LOOKS:
+    for k in levels * STAGED_START.friction_passes:
         trials = []
-        for factor in LEVELS:
+        for factor in factors:
             values = point.values.copy()
             values[k] = np.clip(factor * values[k], problem.lower[k], problem.upper[k])
             trials.append(point.moved(values))
@@ -92,8 +113,12 @@ def _levelled(problem: Problem, point: Point) -> Point:
 
 
 def _about(problem: Problem, start: Point) -> Problem:
-    """The problem with bounds about the start, of what starts above zero."""
+    """Restrict positive unknowns of `SOUGHT` to bounds about the start."""
     sought = np.array([name in SOUGHT for name in start.names]) & (start.values > 0.0)
-    lower = np.where(sought, np.maximum(problem.lower, start.values / ABOUT), problem.lower)
-    upper = np.where(sought, np.minimum(problem.upper, start.values * ABOUT), problem.upper)
+    lower = np.where(
+        sought, np.maximum(problem.lower, start.values / STAGED_START.search_factor), problem.lower
+    )
+    upper = np.where(
+        sought, np.minimum(problem.upper, start.values * STAGED_START.search_factor), problem.upper
+    )
     return replace(problem, lower=lower, upper=upper)

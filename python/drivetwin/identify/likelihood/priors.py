@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Which unknowns are free, between what bounds, and what is known of them beforehand.
+"""Free unknowns of the fit, their bounds and their priors.
 
 A design value with a standard deviation is a prior, one without is fixed. The laws' priors are
-those of the linear friction fit.
+those of the linear friction fit. Most parameters are unknowns themselves. J′_g = Je + Jo′/i_g² is
+not: a known J′ with a standard deviation is a prior on that sum, one without ties Je to Jo′.
 """
 
 from __future__ import annotations
@@ -13,14 +14,9 @@ from itertools import groupby
 import numpy as np
 
 from drivetwin.driveline import LossLaw
+from drivetwin.errors import InputError
 from drivetwin.identify.friction import LAW_PRIOR
 from drivetwin.identify.likelihood.carriers import all_carriers
-from drivetwin.identify.likelihood.known import (
-    gear_inertias,
-    known_unknowns,
-    tie_of,
-    with_gear_inertias,
-)
 from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import LATEST, record_of
 from drivetwin.identify.likelihood.smooth import local_mean
@@ -31,15 +27,16 @@ from drivetwin.identify.likelihood.unknowns import (
     LAW,
     START,
     TE_OFFSET,
-    Point,
     Structure,
+    Tie,
     own_of,
 )
 from drivetwin.identify.load import AERO_SPREAD, mean_speed_of
 from drivetwin.identify.momentum import DELAY_STD_MAX, MomentumSettings, rounding_error
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import Driveline, FloatArray, Sampled, ShiftSignals, Span
-from drivetwin.parameters import SPECS
+from drivetwin.parameters import OVER_ETA, SPECS
 from drivetwin.shifts.divided import divided
 from drivetwin.vehicle.spec import PriorValue
 
@@ -59,12 +56,13 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
 """Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
 PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
 """Efficiency of a gearbox where no output torque shows it."""
+_GEAR_INERTIA = "J_prime_"
 OFF_DESIGN = 10.0
-"""Factor beside the card's Jo′ within which it is sought. Of all inertias it alone may be so small
-that with the shaft's damping one run takes as long as a whole fit."""
+"""Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
+small that, with the shaft's damping, one run takes as long as a whole fit."""
 OFF_GOING = {"mu_c": 0.03, "mu_drop": 0.02}
-"""Spread of the friction of an element that only lets go, about that of the one coming on: what
-shows of it is at what pressure it breaks away, and how its torque then falls with slip."""
+"""Prior standard deviation of the friction of an element that only disengages, about that of the
+engaging one: the log shows the break-away pressure and the decrease of its torque with slip."""
 
 
 def problem_of(
@@ -74,7 +72,7 @@ def problem_of(
     guess: Mapping[str, float],
     hilly: bool = False,
 ) -> tuple[Problem, Point]:
-    """The fit of all shifts of one log or of several, and where its search starts.
+    """Build the fit of all shifts of one or several logs, and its initial point.
 
     `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
     start of each shift's run is read from the first samples. The age of the engine torque is held
@@ -123,18 +121,18 @@ def problem_of(
 
 
 def _of_each(names: Sequence[str], logs: Sequence[int]) -> list[str]:
-    """The names with those that each log has of its own once for each."""
+    """Expand the names: those that each log has of its own once for each log."""
     return list(dict.fromkeys(own_of(log).get(name, name) for name in names for log in logs))
 
 
 def _with_own(guess: Mapping[str, float], logs: Sequence[int]) -> dict[str, float]:
-    """The guess with a value for what each log has of its own; one given by that name stays."""
+    """Add values for the log-specific unknowns to the guess; given ones stay."""
     own = {n: guess[name] for log in logs for name, n in own_of(log).items() if name in guess}
     return own | dict(guess)
 
 
 def _departures(signals: Sequence[ShiftSignals]) -> dict[int, dict[str, float]]:
-    """By number of the shift how its load departs from the mean of its log: factors of unknowns.
+    """Compute by shift number the deviation of its load from the log's mean: factors of unknowns.
 
     Nothing of a shift that is the only one of its log.
     """
@@ -149,7 +147,7 @@ def _departures(signals: Sequence[ShiftSignals]) -> dict[int, dict[str, float]]:
 
 
 def over_eta(quantity: PriorValue, driveline: Driveline) -> PriorValue:
-    """Design value of a torque-like quantity over the efficiency, as known from design or usual."""
+    """Divide a torque-like design value by the efficiency, known from design or typical."""
     eta = driveline.known.get("eta", PLAUSIBLE_ETA)
     value = quantity.value / eta.value
     spread = value * eta.std / eta.value
@@ -157,7 +155,8 @@ def over_eta(quantity: PriorValue, driveline: Driveline) -> PriorValue:
 
 
 def shows_age(torque: Sampled) -> bool:
-    """Whether the engine torque moves enough, against its noise, for its age to show."""
+    """Return whether the engine torque varies enough, relative to its noise, to identify its
+    delay."""
     if torque.sigma == 0.0:
         return bool(np.ptp(torque.values) > 0.0)
     rate = np.diff(local_mean(torque)) / np.diff(torque.time)
@@ -165,7 +164,7 @@ def shows_age(torque: Sampled) -> bool:
 
 
 def spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
-    """Span [s] of the log that each shift accounts for; no sample is counted twice.
+    """Divide the log into one span [s] per shift; no sample is counted twice.
 
     A gear between two shifts is divided in its middle. Each log stands by itself.
     """
@@ -174,7 +173,7 @@ def spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
 
 
 def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper bounds (p,) of unknowns."""
+    """Return the lower and upper bounds (p,) of unknowns."""
     pairs = []
     for name in names:
         stem = name.split(".")[-1]
@@ -191,7 +190,7 @@ def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
 def _about_design(
     bounds: tuple[FloatArray, FloatArray], names: Sequence[str], priors: Mapping[str, PriorValue]
 ) -> tuple[FloatArray, FloatArray]:
-    """The bounds with those of Jo′ about its design value, where the card has one."""
+    """Restrict the bounds of Jo′ to a factor about its design value, if the card has one."""
     lower, upper = bounds
     if "J_out" in names and "J_out" in priors:
         k, design = names.index("J_out"), priors["J_out"].value
@@ -201,7 +200,7 @@ def _about_design(
 
 
 def _laws(signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]) -> list[str]:
-    """Free coefficients of the friction laws."""
+    """Return the free coefficients of the friction laws."""
     shown = all_carriers(signals, drivelines)
     leaving = [d.offgoing.name for d in drivelines if d.offgoing.name not in shown]
     free = [f"{e}.{key}" for e in shown for key in LAW]
@@ -209,7 +208,7 @@ def _laws(signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]) -> l
 
 
 def _fills(drivelines: Sequence[Driveline]) -> list[str]:
-    """P0 of the elements of the shifts, and drums of all that have one."""
+    """Return P0 of the elements of the shifts, and the drums of all elements that have one."""
     elements = dict.fromkeys(e.name for d in drivelines for e in (d.oncoming, d.offgoing))
     drums = dict.fromkeys((*elements, *(e.name for d in drivelines for e in d.drums)))
     return [*(f"{e}.P0" for e in elements), *(f"{e}.drum" for e in drums)]
@@ -218,7 +217,7 @@ def _fills(drivelines: Sequence[Driveline]) -> list[str]:
 def _priors(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], guess: Mapping[str, float]
 ) -> dict[str, PriorValue]:
-    """What is known beforehand, by unknown."""
+    """Collect the priors by unknown."""
     found = {"te_delay": MomentumSettings().delay_prior}
     if drivelines[0].J_out is not None:
         known = drivelines[0].J_out
@@ -250,3 +249,72 @@ def _priors(
 
 def _is_known(prior: PriorValue | None) -> bool:
     return prior is not None and prior.std == 0.0
+
+
+def known_unknowns(driveline: Driveline, scale_known: bool) -> dict[str, PriorValue]:
+    """Collect the priors of unknowns that are parameters themselves; `std` 0: fixed.
+
+    Without an output torque the unknowns are the quantities over η, and only what is known of
+    those counts.
+    """
+    found = {}
+    for name, prior in driveline.known.items():
+        unknown = name.removesuffix(OVER_ETA)
+        told = scale_known if unknown == name else not scale_known
+        if unknown in COMMON and (told or unknown == "te_delay"):
+            found[unknown] = prior
+    return found
+
+
+def gear_inertias(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]
+) -> list[tuple[float, PriorValue]]:
+    """Return the overall ratio of each gear whose J′ is known, with the prior [kg m^2]."""
+    ending = "" if signals[0].scale_known else OVER_ETA
+    ratios: dict[str, float] = {}
+    for s, d in zip(signals, drivelines, strict=True):
+        ratios |= {s.shift.start_gear: d.i_before, s.shift.end_gear: d.i_after}
+    known = drivelines[0].known
+    return [
+        (ratio, known[name])
+        for gear, ratio in ratios.items()
+        if (name := f"{_GEAR_INERTIA}{gear}{ending}") in known
+    ]
+
+
+def tie_of(inertias: Sequence[tuple[float, PriorValue]]) -> Tie | None:
+    """Build the tie of Je to Jo′ by a J′ that is exactly known; None without one.
+
+    Raises InputError for two: between them Jo′ would follow, which has an entry of its own.
+    """
+    exact = [Tie(prior.value, ratio) for ratio, prior in inertias if prior.std == 0.0]
+    if len(exact) > 1:
+        raise InputError(
+            f"J′ of {len(exact)} gears are fixed, and all follow from one inertia and J_out",
+            "fix J′ of one gear, and J_out if it is known",
+        )
+    return exact[0] if exact else None
+
+
+def with_gear_inertias(
+    prior: Prior,
+    point: Point,
+    fixed: Mapping[str, float],
+    inertias: Sequence[tuple[float, PriorValue]],
+) -> Prior:
+    """Add the priors on J′ as priors on sums of Je and Jo′."""
+    soft = [(ratio, known) for ratio, known in inertias if known.std > 0.0]
+    if not soft or "J_e" not in point.names:
+        return prior
+    place = [point.names.index(name) for name in ("J_e", "J_out") if name in point.names]
+    precision, mean = prior.precision.copy(), prior.mean.copy()
+    inner = precision[np.ix_(place, place)]
+    pull = inner @ mean[place]
+    for ratio, known in soft:
+        row: FloatArray = np.array([1.0, ratio**-2][: len(place)])
+        rest = 0.0 if len(place) == 2 else fixed["J_out"] / ratio**2
+        inner = inner + np.outer(row, row) / known.std**2
+        pull = pull + row * (known.value - rest) / known.std**2
+    precision[np.ix_(place, place)] = inner
+    mean[place] = np.linalg.lstsq(inner, pull, rcond=None)[0]
+    return Prior(mean, precision)

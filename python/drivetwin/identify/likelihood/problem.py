@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The least-squares problem of the fit: residuals of all shifts, their weighting, the priors.
+"""Likelihood objective: residuals of all shifts, their weighting, the priors.
 
     Q(θ) = Σ_shifts (y - ŷ(θ))ᵀ Σ⁻¹ (y - ŷ(θ)) + (θ - θ₀)ᵀ P₀⁻¹ (θ - θ₀)
 
@@ -25,8 +25,9 @@ from drivetwin.errors import InputError
 from drivetwin.identify.likelihood.covariance import Whiteness, sensor_noise, with_input_noise
 from drivetwin.identify.likelihood.record import TORQUE, Record
 from drivetwin.identify.likelihood.response import Response, observed, response_of
-from drivetwin.identify.likelihood.unknowns import TE_OFFSET, Point, Structure
+from drivetwin.identify.likelihood.unknowns import TE_OFFSET, Structure, retract
 from drivetwin.identify.likelihood.work import EXPANSION, RUN, WEIGHTING, spend
+from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import FloatArray
 
@@ -51,16 +52,16 @@ class Part:
 
     @classmethod
     def unweighted(cls, structure: Structure, record: Record) -> Part:
-        """A part whose residuals count by the sensors' noise alone."""
+        """Build a part whose residuals are weighted by the sensors' noise alone."""
         return cls(structure, record, sensor_noise(record))
 
     @property
     def scale_known(self) -> bool:
-        """Whether an output torque is among the compared signals."""
+        """True if an output torque is among the compared signals."""
         return any(out.name == "output_torque" for out in self.record.outputs)
 
     def run(self, point: Point) -> Trajectory | None:
-        """The simulation at `point`; None where it has none or does not reach the end."""
+        """Simulate the part at `point`; None if the simulation fails or does not reach the end."""
         try:
             found = simulate(
                 self.structure.model(point),
@@ -74,16 +75,17 @@ class Part:
         return found if self._whole(found) else None
 
     def _whole(self, run: Trajectory) -> bool:
-        """Whether a run reached its end with outputs that can be squared."""
+        """Return whether a run reached its end with residuals that can be squared."""
         worst = np.max(np.abs(self.residual(run)) / self.record.sigma)
         return run.status == "completed" and bool(worst < LARGEST)
 
     def residual(self, run: Trajectory) -> FloatArray:
-        """Measured minus simulated (n,), the latter as the measured inputs would have it."""
+        """Compute measured minus simulated (n,), the latter as for the measured inputs."""
         return self.record.measured - self.record.stacked(run) - self.returned
 
     def linearised(self, point: Point) -> tuple[FloatArray, FloatArray] | None:
-        """Residual (n,) and the derivative (n, p) of the simulated samples by `point`."""
+        """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
+        `point`."""
         names, matrix = self.structure.slopes(point)
         model = self.structure.model(point)
         try:
@@ -100,7 +102,7 @@ class Part:
         if not self._whole(found.run):
             return None
         columns = np.column_stack([self.record.stacked(found.derivatives[n]) for n in names])
-        acting = np.any(matrix != 0.0, axis=0)  # of many shifts a part knows few unknowns
+        acting = np.any(matrix != 0.0, axis=0)  # a part depends on few unknowns
         slopes = np.zeros((len(columns), acting.size))
         slopes[:, acting] = columns @ matrix[:, acting]
         response = self.response(point, found.run)
@@ -112,7 +114,7 @@ class Part:
         return self.residual(found.run), slopes
 
     def _torque_changes(self, point: Point) -> dict[str, FloatArray]:
-        """How the acting engine torque changes (N-1,) per unit of its own unknowns.
+        """Compute the change (N-1,) of the acting engine torque per unit of its own unknowns.
 
         The rate is that of the torque without noise: jitter has no age, and would seem to show one.
         """
@@ -125,21 +127,23 @@ class Part:
         return found
 
     def response(self, point: Point, run: Trajectory) -> Response:
-        """Linear response to disturbances of the inputs around `run`."""
+        """Compute the linear response to disturbances of the inputs around `run`."""
         return response_of(self.structure.model(point), run, self.record)
 
     def answer_to(
         self, point: Point, run: Trajectory, disturbance: dict[str, FloatArray]
     ) -> FloatArray:
-        """Change (n,) of the simulated samples by disturbances (N-1,) of inputs, by name."""
+        """Compute the change (n,) of the simulated samples by disturbances (N-1,) of inputs, by
+        name."""
         return self.seen(point, self.response(point, run).to(disturbance))
 
     def answer_to_force(self, point: Point, run: Trajectory, force: FloatArray) -> FloatArray:
-        """The same (n,) by torques (N-1, 4) on the speeds of engine, output and wheel."""
+        """Compute the change (n,) of the simulated samples by torques (N-1, 4) on the speeds of
+        engine, output and wheel."""
         return self.seen(point, self.response(point, run).forced(force))
 
     def seen(self, point: Point, z: FloatArray) -> FloatArray:
-        """What the sensors see (n,) of disturbances z (N, 4) of the state."""
+        """Project disturbances z (N, 4) of the state onto the compared samples (n,)."""
         model = self.structure.model(point)
         with np.errstate(over="ignore", invalid="ignore"):
             return np.concatenate(
@@ -147,16 +151,17 @@ class Part:
             )
 
     def weighted_by(self, point: Point) -> Part:
-        """The part with the covariance of output and input noise at `point`.
+        """Form the covariance of output and input noise at `point`.
 
-        The part as it is where the simulation fails there, or has no finite response.
+        Returns the part unchanged if the simulation fails there or has no finite response.
         """
         return self._weighted(point) or self
 
     def with_expected_inputs(self, point: Point) -> Part:
-        """The part driven by its inputs less their expected noise at `point`, weighted there.
+        """Subtract the expected input noise at `point` from the inputs, and form the weighting
+        there.
 
-        The part as it is where the simulation fails with them.
+        Returns the part unchanged if the simulation fails with the new inputs.
         """
         run = self.run(point)
         noise = {} if run is None else self.weighting.input_noise(self.residual(run))
@@ -166,7 +171,7 @@ class Part:
         return replace(self, record=self.record.less(noise, age))._weighted(point) or self
 
     def _weighted(self, point: Point) -> Part | None:
-        """The part with weighting and held-back inputs as they act at `point`; None: no run."""
+        """Form weighting and the effect of the held-back inputs at `point`; None if no run."""
         run = self.run(point)
         if run is None:
             return None
@@ -183,13 +188,14 @@ class Part:
         return replace(self, weighting=weighting, returned=returned)
 
     def _pressures(self) -> dict[str, Signal]:
-        """Pressures of all elements of the model: none of those that stay open."""
+        """Return the pressures of all elements of the model; zero for those that stay open."""
         ends = self.record.time[[0, -1]]
         idle = {one.name: Signal(ends, np.zeros(2)) for one in self.structure.spinning}
         return {**self.record.pressures, **idle}
 
     def _torque(self, point: Point) -> Signal:
-        """Engine torque as it acts: read, less its mean error, moved back by its age."""
+        """Return the engine torque as it acts: measured, less its mean error, advanced by its
+        delay."""
         signal = self.record.engine_torque
         values = signal.values
         offset = self.structure.unknown(TE_OFFSET)
@@ -197,22 +203,6 @@ class Part:
             values = values - point[offset]
         delay = self.structure.value(point, "te_delay")
         return Signal(signal.time, values, -delay)
-
-
-@dataclass(frozen=True, eq=False)
-class Normal:
-    """Q and its Gauss-Newton expansion at one point: gradient (p,), information (p, p).
-
-    `data` (p, p) is the information of the measurements alone. Per part: `residuals` (n,) and the
-    weighted derivatives `regressors` (n, p), Σ⁻¹ times those of the simulated samples.
-    """
-
-    cost: float
-    gradient: FloatArray
-    information: FloatArray
-    data: FloatArray
-    residuals: tuple[FloatArray, ...]
-    regressors: tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,12 +230,12 @@ class Problem:
         return frozenset[str]().union(*(part.record.kinds for part in self.parts))
 
     def of_kinds(self, names: Collection[str]) -> Problem:
-        """This problem, all of whose signals are as read, with the kinds of `names`."""
+        """Set the sampling modes of all signals to those of `names`; all must be as read."""
         parts = [Part.unweighted(p.structure, p.record.of_kinds(names)) for p in self.parts]
         return replace(self, parts=tuple(parts))
 
     def until(self, ends: Sequence[float]) -> Problem:
-        """The problem with each part cut at its end [s], weighted by sensor noise."""
+        """Cut each part at its end [s]; weighted by sensor noise."""
         cut = [
             Part.unweighted(part.structure, part.record.until(end))
             for part, end in zip(self.parts, ends, strict=True)
@@ -253,16 +243,16 @@ class Problem:
         return replace(self, parts=tuple(cut))
 
     def weighted_by(self, point: Point) -> Problem:
-        """The problem with input noise in the covariance, at `point`."""
+        """Form the covariance with input noise at `point`."""
         spend(WEIGHTING)
         return replace(self, parts=tuple(part.weighted_by(point) for part in self.parts))
 
     def with_expected_inputs(self, point: Point) -> Problem:
-        """The problem driven by the expected inputs at `point`, weighted there."""
+        """Drive the problem by the expected inputs at `point`, weighted there."""
         return replace(self, parts=tuple(part.with_expected_inputs(point) for part in self.parts))
 
     def cost(self, point: Point) -> float:
-        """Q; infinite where a simulation fails, or where it is no sum of squares."""
+        """Compute Q; infinite if a simulation fails or Q is not a sum of squares."""
         spend(RUN)
         total = self.prior.cost(point.values)
         for part in self.parts:
@@ -277,8 +267,12 @@ class Problem:
             total += square
         return total
 
+    def retract(self, point: Point, step: FloatArray) -> FloatArray:
+        """Compute the values (p,) after a `step` (p,); friction laws move along their valley."""
+        return retract(point, step)
+
     def normal(self, point: Point) -> Normal | None:
-        """Expansion of Q at `point`; None where a simulation fails."""
+        """Compute the expansion of Q at `point`; None if a simulation fails."""
         spend(EXPANSION)
         size = len(point.names)
         cost, gradient = self.prior.cost(point.values), self.prior.pull(point.values)
@@ -311,14 +305,19 @@ class Problem:
 
 
 def _is_square(value: float) -> bool:
-    """Whether a sum of squares could be told: not where numbers overflow, and not where the
-    weighting has lost its digits to inputs so coarse that their noise explains everything."""
+    """Return whether a sum of squares is finite and not negative.
+
+    It is negative if the weighting has lost its digits to inputs so coarse that their noise
+    explains everything.
+    """
     return bool(np.isfinite(value)) and value >= 0.0
 
 
 def _are_products(data: FloatArray) -> bool:
-    """Whether a matrix can be that of the weighted scalar products of slopes: a weighting that has
-    lost its digits gives some directions a negative length."""
+    """Return whether a matrix can be one of weighted scalar products of slopes.
+
+    A weighting that has lost its digits gives some directions a negative length.
+    """
     squares = np.diag(data)
     if np.any(squares < 0.0):
         return False

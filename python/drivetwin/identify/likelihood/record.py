@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One shift as the fit sees it: inputs to the simulation and the outputs it is compared with."""
+"""Data of one shift for the fit: simulation inputs and the compared outputs."""
 
 from __future__ import annotations
 
@@ -71,44 +71,45 @@ class Output:
             object.__setattr__(self, "centre", self.place)
 
     def cut(self, count: int) -> Output:
-        """The samples stamped within the first `count` points of the grid."""
+        """Keep the samples stamped within the first `count` points of the grid."""
         keep = int(np.searchsorted(self.place, count))
         return replace(
             self, place=self.place[:keep], values=self.values[:keep], centre=self.centre[:keep]
         )
 
     def period(self, time: FloatArray) -> float:
-        """Time from sample to sample [s]."""
+        """Return the sampling time [s]."""
         return float(np.median(np.diff(time[self.place])))
 
     def after_period(self, time: FloatArray) -> Output:
-        """The samples stamped a period or more after the grid `time` (N,) starts: what they show
-        is on it, whether they are samples or means."""
+        """Keep the samples stamped a period or more after the grid `time` (N,) starts: point
+        samples and means are then both defined on it."""
         first = int(np.searchsorted(time[self.place], time[0] + self.period(time)))
         return replace(
             self, place=self.place[first:], values=self.values[first:], centre=self.centre[first:]
         )
 
     def averaged(self, time: FloatArray) -> Output:
-        """The same samples taken as means over the time since the one before."""
+        """Interpret the samples as means over the time since the previous one."""
         window = self.period(time)
         centre = np.searchsorted(time, time[self.place] - 0.5 * window)
         return replace(self, window=window, centre=centre)
 
     def seen(self, time: FloatArray, column: FloatArray) -> FloatArray:
-        """What a sensor of this kind shows (n,) of a quantity (N,) over the grid `time` (N,)."""
+        """Sample a quantity (N,) on the grid `time` (N,) as this sensor does; shape (n,)."""
         if self.window == 0.0:
             return column[self.place]
         return self._mean(time, column, self.window)
 
     def otherwise(self, time: FloatArray, column: FloatArray) -> FloatArray:
-        """What it would show (n,) if its samples were means where they are none, or the reverse."""
+        """Sample a quantity in the other mode (n,): means instead of point samples, or the
+        reverse."""
         if self.window > 0.0:
             return column[self.place]
         return self._mean(time, column, self.period(time))
 
     def _mean(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
-        """Means (n,) over the `window` [s] before each stamp."""
+        """Compute means (n,) over the `window` [s] before each stamp."""
         total = np.concatenate([[0.0], np.cumsum(0.5 * (column[1:] + column[:-1]) * np.diff(time))])
         before = np.interp(time[self.place] - window, time, total)
         return np.asarray((total[self.place] - before) / window)
@@ -161,19 +162,19 @@ class Record:
         return np.concatenate([out.values for out in self.outputs])
 
     def stacked(self, run: Trajectory) -> FloatArray:
-        """The same samples of a run or of its derivative (size,)."""
+        """Sample a trajectory (or a sensitivity) at the measured stamps; shape (size,)."""
         columns = columns_of(run)
         return np.concatenate([out.seen(run.time, columns[out.name]) for out in self.outputs])
 
     @property
     def kinds(self) -> frozenset[str]:
-        """Names of the outputs that are taken as means over their period, and `TORQUE` where the
-        engine torque is a curve between its samples and not a straight line."""
+        """Names of the outputs interpreted as means over their period, and `TORQUE` if the
+        engine torque is a curve between its samples instead of a straight line."""
         means = frozenset(out.name for out in self.outputs if out.window > 0.0)
         return means | {TORQUE} if self.curved else means
 
     def of_kinds(self, names: Collection[str]) -> Record:
-        """This record, which has samples and straight lines alone, with the kinds of `names`."""
+        """Set the sampling modes of `names` in a record of point samples and straight lines."""
         outputs = [out.averaged(self.time) if out.name in names else out for out in self.outputs]
         found = replace(self, outputs=tuple(outputs))
         if TORQUE not in names:
@@ -184,12 +185,13 @@ class Record:
         )
 
     def bend_over(self, age: float) -> FloatArray:
-        """What a curved engine torque adds to a straight one (N-1,) over each step of the grid."""
+        """Compute the difference (N-1,) of a curved engine torque from a straight one over each
+        step."""
         middle = 0.5 * (self.time[1:] + self.time[:-1])
         return np.interp(middle, self.engine_torque.time - age, self.bend)
 
     def less(self, noise: Mapping[str, FloatArray], age: float) -> Record:
-        """The record with expected `noise` (N-1,) per step of the grid held back from its inputs.
+        """Subtract the expected `noise` (N-1,) per step of the grid from the inputs.
 
         Of a pressure's noise only the part that passes the local cubic still drives the run.
         """
@@ -204,7 +206,8 @@ class Record:
         return replace(self, engine_torque=torque, pressures=pressures, held_back=held)
 
     def held_back_over(self, age: float) -> dict[str, FloatArray]:
-        """What is held back of each input (N-1,) in the middle of each step of the grid."""
+        """Compute the held-back part of each input (N-1,) in the middle of each step of the
+        grid."""
         middle = 0.5 * (self.time[1:] + self.time[:-1])
         stamps = {name: p.time for name, p in self.pressures.items()}
         stamps[TORQUE] = self.engine_torque.time - age
@@ -212,8 +215,8 @@ class Record:
 
     @property
     def torque_sigma(self) -> FloatArray:
-        """Noise (m,) of the samples of the engine torque that is no compared signal's and comes and
-        goes from sample to sample."""
+        """Standard deviation (m,) of the white noise of the engine torque samples that is
+        independent of the compared signals."""
         time, sigma = self.engine_torque.time, self.input_sigma[TORQUE]
         if self.of_speeds is None:
             return np.full(time.size, sigma)
@@ -221,7 +224,8 @@ class Record:
         return np.maximum(np.interp(time, self.of_speeds.time, self.of_speeds.rest), least)
 
     def variance_of(self, name: str) -> FloatArray:
-        """Variance (m,) of white samples with the power of an input's own noise and rounding."""
+        """Compute the variance (m,) of white samples with the power of an input's own noise and
+        rounding."""
         if name == TORQUE:
             noise = self.torque_sigma**2
         else:
@@ -231,7 +235,8 @@ class Record:
         return noise
 
     def torque_share(self) -> csr_array | None:
-        """Noise of the engine torque over each step per that of a compared sample (N-1, size).
+        """Compute the noise of the engine torque over each step per that of a compared sample (N-1,
+        size).
 
         None where the torque has a sensor of its own. One that is computed from speeds has no age.
         """
@@ -243,13 +248,14 @@ class Record:
         return csr_array(by_step @ self._torque_by_sample(self.of_speeds))
 
     def torque_noise(self, noise: FloatArray) -> FloatArray:
-        """What `noise` (size,) of the compared samples does to those of the engine torque (m,)."""
+        """Map `noise` (size,) of the compared samples to noise of the engine torque samples
+        (m,)."""
         if self.of_speeds is None:
             return np.zeros(self.engine_torque.time.size)
         return np.asarray(self._torque_by_sample(self.of_speeds) @ noise)
 
     def _torque_by_sample(self, of_speeds: TorqueOfSpeeds) -> csr_array:
-        """Noise of samples of the engine torque per that of a compared sample (m, size)."""
+        """Compute the noise of engine torque samples per that of a compared sample (m, size)."""
         torque = self.engine_torque.time
         slope = np.interp(torque, of_speeds.time, of_speeds.slope)
         first = 0
@@ -261,20 +267,21 @@ class Record:
         return csr_array(of_speed * slope[:, None])
 
     def torque_rate(self, age: float) -> FloatArray:
-        """Rate of the engine torque [N m/s] as it acts over each step of the grid (N-1,)."""
+        """Compute the rate of the engine torque [N m/s] as it acts over each step of the grid
+        (N-1,)."""
         signal = self.steady_torque
         ends = np.interp(self.time + age, signal.time, signal.values)
         return np.asarray(np.diff(ends) / np.diff(self.time))
 
     def until(self, end: float) -> Record:
-        """The record cut at `end` [s]."""
+        """Cut the record at `end` [s]."""
         count = int(np.searchsorted(self.time, end, side="right"))
         outputs = tuple(out.cut(count) for out in self.outputs)
         return replace(self, time=self.time[:count], outputs=outputs)
 
 
 def columns_of(run: Trajectory) -> dict[str, FloatArray]:
-    """What may be compared (N,) of a run, by name of the output."""
+    """Return the comparable quantities (N,) of a run, by name of the output."""
     return {
         "output_torque": run.shaft_torque,
         "engine_speed": run.engine_speed,
@@ -286,12 +293,12 @@ def columns_of(run: Trajectory) -> dict[str, FloatArray]:
 def record_of(
     signals: ShiftSignals, span: Span, fills: Mapping[str, PriorValue] | None = None
 ) -> Record:
-    """The record of one shift over `span` [s]; `fills` is P0 [Pa] by element as the card has it.
+    """Build the record of one shift over `span` [s]; `fills` is P0 [Pa] by element from the card.
 
-    An output that stopped before it, or starts at its end, is not compared in it. The first sample
-    of each is left out, as a mean it would show what was before: kinds of signals are compared by
-    what they leave of the same samples. Raises IdentificationError where the span holds too little
-    to compare.
+    An output that stops before the span, or starts at its end, is not compared. The first sample of
+    each output is left out, because as a mean it covers time before the span: sampling modes are
+    compared on the same samples. Raises IdentificationError if the span holds too little to
+    compare.
     """
     channels = {
         "output_torque": signals.output_torque,
@@ -346,8 +353,8 @@ def record_of(
 
 
 def _rounding(signals: ShiftSignals) -> dict[str, Rounding]:
-    """What rounding leaves of the inputs' samples, by name; those of the torque as `_held` has
-    them."""
+    """Compute the quantization errors of the inputs by name; those of the torque as extended by
+    `_held`."""
     found = {n: rounding_of(p, resolution(p.values)) for n, p in signals.pressures.items()}
     torque = rounding_of(signals.engine_torque, signals.torque_resolution)
     if torque is not None:
@@ -356,19 +363,19 @@ def _rounding(signals: ShiftSignals) -> dict[str, Rounding]:
 
 
 def _noise(of_input: Sampled) -> float:
-    """Noise of an input's samples, no less than an ideal sensor's."""
+    """Return the noise of an input's samples, at least that of an ideal sensor."""
     return max(of_input.sigma, FLOOR * float(np.max(np.abs(of_input.values))))
 
 
 def _filled(time: FloatArray) -> FloatArray:
-    """Stamps of the outputs with grid points where they lie further apart than SLOW."""
+    """Insert grid points between output stamps that are further apart than SLOW."""
     wide = np.flatnonzero(np.diff(time) > SLOW)
     steps = [np.arange(time[k] + GRID, time[k + 1] - 0.5 * GRID, GRID) for k in wide]
     return np.sort(np.concatenate([time, *steps]))
 
 
 def _at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:
-    """Noise of samples at `stamps` (m,) from that over each step of `grid` (N-1,).
+    """Compute the noise of samples at `stamps` (m,) from that over each step of `grid` (N-1,).
 
     A sample acts on the steps about it as interpolation has it; its expected noise is their mean
     with the same weights, the transpose of interpolation.
@@ -379,7 +386,7 @@ def _at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> Floa
 
 
 def _interpolation(stamps: FloatArray, at: FloatArray, columns: tuple[int, int]) -> csr_array:
-    """The matrix (m, count) that interpolates linearly from `stamps` (n,) to `at` (m,).
+    """Build the matrix (m, count) that interpolates linearly from `stamps` (n,) to `at` (m,).
 
     Held beyond both ends. `columns` are the first of the stamps' columns and the count of all.
     """
@@ -393,7 +400,7 @@ def _interpolation(stamps: FloatArray, at: FloatArray, columns: tuple[int, int])
 
 
 def _held(signal: Sampled) -> Signal:
-    """The signal, its end values held so far that any plausible age finds a value."""
+    """Extend a signal by its end values over any plausible delay."""
     beyond = 2.0 * LATEST
     time = np.concatenate([[signal.time[0] - beyond], signal.time, [signal.time[-1] + beyond]])
     values = np.concatenate([signal.values[:1], signal.values, signal.values[-1:]])

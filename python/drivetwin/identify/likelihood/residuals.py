@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of what the fit leaves over: whiteness, and correlation with the inputs.
+"""Residual tests: whiteness, and correlation with the inputs.
 
 Q per sample hardly notices a wrong model (docs/accuracy.md, faults that nobody states), since the
 error is slow and the noise is not. Averages over blocks show it: white noise leaves 1/m of
@@ -38,7 +38,7 @@ class ResidualTest:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the test says against the model, in words."""
+        """Warnings of the test, as sentences."""
         name = self.output.replace("_", " ")
         texts = []
         if self.excess > EXCESS:
@@ -56,7 +56,7 @@ class ResidualTest:
 
 
 def white_residuals(fit: LikelihoodFit) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
-    """Times (n,) and residuals (n,) over their noise, input noise taken out, by shift and output.
+    """Return times (n,) and normalised residuals (n,), input noise removed, by shift and output.
 
     Of a right model they are white with variance one, or less where input noise explains a part.
     """
@@ -70,7 +70,7 @@ def white_residuals(fit: LikelihoodFit) -> dict[str, dict[str, tuple[FloatArray,
 
 
 def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
-    """Tests of every output by label of the shift."""
+    """Test every output by label of the shift."""
     found = {}
     for part, outputs in zip(fit.problem.parts, white_residuals(fit).values(), strict=True):
         inputs = {TORQUE: part.record.engine_torque} | {
@@ -83,10 +83,11 @@ def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
 
 
 def against(fit: LikelihoodFit) -> str:
-    """What the residuals say against every value of the fit; empty where nothing.
+    """Return why the residuals contradict every value of the fit; empty if they do not.
 
-    Noise goes with no input, unless it is as slow as the log is long. What does is missing in the
-    model, or a drift, and moves the parameters by as much as it likes: no interval counts that.
+    Noise is correlated with no input, unless it is as slow as the log is long. A correlated
+    residual shows a missing effect or a drift, whose influence on the parameters no interval
+    covers.
     """
     found = {
         (test.output, source): abs(size)
@@ -105,10 +106,9 @@ def against(fit: LikelihoodFit) -> str:
 
 
 def unweighted(fit: LikelihoodFit, labels: Sequence[str]) -> str:
-    """What is said against every value where a part's weighting leaves out the noise of the inputs;
-    empty where none does. `labels` are those of the shifts.
+    """Return a warning if the weighting of a part omits the noise of the inputs; else empty.
 
-    It has no weighting with that noise where a run has no finite response to it.
+    That is the case if a run has no finite response to the noise. `labels` are those of the shifts.
     """
     left = [
         label

@@ -46,7 +46,7 @@ class Response:
     effect: FloatArray
 
     def to(self, disturbance: dict[str, FloatArray]) -> FloatArray:
-        """z (N, 4) in answer to disturbances (N-1,) of inputs by name, from z = 0.
+        """Compute z (N, 4) for disturbances (N-1,) of inputs by name, from z = 0.
 
         Not finite where the run itself is unstable, as with a law that falls steeply with slip.
         """
@@ -58,15 +58,15 @@ class Response:
         return self.pushed(push)
 
     def forced(self, force: FloatArray) -> FloatArray:
-        """z (N, 4) in answer to forces (N-1, 4) on the speeds, the last column 0."""
+        """Compute z (N, 4) for forces (N-1, 4) on the speeds, the last column 0."""
         return self.pushed(np.einsum("kij,kj->ki", self.effect, force))
 
     def pushed(self, push: FloatArray) -> FloatArray:
-        """z (N, 4) with changes `push` (N-1, 4) over the steps, from z = 0."""
+        """Compute z (N, 4) for changes `push` (N-1, 4) over the steps, from z = 0."""
         return self.pushed_each(push[:, :, None])[:, :, 0]
 
     def pushed_each(self, push: FloatArray) -> FloatArray:
-        """z (N, 4, q) with each of q changes `push` (N-1, 4, q) over the steps, from z = 0."""
+        """Compute z (N, 4, q) for q changes `push` (N-1, 4, q) over the steps, from z = 0."""
         start = np.zeros((1, *push.shape[1:]))
         pushed = np.concatenate([start, push])
         columns = pushed.reshape(-1, push.shape[-1])
@@ -78,7 +78,7 @@ class Response:
         return np.asarray(z.reshape(pushed.shape))
 
     def pulled_each(self, pull: FloatArray) -> FloatArray:
-        """The transpose of `pushed_each`: (N-1, 4, q) from weights `pull` (N, 4, q) on z."""
+        """Apply the transpose of `pushed_each`: (N-1, 4, q) from weights `pull` (N, 4, q) on z."""
         lower, count = self._banded, len(pull) * STATES
         upper = np.zeros_like(lower)
         for below, diagonal in enumerate(lower):
@@ -114,7 +114,7 @@ class Response:
 
     @property
     def finite(self) -> bool:
-        """Whether all transitions are finite numbers."""
+        """True if all transitions are finite numbers."""
         return bool(np.all(np.isfinite(self.transition)))
 
 
@@ -205,7 +205,7 @@ def _friction(
 
 
 def _locked(run: Trajectory, name: str, middle: FloatArray) -> BoolArray:
-    """Whether the element is locked at the instants `middle` (n,)."""
+    """Return a mask (n,) of the instants `middle` (n,) at which the element is locked."""
     state = np.abs(run.slip[name][0]) < 1e-9
     result = np.full(middle.size, state)
     for event in run.events:
@@ -215,7 +215,7 @@ def _locked(run: Trajectory, name: str, middle: FloatArray) -> BoolArray:
 
 
 def _driving(model: DualClutch, run: Trajectory) -> BoolArray:
-    """Whether power flows from the engine over each step (N-1,): the loss law is of two parts.
+    """Return a mask (N-1,) of the steps in which power flows from the engine (two-sided loss law).
 
     φ(T_g) is what the input side and the elements take; its sign is that of T_g.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What rounding leaves of an input that its own noise does not dither.
+"""Quantization errors of an input that its own noise does not dither.
 
 While a torque or pressure stays at a level the error stays too: its mean over that time is as far
 off as one sample, and noise of the same size that comes and goes from sample to sample would be far
@@ -36,13 +36,13 @@ class Rounding:
         return np.asarray(self.error * np.sqrt(np.bincount(self.stay)[self.stay]))
 
     def drawn(self, rng: np.random.Generator) -> FloatArray:
-        """Errors (m,) as they might have been."""
+        """Draw random errors (m,)."""
         return np.asarray(self.error * rng.standard_normal(int(self.stay[-1]) + 1)[self.stay])
 
 
 def rounding_of(signal: Sampled, step: float) -> Rounding | None:
-    """Errors that rounding to `step` leaves, in the signal's unit; None where they are lost in the
-    noise."""
+    """Compute the errors that quantization to `step` leaves, in the signal's unit; None if noise
+    dithers them."""
     error = rounding_error(signal, step)
     if error == 0.0:
         return None

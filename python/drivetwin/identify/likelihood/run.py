@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The likelihood method over all shifts of a log, started from the linear method."""
+"""Likelihood method over all shifts of a log, started from the linear method."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ DISAGREE = 5.0
 OUTSIDE = 10.0
 """Factor beside the design range of J3 from which the linear method's value is no start."""
 BEHIND_GEARBOX = ("J_vehicle", "Tv_over_if", "k_o", "c_o")
-"""Unknowns whose start hangs on the linear method's J3."""
+"""Unknowns whose initial value depends on the linear method's J3."""
 OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
 """What a method reads off a load that it takes as constant."""
 
@@ -36,10 +36,11 @@ OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
 def likelihood_alone(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
 ) -> tuple[Conclusions, LikelihoodFit]:
-    """Fit without the linear method: of a log without an output torque, which tells ratios over η
-    and whose absolute values are all refused, or of one that has no equation for that method.
+    """Fit without the linear method.
 
-    Raises IdentificationError where the fit does not reach a plausible minimum.
+    For a log without an output torque, which gives ratios over η and no absolute values, and for a
+    log without an equation for the linear method. Raises IdentificationError if the fit does not
+    reach a plausible minimum.
     """
     guess = _own_guess(signals, drivelines, card)
     best, notes = choose(signals, drivelines, card.loss_law, guess)
@@ -50,7 +51,7 @@ def likelihood_alone(
 def _own_guess(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
 ) -> dict[str, float]:
-    """A value for every unknown without the linear method."""
+    """Compute an initial value of every unknown without the linear method."""
     guess: dict[str, float] = {}
     loads = []
     for s, d in zip(signals, drivelines, strict=True):
@@ -66,7 +67,8 @@ def _guess(
     shifts: Sequence[IntegralShift],
     card: VehicleCard,
 ) -> dict[str, float]:
-    """A value for every unknown from the linear method, but for a vehicle that cannot be.
+    """Compute an initial value of every unknown from the linear method, unless its J3 is
+    impossible.
 
     Without a wheel speed that method takes the output speed for it, and where the shaft is soft
     its swing hides how little the vehicle's speed changes.
@@ -86,7 +88,7 @@ def likelihood(
     linear: tuple[Conclusions, Sequence[IntegralShift]],
     card: VehicleCard,
 ) -> tuple[Conclusions, LikelihoodFit]:
-    """Fit all shifts together and judge the result; `linear` is what the linear method found.
+    """Fit all shifts together and assess the result; `linear` is the result of the linear method.
 
     Raises IdentificationError where the fit does not reach a plausible minimum.
     """
@@ -99,7 +101,7 @@ def likelihood(
 
 
 def _disagreements(told: Conclusions, linear: Conclusions) -> list[str]:
-    """Parameters on which the two methods differ by more than their noise explains.
+    """Return a warning for each parameter on which both methods differ by more than their noise.
 
     Where one of them alone has a load that grows with speed, which is told, the other must differ
     on what it reads off a constant one.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Start values from speeds and engine torque alone: everything torque-like is divided by η.
+"""Initial values from speeds and engine torque alone; torque-like values are divided by η.
 
 They tell ratios only (THEORY section 6). With η = 1 in the model, its parameters are those ratios;
 these are their start values:
@@ -9,6 +9,8 @@ these are their start values:
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,18 +24,26 @@ from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals, Span
 from drivetwin.identify.wlse import whole
 from drivetwin.vehicle.spec import VehicleCard, middle_of
 
-STEP = 0.1
-"""Time over which speeds are differenced [s]: about a period of the driveline's oscillation."""
-ROUNDS = 3
-"""How often the expected slopes follow what was found with them."""
-RING = (0.05, 0.8)
-"""Stretch after lock-up in which the shaft's oscillation is looked for [s]."""
+
+@dataclass(frozen=True)
+class TorqueFreeGuessSettings:
+    """Settings of the initial values without an output torque."""
+
+    step: float = 0.1
+    """Time over which speeds are differenced: about a period of the driveline oscillation [s]."""
+    iterations: int = 3
+    """Iterations of the instruments, the slopes expected from the estimate [-]."""
+    ringdown: tuple[float, float] = (0.05, 0.8)
+    """Start and end, after lock-up, of the stretch in which the shaft oscillation is sought [s]."""
+
+
+GUESS = TorqueFreeGuessSettings()
 
 
 def guess_without_torque(
     signals: ShiftSignals, driveline: Driveline, card: VehicleCard
 ) -> dict[str, float]:
-    """A value for every unknown, from speeds and engine torque of one shift.
+    """Compute an initial value of every unknown from speeds and engine torque of one shift.
 
     With an output torque η is a plausible one, and the ratios stand for what they are ratios of.
     """
@@ -64,7 +74,7 @@ def guess_without_torque(
 def _inertias(
     signals: ShiftSignals, driveline: Driveline, card: VehicleCard
 ) -> tuple[float, float, float]:
-    """(Je/η, J_v/η, T_v/i_f/η) over both gears.
+    """Estimate (Je/η, J_v/η, T_v/i_f/η) over both gears.
 
     The vehicle outweighs the engine side, so Je is taken from the middle of the card's range. Noise
     of the slopes would make the vehicle too light by least squares; the slopes that the torque lets
@@ -78,13 +88,13 @@ def _inertias(
         time, in_gear = _slopes(signals, span)
         slopes.append(in_gear)
         ratios.append(np.full(in_gear.size, gear))
-        torques.append(np.array([_mean(signals, t - 0.5 * STEP + age) for t in time]))
+        torques.append(np.array([_mean(signals, t - 0.5 * GUESS.step + age) for t in time]))
     every = (np.concatenate(each) for each in (ratios, slopes, torques))
     ratio, slope, torque = whole(*every)
     target, seen = torque - J_e * slope, np.column_stack([slope / ratio**2, 1.0 / ratio])
     limits = np.array(card.J_vehicle_range) / driveline.i_f**2
     found = np.linalg.lstsq(seen, target, rcond=None)[0]
-    for _ in range(ROUNDS):
+    for _ in range(GUESS.iterations):
         expected = (torque - found[1] / ratio) / (J_e * ratio**2 + found[0])
         instrument = np.column_stack([expected, 1.0 / ratio])
         found = np.linalg.lstsq(instrument.T @ seen, instrument.T @ target, rcond=None)[0]
@@ -93,25 +103,25 @@ def _inertias(
 
 
 def _slopes(signals: ShiftSignals, span: Span) -> tuple[FloatArray, FloatArray]:
-    """Centres [s] and differences of the engine speed [rad/s^2] over windows of `STEP`.
+    """Compute centres [s] and slopes of the engine speed [rad/s^2] over windows of `step`.
 
     NaN in gaps; a gear held for less than a window has none.
     """
-    edges = np.arange(span[0], span[1], STEP)
+    edges = np.arange(span[0], span[1], GUESS.step)
     speed = signals.engine_speed
-    return 0.5 * (edges[1:] + edges[:-1]), np.diff(speed.at(edges)) / STEP
+    return 0.5 * (edges[1:] + edges[:-1]), np.diff(speed.at(edges)) / GUESS.step
 
 
 def _mean(signals: ShiftSignals, start: float) -> float:
-    """Mean engine torque over `STEP` from `start` [s]."""
-    time = np.linspace(start, start + STEP, 11)
+    """Compute the mean engine torque over `GUESS.step` from `start` [s]."""
+    time = np.linspace(start, start + GUESS.step, 11)
     return float(np.mean(signals.engine_torque.at(time)))
 
 
 def _mode(signals: ShiftSignals, driveline: Driveline) -> tuple[float, float]:
-    """Decay rate [1/s] and angular frequency [rad/s] of the twist rate after lock-up."""
+    """Estimate decay rate [1/s] and angular frequency [rad/s] of the twist rate after lock-up."""
     lockup = signals.shift.lockup_time
-    part = signals.output_speed.within((lockup + RING[0], lockup + RING[1]))
+    part = signals.output_speed.within((lockup + GUESS.ringdown[0], lockup + GUESS.ringdown[1]))
     time, twist_rate = part.time, part.values
     if signals.wheel_speed is not None:
         twist_rate = part.values - driveline.i_f * signals.wheel_speed.at(part.time)
@@ -126,7 +136,7 @@ def _mode(signals: ShiftSignals, driveline: Driveline) -> tuple[float, float]:
 
 
 def _level(signals: ShiftSignals, driveline: Driveline, J_e: float) -> float:
-    """Mean μ/η over the middle half of the inertia phase."""
+    """Estimate the mean μ/η over the middle half of the inertia phase."""
     start, end = signals.shift.inertia_phase
     low, high = start + 0.25 * (end - start), end - 0.25 * (end - start)
     speed, element = signals.engine_speed, driveline.oncoming

@@ -12,8 +12,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drivetwin.identify.likelihood.problem import Normal, Part, Problem
+from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import Output
+from drivetwin.identify.optimize.objective import Normal
 from drivetwin.identify.signals import FloatArray
 
 BLOCK = 0.02

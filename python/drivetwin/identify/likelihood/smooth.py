@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inputs without the part of their noise that the driveline never had.
+"""Removal of input noise that lies above the band of the actuators.
 
 A valve and a clutch volume are slow, sensor noise is not. Noise left on a pressure that drives the
 simulation makes elements lock and break away many times where the real one did so once, adds up to
@@ -11,6 +11,8 @@ off a pressure that stays or goes evenly.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import savgol_coeffs, savgol_filter
@@ -18,58 +20,69 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from drivetwin.identify.signals import FloatArray, Sampled
 from drivetwin.vehicle.spec import PriorValue
 
-WINDOW = 0.015
-"""Length of the local cubic [s]: it passes what a valve can do, up to about 60 Hz."""
 CUBIC = 3
-LONGER = (0.03, 0.06, 0.12, 0.24)
-"""Lengths of the cubics [s] that are tried about P0."""
-AGREE = 1.5
-"""Half width of the interval of a cubic's middle, in standard deviations: those of all shorter
-cubics must meet it. Narrower than of means: a corner that is cut opens the element elsewhere."""
-ABOUT = 3.0
-"""Distance from P0, in the noise of a sample, within which noise may open or close the element."""
-CORNER = 5.0
-"""Distance of a sample from the local cubic, in standard deviations, that shows a corner."""
-GAP = 1.5
-"""Distance of samples over the usual one from which on something is missing between them."""
-HALF_WIDTHS = (0, 1, 2, 4, 8, 16, 32, 64)
-"""Windows tried by the local mean: so many samples on either side."""
-INTERVAL = 2.5
-"""Half width of an interval in standard deviations of its mean."""
+
+
+@dataclass(frozen=True)
+class InputSmoothingSettings:
+    """Settings of the removal of input noise."""
+
+    window: float = 0.015
+    """Length of the local cubic, which passes what a valve can do, up to about 60 Hz [s]."""
+    longer_windows: tuple[float, ...] = (0.03, 0.06, 0.12, 0.24)
+    """Lengths of the cubics that are tried about P0 [s]."""
+    cubic_sigma: float = 1.5
+    """Half width of the interval of the middle of a cubic, in its standard deviations: the
+    intervals of all shorter cubics must overlap. Narrower than that of means, because a cut corner
+    opens the element elsewhere [-]."""
+    fill_sigma: float = 3.0
+    """Distance from P0, in the noise of a sample, within which noise may open or close the element
+    [-]."""
+    corner_sigma: float = 5.0
+    """Distance of a sample from the local cubic that shows a corner, in standard deviations [-]."""
+    gap_ratio: float = 1.5
+    """Distance of samples, over the usual one, above which samples are missing [-]."""
+    half_widths: tuple[int, ...] = (0, 1, 2, 4, 8, 16, 32, 64)
+    """Windows of the local mean: samples to either side [-]."""
+    mean_sigma: float = 2.5
+    """Half width of the interval of a mean, in its standard deviations [-]."""
+
+
+SMOOTHING = InputSmoothingSettings()
 
 
 def smooth_pressure(pressure: Sampled, fill: PriorValue | None = None) -> FloatArray:
-    """Pressure (n,) without its fast noise; as read about corners too sharp for a local cubic.
+    """Remove the fast noise of a pressure (n,); corners too sharp for a local cubic stay as read.
 
     `fill` is P0 [Pa] as the card has it: about it the noise is taken off that a longer cubic takes.
     """
     smooth = local_cubic(pressure.time, pressure.values)
-    apart = np.abs(pressure.values - smooth) > CORNER * pressure.sigma
+    apart = np.abs(pressure.values - smooth) > SMOOTHING.corner_sigma * pressure.sigma
     if fill is not None:
         steady = _steady(pressure, smooth)
-        band = ABOUT * pressure.sigma + 2.0 * fill.std
+        band = SMOOTHING.fill_sigma * pressure.sigma + 2.0 * fill.std
         smooth = np.where(np.abs(steady - fill.value) < band, steady, smooth)
     return np.where(maximum_filter1d(apart, _samples(pressure.time)), pressure.values, smooth)
 
 
 def _steady(pressure: Sampled, smooth: FloatArray) -> FloatArray:
-    """Middle (n,) of the longest cubic about each sample that agrees with all shorter ones and with
-    `smooth`, that over `WINDOW` (as `local_mean`).
+    """Compute the middle (n,) of the longest cubic about each sample that agrees with all shorter
+    ones and with `smooth`, that over `SMOOTHING.window` (as `local_mean`).
 
     Noise that flickers about P0 gives the fit many minima, and in each a torque that comes and goes
     with the noise seems to tell P0 from μ: 5 kPa above P0 an estimate may be four standard
     deviations off.
     """
     values, steady = pressure.values, smooth
-    margin = AGREE * pressure.sigma * _noise_left(_samples(pressure.time))
+    margin = SMOOTHING.cubic_sigma * pressure.sigma * _noise_left(_samples(pressure.time))
     low, high = smooth - margin, smooth + margin
     open_ = np.ones(values.size, dtype=bool)
-    for window in LONGER:
+    for window in SMOOTHING.longer_windows:
         size = _samples(pressure.time, window)
         if not CUBIC + 1 < size <= values.size:
             continue
         trial = savgol_filter(values, size, CUBIC)
-        margin = AGREE * pressure.sigma * _noise_left(size)
+        margin = SMOOTHING.cubic_sigma * pressure.sigma * _noise_left(size)
         low, high = np.maximum(low, trial - margin), np.minimum(high, trial + margin)
         open_ &= low <= high
         steady = np.where(open_, trial, steady)
@@ -77,14 +90,14 @@ def _steady(pressure: Sampled, smooth: FloatArray) -> FloatArray:
 
 
 def _noise_left(size: int) -> float:
-    """Noise of the middle of a cubic over `size` samples, over that of a sample."""
+    """Compute the noise of the middle of a cubic over `size` samples, over that of a sample."""
     if size <= CUBIC + 1:
         return 1.0
     return float(np.linalg.norm(savgol_coeffs(size, CUBIC)))
 
 
 def local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Values (n,) of cubics over `WINDOW` about each sample (Savitzky and Golay 1964).
+    """Fit cubics over `SMOOTHING.window` about each sample (n,) (Savitzky and Golay 1964).
 
     The values as they are where the window holds too few samples for a cubic.
     """
@@ -95,7 +108,7 @@ def local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def bend_of(time: FloatArray, values: FloatArray) -> FloatArray:
-    """What to add to samples (n,) so that, joined by straight lines, they have the mean of a curve.
+    """Compute the correction (n,) that gives samples joined by straight lines the mean of a curve.
 
     Chords lie inside a curve, by h²/12 of its second derivative in the mean: in an engine torque
     that comes every 20 ms that is as much as its noise, and always to the same side. Nothing beside
@@ -104,17 +117,17 @@ def bend_of(time: FloatArray, values: FloatArray) -> FloatArray:
     step = np.diff(time)
     before, after = step[:-1], step[1:]
     second = 2.0 * np.diff(np.diff(values) / step) / (before + after)
-    even = np.maximum(before, after) < GAP * np.median(step)
+    even = np.maximum(before, after) < SMOOTHING.gap_ratio * np.median(step)
     return np.pad(np.where(even, -second * before * after / 12.0, 0.0), 1)
 
 
-def _samples(time: FloatArray, window: float = WINDOW) -> int:
-    """Odd number of samples in a `window` [s]."""
+def _samples(time: FloatArray, window: float = SMOOTHING.window) -> int:
+    """Return the odd number of samples in a `window` [s]."""
     return 2 * int(0.5 * window / float(np.median(np.diff(time)))) + 1
 
 
 def local_mean(signal: Sampled) -> FloatArray:
-    """Signal (n,) without its noise, as far as the noise level allows to tell it.
+    """Remove the noise of a signal (n,) by adaptive local averaging.
 
     At every sample the mean over the longest window that agrees with those over all shorter ones
     (intersection of confidence intervals; Goldenshluger and Nemirovski 1997).
@@ -122,11 +135,11 @@ def local_mean(signal: Sampled) -> FloatArray:
     values = signal.values
     low, high = np.full(values.size, -np.inf), np.full(values.size, np.inf)
     mean, open_ = values.copy(), np.ones(values.size, dtype=bool)
-    for half in HALF_WIDTHS:
+    for half in SMOOTHING.half_widths:
         padded = np.pad(values, half, mode="edge")
         total = np.cumsum(np.concatenate([[0.0], padded]))
         trial = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-        margin = INTERVAL * signal.sigma / np.sqrt(2 * half + 1)
+        margin = SMOOTHING.mean_sigma * signal.sigma / np.sqrt(2 * half + 1)
         low, high = np.maximum(low, trial - margin), np.minimum(high, trial + margin)
         open_ &= low <= high
         mean = np.where(open_, trial, mean)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What errors of gain, offset and age of the sensors do to the fit: one weighted column each.
+"""Effect of sensor errors in gain, offset and delay on the unknowns and the results.
 
 An error e(t) of a measured output moves the minimum of Q by F⁻¹Jᵀ Σ⁻¹ e; an error of a measured
 input acts through the linear response of the run to it, with the opposite sign.
@@ -7,25 +7,34 @@ input acts through the linear response of the run to it, with the opposite sign.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from drivetwin.driveline import Trajectory
+from drivetwin.identify.likelihood.derived import parameters
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.problem import Part
 from drivetwin.identify.likelihood.record import TORQUE, Output, columns_of
-from drivetwin.identify.likelihood.unknowns import Point
-from drivetwin.identify.signals import FloatArray
-from drivetwin.logs.pressure import pressed_element
+from drivetwin.identify.optimize.objective import Point
+from drivetwin.identify.result import FrictionCurve
+from drivetwin.identify.signals import FloatArray, ShiftSignals
+from drivetwin.logs.pressure import pressed_element, pressure_role
 from drivetwin.vehicle.spec import SensorTolerance
+
+SIZE = 0.01
+"""Gain error, and offset in shares of a sensor's largest reading."""
+AGE = 1e-3
+"""How much older values are than their stamps [s]."""
+FRICTION = "mu."
+"""Start of the id of μ of an element, at `slips` of the sensitivity."""
 
 
 def sensor_shifts(
     fit: LikelihoodFit, tolerances: Mapping[str, SensorTolerance]
 ) -> dict[str, FloatArray]:
-    """Shift (p,) of all unknowns by one standard deviation of each sensor error.
+    """Compute the shift (p,) of all unknowns by one standard deviation of each sensor error.
 
     Keys are `<role> gain`, `<role> offset` and `<role> age`; a sensor that the fit does not use has
     none.
@@ -70,7 +79,7 @@ def _error(part: Part, fit: LikelihoodFit, role: str, kind: str) -> FloatArray |
 
 
 def _output_error(out: Output, run: Trajectory, kind: str) -> FloatArray:
-    """What an error of size one adds to the samples (n,) of an output."""
+    """Compute the change of output samples (n,) by an error of size one."""
     match kind:
         case "gain":
             return out.values
@@ -81,7 +90,7 @@ def _output_error(out: Output, run: Trajectory, kind: str) -> FloatArray:
 
 
 def _input_error(part: Part, point: Point, source: str, kind: str) -> FloatArray:
-    """The same for an input (N-1,), over each step of the grid."""
+    """Compute the change of an input (N-1,) over each step of the grid by an error of size one."""
     record, time = part.record, part.record.time
     one = record.engine_torque if source == TORQUE else record.pressures[source]
     match kind:
@@ -93,3 +102,82 @@ def _input_error(part: Part, point: Point, source: str, kind: str) -> FloatArray
             return -record.torque_rate(part.structure.value(point, "te_delay"))
         case _:
             return -np.diff(np.interp(time, one.time, one.values)) / np.diff(time)
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Change of each result by each sensor error, SI.
+
+    `ids` (q,) are parameter ids and `mu.<element>`, `values` (q,) their values; `errors` (e,) read
+    `<role> gain`, `<role> offset` or `<role> age`, `sizes` (e,) say how large (SI but for a gain);
+    `change` is (q, e). `slips` [rad/s] by element are those at which μ is told.
+    """
+
+    ids: tuple[str, ...]
+    values: FloatArray
+    errors: tuple[str, ...]
+    sizes: FloatArray
+    change: FloatArray
+    slips: Mapping[str, float]
+
+
+def sensitivity(
+    fit: LikelihoodFit, signals: Sequence[ShiftSignals], friction: Mapping[str, FrictionCurve]
+) -> Sensitivity:
+    """Compute the change of every parameter and of μ in the middle of the observed slip range.
+
+    To first order in the fit's unknowns; costs one linear response of the run per input and kind.
+    """
+    largest = _largest_readings(fit)
+    sizes = {role: SensorTolerance(SIZE, SIZE * value, AGE) for role, value in largest.items()}
+    slips = {name: float(np.mean(curve.slip[[0, -1]])) for name, curve in friction.items()}
+
+    def results(unknowns: FloatArray) -> dict[str, float]:
+        point = fit.point.moved(unknowns)
+        return parameters(fit.problem, point, signals) | _friction(fit, point, slips)
+
+    base = results(fit.point.values)
+    columns, errors = [], []
+    for error, shift in sensor_shifts(fit, sizes).items():
+        ahead, behind = (results(fit.point.values + sign * shift) for sign in (0.5, -0.5))
+        columns.append([ahead[name] - behind[name] for name in base])
+        errors.append(error)
+    return Sensitivity(
+        ids=tuple(base),
+        values=np.array(list(base.values())),
+        errors=tuple(errors),
+        sizes=np.array([_size(sizes, error) for error in errors]),
+        change=np.array(columns).reshape(len(errors), len(base)).T,
+        slips=slips,
+    )
+
+
+def _friction(fit: LikelihoodFit, point: Point, slips: Mapping[str, float]) -> dict[str, float]:
+    """Compute μ of each element at its slip."""
+    laws = {
+        element.name: element.friction
+        for part in fit.problem.parts
+        for element in part.structure.model(point).elements
+    }
+    return {
+        FRICTION + name: float(laws[name].at(np.array([slip]))[0]) for name, slip in slips.items()
+    }
+
+
+def _largest_readings(fit: LikelihoodFit) -> dict[str, float]:
+    """Return the largest absolute reading by role over all shifts, SI."""
+    found: dict[str, float] = {}
+    for part in fit.problem.parts:
+        record = part.record
+        readings = {"engine_torque": record.engine_torque.values}
+        readings |= {pressure_role(name): one.values for name, one in record.pressures.items()}
+        for out in record.outputs:
+            readings["input_speed" if out.name == "engine_speed" else out.name] = out.values
+        for role, values in readings.items():
+            found[role] = max(found.get(role, 0.0), float(np.abs(values).max()))
+    return found
+
+
+def _size(sizes: Mapping[str, SensorTolerance], error: str) -> float:
+    role, kind = error.rsplit(" ", 1)
+    return float(getattr(sizes[role], kind))

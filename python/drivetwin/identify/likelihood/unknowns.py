@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""The unknowns of the fit and how the simulated model follows from them.
+"""Unknowns of the fit and the simulated model as a function of them.
 
-    J1 = Je/η, J2e = 0 (THEORY section 3: only Je = J1·η + J2e can be told)
+    J1 = Je/η, J2e = 0 (THEORY section 3: only Je = J1·η + J2e is identifiable)
     load.constant = i_f·(T_v/i_f + d) - aero·mean speed², mu_s = mu_c + mu_drop, v_s = exp(ln_v_s)
 
-On a hilly road the load of each shift departs from T_v/i_f by a d of its own. They add up to zero
+On a hilly road the load of each shift deviates from T_v/i_f by d. The deviations add up to zero
 over the shifts of a log, so T_v/i_f is the mean: the d of the first is minus the sum of the others.
-An element that comes on in one of the shifts has its own Stribeck law; of one that only lets go
-no more than the level of its law shows, through the instant at which it breaks away.
+An element that engages in one of the shifts has its own Stribeck law. Of an element that only
+disengages, the level of the law is identifiable alone, from the instant of break-away.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivetwin.driveline import DualClutch, LossLaw, RoadLoad, ShiftElement, State, Stribeck
+from drivetwin.identify.friction import stribeck
 from drivetwin.identify.load import AERO as AERO
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import Coupling, Driveline, FloatArray
 
 COMMON = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
@@ -35,27 +37,14 @@ START = ("speed", "wheel_speed", "twist")
 DEPARTURE = "load"
 """Unknown of each shift but the first of a log on a hilly road: d, its load at the output shaft
 less the mean over the shifts of the log [N m]."""
+RETRACTION_SLIPS = np.array([2.0, 25.0, 80.0])
+"""Slips [rad/s] at which a law takes its step: near lock-up, in the middle, at the start."""
 OF_RUN = (*START, DEPARTURE)
 """All unknowns that belong to the run of one shift, by what follows its label and the dot."""
 
 
-@dataclass(frozen=True, eq=False)
-class Point:
-    """One set of values of all unknowns by name; immutable."""
-
-    names: tuple[str, ...]
-    values: FloatArray
-
-    def __getitem__(self, name: str) -> float:
-        return float(self.values[self.names.index(name)])
-
-    def moved(self, values: FloatArray) -> Point:
-        """The same unknowns at other `values` (p,)."""
-        return Point(self.names, values)
-
-
 def own_of(log: int) -> dict[str, str]:
-    """Unknown by name that stands for each of `OWN` in one of several logs, numbered from 1.
+    """Map the log-specific names `OWN` to their unknowns in one of several logs, numbered from 1.
 
     Empty for log 0, the only one.
     """
@@ -72,7 +61,7 @@ class Tie:
 
 @dataclass(frozen=True)
 class Structure:
-    """What is fixed during a fit: structure of one shift and the laws that are not free.
+    """Fixed description of one shift: its elements and every value that is not estimated.
 
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
     start unknowns of this shift. `mean_speed` is that of the wheel over the log [rad/s], at which
@@ -103,18 +92,18 @@ class Structure:
         return tuple(one for one in self.driveline.drums if one.name not in taking_part)
 
     def value(self, point: Point, name: str) -> float:
-        """Value of an unknown, free, fixed or tied."""
+        """Return the value of an unknown, free, fixed or tied."""
         if name == "J_e" and self.tie is not None:
             return self.tie.inertia - self.value(point, "J_out") / self.tie.ratio**2
         free = self.unknown(name)
         return point[free] if free in point.names else self.fixed[name]
 
     def unknown(self, name: str) -> str:
-        """Name of the unknown that stands for `name` in this shift's log."""
+        """Return the name of the unknown that stands for `name` in this shift's log."""
         return own_of(self.log).get(name, name)
 
     def model(self, point: Point) -> DualClutch:
-        """The model to be simulated at `point`."""
+        """Build the model to be simulated at `point`."""
         eta = self.value(point, "eta")
         return DualClutch(
             J1=self.value(point, "J_e") / eta,
@@ -140,7 +129,8 @@ class Structure:
         return RoadLoad(constant=mean - aero * self.mean_speed**2, aero=aero)
 
     def load(self, point: Point) -> float:
-        """Load of this shift at the output shaft [N m], at the mean speed of its log."""
+        """Compute the load of this shift at the output shaft [N m], at the mean speed of its
+        log."""
         departure = sum(factor * point[name] for name, factor in self.departure.items())
         return self.value(point, "Tv_over_if") + departure
 
@@ -158,19 +148,19 @@ class Structure:
         )
 
     def _drum(self, point: Point, one: Coupling) -> ShiftElement:
-        """An element of which only the drum acts."""
+        """Build an element of which only the drum acts."""
         drum = self.value(point, f"{one.name}.drum")
         law = Stribeck(*NO_LAW)
         return ShiftElement(one.name, 1.0 / one.a, one.b, one.gain, one.P0.value, law, 1.0, drum)
 
     def start(self, point: Point) -> State:
-        """Start of the run at `point`: the off-going element is locked."""
+        """Build the initial state of the run at `point`: the off-going element is locked."""
         speed, wheel, twist = (point[f"{self.label}.{key}"] for key in START)
         ratio = self.driveline.i_before
         return State(ratio * speed, speed, wheel, twist, (self.driveline.offgoing.name,))
 
     def slopes(self, point: Point) -> tuple[tuple[str, ...], FloatArray]:
-        """Names the core knows (m,) and the derivative of their values by `point` (m, p)."""
+        """Compute the core's names (m,) and the derivative of their values by `point` (m, p)."""
         entries = [entry for name in point.names for entry in self._entries(point, name)]
         core = tuple(dict.fromkeys(entry[0] for entry in entries))
         matrix = np.zeros((len(core), len(point.names)))
@@ -179,7 +169,8 @@ class Structure:
         return core, matrix
 
     def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
-        """(name in the core, unknown, derivative) of one unknown; nothing for foreign ones."""
+        """Yield (name in the core, unknown, derivative) of one unknown; nothing for foreign
+        ones."""
         i_f, eta, J_e = self.driveline.i_f, self.value(point, "eta"), self.value(point, "J_e")
         by_tie = 0.0 if self.tie is None else -1.0 / (self.tie.ratio**2 * eta)
         table: dict[str, Sequence[tuple[str, float]]] = {
@@ -216,3 +207,23 @@ class Structure:
             table[f"{one.name}.drum"] = [(f"{one.name}.drum_inertia", 1.0)]
         for known, slope in table.get(name, ()):
             yield known, name, slope
+
+
+def retract(point: Point, step: FloatArray) -> FloatArray:
+    """Compute the values (p,) after a `step` (p,), straight in the friction laws' own values.
+
+    The four coefficients of a Stribeck law nearly compensate each other if v_s is as large as the
+    slips that occur. The valley of Q is then curved in the coefficients, and straight in the
+    values of the law at three slips with ln v_s as the fourth coordinate.
+    """
+    values = point.values + step
+    for name in point.names:
+        element, _, key = name.rpartition(".")
+        if key != LAW[-1]:
+            continue
+        index = [point.names.index(f"{element}.{coefficient}") for coefficient in LAW]
+        mu, slopes = stribeck(point.values[index], RETRACTION_SLIPS)
+        target = mu + slopes.T @ step[index]
+        _, linear = stribeck(values[index], RETRACTION_SLIPS)
+        values[index[:-1]] = np.linalg.solve(linear[:-1].T, target)
+    return values

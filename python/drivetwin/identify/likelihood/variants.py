@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the log itself decides about the model: how the load grows and differs, what outputs show.
+"""Model selection by the log: growth and variation of the load, sampling mode of the outputs.
 
 A part of the model that is wrongly left out biases everything (a load that grows with speed moves
 J3 by several per cent), and one that is wrongly left in widens intervals. The growing part is
@@ -10,6 +10,7 @@ unless all may be one (hills.py); outputs are samples or means, whichever leaves
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,8 +18,7 @@ from drivetwin.driveline import LossLaw
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood import growth
 from drivetwin.identify.likelihood.fit import (
-    GOOD,
-    RESTARTS,
+    MULTI_START,
     Hopeless,
     LikelihoodFit,
     checked,
@@ -36,24 +36,34 @@ from drivetwin.identify.likelihood.kinds import (
 from drivetwin.identify.likelihood.lingering import lowest
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Problem
-from drivetwin.identify.likelihood.unknowns import AERO, Point
+from drivetwin.identify.likelihood.unknowns import AERO
 from drivetwin.identify.likelihood.work import OutOfWork, at_most
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.signals import Driveline, ShiftSignals
 from drivetwin.progress import part
 from drivetwin.shifts.shift import Shift
 
-WORK = 700.0
-"""Passes over the log that the search may take: from a bad start and to the end it takes 450."""
-LESS_WORK = 200.0
-"""Passes that the search may take which starts from a minimum of the wider model: it takes 160."""
-LINGER_WORK = 400.0
-"""Passes that may be spent on other minima of an element that lingers about P0, of what the search
-has left: each takes about 100."""
-DOUBT_WORK = 400.0
-"""Passes that may be spent on kinds of signals that the log hardly tells, of what the search has
-left: each takes about 100."""
-SMALL = 1e-3
-"""Growing part of the load [N m s^2/rad^2] to start from: one that is zero has no derivative."""
+
+@dataclass(frozen=True)
+class SelectionSettings:
+    """Settings of the model selection; work is counted in passes over the log."""
+
+    max_work: float = 700.0
+    """Work of the search: one from a bad start takes 450 passes [passes]."""
+    max_restricted_work: float = 200.0
+    """Work of the search that starts from a minimum of the wider model: it takes 160 passes
+    [passes]."""
+    max_touch_point_work: float = 400.0
+    """Work on other minima of an element that stays about P0, at most what the search has left:
+    each takes about 100 passes [passes]."""
+    max_sampling_mode_work: float = 400.0
+    """Work on sampling modes that the log hardly distinguishes, at most what the search has left:
+    each takes about 100 passes [passes]."""
+    min_aero: float = 1e-3
+    """Initial growing part of the load; at zero it has no derivative [N m s^2/rad^2]."""
+
+
+SELECTION = SelectionSettings()
 
 
 def choose(
@@ -62,19 +72,19 @@ def choose(
     loss_law: LossLaw,
     guess: Mapping[str, float],
 ) -> tuple[LikelihoodFit, tuple[str, ...]]:
-    """The fit of the variant that the log speaks for, and what was decided, in words.
+    """Fit the variant that the log supports; return the decisions as sentences.
 
     Raises IdentificationError where no variant converges.
     """
     shifts = [s.shift for s in signals]
-    growing = {**guess, AERO: max(guess.get(AERO, 0.0), SMALL)}
+    growing = {**guess, AERO: max(guess.get(AERO, 0.0), SELECTION.min_aero)}
     constant = {name: value for name, value in guess.items() if name != AERO}
     problem, start = problem_of(signals, drivelines, loss_law, growing, hilly=True)
-    with part(0.0, 0.45), at_most(WORK) as search:
+    with part(0.0, 0.45), at_most(SELECTION.max_work) as search:
         best = _fit_either(problem, start, shifts)
-    with part(0.45, 0.5, "kinds of signals"), at_most(DOUBT_WORK):
+    with part(0.45, 0.5, "kinds of signals"), at_most(SELECTION.max_sampling_mode_work):
         best = with_slow_outputs(problem, best)
-    with part(0.5, 0.65), at_most(LESS_WORK):
+    with part(0.5, 0.65), at_most(SELECTION.max_restricted_work):
         level = with_one_load(best)
         point, covariance = level or (best.point, best.covariance)
         guess = growing if growth.grows(point, covariance) else constant
@@ -82,11 +92,17 @@ def choose(
         wider = best
         best, problem = _narrowed(best, point, narrower, shifts) or (best, problem)
     notes = growth.told(best)
-    with part(0.65, 0.85, "other minima"), at_most(min(LINGER_WORK, search.left)):
+    with (
+        part(0.65, 0.85, "other minima"),
+        at_most(min(SELECTION.max_touch_point_work, search.left)),
+    ):
         best = lowest(problem, best)
-    with part(0.85, 1.0, "kinds of signals"), at_most(min(DOUBT_WORK, search.left)):
+    with (
+        part(0.85, 1.0, "kinds of signals"),
+        at_most(min(SELECTION.max_sampling_mode_work, search.left)),
+    ):
         best, doubts = averaged_over_kinds(problem, best)
-    with at_most(DOUBT_WORK):
+    with at_most(SELECTION.max_sampling_mode_work):
         best, either = with_either_kind(problem, best)
     if AERO not in best.point.names:
         best = growth.allowed_for(best, wider)
@@ -96,10 +112,10 @@ def choose(
 def _narrowed(
     wider: LikelihoodFit, point: Point, narrower: tuple[Problem, Point], shifts: Sequence[Shift]
 ) -> tuple[LikelihoodFit, Problem] | None:
-    """The fit of a model without what the log does not show, and its problem; None where it shows
-    all, and where the work runs out: the wider model is right all the same.
+    """Fit the model without the effects that the log does not show, and return its problem.
 
-    `narrower` is its problem and start, `point` what the wider fit says of it.
+    Returns None if the log shows all effects, or if the work runs out: the wider model is correct
+    all the same.
     """
     problem, start = narrower
     left_out = [name for name in wider.point.names if name not in start.names]
@@ -115,21 +131,23 @@ def _narrowed(
 
 
 def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:
-    """The fit with every signal of the likeliest kind.
+    """Fit with every signal in its likeliest sampling mode.
 
     Raises IdentificationError where it does not converge with the likeliest kinds.
     """
     likely, other = likely_kinds(problem, start, shifts)
-    best = _tried(likely, start, shifts) or fit(other, start, shifts, restarts=RESTARTS[:1])
+    best = _tried(likely, start, shifts) or fit(
+        other, start, shifts, restarts=MULTI_START.shaft_factors[:1]
+    )
     best = with_best_kinds(problem, best)
-    if best.chi2 < GOOD:
+    if best.chi2 < MULTI_START.accept_chi2:
         return best
     second = checked(best, problem.of_kinds(best.problem.kinds), start, shifts)
     return best if second is best else with_best_kinds(problem, second)
 
 
 def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit | None:
-    """The first plausible minimum; None where there is none.
+    """Fit up to the first plausible minimum; None if there is none.
 
     Raises Hopeless where none is near.
     """
@@ -142,6 +160,6 @@ def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Likelihoo
 
 
 def _taken(start: Point, found: Point) -> Point:
-    """`start` with the values of `found` where it has them."""
+    """Copy the values of `found` into `start` for the names that it has."""
     values = [found[n] if n in found.names else start[n] for n in start.names]
     return start.moved(np.array(values))

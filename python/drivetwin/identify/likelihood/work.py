@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""How much work a search may do before what it has found must do.
+"""Work limit of a search, counted in passes over the log.
 
-Counted in passes over the log and never timed: a slow machine then gives the result of a fast one.
+The work is never timed, so a slow machine gives the same result as a fast one.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ REMEDY = (
 
 
 class OutOfWork(IdentificationError):
-    """A search has done all the work that it was given."""
+    """The work limit of a search is exceeded."""
 
 
 @dataclass
 class Meter:
-    """Passes that are left."""
+    """Remaining passes."""
 
     left: float
 
@@ -42,7 +42,7 @@ _present: ContextVar[Meter | None] = ContextVar("drivetwin_work", default=None)
 
 @contextmanager
 def at_most(passes: float) -> Iterator[Meter]:
-    """Give all searches of this thread inside the block so many passes over the log together."""
+    """Limit the work of all searches of this thread inside the block, in passes over the log."""
     meter = Meter(passes)
     token = _present.set(meter)
     try:
@@ -52,7 +52,7 @@ def at_most(passes: float) -> Iterator[Meter]:
 
 
 def spend(passes: float) -> None:
-    """Count work; outside a block of `at_most` it is free.
+    """Count work; free outside a block of `at_most`.
 
     Raises OutOfWork where none is left.
     """

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Do the logs of one fit agree on what they share?
+"""Homogeneity test of the logs of a joint fit.
 
-At the common minimum each log alone pulls the shared unknowns θ by g_k against its information
-F_k, what it has of its own eliminated (Schur complement). In coordinates in which the joint
+At the common minimum, g_k is the gradient and F_k the information of log k on the shared unknowns
+θ; its log-specific unknowns are eliminated (Schur complement). In coordinates in which the joint
 covariance is the identity, G_k = Lᵀ F_k L has a row of information for each direction that the log
-tells, and
+identifies, and
 
     χ² = min over δ of Σ_k ‖U_kᵀ δ·√w_k + U_kᵀ h_k/√w_k‖²,   G_k = U_k diag(w_k) U_kᵀ,  h_k = Lᵀ g_k
 
 is χ² distributed with as many degrees of freedom as there are rows beyond the rank: the
 homogeneity test of Cochran (1954) for vectors. Design priors take no part in it. How far each
-parameter would move without one log, in standard deviations of that move, says where it comes from.
+parameter would move without one log, in standard deviations of that move, shows the source of an
+inconsistency.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from drivetwin.identify.signals import FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import root_of
 
 TOLD = 0.02
-"""Share of the joint information on a direction below which a log says nothing of it."""
+"""Share of the joint information on a direction below which a log is uninformative."""
 SIGNIFICANT = 0.01
 """Probability of χ² under agreeing logs below which they are said to disagree."""
 FAR = 3.0
@@ -43,7 +44,7 @@ FAR = 3.0
 
 @dataclass(frozen=True)
 class Move:
-    """How far log `log` moves a parameter from what the others say, in its standard deviations."""
+    """Discrepancy between one log and the others on a parameter, in its standard deviations."""
 
     parameter: str
     log: int
@@ -65,18 +66,18 @@ class Consistency:
 
     @property
     def agree(self) -> bool:
-        """Whether the logs may be of one vehicle in one state."""
+        """True if the logs are consistent with one vehicle in one state."""
         return self.p >= SIGNIFICANT
 
     @property
     def doubtful(self) -> dict[str, Move]:
-        """The parameters on which the logs disagree; empty where they agree."""
+        """Parameters on which the logs disagree; empty if they agree."""
         far = {one.parameter: one for one in self.moves if abs(one.z) > FAR}
         return {} if self.agree else far
 
     @property
     def text(self) -> str:
-        """The outcome in a sentence."""
+        """Outcome as a sentence."""
         figures = f"χ² {self.chi2:.1f} on {self.freedom}, p = {self.p:.2g}"
         if self.agree:
             return f"the logs agree on what they share ({figures})"
@@ -114,7 +115,7 @@ def consistency(
 
 
 def shared_of(fit: LikelihoodFit) -> list[int]:
-    """Places of the unknowns that all logs share: neither a log's own nor a run's."""
+    """Return the indices of the unknowns that all logs share."""
     structures = [part.structure for part in fit.problem.parts]
     own = {name for one in structures for name in own_of(one.log).values()}
     starts = {f"{one.label}.{key}" for one in structures for key in OF_RUN}
@@ -122,7 +123,7 @@ def shared_of(fit: LikelihoodFit) -> list[int]:
 
 
 def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray) -> Pull:
-    """What one log alone says of the shared unknowns at the minimum of all.
+    """Compute information and gradient of one log on the shared unknowns at the common minimum.
 
     Raises IdentificationError where a simulation that the fit had made does not run again.
     """
@@ -144,7 +145,7 @@ def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray)
 
 
 def homogeneity(pulls: Sequence[Pull]) -> tuple[float, int]:
-    """χ² and its degrees of freedom over the directions that each log tells."""
+    """Compute χ² and its degrees of freedom over the directions that each log identifies."""
     rows, targets = [], []
     for one in pulls:
         power, directions = np.linalg.eigh(one.information)
@@ -161,7 +162,7 @@ def homogeneity(pulls: Sequence[Pull]) -> tuple[float, int]:
 def _moves(
     pulls: Sequence[Pull], told: Mapping[str, FloatArray], widened: float
 ) -> tuple[Move, ...]:
-    """The largest move of every parameter by one log: minus what leaving it out would do."""
+    """Find the largest discrepancy of every parameter over the logs."""
     largest: dict[str, Move] = {}
     for one in pulls:
         power, directions = np.linalg.eigh(one.information)
@@ -179,7 +180,7 @@ def _moves(
 def _rows(
     fit: LikelihoodFit, signals: Sequence[ShiftSignals], friction: Mapping[str, FrictionCurve]
 ) -> dict[str, FloatArray]:
-    """Derivative (p,) by the unknowns of every parameter that the logs share, and of friction."""
+    """Compute the derivative (p,) by the unknowns of every shared parameter, and of friction."""
     names = list(parameters(fit.problem, fit.point, signals))
     matrix = slopes(fit.problem, fit.point, np.sqrt(np.diag(fit.covariance)), signals)
     own = np.setdiff1d(np.arange(len(fit.point.names)), shared_of(fit))

@@ -25,7 +25,7 @@ from drivetwin.identify.design import outside_ranges, without_gain
 from drivetwin.identify.evidence import Evidence
 from drivetwin.identify.inputs import driveline_behind, tolerances_of
 from drivetwin.identify.likelihood.conclude import conclude
-from drivetwin.identify.likelihood.fit import PLAUSIBLE, LikelihoodFit, covariance_of
+from drivetwin.identify.likelihood.fit import MULTI_START, LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.unknowns import AERO, OF_RUN, OWN, own_of
 from drivetwin.identify.likelihood.variants import choose
 from drivetwin.identify.method import Method
@@ -51,8 +51,8 @@ NAMED = 3
 class LogShare:
     """One log of a fit of several: `number` from 1, as in parameter ids such as `te_delay.1`.
 
-    `alone` is what the log tells by itself, by parameter id without the number. T_v/i_f of the log
-    holds at `mean_speed` of the wheel [rad/s].
+    `alone` are the estimates from the log by itself, by parameter id without the number. T_v/i_f of
+    the log holds at `mean_speed` of the wheel [rad/s].
     """
 
     number: int
@@ -158,7 +158,7 @@ def _refuse_unlike(logs: Sequence[ShiftLog]) -> None:
 
 
 def _same(one: ShiftLog, other: ShiftLog) -> bool:
-    """Whether two logs are one recording, be it in two formats."""
+    """Return whether two logs are the same recording, even in two formats."""
     if one.sha256 == other.sha256:
         return True
     common = [role for role in one.channels if role in other]
@@ -210,7 +210,7 @@ def _refuse_apart(alone: Sequence[Identification]) -> None:
     for names, values, information in told:
         away = values - np.array([mean[name] for name in names])
         excess += float(away @ information @ away)
-    if excess > (PLAUSIBLE - 1.0) * sum(fit.problem.size for fit in fits):
+    if excess > (MULTI_START.plausible_chi2 - 1.0) * sum(fit.problem.size for fit in fits):
         raise IdentificationError(f"they disagree by χ² {excess:.3g}", "")
 
 
@@ -260,7 +260,7 @@ def _share(number: int, log: ShiftLog, alone: Identification, fit: LikelihoodFit
 
 
 def _joined(alone: Sequence[Identification], told: Conclusions, several: Several) -> Identification:
-    """One identification of all logs, but for its evidence."""
+    """Build one identification of all logs, without its evidence."""
     told = judged(told, several.consistency)
     names = [Path(share.source).name for share in several.logs]
     agreed = (several.consistency.text,) if several.consistency.agree else ()
@@ -287,7 +287,7 @@ def _joined(alone: Sequence[Identification], told: Conclusions, several: Several
 
 
 def _covered(alone: Sequence[Identification]) -> dict[str, tuple[float, float]]:
-    """Ranges that any log saw."""
+    """Return the union of the ranges that the logs cover."""
     names = dict.fromkeys(name for one in alone for name in one.validity)
     spans = {name: [one.validity[name] for one in alone if name in one.validity] for name in names}
     return {
@@ -297,7 +297,7 @@ def _covered(alone: Sequence[Identification]) -> dict[str, tuple[float, float]]:
 
 
 def of_one_log(found: Identification, share: LogShare) -> Identification:
-    """What a fit of several logs says of one of them: its own values under their plain ids.
+    """Extract one log from a joint identification: its own values under their plain ids.
 
     For a twin that is to simulate this log; of the shifts only its own are in it.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a disagreement of the logs does to the verdicts, and the friction points of all logs."""
+"""Verdicts under disagreement of the logs, and friction points of all logs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivetwin.identify.several.consistency import Consistency, Move
 
 
 def judged(told: Conclusions, tested: Consistency) -> Conclusions:
-    """Conclusions with the outcome of the test: unchanged where the logs agree.
+    """Apply the outcome of the homogeneity test; unchanged if the logs agree.
 
     A parameter on which they do not is weak at best, and its interval is as many times wider as
     the log that is farthest off is away in standard deviations (Birge 1932).
@@ -32,7 +32,7 @@ def judged(told: Conclusions, tested: Consistency) -> Conclusions:
 
 
 def _doubted(one: Estimate, move: Move) -> Estimate:
-    """An estimate that one log pulls away from the others by more than noise explains."""
+    """Downgrade an estimate that one log contradicts by more than noise explains."""
     if one.value is None or one.std_noise is None or one.verdict is Verdict.DESIGN:
         return one
     factor = abs(move.z)
@@ -52,7 +52,7 @@ def _widened(curve: FrictionCurve, move: Move | None) -> FrictionCurve:
 
 
 def pooled_curves(alone: Sequence[Identification]) -> dict[str, FrictionCurve]:
-    """By element the curve over the slips that any log saw, with the points of all."""
+    """Merge by element the curves of all logs over the slips that any log covers."""
     found: dict[str, list[FrictionCurve]] = {}
     for one in alone:
         for name, curve in one.friction.items():
@@ -61,7 +61,7 @@ def pooled_curves(alone: Sequence[Identification]) -> dict[str, FrictionCurve]:
 
 
 def _pooled(curves: Sequence[FrictionCurve]) -> FrictionCurve:
-    """The first curve over the slips of all; its μ waits to be told by the common fit."""
+    """Extend the first curve over the slips of all; its μ is filled in by the common fit."""
     ends = np.concatenate([curve.slip[[0, -1]] for curve in curves])
     slip = np.linspace(ends.min(), ends.max(), curves[0].slip.size)
     nothing = np.zeros_like(slip)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a fit may be expected to leave of a shift that it has not seen.
+"""Prediction bounds for a shift that the fit has not used.
 
 What the shift's log has of its own (load, age of the torque, state at the start) is unknown to
 the fit. It is estimated from the gear held before the shift, the shared parameters θ staying as
@@ -24,20 +24,29 @@ from drivetwin.errors import IdentificationError
 from drivetwin.identify.inputs import driveline_behind
 from drivetwin.identify.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.identify.likelihood.guess import TYPICAL_LAW
-from drivetwin.identify.likelihood.newton import minimise
-from drivetwin.identify.likelihood.output_error import CLEAR
+from drivetwin.identify.likelihood.output_error import STAGED_START
 from drivetwin.identify.likelihood.priors import problem_of
 from drivetwin.identify.likelihood.problem import Part, Problem
-from drivetwin.identify.likelihood.unknowns import AERO, LAW, OWN, START, Point, own_of
+from drivetwin.identify.likelihood.unknowns import AERO, LAW, OWN, START, own_of
+from drivetwin.identify.optimize.gauss_newton import minimise
+from drivetwin.identify.optimize.objective import Point
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.signals import Driveline, FloatArray, ShiftSignals
 from drivetwin.identify.uncertainty import root_of
 from drivetwin.vehicle.spec import VehicleCard
 
-DRAWS = 120
-"""Draws of noise and parameters: the bound is the third largest."""
-LARGEST = 0.975
-"""Share of the draws below the bound."""
+
+@dataclass(frozen=True)
+class PredictionSettings:
+    """Settings of the prediction bounds."""
+
+    draws: int = 120
+    """Draws of noise and parameters: the bound is the third largest [-]."""
+    upper_quantile: float = 0.975
+    """Share of the draws below the upper bound [-]."""
+
+
+PREDICTION = PredictionSettings()
 
 
 @dataclass(frozen=True)
@@ -53,13 +62,13 @@ class Bound:
 
 @dataclass(frozen=True)
 class Expected:
-    """What is expected of one shift held out.
+    """Prediction for one shift held out.
 
-    `own` are values and standard deviations of what its log has of its own, by plain name, where
-    the fit has not seen the log; T_v/i_f holds at `mean_speed` of the wheel [rad/s]. `start` is the
-    state at `time` [s] that the whole stretch before the shift tells. `bounds` go
-    by compared signal; empty where the law of the on-coming element is another's, whose spread
-    nobody knows.
+    `own` are values and standard deviations of the log-specific unknowns by plain name, if the log
+    was not part of the fit; T_v/i_f holds at `mean_speed` of the wheel [rad/s]. `start` is the
+    state at `time` [s], estimated from the whole stretch before the shift. `bounds` are by compared
+    signal; empty if the law of the on-coming element is that of another element, whose deviation is
+    unknown.
     """
 
     own: Mapping[str, tuple[float, float]]
@@ -72,7 +81,7 @@ class Expected:
 def expected(
     fit: LikelihoodFit, held: Sequence[ShiftSignals], card: VehicleCard, seed: int = 0
 ) -> tuple[Expected, ...]:
-    """What `fit` leads one to expect of each shift `held` out of one log.
+    """Predict each shift `held` out of one log from `fit`.
 
     The signals' `log` is their number in the fit, or one that it does not have. Raises
     IdentificationError where the stretch before the shift cannot be simulated.
@@ -81,7 +90,9 @@ def expected(
     problem, point = problem_of(held, drivelines, card.loss_law, _known(fit, drivelines))
     problem = problem.of_kinds(fit.problem.kinds)
     unseen = _unseen(fit, problem, point)
-    before = _before(problem, point, unseen, [s.shift.before[1] - CLEAR for s in held])
+    before = _before(
+        problem, point, unseen, [s.shift.before[1] - STAGED_START.clearance for s in held]
+    )
     point, own = before.point, own_of(held[0].log)
     std = np.sqrt(np.diag(before.own))
     told = {
@@ -106,12 +117,12 @@ def expected(
 
 
 def _has_law(fit: LikelihoodFit, part: Part) -> bool:
-    """Whether the fit shows the friction of the element that comes on."""
+    """Return whether the fit identifies the friction of the on-coming element."""
     return f"{part.structure.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
 
 
 def _known(fit: LikelihoodFit, drivelines: Sequence[Driveline]) -> dict[str, float]:
-    """A value for every unknown, from the fit; an element it has not seen takes its partner's law.
+    """Collect a value for every unknown from the fit; an unknown element takes its partner's law.
 
     Where neither has one, that of a usual facing.
     """
@@ -133,7 +144,8 @@ def _known(fit: LikelihoodFit, drivelines: Sequence[Driveline]) -> dict[str, flo
 
 
 def _unseen(fit: LikelihoodFit, problem: Problem, point: Point) -> list[int]:
-    """Places of what belongs to the log or the run and is not known from the fit."""
+    """Return the indices of the unknowns that belong to the log or the run and are not in the
+    fit."""
     structures = [part.structure for part in problem.parts]
     starts = {f"{one.label}.{key}" for one in structures for key in START}
     own = {name for one in structures for name in own_of(one.log).values()}
@@ -143,8 +155,8 @@ def _unseen(fit: LikelihoodFit, problem: Problem, point: Point) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class _Before:
-    """What the gear held before the shifts tells: `point`, covariance `own` (u, u) of what is
-    unseen, and its answer `along` (u, k) to a change of what is known."""
+    """Fit to the gear before the shifts: `point`, covariance `own` (u, u) of the new unknowns,
+    and their response `along` (u, k) to a change of the known ones."""
 
     point: Point
     own: FloatArray
@@ -152,7 +164,7 @@ class _Before:
 
 
 def _before(problem: Problem, point: Point, unseen: list[int], ends: Sequence[float]) -> _Before:
-    """Fit what is unseen to the stretches before the shifts, all else held."""
+    """Fit the new unknowns to the stretches before the shifts, all others fixed."""
     known = [k for k in range(len(point.names)) if k not in unseen]
     prior = problem.prior
     precision = np.zeros_like(prior.precision)
@@ -174,7 +186,7 @@ def _before(problem: Problem, point: Point, unseen: list[int], ends: Sequence[fl
 
 
 def _moved(fit: LikelihoodFit, problem: Problem, before: _Before, unseen: list[int]) -> FloatArray:
-    """Root (p, d) of the covariance of all unknowns of the shifts held out."""
+    """Compute a root (p, d) of the covariance of all unknowns of the held-out shifts."""
     names = before.point.names
     known = [k for k in range(len(names)) if k not in unseen]
     spread = np.zeros((len(known), len(known)))
@@ -193,21 +205,21 @@ def _moved(fit: LikelihoodFit, problem: Problem, before: _Before, unseen: list[i
 
 
 def _inverse(precision: float) -> float:
-    """Variance of what a prior alone tells; 0 where it tells nothing, which then stays."""
+    """Return the variance of a prior alone; 0 without one, which fixes the value."""
     return 1.0 / precision if precision > 0.0 else 0.0
 
 
 def _bounds(
     part: Part, point: Point, moved: FloatArray, rng: np.random.Generator
 ) -> dict[str, Bound]:
-    """Size of the error of each output over draws; empty where the shift cannot be simulated."""
+    """Compute the error of each output over draws; empty if the shift cannot be simulated."""
     part = part.weighted_by(point)
     linear, run, path = part.linearised(point), part.run(point), part.weighting.path
     if linear is None or run is None or path is None:
         return {}
     columns, response = linear[1] @ moved, part.response(point, run)
     rms: dict[str, list[float]] = {out.name: [] for out in part.record.outputs}
-    for _ in range(DRAWS):
+    for _ in range(PREDICTION.draws):
         noise = {name: np.sqrt(p) * rng.standard_normal(p.size) for name, p in path.power.items()}
         error = part.seen(point, response.to(noise)) + columns @ rng.standard_normal(
             columns.shape[1]
@@ -219,6 +231,6 @@ def _bounds(
             first += out.values.size
             rms[out.name].append(float(np.sqrt(np.mean(piece**2))))
     return {
-        name: Bound(float(np.median(one)), float(np.quantile(one, LARGEST)))
+        name: Bound(float(np.median(one)), float(np.quantile(one, PREDICTION.upper_quantile)))
         for name, one in rms.items()
     }

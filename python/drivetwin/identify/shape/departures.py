@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the friction law leaves out: drag of open clutches, and μ that goes with pressure or heat.
+"""Deviations from the friction law: drag of open clutches, dependence on pressure or temperature.
 
     T_drag = d·s whatever the pressure        μ(s)·(1 + p·(P - P̄) + h·(θ - θ̄)) while slipping
 
@@ -24,27 +24,35 @@ import numpy as np
 
 from drivetwin.identify.likelihood.contact import Contact, contact_of
 from drivetwin.identify.likelihood.fit import LikelihoodFit, spread_of
-from drivetwin.identify.likelihood.newton import minimise, step_of
+from drivetwin.identify.likelihood.left_out import score_of
 from drivetwin.identify.likelihood.problem import Part
-from drivetwin.identify.likelihood.score import score_of
+from drivetwin.identify.optimize.gauss_newton import minimise, step_of
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.result import Identification
 from drivetwin.identify.signals import FloatArray, Sampled
 
-DRAG_SHARE = 0.1
-"""Plausible drag of an open clutch at the largest slip, as a share of the largest engine torque."""
-LEVEL_SHARE = 0.3
-"""Plausible change of μ over the pressures or temperatures seen."""
-SIGNIFICANT = 3.0
-"""Standard deviations from zero from which a departure counts as seen."""
-ROUNDS = 2
-"""How often what was found is put back."""
-TOLD = 0.5
-"""Share of what is plausible up to which a standard deviation says something."""
+
+@dataclass(frozen=True)
+class FrictionDependenceSettings:
+    """Settings of the deviations from the friction law."""
+
+    drag_share: float = 0.1
+    """Plausible drag of an open clutch at the largest slip, over the largest engine torque [-]."""
+    level_share: float = 0.3
+    """Plausible change of μ over the observed pressures or temperatures [-]."""
+    significant_sigma: float = 3.0
+    """Distance from zero, in standard deviations, above which a deviation is significant [-]."""
+    rounds: int = 2
+    """Number of refits with the deviations taken off the residuals [-]."""
+    max_relative_std: float = 0.5
+    """Largest standard deviation of an informative value, over the plausible value [-]."""
+
+
+DEPENDENCE = FrictionDependenceSettings()
 
 
 class Kind(StrEnum):
-    """What departs from the law."""
+    """Kinds of deviations from the friction law."""
 
     DRAG = "drag"
     PRESSURE = "pressure"
@@ -66,10 +74,10 @@ class Departure:
 
     @property
     def text(self) -> str:
-        """What the log says of it."""
-        if self.std > TOLD * self.plausible:
+        """Verdict of the log on it."""
+        if self.std > DEPENDENCE.max_relative_std * self.plausible:
             return "not told by this log"
-        if abs(self.value) > SIGNIFICANT * self.std:
+        if abs(self.value) > DEPENDENCE.significant_sigma * self.std:
             return "seen"
         return "none seen"
 
@@ -85,7 +93,7 @@ class _Effect:
 
 
 def departures(found: Identification, temperature: Sampled | None = None) -> tuple[Departure, ...]:
-    """Departures of all elements of a likelihood identification.
+    """Estimate the deviations of all elements of a likelihood identification.
 
     `temperature` [K] is that of the oil over the log, which changes so slowly that it is also told
     across a gap. Raises IdentificationError where the
@@ -94,7 +102,7 @@ def departures(found: Identification, temperature: Sampled | None = None) -> tup
     fit, signals = likelihood_of(found)
     largest = max(float(np.max(np.abs(s.engine_torque.values))) for s in signals)
     total, step = np.zeros(0), _step(fit, largest, temperature)
-    for _ in range(ROUNDS):
+    for _ in range(DEPENDENCE.rounds):
         total = step.values if total.size == 0 else total + step.values
         again = _put_back(fit, step, total)
         if again is None:
@@ -109,7 +117,7 @@ def departures(found: Identification, temperature: Sampled | None = None) -> tup
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """What one step finds: `values` (q,) of the effects, and `columns` (n, q) of each part."""
+    """Result of one step: `values` (q,) of the effects, and `columns` (n, q) of each part."""
 
     effects: list[_Effect]
     columns: list[FloatArray]
@@ -123,7 +131,7 @@ def _step(
     temperature: Sampled | None,
     known: FloatArray | None = None,
 ) -> _Step:
-    """One step from the minimum; `known` (q,) has been put back already."""
+    """Compute one step from the minimum; `known` (q,) is already in the residuals."""
     effects = [e for e in _effects(fit, largest, temperature) if e.plausible > 0.0]
     columns = [_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
     precision = np.array([e.plausible for e in effects]) ** -2.0
@@ -135,7 +143,7 @@ def _step(
 
 
 def _put_back(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodFit | None:
-    """The fit with what the effects do to the outputs taken off the residuals; None if it fails."""
+    """Refit with the effects subtracted from the residuals; None if the fit fails."""
     parts = tuple(
         replace(part, returned=part.returned + z @ total)
         for part, z in zip(fit.problem.parts, step.columns, strict=True)
@@ -147,7 +155,7 @@ def _put_back(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodF
 
 
 def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) -> Iterator[_Effect]:
-    """Every departure of every element."""
+    """Yield every deviation of every element."""
     runs = [part.run(fit.point) for part in fit.problem.parts]
     names = dict.fromkeys(e.name for part in fit.problem.parts for e in part.structure.elements)
     for name in names:
@@ -158,7 +166,7 @@ def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) ->
         ]
         slip = tuple(one.slip for one in seen)
         reach = max(float(np.max(np.abs(s))) for s in slip)
-        yield _Effect(Kind.DRAG, name, slip, DRAG_SHARE * largest / reach)
+        yield _Effect(Kind.DRAG, name, slip, DEPENDENCE.drag_share * largest / reach)
         yield _level(Kind.PRESSURE, name, seen, [one.above for one in seen])
         if temperature is not None:
             known = temperature.time, temperature.values
@@ -167,7 +175,7 @@ def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) ->
 
 
 def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray]) -> _Effect:
-    """μ that goes with a quantity, about its mean while the element slips."""
+    """Build the change of μ in proportion to a quantity, about its mean while the element slips."""
     contact = [one.friction * one.per_mu for one in seen]
     weights = np.abs(np.concatenate(contact))
     values = np.concatenate(quantity)
@@ -176,11 +184,11 @@ def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray
         return _Effect(kind, name, (), 0.0)
     mean = float(np.average(values, weights=weights))
     torques = tuple(one * (part - mean) for one, part in zip(contact, quantity, strict=True))
-    return _Effect(kind, name, torques, LEVEL_SHARE / float(np.ptp(values[slipping])))
+    return _Effect(kind, name, torques, DEPENDENCE.level_share / float(np.ptp(values[slipping])))
 
 
 def _columns(part: Part, fit: LikelihoodFit, effects: list[_Effect], place: int) -> FloatArray:
-    """Change (n, q) of the outputs of one part by a unit of each effect."""
+    """Compute the change (n, q) of the outputs of one part by a unit of each effect."""
     run = part.run(fit.point)
     assert run is not None
     columns = []

@@ -8,27 +8,28 @@ and prior, MacKay 1992).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
-from drivetwin.driveline import FrictionTable, Stribeck
+from drivetwin.driveline import FrictionTable, ShiftElement, Stribeck
 from drivetwin.errors import IdentificationError
 from drivetwin.identify.likelihood.curves import POINTS
 from drivetwin.identify.likelihood.fit import LikelihoodFit, nearest
 from drivetwin.identify.likelihood.priors import spans
-from drivetwin.identify.likelihood.problem import Normal, Part, Problem
+from drivetwin.identify.likelihood.problem import Part, Problem
 from drivetwin.identify.likelihood.record import Record, record_of
 from drivetwin.identify.likelihood.tolerance import sensor_shifts
-from drivetwin.identify.likelihood.unknowns import LAW, Point
+from drivetwin.identify.likelihood.unknowns import LAW, Structure
+from drivetwin.identify.optimize.gauss_newton import step_of
+from drivetwin.identify.optimize.objective import Normal, Point
 from drivetwin.identify.profile import likelihood_of
 from drivetwin.identify.regression import Prior
 from drivetwin.identify.result import Z95, FrictionCurve, Identification
 from drivetwin.identify.shape.kind import Shape
-from drivetwin.identify.shape.monotone import shaped
-from drivetwin.identify.shape.structure import Shaped, Table
-from drivetwin.identify.signals import FloatArray, ShiftSignals, Span
+from drivetwin.identify.signals import Coupling, FloatArray, ShiftSignals, Span
 from drivetwin.vehicle.spec import SensorTolerance
 
 KNOTS = 12
@@ -38,6 +39,38 @@ LEAST = 1e-3
 """Least μ at a knot."""
 LEVEL = (0.12, 0.2)
 """Wide prior of μ at every knot."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Knots (K,) of |slip| [rad/s], the first 0, between which μ is linear."""
+
+    knots: FloatArray
+
+    def names(self, element: str) -> tuple[str, ...]:
+        """Unknowns of an element: its μ at the knots."""
+        return tuple(f"{element}.mu.{k}" for k in range(self.knots.size))
+
+
+@dataclass(frozen=True, eq=False)
+class Shaped(Structure):
+    """A structure whose `tables` take the place of laws, by element."""
+
+    tables: Mapping[str, Table] = field(default_factory=dict)
+
+    def _element(self, point: Point, one: Coupling) -> ShiftElement:
+        element = super()._element(point, one)
+        if one.name not in self.tables:
+            return element
+        table = self.tables[one.name]
+        mu = tuple(point[name] for name in table.names(one.name))
+        return replace(element, friction=FrictionTable(tuple(table.knots.tolist()), mu))
+
+    def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
+        yield from super()._entries(point, name)
+        element, _, key = name.partition(".")
+        if element in self.tables and key.startswith("mu."):
+            yield name, name, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +128,8 @@ def shaped_friction(
 
 
 def _knots(curve: FrictionCurve) -> FloatArray:
-    """Knots from no slip to the largest seen, even in the root of slip: denser where μ changes."""
+    """Place knots from zero slip to the largest observed, even in the root of slip: denser where
+    μ changes."""
     return np.asarray(np.linspace(0.0, np.sqrt(curve.slip[-1]), KNOTS) ** 2, dtype=np.float64)
 
 
@@ -104,7 +138,7 @@ def _problem(
     signals: Sequence[ShiftSignals],
     tables: Mapping[str, Table],
 ) -> tuple[Problem, Point]:
-    """The problem with knots in place of laws, and where its search starts."""
+    """Build the problem with knots in place of laws, and its initial point."""
     laws = {f"{name}.{key}" for name in tables for key in LAW}
     kept = [k for k, name in enumerate(base.point.names) if name not in laws]
     names = [base.point.names[k] for k in kept]
@@ -131,7 +165,7 @@ def _problem(
 
 
 def _law_of(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
-    """Friction law of an element at the minimum."""
+    """Return the friction law of an element at the minimum."""
     for part in base.problem.parts:
         for one in part.structure.model(base.point).elements:
             if one.name == name:
@@ -142,7 +176,7 @@ def _law_of(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
 
 
 def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
-    """The part with tables in place of laws."""
+    """Replace the laws of a part by tables."""
     old = part.structure
     laws = {f"{e.name}.{key}" for e in old.elements for key in LAW}
     fixed = {**old.fixed, **{name: old.value(base.point, name) for name in laws}}
@@ -152,12 +186,12 @@ def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
 
 
 def _measured(part: Part, signals: ShiftSignals, span: Span) -> Record:
-    """The record with its inputs as measured: those of a fit are the expected ones."""
+    """Restore the inputs as measured: those of a fit are the expected ones."""
     return record_of(signals, span, part.record.fills).of_kinds(part.record.kinds)
 
 
 def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) -> Prior:
-    """`base` with the level and the smoothness of every μ."""
+    """Add the priors on level and smoothness of every μ to `base`."""
     level, spread = LEVEL
     mean, precision = base.mean.copy(), base.precision.copy()
     for name, table in tables.items():
@@ -170,12 +204,12 @@ def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) 
 
 
 def _evidence(normal: Normal, without: Prior, prior: Prior, point: Point) -> float:
-    """-2·log-evidence of a prior, but for a constant, with Q expanded at `point`."""
+    """Compute -2·log-evidence of a prior, up to a constant, with Q expanded at `point`."""
     gradient = normal.gradient - without.pull(point.values) + prior.pull(point.values)
     information = normal.data + prior.precision
     scale = np.sqrt(np.diag(information))
     unit = information / np.outer(scale, scale)
-    step = np.linalg.lstsq(unit, -gradient / scale, rcond=1e-13)[0] / scale
+    step = step_of(information, gradient)
     fall = float(2.0 * step @ gradient + step @ information @ step)
     known = np.flatnonzero(np.diag(prior.precision))
     block = prior.precision[np.ix_(known, known)]
@@ -189,7 +223,8 @@ def _curve(
     seen: FrictionCurve,
     systematic: FloatArray,
 ) -> FrictionCurve:
-    """μ between the knots over the slip range seen, with the band of noise and sensors."""
+    """Interpolate μ between the knots over the observed slips, with the band of noise and
+    sensors."""
     name, table, shape = one
     first = best.point.names.index(table.names(name)[0])
     part = slice(first, first + table.knots.size)
@@ -209,3 +244,21 @@ def _curve(
         stribeck_covariance=None,
         method=f"likelihood, {shape} shape",
     )
+
+
+def shaped(shape: Shape, mu: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Project μ (K,) at the knots, and its covariance (K, K), onto curves of `shape`."""
+    if shape is Shape.FREE:
+        return mu, covariance
+    matrix = np.tril(np.ones((mu.size, mu.size)))
+    if shape is Shape.FALLING:
+        matrix = matrix[::-1]
+    scale = np.sqrt(np.diag(covariance))
+    root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale)))
+    weighted = root @ (matrix / scale[:, None])
+    lower = np.concatenate([[-np.inf], np.zeros(mu.size - 1)])
+    found = lsq_linear(weighted, root @ (mu / scale), bounds=(lower, np.inf), tol=1e-12)
+    moving = np.flatnonzero(found.active_mask == 0)
+    inverse = np.linalg.inv(weighted[:, moving].T @ weighted[:, moving])
+    within = matrix[:, moving] @ inverse @ matrix[:, moving].T
+    return np.asarray(matrix @ found.x), np.asarray(within)

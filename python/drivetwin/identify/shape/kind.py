@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shapes of friction over slip, by the names used on the command line."""
+"""Prior shapes of friction over slip, by their names on the command line."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class Shape(StrEnum):
-    """What is known of μ over slip beforehand."""
+    """Prior knowledge of μ over slip."""
 
     FREE = "free"
     FALLING = "falling"

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from drivetwin.display import display_of, significant
-from drivetwin.identify.likelihood.sensitivity import AGE, FRICTION, SIZE, Sensitivity
+from drivetwin.identify.likelihood.tolerance import AGE, FRICTION, SIZE, Sensitivity
 from drivetwin.identify.result import FloatArray
 from drivetwin.parameters import spec_of
 from drivetwin.report.labels import channel_symbol, channel_unit, parameter_label

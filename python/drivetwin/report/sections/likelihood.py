@@ -15,8 +15,8 @@ from drivetwin.identify.likelihood.residuals import (
     residual_tests,
     white_residuals,
 )
-from drivetwin.identify.likelihood.sensitivity import sensitivity
 from drivetwin.identify.likelihood.slow import BLOCK
+from drivetwin.identify.likelihood.tolerance import sensitivity
 from drivetwin.identify.result import Identification
 from drivetwin.identify.signals import ShiftSignals
 from drivetwin.report.figures.residuals import residual_figure, residual_panels

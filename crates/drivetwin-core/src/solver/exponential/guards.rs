@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: MIT
+//! Guards of fixed steps: torques within their limits, speeds above zero, normal loads above zero.
+
+use crate::network::smooth::{Line, Sample};
+use crate::number::{Factor, Lane, Values};
+use crate::solver::exponential::propagator::{Bound, MAX_GUARDS, Propagator, SampleGuard};
+use crate::solver::exponential::samples::{ChannelState, InputSource, SampleBuffer, SampleColumn};
+
+/// Of the watched forms at the start of a sample, what torques are off their limits by or what speeds are,
+/// and what the forms are.
+pub type Guards<V> = [[V; 2]; MAX_GUARDS];
+
+/// Guards that never cross.
+pub fn inactive_guards<V: Values>() -> Guards<V> {
+    [[V::all(1.0), V::all(0.0)]; MAX_GUARDS]
+}
+
+impl<L: Lane, const N: usize> Propagator<L, N> {
+    /// Return true if every normal load stays above zero over samples, in all lanes.
+    #[inline(always)]
+    pub fn stays_loaded<S: InputSource<L>, const F: bool>(
+        &self,
+        source: &S,
+        samples: (usize, usize),
+    ) -> bool {
+        // A loop: the body of `all` would be compiled apart, for the least of all processors.
+        let mut loaded = true;
+        for load in &self.loads {
+            loaded &= load.stays_positive::<F>(source.bounds(load.input, samples));
+        }
+        loaded
+    }
+
+    /// Negative where a watched form may leave its limits within the sample that ends with these inputs,
+    /// states and channels, or a normal load falls there where `loads` are looked at; `guards` are moved on.
+    ///
+    /// Apart from what falls in the step: sums over a loop that start from nothing stay in vectors.
+    #[inline(always)]
+    pub fn crossed<V: Factor<L::Values>, const F: bool, const A: usize>(
+        &self,
+        guards: &mut Guards<L::Values>,
+        input: impl Fn(usize) -> V,
+        loads: bool,
+        at: (&[L; N], &[ChannelState<L>; A]),
+    ) -> L::Values {
+        let mut left = [L::Values::all(0.0)];
+        for (place, before) in guards.iter_mut().enumerate().take(self.guards.len()) {
+            let after = self.guard::<V, F, A>(place, &input, at.0, at.1);
+            self.may_cross::<F, _>(place, (before, &after.map(|value| [value])), &mut left);
+            *before = after;
+        }
+        if loads {
+            for load in &self.loads {
+                load.may_cross::<_, F, 1>(&[input(load.input)], &mut left);
+            }
+        }
+        left[0]
+    }
+
+    /// The same of `some` samples together, by what the trail has of them and by the inputs at their ends.
+    #[inline(always)]
+    pub fn crossed_in_block<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
+        &self,
+        guards: &mut Guards<L::Values>,
+        ends: impl Fn(usize) -> [V; W],
+        loads: bool,
+        trail: &SampleBuffer<L, N>,
+        from: usize,
+        some: usize,
+    ) -> [L::Values; W] {
+        let mut left = [L::Values::all(0.0); W];
+        for (place, before) in guards.iter_mut().enumerate().take(self.guards.len()) {
+            let after = self.guards_after::<_, F, A, W>(place, &ends, trail, from);
+            self.may_cross::<F, _>(place, (before, &after), &mut left);
+            *before = after.map(|values| values[some - 1]);
+        }
+        if loads {
+            for load in &self.loads {
+                load.may_cross::<_, F, W>(&ends(load.input), &mut left);
+            }
+        }
+        left
+    }
+
+    /// All guards at the start of a segment.
+    #[inline(always)]
+    pub fn guards<U: Factor<L, Values: Factor<L::Values>>, const F: bool, const A: usize>(
+        &self,
+        sample: &Sample<U>,
+        at: (&[L; N], &[ChannelState<L>; A]),
+    ) -> Guards<L::Values> {
+        let mut guards = inactive_guards();
+        for (place, guard) in guards.iter_mut().enumerate().take(self.guards.len()) {
+            *guard = self.guard::<_, F, A>(place, |input| sample[input][0].values(), at.0, at.1);
+        }
+        guards
+    }
+
+    /// Margin or speed, and value, of a watched form at one instant, by the values of inputs there.
+    #[inline(always)]
+    fn guard<V: Factor<L::Values>, const F: bool, const A: usize>(
+        &self,
+        place: usize,
+        input: impl Fn(usize) -> V,
+        x: &[L; N],
+        carry: &[ChannelState<L>; A],
+    ) -> [L::Values; 2] {
+        let SampleGuard { form, bound } = &self.guards[place];
+        let mut value = form.constant.values();
+        for drive in &self.drives {
+            value = input(drive.input).onto::<F>(drive.guards[place].values(), value);
+        }
+        for i in 0..self.columns() {
+            value = form.state[i].values().fma::<F>(x[i].values(), value);
+        }
+        for a in 0..A {
+            let carried = self.channels[a].torque(&carry[a]).values();
+            value = form.channels[a].values().fma::<F>(carried, value);
+        }
+        match bound {
+            Bound::Within { limit, side } => {
+                let Line { input: of, gain, offset } = limit;
+                let limit = input(*of).onto::<F>(gain.values(), offset.values());
+                [margin::<L, F>(*side, limit, value), value]
+            }
+            Bound::Above(row) => {
+                let mut speed = L::Values::all(0.0);
+                for i in 0..self.columns() {
+                    speed = row[i].values().fma::<F>(x[i].values(), speed);
+                }
+                [speed, value]
+            }
+        }
+    }
+
+    /// Margins or speeds, and values, of a guard at the ends of `W` samples from `from` on.
+    #[inline(always)]
+    fn guards_after<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
+        &self,
+        place: usize,
+        ends: &impl Fn(usize) -> [V; W],
+        trail: &SampleBuffer<L, N>,
+        from: usize,
+    ) -> [[L::Values; W]; 2] {
+        let SampleGuard { form, bound } = &self.guards[place];
+        let mut values = [form.constant.values(); W];
+        for drive in &self.drives {
+            add::<L, V, F, W>(&mut values, drive.guards[place], &ends(drive.input));
+        }
+        self.add_states::<F, W>(&mut values, &form.state, trail, from);
+        for a in 0..A {
+            let column: &[L; W] = after(trail.torques(a), from);
+            for k in 0..W {
+                values[k] = form.channels[a].values().fma::<F>(column[k].values(), values[k]);
+            }
+        }
+        match bound {
+            Bound::Within { limit, side } => {
+                let mut margins = [limit.offset.values(); W];
+                add::<L, V, F, W>(&mut margins, limit.gain, &ends(limit.input));
+                for k in 0..W {
+                    margins[k] = margin::<L, F>(*side, margins[k], values[k]);
+                }
+                [margins, values]
+            }
+            Bound::Above(row) => {
+                let mut speeds = [L::Values::all(0.0); W];
+                self.add_states::<F, W>(&mut speeds, row, trail, from);
+                [speeds, values]
+            }
+        }
+    }
+
+    /// Add a form over the states at the end of samples.
+    #[inline(always)]
+    fn add_states<const F: bool, const W: usize>(
+        &self,
+        sums: &mut [L::Values; W],
+        row: &[L; N],
+        trail: &SampleBuffer<L, N>,
+        from: usize,
+    ) {
+        for i in 0..self.columns() {
+            let column: &[L; W] = after(trail.states(i), from);
+            for k in 0..W {
+                sums[k] = row[i].values().fma::<F>(column[k].values(), sums[k]);
+            }
+        }
+    }
+
+    /// Make negative where a watched form may leave its limits within a sample, by these before and after
+    /// each.
+    ///
+    /// A torque that swings within limits in both signs is no smaller than its swing where it comes near one;
+    /// one that is bounded in one sign only (a freewheel's, power through a gear) is taken to be like that,
+    /// which it need not be: its release at the crest of a swing within one sample can be passed by.
+    /// Of a speed near zero its size says nothing: it stays above the least corner of the cubic through its
+    /// values and rates (Bernstein's form), to fourth order.
+    #[inline(always)]
+    fn may_cross<const F: bool, const W: usize>(
+        &self,
+        place: usize,
+        (before, after): (&[L::Values; 2], &[[L::Values; W]; 2]),
+        fallen: &mut [L::Values; W],
+    ) {
+        let [mut margin, mut value] = *before;
+        for k in 0..W {
+            let (margin_after, value_after) = (after[0][k], after[1][k]);
+            let left = if let Bound::Within { .. } = self.guards[place].bound {
+                let rise = (value_after - value).magnitude();
+                let size = value.magnitude().larger(value_after.magnitude());
+                let chord_deviation = self.chord_deviation[0]
+                    .values()
+                    .fma::<F>(rise, self.chord_deviation[1].values() * size);
+                margin.smaller(margin_after) - chord_deviation
+            } else {
+                let corners = (margin + value).smaller(margin_after - value_after);
+                corners.smaller(margin).smaller(margin_after)
+            };
+            fallen[k] = fallen[k].negative_with(left);
+            (margin, value) = (margin_after, value_after);
+        }
+    }
+}
+
+/// The samples after those from `from` on.
+#[inline(always)]
+fn after<L, const W: usize>(column: &SampleColumn<L>, from: usize) -> &[L; W] {
+    column[from + 1..].first_chunk().expect("stretches that divide a block")
+}
+
+/// Add multiples of inputs.
+#[inline(always)]
+fn add<L: Lane, V: Factor<L::Values>, const F: bool, const W: usize>(
+    sums: &mut [L::Values; W],
+    factor: L,
+    inputs: &[V; W],
+) {
+    for k in 0..W {
+        sums[k] = inputs[k].onto::<F>(factor.values(), sums[k]);
+    }
+}
+
+/// Distance of a torque to its limit, see [`Bound::Within`].
+#[inline(always)]
+fn margin<L: Lane, const F: bool>(side: L, limit: L::Values, torque: L::Values) -> L::Values {
+    (limit + torque).smaller(side.values().fma::<F>(-torque, limit))
+}
+
+impl<L: Lane> Line<L> {
+    /// Return true if the line stays above zero in all lanes while its input stays within bounds.
+    #[inline(always)]
+    fn stays_positive<const F: bool>(&self, [low, high]: [L::Values; 2]) -> bool {
+        let (gain, offset) = (self.gain.values(), self.offset.values());
+        // Above zero where its negative is below.
+        let below = |u| (-gain.fma::<F>(u, offset)).negative();
+        below(low) & below(high) == L::Values::all(-1.0).negative()
+    }
+
+    /// Make negative where the line falls below zero at the end of a sample.
+    #[inline(always)]
+    fn may_cross<V: Factor<L::Values>, const F: bool, const W: usize>(
+        &self,
+        ends: &[V; W],
+        fallen: &mut [L::Values; W],
+    ) {
+        for k in 0..W {
+            let load = ends[k].onto::<F>(self.gain.values(), self.offset.values());
+            fallen[k] = fallen[k].negative_with(load);
+        }
+    }
+}

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+//! Integrals of the motion of one mode over a step, by the series of its matrix: what the exact step
+//! operators are made of.
+//!
+//! Plain loops throughout: the body of a closure would be compiled apart, for the least of all processors.
+//! Matrices are written in place: of several runs side by side they are large, and copied where returned.
+
+use crate::number::{Lane, Number, Values};
+use crate::solver::tolerances::SERIES_RTOL;
+
+/// A square matrix by rows.
+type Square<T, const N: usize> = [[T; N]; N];
+
+/// [`phi_functions`], S_0 first.
+pub type PhiFunctions<T, const N: usize> = [Square<T, N>; FORCING_DEGREE + 1];
+
+/// What a channel's cubic over a sample is a sum of, with `t` from 0 to 1 over it: 1, t, t², and Hermite's
+/// `3t² - 2t³` and `t³ - t²`, which raise the value and the slope at its end and nothing else.
+pub const N_BASIS: usize = 5;
+/// Powers of time that a force is integrated with.
+pub const FORCING_DEGREE: usize = 4;
+/// Most terms of the series.
+const MAX_SERIES: usize = 40;
+
+/// Coefficients of the series of the operators but for its first factor, and their number. Those that a run
+/// does not need are zero.
+#[inline(always)]
+fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], h: f64, reach: T) -> usize {
+    let mut left = T::Values::of(1.0);
+    all[0] = left;
+    let mut ended = 0;
+    for i in 1..MAX_SERIES {
+        left *= reach.re() / i as f64;
+        ended |= left.mask_where(|left| left < SERIES_RTOL);
+        if ended == T::RUNS {
+            return i;
+        }
+        all[i] = (all[i - 1] * h / (i + FORCING_DEGREE) as f64).with(ended, T::Values::zero_());
+    }
+    MAX_SERIES
+}
+
+/// `S_k = Σ_i A^i h^(i+k) / (i+k)!` for k = 0 .. CUBIC: S_0 is the transition matrix, and
+/// `k! S_(k+1) e` the response to a force `e t^k`. The highest by its series, the lower ones by
+/// `S_(k-1) = I h^(k-1)/(k-1)! + A S_k`.
+#[inline(always)]
+pub fn phi_functions<T: Number, const F: bool, const N: usize>(
+    a: &Square<T, N>,
+    h: f64,
+    reach: T,
+    all: &mut PhiFunctions<T, N>,
+) {
+    let mut series = [T::Values::zero_(); MAX_SERIES + 2];
+    let terms = coefficients::<T>(&mut series, h, reach);
+    let mut weights = [1.0; FORCING_DEGREE + 1];
+    for k in 1..=FORCING_DEGREE {
+        weights[k] = weights[k - 1] * h / k as f64;
+    }
+    let sum = &mut all[FORCING_DEGREE];
+    polynomial::<T, F, N>(a, &series[..terms.next_multiple_of(3)], sum);
+    for i in 0..N {
+        for j in 0..unrolled::<T, N>() {
+            sum[i][j] *= weights[FORCING_DEGREE];
+        }
+    }
+    for k in (0..FORCING_DEGREE).rev() {
+        let (lower, higher) = all.split_at_mut(k + 1);
+        multiply::<T, F, N>(a, &higher[0], &mut lower[k]);
+        add_to_diagonal(&mut lower[k], T::of(weights[k]));
+    }
+}
+
+/// `Σ c_i A^i` over whole threes of coefficients, by Horner's rule over the cube: less than half as many
+/// products of matrices as over A (Paterson and Stockmeyer 1973).
+#[inline(always)]
+fn polynomial<T: Number, const F: bool, const N: usize>(
+    a: &Square<T, N>,
+    coefficients: &[T::Values],
+    sum: &mut Square<T, N>,
+) {
+    let [mut square, mut cube, mut product] = [[[T::zero_(); N]; N]; 3];
+    multiply::<T, F, N>(a, a, &mut square);
+    multiply::<T, F, N>(a, &square, &mut cube);
+    for at in (0..coefficients.len()).step_by(3).rev() {
+        if at + 3 < coefficients.len() {
+            multiply::<T, F, N>(&cube, sum, &mut product);
+        }
+        for i in 0..N {
+            for j in 0..unrolled::<T, N>() {
+                let low = a[i][j].fma_values::<F>(coefficients[at + 1], product[i][j]);
+                sum[i][j] = square[i][j].fma_values::<F>(coefficients[at + 2], low);
+            }
+        }
+        add_to_diagonal(sum, T::promote(coefficients[at]));
+    }
+}
+
+#[inline(always)]
+fn add_to_diagonal<T: Number, const N: usize>(a: &mut Square<T, N>, value: T) {
+    for i in 0..N {
+        a[i][i] += value;
+    }
+}
+
+/// Product of two matrices, in place of what is in `out`.
+#[inline(always)]
+fn multiply<T: Number, const F: bool, const N: usize>(
+    a: &Square<T, N>,
+    b: &Square<T, N>,
+    out: &mut Square<T, N>,
+) {
+    for i in 0..N {
+        for j in 0..N {
+            let mut sum = T::zero_();
+            for k in 0..unrolled::<T, N>() {
+                sum = a[i][k].fma::<F>(b[k][j], sum);
+            }
+            out[i][j] = sum;
+        }
+    }
+}
+
+/// A matrix times a vector.
+#[inline(always)]
+pub fn apply<T: Number, const F: bool, const N: usize>(a: &Square<T, N>, v: &[T; N]) -> [T; N] {
+    let mut out = [T::zero_(); N];
+    for i in 0..N {
+        out[i] = dot::<T, F, N>(&a[i], v);
+    }
+    out
+}
+
+/// Scalar product.
+#[inline(always)]
+pub fn dot<T: Number, const F: bool, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
+    let mut sum = T::zero_();
+    for i in 0..unrolled::<T, N>() {
+        sum = a[i].fma::<F>(b[i], sum);
+    }
+    sum
+}
+
+/// `N`, but hidden from the compiler where a number is a vector already: a loop that it unrolls it would
+/// also take for several entries at once, and gather these.
+#[inline(always)]
+pub fn unrolled<T: Number, const N: usize>() -> usize {
+    if T::DERIVATIVES || T::RUNS > 1 { std::hint::black_box(N) } else { N }
+}
+
+/// Response of the state at the end to a force `e` times each of the [`N_BASIS`].
+#[inline(always)]
+pub fn forcing_response<T: Number, const F: bool, const N: usize>(
+    s: &PhiFunctions<T, N>,
+    force: &[T; N],
+    h: f64,
+) -> [[T; N]; N_BASIS] {
+    // Those to 1, t, t² and t³ first.
+    let mut all = [[T::zero_(); N]; N_BASIS];
+    let mut weight = 1.0;
+    for k in 0..FORCING_DEGREE {
+        weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
+        let response = apply::<T, F, N>(&s[k + 1], force);
+        for i in 0..unrolled::<T, N>() {
+            all[k][i] = response[i] * weight;
+        }
+    }
+    for i in 0..unrolled::<T, N>() {
+        let (square, cube) = (all[2][i], all[3][i]);
+        all[3][i] = square * 3.0 - cube * 2.0;
+        all[4][i] = cube - square;
+    }
+    all
+}

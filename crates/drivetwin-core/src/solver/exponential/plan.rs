@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT
+//! Plan of fixed steps in the present mode: the propagator and its guards.
+
+use crate::network::channel;
+use crate::network::smooth::{Law, Line, MAX_INPUTS, line_of};
+use crate::network::{Cell, Channel, GearState, Network, Row};
+use crate::number::{Lane, Number};
+use crate::solver::exponential::propagator::{
+    MAX_ACTIVE, MAX_GUARDS, MAX_STATES, Propagator, SizedPropagator,
+};
+use crate::solver::exponential::propagator_cache::PropagatorCache;
+use crate::solver::exponential::propagator_cache::PropagatorKey;
+use crate::solver::hybrid::event::FrictionState;
+use crate::solver::hybrid::state::HybridState;
+use crate::solver::tolerances::TORQUE_ATOL;
+use std::sync::Arc;
+
+/// Most states of a network over `T` that is marched. With derivatives the gain with more does not pay for the
+/// code, and several runs side by side are drivelines of two clutches.
+const fn max_states<T: Lane>() -> usize {
+    if T::RUNS > 1 {
+        4
+    } else if T::DERIVATIVES {
+        8
+    } else {
+        MAX_STATES
+    }
+}
+
+/// Return true if propagators can pass the samples of a network.
+pub fn supports_fixed_step<T: Number>(network: &Network<T>) -> bool {
+    let smooth = |channel: &Channel<T>| {
+        matches!(channel.law, channel::Law::Friction { .. } | channel::Law::Quadratic(_))
+    };
+    network.states() <= max_states::<T>()
+        && network.prescribed.is_empty()
+        && network.mechanism.inputs.len() <= MAX_INPUTS
+        && network.channels.iter().all(smooth)
+}
+
+/// Propagator and active channels of fixed steps.
+pub(crate) struct StepPlan<T> {
+    /// Operators of the present mode.
+    pub operators: SizedPropagator<T>,
+    /// Channels that are not off.
+    pub active: Vec<usize>,
+}
+
+impl<T: Number> HybridState<'_, T> {
+    /// Plan fixed steps of length `h` [s]. Return None if the mode does not allow them.
+    pub(crate) fn plan_steps(
+        &mut self,
+        propagators: &mut PropagatorCache<T>,
+        h: f64,
+    ) -> Option<StepPlan<T>> {
+        if !self.is_simple() {
+            return None;
+        }
+        let on = |j: &usize| self.cells[*j] != Cell::Off;
+        let active: Vec<usize> = (0..self.cells.len()).filter(on).collect();
+        let operators = self.operators(propagators, &active, h)?;
+        Some(StepPlan { operators, active })
+    }
+
+    /// Operators of the present mode, if they apply.
+    fn operators(
+        &mut self,
+        propagators: &mut PropagatorCache<T>,
+        active: &[usize],
+        h: f64,
+    ) -> Option<SizedPropagator<T>> {
+        if active.len() > MAX_ACTIVE {
+            return None;
+        }
+        let key = self.key(active, h);
+        if let Some(known) = propagators.entries.get(&key) {
+            return known.clone();
+        }
+        let laws = active.iter().map(|&j| Law::of(&self.network.channels[j], self.cells[j]));
+        let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| match self.network.states() {
+            0..=4 => self.build::<4>(active, &laws, h).map(|o| SizedPropagator::Four(Arc::new(o))),
+            5..=8 if T::RUNS == 1 => {
+                self.build::<8>(active, &laws, h).map(|o| SizedPropagator::Eight(Arc::new(o)))
+            }
+            9..=12 if max_states::<T>() == MAX_STATES => {
+                self.build::<12>(active, &laws, h).map(|o| SizedPropagator::Twelve(Arc::new(o)))
+            }
+            13..=MAX_STATES if max_states::<T>() == MAX_STATES => self
+                .build::<MAX_STATES>(active, &laws, h)
+                .map(|o| SizedPropagator::Many(Arc::new(o))),
+            _ => None,
+        });
+        propagators.entries.insert(key, built.clone());
+        built
+    }
+
+    fn key(&self, active: &[usize], h: f64) -> PropagatorKey {
+        let mut branches = [0; 3];
+        let mut pieces = [0; MAX_ACTIVE];
+        for (slot, &j) in active.iter().enumerate() {
+            branches[0] |= 1 << j;
+            if let Cell::Moving { sign, piece } = self.cells[j] {
+                branches[1] |= u64::from(sign < 0.0) << j;
+                pieces[slot] = piece as u8;
+            }
+        }
+        for (j, row) in self.rows.iter().enumerate() {
+            branches[2] |= u64::from(self.pressed[j]) << j;
+            branches[2] |= u64::from(matches!(row, FrictionState::Slipping { .. })) << (32 + j);
+        }
+        PropagatorKey { mode: self.mode.key, branches, pieces, step: (h * 1e12).round() as u64 }
+    }
+
+    /// Return true if fixed steps cover the present mode.
+    fn is_simple(&self) -> bool {
+        self.network.prescribed.is_empty()
+            && self.network.mechanism.inputs.len() <= MAX_INPUTS
+            && !self.mode.redundant
+            && !self.blocked.contains(&true)
+            && !self.released.contains(&true)
+            && !self.rows.iter().any(FrictionState::is_saturated)
+            && self.gears.iter().all(|gear| *gear != GearState::Locked)
+    }
+
+    /// Build operators that watch all guards of the present mode.
+    fn build<const N: usize>(
+        &self,
+        active: &[usize],
+        laws: &[Law<T>],
+        h: f64,
+    ) -> Option<Propagator<T, N>> {
+        let mut operators = Propagator::build(self.network, &self.mode, (active, laws), h)?;
+        self.guard_frictions(active, h, &mut operators);
+        self.guard_gears(active, h, &mut operators);
+        (operators.guards.len() <= MAX_GUARDS).then_some(operators)
+    }
+
+    fn guard_frictions<const N: usize>(
+        &self,
+        active: &[usize],
+        h: f64,
+        operators: &mut Propagator<T, N>,
+    ) {
+        for (j, row) in self.network.frictions.iter().enumerate() {
+            let side = if self.pressed[j] { 1.0 } else { -1.0 };
+            let load = line_of(&row.normal);
+            // At the end of a sample the load is a sum, with round-off of its own.
+            let nothing =
+                row.normal.load_tolerance() + if self.pressed[j] { TORQUE_ATOL } else { 0.0 };
+            let above = Line { offset: load.offset - nothing, ..load };
+            operators.loads.push(above.map(|v| v * side));
+            match self.rows[j] {
+                FrictionState::Sticking => {
+                    let mu = if self.pressed[j] {
+                        row.law.at(T::zero_()) * row.peak
+                    } else {
+                        T::zero_()
+                    };
+                    let position = self.mode.stuck.iter().position(|&s| s == Row::Friction(j));
+                    let position = position.expect("a stuck element belongs to the mode");
+                    let torque = self.mode.stuck_torque.row(position);
+                    let mut limit = load.map(|v| v * mu);
+                    limit.offset += if row.one_way { TORQUE_ATOL } else { 0.0 };
+                    operators.guard_torque(self.network, active, torque, limit, !row.one_way);
+                }
+                FrictionState::Slipping { sign } if !active.contains(&j) => {
+                    let speed: Vec<T> = row.slip.iter().map(|&c| c * sign).collect();
+                    operators.guard_speed(self.network, &self.mode, active, &speed, h);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn guard_gears<const N: usize>(
+        &self,
+        active: &[usize],
+        h: f64,
+        operators: &mut Propagator<T, N>,
+    ) {
+        for (i, gear) in self.network.losses.iter().enumerate() {
+            let GearState::Meshing { sign, power_reversed } = self.gears[i] else { continue };
+            if !gear.loss.is_directional() {
+                continue;
+            }
+            let side = if power_reversed { -1.0 } else { 1.0 };
+            let scaled = |row: &[T], by: f64| row.iter().map(|&c| c * by).collect::<Vec<T>>();
+            let power = scaled(self.mode.gear_torque(self.network).row(i), sign * side);
+            let limit = constant(-gear.loss.threshold() * side + TORQUE_ATOL);
+            operators.guard_torque(self.network, active, &power, limit, false);
+            let speed = scaled(&gear.speed, sign);
+            operators.guard_speed(self.network, &self.mode, active, &speed, h);
+        }
+    }
+}
+
+fn constant<T: Number>(value: T) -> Line<T> {
+    Line { input: 0, gain: T::zero_(), offset: value }
+}

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+//! Active set of the friction programme: the trial state of every friction element and gear.
+
+use crate::network::{GearState, Row};
+use crate::solver::hybrid::event::FrictionState;
+
+/// A trial: the state of every friction element and of every lossy gear.
+#[derive(Clone, PartialEq)]
+pub(crate) struct ActiveSet {
+    /// Friction elements.
+    pub rows: Vec<FrictionState>,
+    /// Lossy gears.
+    pub gears: Vec<GearState>,
+}
+
+impl ActiveSet {
+    /// Set a row to sticking.
+    pub fn rest(&mut self, row: Row) {
+        match row {
+            Row::Friction(j) => self.rows[j] = FrictionState::Sticking,
+            Row::Gear(i) => self.gears[i] = GearState::Locked,
+        }
+    }
+
+    /// Set a row to slipping in a direction.
+    pub fn move_off(&mut self, row: Row, sign: f64) {
+        match row {
+            Row::Friction(j) => self.rows[j] = FrictionState::Slipping { sign },
+            Row::Gear(i) => self.gears[i] = GearState::Meshing { sign, power_reversed: false },
+        }
+    }
+
+    /// Count the friction elements that slip, and those that do not stick.
+    pub fn moving_off(&self, candidates: &[Row]) -> (usize, usize) {
+        let friction =
+            |row: &Row| if let Row::Friction(j) = *row { Some(self.rows[j]) } else { None };
+        let rows = || candidates.iter().filter_map(friction);
+        let moving = rows().filter(|row| matches!(row, FrictionState::Slipping { .. })).count();
+        (moving, moving + rows().filter(FrictionState::is_saturated).count())
+    }
+
+    /// Reverse the power direction of a meshing gear.
+    pub fn reverse_power(&mut self, i: usize) {
+        if let GearState::Meshing { power_reversed, .. } = &mut self.gears[i] {
+            *power_reversed = !*power_reversed;
+        }
+    }
+
+    /// Direction in which a row moves, none at rest or without capacity.
+    pub fn direction(&self, row: Row) -> Option<f64> {
+        match row {
+            Row::Friction(j) => match self.rows[j] {
+                FrictionState::Slipping { sign } => Some(sign),
+                _ => None,
+            },
+            Row::Gear(i) => match self.gears[i] {
+                GearState::Meshing { sign, .. } => Some(sign),
+                GearState::Locked => None,
+            },
+        }
+    }
+}

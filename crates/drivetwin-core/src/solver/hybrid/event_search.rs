@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: MIT
+//! Guards: polynomials that must stay positive while a mode holds, and the earliest that falls.
+
+use crate::network::{GearState, Row};
+use crate::number::{Lane, Number, Pack, Real, Series, TERMS, Values, evaluate, slope};
+use crate::solver::hybrid::event::{EventCause, FrictionState};
+use crate::solver::hybrid::state::HybridState;
+use crate::solver::hybrid::zero_crossing::first_zero_crossing;
+use crate::solver::lane_mask::lanes_in;
+use crate::solver::simd::{Kernel, dispatch_simd};
+use crate::solver::tolerances::{
+    ACCELERATION_ATOL, BOUND_RTOL, GRAZING_RTOL, RELEASE_RATE_RTOL, SUM_RTOL, TORQUE_ATOL,
+    sum_and_scale,
+};
+
+/// The earliest fall within `h` [s], refined so that the time carries derivatives, and whether it
+/// grazes.
+pub fn earliest<T: Real>(state: &HybridState<'_, T>, h: f64) -> Option<(T, EventCause, bool)> {
+    let mut best: Option<(f64, Series<T>, EventCause)> = None;
+    all_guards(state, &mut |series: Series<T>, cause: EventCause| {
+        let horizon = best.as_ref().map_or(h, |b| b.0);
+        let (falls, t) = first_zero_crossing(&series, state.expansion.order, 1, horizon);
+        if falls == 1 && best.as_ref().is_none_or(|b| t < b.0) {
+            best = Some((t, series, cause));
+        }
+    });
+    best.map(|(t, series, cause)| {
+        let order = state.expansion.order;
+        (refined(&series, order, t), cause, grazes(&series, order, t, h))
+    })
+}
+
+/// The earliest falls of several runs, `runs` as bits, each within its own `h` [s].
+pub fn earliest_per_lane<const K: usize>(
+    state: &HybridState<'_, Pack<K>>,
+    runs: u32,
+    h: Pack<K>,
+) -> [Option<(f64, EventCause)>; K] {
+    let (mut causes, mut fallen, mut earliest) = ([None; K], 0, h);
+    all_guards(state, &mut |series: Series<Pack<K>>, cause: EventCause| {
+        let guard = (&series, state.expansion.order);
+        let (falls, t) = dispatch_simd(ZeroCrossingKernel { guard, span: (runs, earliest) });
+        let earlier = falls & (!fallen | (earliest - t).mask_where(|left| left > 0.0));
+        lanes_in(earlier).for_each(|run| causes[run] = Some(cause));
+        earliest = earliest.with(earlier, t);
+        fallen |= earlier;
+    });
+    std::array::from_fn(|run| causes[run].map(|cause| (earliest.0[run], cause)))
+}
+
+/// [`first_zero_crossing`], to be dispatched.
+struct ZeroCrossingKernel<'s, const K: usize> {
+    guard: (&'s Series<Pack<K>>, usize),
+    span: (u32, Pack<K>),
+}
+
+impl<const K: usize> Kernel for ZeroCrossingKernel<'_, K> {
+    type Output = (u32, Pack<K>);
+
+    #[inline(always)]
+    fn run<const F: bool>(self) -> Self::Output {
+        first_zero_crossing(self.guard.0, self.guard.1, self.span.0, self.span.1)
+    }
+}
+
+/// Hand on every guard with what its fall causes.
+fn all_guards<T: Number>(
+    state: &HybridState<'_, T>,
+    consider: &mut impl FnMut(Series<T>, EventCause),
+) {
+    for j in 0..state.rows.len() {
+        friction_guards(state, j, consider);
+    }
+    for i in 0..state.gears.len() {
+        gear_guards(state, i, consider);
+    }
+    for (i, channel) in state.network.channels.iter().enumerate() {
+        let series = &state.expansion.channels[i];
+        for (border, next) in channel.borders(state.cells[i], &state.expansion.inputs, series) {
+            consider(border, EventCause::BranchBoundary(i, next));
+        }
+    }
+}
+
+fn friction_guards<T: Number>(
+    state: &HybridState<'_, T>,
+    j: usize,
+    consider: &mut impl FnMut(Series<T>, EventCause),
+) {
+    let row = &state.network.frictions[j];
+    let normal = row.normal.series(&state.expansion.inputs);
+    let pressed = state.pressed[j];
+    let mut load = if pressed { normal } else { negative(normal) };
+    if !pressed {
+        load[0] += row.normal.load_tolerance();
+    }
+    consider(load, EventCause::LoadOnset(j));
+    match state.rows[j] {
+        FrictionState::Open | FrictionState::Saturated { .. } => {}
+        FrictionState::Slipping { sign } => {
+            let slip = &state.expansion.channels[j].arguments[0];
+            let cause = EventCause::SlipZero(Row::Friction(j));
+            consider(departing(slip, sign, state.released[j]), cause);
+        }
+        FrictionState::Sticking => {
+            let torque = holding_torque(state, Row::Friction(j));
+            let capacity = row.law.at(T::zero_()) * row.peak;
+            let mut cap = scaled(&normal, if pressed { capacity } else { T::zero_() });
+            cap[0] += balanced(state) * BOUND_RTOL + if row.one_way { TORQUE_ATOL } else { 0.0 };
+            consider(combined(&cap, &torque, 1.0), EventCause::TorqueLimit(Row::Friction(j), -1.0));
+            if !row.one_way {
+                consider(
+                    combined(&cap, &torque, -1.0),
+                    EventCause::TorqueLimit(Row::Friction(j), 1.0),
+                );
+            }
+        }
+    }
+}
+
+fn gear_guards<T: Number>(
+    state: &HybridState<'_, T>,
+    i: usize,
+    consider: &mut impl FnMut(Series<T>, EventCause),
+) {
+    let gear = &state.network.losses[i];
+    if !gear.loss.is_directional() {
+        return;
+    }
+    let torque = state.expansion.form(state.network, state.mode.gear_torque(state.network).row(i));
+    match state.gears[i] {
+        GearState::Meshing { sign, power_reversed } => {
+            let mut power = scaled(&torque, T::of(sign));
+            power[0] -= gear.loss.threshold();
+            let mut power = if power_reversed { scaled(&power, T::of(-1.0)) } else { power };
+            power[0] += balanced(state) * SUM_RTOL + without_direction(state, i);
+            consider(power, EventCause::PowerReversal(i));
+            if state.blocked[i] {
+                return;
+            }
+            let released = state.released[state.rows.len() + i];
+            let speed = state.expansion.speed_form(&gear.speed);
+            consider(departing(&speed, sign, released), EventCause::SlipZero(Row::Gear(i)));
+        }
+        GearState::Locked => {
+            let loss = holding_torque(state, Row::Gear(i));
+            let bounds = gear.loss.bounds();
+            let line = |(slope, drag): (T, T)| {
+                let mut line = scaled(&torque, slope);
+                line[0] += drag;
+                line
+            };
+            let mut upper = larger(bounds.upper.map(line));
+            let mut lower = scaled(&larger(bounds.lower.map(line).map(negative)), T::of(-1.0));
+            upper[0] += TORQUE_ATOL;
+            lower[0] -= TORQUE_ATOL;
+            consider(combined(&upper, &loss, -1.0), EventCause::TorqueLimit(Row::Gear(i), 1.0));
+            consider(combined(&loss, &lower, -1.0), EventCause::TorqueLimit(Row::Gear(i), -1.0));
+        }
+    }
+}
+
+/// The line that is the larger one now; where the other takes over the mode is decided anew.
+fn larger<T: Number>([a, b]: [Series<T>; 2]) -> Series<T> {
+    let [above, level] =
+        [|a, b| a > b, |a, b| a == b].map(|say| a[0].re().decide_with(b[0].re(), say));
+    let ahead = above || (level && a[1].re().decide_with(b[1].re(), |a, b| a >= b));
+    if ahead { a } else { b }
+}
+
+fn holding_torque<T: Number>(state: &HybridState<'_, T>, row: Row) -> Series<T> {
+    let position = state.mode.stuck.iter().position(|&s| s == row);
+    let position = position.expect("what is at rest belongs to the mode");
+    state.expansion.form(state.network, state.mode.stuck_torque.row(position))
+}
+
+/// Sum of the torques that elements at rest hold [N·m]: what they balance leaves round-off in others.
+fn balanced<T: Number>(state: &HybridState<'_, T>) -> T {
+    let held = state.mode.stuck.iter().map(|&row| holding_torque(state, row)[0].re());
+    T::promote(held.fold(T::Values::zero_(), |sum, torque| sum + torque.magnitude()))
+}
+
+/// Torque [N·m] through a rolling gear of which the direction is round-off.
+fn without_direction<T: Number>(state: &HybridState<'_, T>, i: usize) -> T {
+    let mut basis = Vec::new();
+    state.expansion.basis_at(state.network, T::zero_(), &mut basis);
+    let row = state.mode.gear_torque(state.network).row(i);
+    T::promote(sum_and_scale(row, &basis).1 * BOUND_RTOL + T::Values::of(TORQUE_ATOL))
+}
+
+/// Slip in its direction. What is released at this instant starts from exact zero, and where static
+/// and kinetic capacities agree also from zero acceleration: what is left of these beside the next term, or
+/// against its direction, is round-off and would look like an immediate return.
+fn departing<T: Number>(slip: &Series<T>, sign: f64, released: bool) -> Series<T> {
+    let mut guard = scaled(slip, T::of(sign));
+    if released {
+        guard[0] = T::zero_();
+        let (rate, bend) = (guard[1].re(), guard[2].re().magnitude());
+        let small = (rate.magnitude() - bend * RELEASE_RATE_RTOL).mask_where(|left| left <= 0.0);
+        let against = rate.mask_where(|rate| (-ACCELERATION_ATOL..0.0).contains(&rate));
+        guard[1] = guard[1].with(small | against, T::zero_());
+    }
+    guard
+}
+
+fn negative<T: Number>(series: Series<T>) -> Series<T> {
+    scaled(&series, T::of(-1.0))
+}
+
+fn scaled<T: Number>(series: &Series<T>, factor: T) -> Series<T> {
+    series.map(|c| c * factor)
+}
+
+fn combined<T: Number>(a: &Series<T>, b: &Series<T>, sign: f64) -> Series<T> {
+    let mut out = [T::zero_(); TERMS];
+    for (o, (&a, &b)) in out.iter_mut().zip(a.iter().zip(b)) {
+        *o = a + b * sign;
+    }
+    out
+}
+
+/// Whether a guard falls so flatly that its parabola dips below zero by next to nothing: the event, and
+/// with it everything after, then hangs on round-off and has no usable derivative.
+fn grazes<T: Real>(guard: &Series<T>, order: usize, t: f64, h: f64) -> bool {
+    let g: Series<f64> = guard.map(|c| c.re());
+    let (fall, mut bend, mut size, mut power) = (slope(&g, order, t), 0.0, 0.0, 1.0);
+    for k in (2..=order).rev() {
+        bend = bend * t + g[k] * (k * (k - 1)) as f64;
+    }
+    for c in &g[..=order] {
+        size += c.abs() * power;
+        power *= h;
+    }
+    t > 0.0 && bend > 0.0 && fall * fall < 2.0 * bend * GRAZING_RTOL * size
+}
+
+/// One Newton step over the number type: the time of the event then carries its derivatives,
+/// dt = -g_p / g_t.
+fn refined<T: Real>(guard: &Series<T>, order: usize, t: f64) -> T {
+    let at = T::of(t);
+    let rate = slope(guard, order, at);
+    if t == 0.0 || rate.re() == 0.0 {
+        return at;
+    }
+    let correction = evaluate(guard, order, at) / rate;
+    let correction = correction - correction.re();
+    at - correction
+}

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+//! Hybrid automaton of the driveline: modes, guards, events and Taylor steps between them.
+
+pub(crate) mod active_set;
+pub(crate) mod event;
+pub(crate) mod event_search;
+pub(crate) mod mode_cache;
+pub(crate) mod stall;
+pub(crate) mod state;
+pub(crate) mod stick_slip;
+pub(crate) mod taylor;
+pub(crate) mod transition;
+pub(crate) mod zero_crossing;

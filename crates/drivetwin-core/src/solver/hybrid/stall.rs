@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+//! Detection of runs without advance: stalls, Zeno behaviour and step underflow.
+
+use crate::solver::tolerances::{
+    ADVANCE_RTOL, MIN_ADVANCE_OF_EVENTS, MIN_ADVANCE_OF_STEPS, TIME_RTOL,
+};
+
+/// Steps without progress after which a run moves on and decides anew.
+const MAX_STALLED: usize = 20;
+/// Events over which a run must advance by at least [`MIN_ADVANCE_OF_EVENTS`].
+const PROGRESS_WINDOW: usize = 1000;
+/// Steps over which a run must advance by at least [`MIN_ADVANCE_OF_STEPS`].
+const STEP_WINDOW: usize = 10_000;
+
+/// Counters of the advance of a run over its last steps.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StallDetector {
+    /// Events in a row without progress.
+    stalled: usize,
+    /// Events since, and time of, the last look at these.
+    events: (usize, f64),
+    /// Steps since, and time of, the last look at these.
+    steps: (usize, f64),
+}
+
+/// Kind of a stall.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Stall {
+    /// Steps are too small.
+    TooSmall,
+    /// Events accumulate (Zeno behaviour).
+    Zeno,
+}
+
+/// Return true if a step of length `h` before the time `end` [s] is lost in round-off.
+pub(crate) fn underflows(h: f64, end: f64) -> bool {
+    h < TIME_RTOL * (1.0 + end.abs())
+}
+
+impl StallDetector {
+    /// Create the detector of a run that starts at `time` [s].
+    pub fn from(time: f64) -> Self {
+        Self { stalled: 0, events: (0, time), steps: (0, time) }
+    }
+
+    /// Return true if events at one instant do not end.
+    pub fn is_stalled(&self) -> bool {
+        self.stalled >= MAX_STALLED
+    }
+
+    /// Record a step: the time it led to, its length [s], and whether an event ended it.
+    pub fn note(&mut self, time: f64, length: f64, event: bool) -> Result<(), Stall> {
+        self.steps.0 += 1;
+        if self.steps.0 == STEP_WINDOW {
+            if time - self.steps.1 < MIN_ADVANCE_OF_STEPS {
+                return Err(Stall::TooSmall);
+            }
+            self.steps = (0, time);
+        }
+        let advances = length > ADVANCE_RTOL * (1.0 + time.abs());
+        self.stalled = if advances || !event { 0 } else { self.stalled + 1 };
+        self.events.0 += usize::from(event);
+        if event && self.events.0 == PROGRESS_WINDOW {
+            if time - self.events.1 < MIN_ADVANCE_OF_EVENTS {
+                return Err(Stall::Zeno);
+            }
+            self.events = (0, time);
+        }
+        Ok(())
+    }
+}

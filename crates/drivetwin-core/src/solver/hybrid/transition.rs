@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: MIT
+//! Changes of mode at events and at jumps of the inputs.
+
+use crate::network::channel::form;
+use crate::network::linalg::Matrix;
+use crate::network::{GearState, Hold, ModeKey, Row};
+use crate::number::{Number, Values};
+use crate::solver::hybrid::active_set::ActiveSet;
+use crate::solver::hybrid::event::{Event, EventCause, EventKind, FrictionState, signum_nonneg};
+use crate::solver::hybrid::state::{HybridState, self_locking};
+use crate::solver::status::Status;
+use crate::solver::tolerances::{STALLED_SLIP, START_SPEED_RTOL, VENT_TIME};
+
+impl<T: Number> HybridState<'_, T> {
+    /// Carry out what an event caused; the inputs are those about this instant.
+    pub(crate) fn change(&mut self, cause: EventCause) -> Result<(), Status> {
+        match cause {
+            EventCause::SlipZero(row) => {
+                self.apply_locking_impulse(&[row]);
+                self.decide(None)
+            }
+            EventCause::LoadOnset(j) => {
+                self.press(j, !self.pressed[j]);
+                self.decide(None)
+            }
+            EventCause::TorqueLimit(Row::Friction(j), _)
+            | EventCause::TorqueLimitAtKnot(Row::Friction(j))
+                if self.is_about_to_vent(j) =>
+            {
+                self.press(j, false);
+                self.decide(None)
+            }
+            EventCause::TorqueLimit(row, sign) => {
+                self.apply_locking_impulse(&[]);
+                self.decide(Some((row, sign)))
+            }
+            EventCause::TorqueLimitAtKnot(_) => {
+                self.apply_locking_impulse(&[]);
+                self.decide(None)
+            }
+            EventCause::PowerReversal(i) => {
+                if let GearState::Meshing { power_reversed, .. } = &mut self.gears[i] {
+                    *power_reversed = !*power_reversed;
+                }
+                self.decide(None)
+            }
+            EventCause::Stalled => {
+                self.apply_locking_impulse(&self.nearly_at_rest());
+                self.decide(None)
+            }
+            EventCause::BranchBoundary(channel, cell) => {
+                self.cells[channel] = cell;
+                Ok(())
+            }
+        }
+    }
+
+    /// Speed that a row keeps at zero where it is at rest.
+    fn slip(&self, row: Row) -> T {
+        form(self.network.slip_of(row), &self.x)
+    }
+
+    /// Rows that can have moved only within the moment that a stalled run moved on.
+    fn nearly_at_rest(&self) -> Vec<Row> {
+        let frictions = (0..self.rows.len()).filter(|&j| self.rows[j] != FrictionState::Open);
+        let directional = |i: &usize| self.network.losses[*i].loss.is_directional();
+        let gears = (0..self.gears.len()).filter(directional);
+        let rows = frictions.map(Row::Friction).chain(gears.map(Row::Gear));
+        rows.filter(|&row| self.slip(row).re().decide(|slip| slip.abs() < STALLED_SLIP)).collect()
+    }
+
+    /// Whether the normal load is gone within round-off of the time: what is left of the capacity is
+    /// then no larger than what is left of the torque.
+    fn is_about_to_vent(&self, j: usize) -> bool {
+        let normal = &self.network.frictions[j].normal;
+        let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
+        self.pressed[j] && now.decide_with(rate, |now, rate| now <= -rate * VENT_TIME)
+    }
+
+    /// The first element of which the normal load is gone from an instant on in some runs, as bits, by the values
+    /// of inputs there and their rates: a load that ends at nothing falls through nothing.
+    pub(crate) fn find_unloaded(
+        &self,
+        inputs: impl Fn(usize) -> [T::Values; 2],
+    ) -> Option<(usize, u32)> {
+        let pressed = (0..self.rows.len()).filter(|&j| self.pressed[j]);
+        pressed
+            .map(|j| (j, self.network.frictions[j].normal.is_unloaded(&inputs)))
+            .find(|&(_, runs)| runs != 0)
+    }
+
+    /// Start of a run: prescribed speeds, elements at rest, directions of gears, cells.
+    pub(crate) fn engage_initial(&mut self, locked: &[usize]) -> Result<(), Status> {
+        let locked: Vec<Row> = locked.iter().map(|&j| Row::Friction(j)).collect();
+        if !self.network.losses.is_empty() {
+            self.lock_through_gears(&locked)?;
+        }
+        self.apply_locking_impulse(&locked);
+        self.turn_gears();
+        for i in self.rows.len()..self.network.channels.len() {
+            self.cells[i] = self.cell_now(i);
+        }
+        self.refresh()?;
+        self.events.clear();
+        Ok(())
+    }
+
+    /// Update normal loads, branches and friction states from the inputs at this instant, as after
+    /// a jump.
+    pub(crate) fn refresh(&mut self) -> Result<(), Status> {
+        for j in 0..self.rows.len() {
+            let normal = &self.network.frictions[j].normal;
+            let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
+            let there = now.decide_with(normal.load_tolerance().re(), |now, nothing| now > nothing);
+            let sets_in = now.decide_with(rate, |now, rate| now >= 0.0 && rate > 0.0);
+            self.press(j, there || sets_in);
+        }
+        for i in self.rows.len()..self.network.channels.len() {
+            if self.network.channels[i].follows_inputs() {
+                self.cells[i] = self.cell_now(i);
+            }
+        }
+        self.decide(None)
+    }
+
+    /// Whether one of the locks carries its full capacity, or their split follows the capacities: they are
+    /// then decided anew at every sample; accelerations do not depend on the split.
+    pub(crate) fn is_split(&self) -> bool {
+        let saturated = self.rows.iter().any(FrictionState::is_saturated);
+        self.mode.redundant || saturated || self.blocked.contains(&true)
+    }
+
+    /// Give an element a normal load or take it away.
+    fn press(&mut self, j: usize, pressed: bool) {
+        let row = &self.network.frictions[j];
+        self.pressed[j] = pressed;
+        let slip = form(&row.slip, &self.x).re();
+        let state = match (pressed, self.rows[j]) {
+            (_, FrictionState::Open) if row.one_way => FrictionState::Slipping { sign: -1.0 },
+            (false, state) if row.one_way => state,
+            (false, _) => FrictionState::Open,
+            (true, FrictionState::Open) => FrictionState::Slipping { sign: signum_nonneg(slip) },
+            (true, state) => state,
+        };
+        let mut after = ActiveSet { rows: self.rows.clone(), gears: self.gears.clone() };
+        after.rows[j] = state;
+        self.record_changes(&after);
+        self.rows = after.rows;
+    }
+
+    /// Directions of lossy gears by their speeds, power taken to flow forward.
+    fn turn_gears(&mut self) {
+        for (gear, loss) in self.gears.iter_mut().zip(&self.network.losses) {
+            let sign = signum_nonneg(form(&loss.speed, &self.x).re());
+            *gear = GearState::Meshing { sign, power_reversed: false };
+        }
+    }
+
+    /// Set prescribed speeds and bring rows to rest by impulses that pass the lossy gears as torques do, each in
+    /// the direction of its own; where no directions agree with their impulses, nothing is done.
+    fn lock_through_gears(&mut self, rows: &[Row]) -> Result<(), Status> {
+        let network = self.network;
+        let excess = self.excess(rows);
+        let speed = |largest: T::Values, v: &T| v.re().magnitude().larger(largest);
+        let fastest = self.x[..network.speeds()].iter().fold(T::Values::zero_(), speed);
+        let is_round_off = excess
+            .max_abs()
+            .decide_with(fastest, |excess, fastest| excess <= START_SPEED_RTOL * fastest);
+        if is_round_off && !T::DERIVATIVES {
+            return Ok(());
+        }
+        self.turn_gears();
+        for _ in 0..=2 * self.gears.len() {
+            let key = ModeKey::new(std::iter::empty(), &self.gears);
+            let found = network.impulse(key, rows, &excess);
+            let (change, entering) = found.ok_or_else(|| self_locking(network, self.time()))?;
+            let before = self.gears.clone();
+            for (i, gear) in self.gears.iter_mut().enumerate() {
+                if let GearState::Meshing { sign, power_reversed } = gear
+                    && network.losses[i].loss.is_directional()
+                    && !is_round_off
+                {
+                    *power_reversed = entering[(i, 0)].re().decide(|impulse| impulse * *sign < 0.0);
+                }
+            }
+            if self.gears == before {
+                for i in 0..network.speeds() {
+                    self.x[i] += change[(i, 0)];
+                }
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Speeds of rows that are to rest, then what prescribed speeds are off theirs, rows × 1, rad/s.
+    fn excess(&self, rows: &[Row]) -> Matrix<T> {
+        let network = self.network;
+        let mut excess = Matrix::zeros(rows.len() + network.prescribed.len(), 1);
+        for (i, &row) in rows.iter().enumerate() {
+            excess[(i, 0)] = form(network.slip_of(row), &self.x);
+        }
+        for (i, (speed, input)) in (rows.len()..).zip(&network.prescribed) {
+            excess[(i, 0)] = form(speed, &self.x) - self.expansion.inputs[*input][0];
+        }
+        excess
+    }
+
+    /// Set prescribed speeds and remove the round-off speed of everything at rest and of `more`,
+    /// changing the momentum least.
+    pub(crate) fn apply_locking_impulse(&mut self, more: &[Row]) {
+        let network = self.network;
+        let resting = |j: usize| {
+            matches!(self.rows[j], FrictionState::Sticking | FrictionState::Saturated { .. })
+        };
+        let frictions = (0..self.rows.len()).filter(|&j| resting(j)).map(Row::Friction);
+        let held = |i: &usize| self.gears[*i] == GearState::Locked;
+        let gears = (0..self.gears.len()).filter(held).map(Row::Gear);
+        let mut rows: Vec<Row> = frictions.chain(gears).collect();
+        rows.extend(more.iter().filter(|row| !rows.contains(row)).copied().collect::<Vec<_>>());
+        let count = rows.len() + network.prescribed.len();
+        if count == 0 {
+            return;
+        }
+        let mut g = Matrix::zeros(count, network.speeds());
+        for (i, &row) in rows.iter().enumerate() {
+            g.row_mut(i).copy_from_slice(network.slip_of(row));
+        }
+        for (i, (speed, _)) in (rows.len()..).zip(&network.prescribed) {
+            g.row_mut(i).copy_from_slice(speed);
+        }
+        let excess = self.excess(&rows);
+        let hold = Hold { inertia: &network.mass, acting: None, rows: g, resting: rows.len() };
+        let change = hold.stop(&excess).expect("the mass is regular");
+        for i in 0..network.speeds() {
+            self.x[i] += change[(i, 0)];
+        }
+    }
+
+    /// State and inputs of the basis for a decision, without the channels.
+    pub(crate) fn basis_without_channels(&self) -> Vec<T> {
+        let inputs = &self.inputs_plus;
+        let mut basis = Vec::with_capacity(self.network.basis());
+        basis.extend_from_slice(&self.x_plus);
+        basis.extend(inputs.iter().map(|input| input[0]));
+        basis.extend(self.network.prescribed.iter().map(|&(_, input)| inputs[input][1]));
+        basis.push(T::of(1.0));
+        basis
+    }
+
+    /// Torque of a channel for a decision, in its present cell.
+    pub(crate) fn channel_plus(&mut self, i: usize) -> T {
+        let (channel, series) = (&self.network.channels[i], &mut self.channel_plus);
+        for (argument, row) in series.arguments.iter_mut().zip(&channel.arguments) {
+            argument[0] = form(row, &self.x_plus);
+        }
+        channel.term(self.cells[i], &self.inputs_plus, series, 0);
+        series.torque[0]
+    }
+
+    fn cell_now(&self, i: usize) -> crate::network::Cell {
+        let channel = &self.network.channels[i];
+        let mut arguments = [T::Values::zero_(); 2];
+        for (argument, row) in arguments.iter_mut().zip(&channel.arguments) {
+            *argument = form(row, &self.x).re();
+        }
+        channel.cell_at(arguments, signum_nonneg(arguments[0]), &self.expansion.inputs)
+    }
+
+    /// Note every difference between the present modes and `after` as an event.
+    pub(crate) fn record_changes(&mut self, after: &ActiveSet) {
+        use FrictionState::{Open, Saturated, Slipping, Sticking};
+        let mut events = Vec::new();
+        for (element, (&before, &after)) in self.rows.iter().zip(&after.rows).enumerate() {
+            let kind = match (before, after) {
+                (Open, Open) => continue,
+                (_, Open) => EventKind::ClutchVented,
+                (Open, _) => EventKind::ClutchFilled,
+                (Slipping { .. }, Sticking | Saturated { .. }) => EventKind::Lock,
+                (Sticking | Saturated { .. }, Slipping { .. }) => EventKind::BreakAway,
+                (Slipping { sign: a }, Slipping { sign: b }) if a != b => EventKind::Reverse,
+                _ => continue,
+            };
+            events.push((element, kind));
+        }
+        for (i, (&before, &after)) in self.gears.iter().zip(&after.gears).enumerate() {
+            let kind = match (before, after) {
+                (GearState::Meshing { .. }, GearState::Locked) => EventKind::Lock,
+                (GearState::Locked, GearState::Meshing { .. }) => EventKind::BreakAway,
+                (GearState::Meshing { sign: a, .. }, GearState::Meshing { sign: b, .. })
+                    if a != b =>
+                {
+                    EventKind::Reverse
+                }
+                _ => continue,
+            };
+            events.push((self.rows.len() + i, kind));
+        }
+        let time = self.t;
+        self.events.extend(events.into_iter().map(|(element, kind)| Event { time, element, kind }));
+    }
+}

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+//! 3 The hybrid solver. It sees friction elements, capacities and modes, and no components.
+//!
+//! Per mode the motion is analytic between input samples, so a step is a Taylor expansion in time
+//! of the whole state; guards are polynomials of the same expansion and their first roots are the
+//! events. The box-constrained programme of THEORY section 1 decides which elements stick.
+//!
+//! `hybrid` holds modes, events and Taylor steps, `exponential` the propagators of whole input
+//! samples, `lockstep` several runs in the lanes of SIMD vectors.
+
+mod cache;
+mod exponential;
+mod hybrid;
+mod input_error;
+mod inputs;
+mod integrator;
+mod lane_mask;
+mod lockstep;
+mod settings;
+mod simd;
+mod single;
+mod status;
+mod tolerances;
+
+pub use cache::SolverCache;
+pub use exponential::plan::supports_fixed_step;
+pub use exponential::samples::{BLOCK, Samples};
+pub use hybrid::event::{Event, EventKind, FrictionState};
+pub use hybrid::state::HybridState;
+pub use hybrid::taylor::TaylorExpansion;
+pub use input_error::InputError;
+pub use inputs::{Inputs, NO_POINT, Signal};
+pub use integrator::Integrator;
+pub use lane_mask::lane_mask;
+pub use lockstep::batch::run_lockstep;
+pub use lockstep::lane::{LANES, LaneSink, Lanes, SampleBlock};
+pub use settings::{Settings, Step};
+pub(crate) use simd::{Kernel, dispatch_simd};
+pub use single::SampleSink;
+pub use status::Status;
+pub use tolerances::MAX_SPECTRAL_STEP_SLIPPING;

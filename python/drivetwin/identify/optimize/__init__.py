@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Least-squares optimisers over an `Objective`, without knowledge of the driveline."""

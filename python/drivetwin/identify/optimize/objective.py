@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""Interface between the optimisers and the least-squares problems that they minimise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from drivetwin.identify.signals import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Named parameter vector: one value for each free parameter; immutable."""
+
+    names: tuple[str, ...]
+    values: FloatArray
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)])
+
+    def moved(self, values: FloatArray) -> Point:
+        """Return a vector of the same parameters with other `values` (p,)."""
+        return Point(self.names, values)
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Q and its Gauss-Newton expansion at one point: half gradient (p,), information (p, p).
+
+    `data` (p, p) is the information of the measurements alone. Per group of residuals: `residuals`
+    (n,) and the weighted derivatives `regressors` (n, p), Σ⁻¹ times those of the model outputs.
+    """
+
+    cost: float
+    gradient: FloatArray
+    information: FloatArray
+    data: FloatArray
+    residuals: tuple[FloatArray, ...]
+    regressors: tuple[FloatArray, ...]
+
+
+class Objective(Protocol):
+    """Weighted sum of squares Q(θ) with bounds on θ; `lower` and `upper` (p,)."""
+
+    @property
+    def lower(self) -> FloatArray:
+        """Lower bounds (p,)."""
+
+    @property
+    def upper(self) -> FloatArray:
+        """Upper bounds (p,)."""
+
+    @property
+    def log_determinant(self) -> float:
+        """log|Σ| of the weighting."""
+
+    def cost(self, point: Point) -> float:
+        """Compute Q; infinite if the model cannot be evaluated."""
+
+    def normal(self, point: Point) -> Normal | None:
+        """Compute the Gauss-Newton expansion of Q; None if the model cannot be evaluated."""
+
+    def retract(self, point: Point, step: FloatArray) -> FloatArray:
+        """Compute the values (p,) after a `step` (p,) along the parameter manifold."""

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+"""A search that ends at its limit has found no minimum, and says so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.identify.likelihood.conclude import conclude
+from drivetwin.identify.likelihood.derived import parameters, slopes
+from drivetwin.identify.likelihood.fit import nearest
+from drivetwin.identify.likelihood.null_space import at_limits
+from drivetwin.identify.result import Verdict
+from tests.identify.likelihood.made import bench, fitted, problem
+
+SHORT = 0.003
+"""Distance from the age that the log has to the limit of the search [s]."""
+
+
+@pytest.mark.parametrize(("side", "word"), [(-1.0, "more"), (1.0, "less")])
+def test_an_age_at_the_limit_of_the_search_is_not_identified(side: float, word: str) -> None:
+    made = bench()
+    posed, start = problem(made)
+    limit = made.truth["te_delay"] + side * SHORT
+    bounds = {"more": posed.upper.copy(), "less": posed.lower.copy()}
+    bounds[word][start.names.index("te_delay")] = limit
+    fit = nearest(replace(posed, upper=bounds["more"], lower=bounds["less"]), start)
+    assert fit is not None
+    told = conclude(fit, [made.signals], [made.driveline], {}, {})
+    age = told.estimates["te_delay"]
+    assert age.value == pytest.approx(limit)
+    assert age.verdict is Verdict.WEAK
+    assert f"the limit of the search: the log speaks for {word}" in age.reason
+    assert any(text.startswith("te_delay: ") for text in told.warnings)
+
+
+def test_within_the_limits_nothing_is_said() -> None:
+    fit, signals = fitted(), [bench().signals]
+    std = np.sqrt(np.diag(fit.covariance))
+    ids = tuple(parameters(fit.problem, fit.mean, signals))
+    assert at_limits(fit, ids, slopes(fit.problem, fit.mean, std, signals)) == {}

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""One noise realisation of a virtual-dyno scenario, as the estimators see it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin.dyno.dyno import DynoRun, run
+from drivetwin.dyno.scenario import Scenario
+from drivetwin.identify.inputs import sampled
+from drivetwin.identify.noise import resolution
+from drivetwin.identify.signals import Coupling, Driveline, ShiftSignals
+from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.vehicle.spec import PriorValue
+
+SHIFT_SIGMA = {"torque_start": 0.01, "inertia_start": 0.001, "lockup": 0.0005}
+"""What shift detection states of its instants on such logs [s]."""
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """Standard deviations of the card's design values, 0 for known: Jo′ relative, P0 [Pa], drums
+    [kg m^2]."""
+
+    J_out: float = 0.0
+    P0: float = 0.0
+    drum: float = 0.0
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Signals and structure of one realisation, with its truth by id."""
+
+    signals: ShiftSignals
+    driveline: Driveline
+    truth: dict[str, float]
+    run: DynoRun
+
+
+def record_bench(scenario: Scenario, seed: int, know: Knowledge, noise: float = 1.0) -> Bench:
+    """Record the scenario with the noise of `seed`.
+
+    Where the card knows a value only roughly, the card's value is drawn about the truth.
+    """
+    made = run(scenario, seed, noise=noise)
+    rng = np.random.default_rng([seed, 1])
+    model = scenario.model
+    J_out = model.J_out * (1.0 + know.J_out * rng.standard_normal())
+    couplings = {}
+    for one in model.elements:
+        P0 = PriorValue(one.P0 + know.P0 * float(rng.standard_normal()), know.P0)
+        about = max(0.0, one.drum_inertia + know.drum * float(rng.standard_normal()))
+        drum = PriorValue(about, know.drum)
+        couplings[one.name] = Coupling(one.name, 1.0 / one.i_c, one.i_out, one.gain, P0, drum)
+    driveline = Driveline(
+        model.i_f,
+        couplings[scenario.offgoing],
+        couplings[scenario.oncoming],
+        couplings,
+        PriorValue(J_out, know.J_out * model.J_out),
+        model.loss_law,
+    )
+    return Bench(_sample_signals(made), driveline, dict(made.truth.parameters), made)
+
+
+def _sample_signals(made: DynoRun) -> ShiftSignals:
+    scenario, truth = made.scenario, made.truth
+    assert truth.torque_start is not None
+    assert truth.inertia_start is not None
+    assert truth.lockup is not None
+    channels = {channel.role: sampled(channel) for channel in made.channels}
+    end = made.scenario.duration
+    start = truth.torque_start - 0.02
+    shift = Shift(
+        scenario.start_gear,
+        scenario.end_gear,
+        scenario.offgoing,
+        scenario.oncoming,
+        ShiftKind.POWER_ON_UP,
+        (0.0, start),
+        (start, truth.inertia_start),
+        (truth.inertia_start, truth.lockup),
+        (truth.lockup, end),
+        truth.lockup,
+        sigma=SHIFT_SIGMA,
+    )
+    return ShiftSignals(
+        channels["engine_torque"],
+        channels["output_torque"],
+        channels["input_speed"],
+        channels["output_speed"],
+        channels["wheel_speed"],
+        {n: channels[f"pressure.{n}"] for n in (scenario.offgoing, scenario.oncoming)},
+        shift,
+        resolution(channels["engine_torque"].values),
+    )

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT
+"""Exact binomial test of the coverage of intervals, with a power that it states."""
+
+from __future__ import annotations
+
+from scipy.stats import binom
+
+CLAIMED = 0.95
+"""Coverage that the intervals claim."""
+TOO_LOW = 0.90
+"""Coverage that the test must reject."""
+LEVEL = 0.01
+"""Probability on each side that intervals of the claimed coverage are rejected."""
+POWER = 0.90
+"""Least probability that intervals of coverage `TOO_LOW` are rejected."""
+
+
+def compute_bounds(draws: int, claimed: float = CLAIMED) -> tuple[int, int]:
+    """Return the smallest and the largest number of intervals that may contain the truth."""
+    return int(binom.ppf(LEVEL, draws, claimed)), int(binom.isf(LEVEL, draws, claimed))
+
+
+def compute_power(draws: int, claimed: float = CLAIMED, too_low: float = TOO_LOW) -> float:
+    """Return the probability that intervals of coverage `too_low` are rejected."""
+    return float(binom.cdf(compute_bounds(draws, claimed)[0] - 1, draws, too_low))
+
+
+def assert_covers(
+    inside: int, draws: int, *, too_low: float = TOO_LOW, conservative: bool = False
+) -> None:
+    """Reject a coverage that differs from 95 %, given `inside` of `draws` independent intervals.
+
+    Both tails are tested at `LEVEL`. With `conservative` the intervals claim at least 95 %, and
+    only the lower tail is tested. `too_low` is the coverage that has to be rejected with `POWER`;
+    too few draws for it are an error of the test.
+    """
+    assert compute_power(draws, too_low=too_low) >= POWER, (
+        f"{draws} draws reject a coverage of {too_low:.0%} in only "
+        f"{compute_power(draws, too_low=too_low):.0%} of cases"
+    )
+    least, most = compute_bounds(draws)
+    assert least <= inside <= (draws if conservative else most), (
+        f"{inside} of {draws} intervals contain the truth ({inside / draws:.1%}); "
+        f"95 % intervals: {least} to {most}"
+    )
