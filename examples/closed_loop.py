@@ -4,7 +4,7 @@
 The plant is the exact model of the paper's driveline with hydraulic lags and noisy sensors; the
 friction of its on-coming clutch fades from shift to shift. The controller runs every 10 ms and asks
 for the clutch torque that ends the inertia phase in half a second. It turns torque into pressure by
-the friction law of the twin, once times the scale that the C observer tells, once as identified.
+the friction law of the twin, once times the scale estimated by the C observer, once as identified.
 
     python examples/closed_loop.py
 """
@@ -98,7 +98,7 @@ class Plant:
 
 
 class Controller:
-    """Pressure commands of a power-on upshift from the twin and what its observer tells."""
+    """Pressure commands of a power-on upshift from the twin and the estimates of its observer."""
 
     def __init__(self, twin: DualClutch, adaptive: bool) -> None:
         self.twin = twin
@@ -154,7 +154,7 @@ def faded(model: DualClutch, scale: float) -> DualClutch:
 
 
 def one_shift(plant: Plant, controller: Controller, observer: CObserver) -> Shift:
-    """Drive one upshift; the observer goes on with the friction it knows."""
+    """Drive one upshift; the observer keeps its friction estimate."""
     true_scale = plant.model.elements[1].friction.at(np.zeros(1))[0]
     true_scale /= controller.twin.elements[1].friction.at(np.zeros(1))[0]
     observer.resume(plant.inputs(plant.pressures), plant.speeds())
@@ -197,10 +197,10 @@ def drive(adaptive: bool, shifts: int = SHIFTS, seed: int = 0) -> list[Shift]:
 
 def main() -> None:
     """Print both runs side by side."""
-    told, believed = drive(adaptive=True), drive(adaptive=False)
+    adapted, fixed = drive(adaptive=True), drive(adaptive=False)
     print("friction of the on-coming clutch        inertia phase, wanted 0.50 s")
     print(" true   observed            observed T_o    adaptive   as identified")
-    for a, b in zip(told, believed, strict=True):
+    for a, b in zip(adapted, fixed, strict=True):
         print(
             f"{a.true_scale:5.2f}   {a.scale:5.3f} ± {a.scale_std:5.3f}   "
             f"rms {a.torque_error:5.0f} N·m{a.inertia_phase:12.2f} s{b.inertia_phase:14.2f} s"
