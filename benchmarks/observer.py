@@ -25,7 +25,7 @@ from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.observe import observed
 from drivetwin.shifts.detect import find_shifts
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.build import build_twin
 
 ROUNDS = 12
 ONSET = 0.4
@@ -47,7 +47,7 @@ def _measure(folder: Path, seed: int, found: dict[tuple[str, str, str], list[Row
     card = drivetwin.load_card(card_file)
     log = drivetwin.read_log(first, card)
     identified = drivetwin.identify_shifts(log, card, find_shifts(log, card))
-    twin = Twin.from_identification(identified, card)
+    twin = build_twin(identified, card)
     other = run(paper_steps().with_torque_reduction(0.3), 1000 + seed)
     second, _, _ = write_run(folder / "second.csv", other)
     log = drivetwin.read_log(second, card)

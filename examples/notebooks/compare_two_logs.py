@@ -18,7 +18,7 @@ for name, seed in (("monday", "1"), ("tuesday", "2")):
     logs[name] = drivetwin.read_log(f"{name}.csv", card)
     found = drivetwin.find_shifts(logs[name], card)
     results[name] = drivetwin.identify_shifts(logs[name], card, found, drivetwin.Method.INTEGRAL)
-    twins[name] = drivetwin.Twin.from_identification(results[name], card)
+    twins[name] = drivetwin.build_twin(results[name], card)
 
 # %% Every parameter, and by how many standard deviations the two are apart.
 candidates = [Candidate.of_twin(name, twin) for name, twin in twins.items()]

@@ -21,7 +21,7 @@ log.plot()
 # %% Find the shift, identify, simulate the model over the measurement.
 found = drivetwin.find_shifts(log, card)
 result = drivetwin.identify_shifts(log, card, found)
-twin = drivetwin.Twin.from_identification(result, card)
+twin = drivetwin.build_twin(result, card)
 result = drivetwin.validated(result, twin, log)
 print(result.summary())
 result.plot()
@@ -32,7 +32,7 @@ twin.plot()
 # %% The same as files: for people, for machines, and the model to simulate.
 drivetwin.save_report("report.html", result, log)
 drivetwin.save_result("result.json", result)
-twin.save("twin.toml")
+drivetwin.save_twin("twin.toml", twin)
 
 # %% The truth of the synthetic log lies within the interval.
 low, high = result.estimates["J_vehicle"].ci95_total or (0.0, 0.0)

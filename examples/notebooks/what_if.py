@@ -17,7 +17,7 @@ card = drivetwin.load_card("shift.card.toml")
 log = drivetwin.read_log("shift.csv", card)
 found = drivetwin.find_shifts(log, card)
 result = drivetwin.identify_shifts(log, card, found, drivetwin.Method.INTEGRAL)
-twin = drivetwin.Twin.from_identification(result, card)
+twin = drivetwin.build_twin(result, card)
 shift = found.shifts[0]
 twin
 

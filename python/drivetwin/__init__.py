@@ -8,7 +8,7 @@ it is first asked for, so that `import drivetwin` costs nothing.
     log = drivetwin.read_log(path, card)                         channels, SI
     found = drivetwin.find_shifts(log, card)                     shifts and their phases
     result = drivetwin.identify_shifts(log, card, found)         estimates with verdicts
-    twin = drivetwin.Twin.from_identification(result, card)      the model
+    twin = drivetwin.build_twin(result, card)      the model
     run = drivetwin.validate_shift(twin, log, found.shifts[0])   simulation over measurement
     result = drivetwin.validated(result, twin, log)              the same of all shifts, into result
     result = drivetwin.examined(result)                          what would tell more, into result
@@ -23,36 +23,45 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from drivetwin._util.rich_display import register_presenter
+
 if TYPE_CHECKING:
     from drivetwin.errors import DrivetwinError
     from drivetwin.estimation.analysis.experiment_design import examined
     from drivetwin.estimation.identify import identify as identify_shifts
     from drivetwin.estimation.result.method import Method
     from drivetwin.files.result_file import save_result
+    from drivetwin.files.twin_conversion import load_twin, save_twin
     from drivetwin.logs.read import read_log
     from drivetwin.report.html import save_report
     from drivetwin.shifts.detect import find_shifts
     from drivetwin.simulation.dual_clutch import DualClutch, simulate
+    from drivetwin.twin.build import build_twin
     from drivetwin.twin.twin import Twin
     from drivetwin.validation.simulate_log import validate as validate_shift
     from drivetwin.validation.simulate_log import validated
     from drivetwin.vehicle.card import load_card
 
+register_presenter(lambda: import_module("drivetwin.report.notebook"))
+
 _HOME = {
     "DrivetwinError": ("errors", "DrivetwinError"),
-    "DualClutch": ("driveline", "DualClutch"),
-    "Method": ("identify.method", "Method"),
-    "Twin": ("twin", "Twin"),
-    "examined": ("identify.experiment.suggest", "examined"),
-    "find_shifts": ("shifts.find", "find_shifts"),
-    "identify_shifts": ("identify.pipeline", "identify"),
+    "DualClutch": ("simulation.dual_clutch", "DualClutch"),
+    "Method": ("estimation.result.method", "Method"),
+    "Twin": ("twin.twin", "Twin"),
+    "build_twin": ("twin.build", "build_twin"),
+    "examined": ("estimation.analysis.experiment_design", "examined"),
+    "find_shifts": ("shifts.detect", "find_shifts"),
+    "identify_shifts": ("estimation.identify", "identify"),
     "load_card": ("vehicle.card", "load_card"),
+    "load_twin": ("files.twin_conversion", "load_twin"),
     "read_log": ("logs.read", "read_log"),
     "save_report": ("report.html", "save_report"),
-    "save_result": ("results.result_file", "save_result"),
-    "simulate": ("driveline", "simulate"),
-    "validate_shift": ("validate", "validate"),
-    "validated": ("validate", "validated"),
+    "save_result": ("files.result_file", "save_result"),
+    "save_twin": ("files.twin_conversion", "save_twin"),
+    "simulate": ("simulation.dual_clutch", "simulate"),
+    "validate_shift": ("validation.simulate_log", "validate"),
+    "validated": ("validation.simulate_log", "validated"),
 }
 """Module below the package, and the name there. `identify` and `validate` are modules, so the
 functions of these names are called after what they take."""
@@ -62,13 +71,16 @@ __all__ = [
     "DualClutch",
     "Method",
     "Twin",
+    "build_twin",
     "examined",
     "find_shifts",
     "identify_shifts",
     "load_card",
+    "load_twin",
     "read_log",
     "save_report",
     "save_result",
+    "save_twin",
     "simulate",
     "validate_shift",
     "validated",

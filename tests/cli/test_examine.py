@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.twin.twin import Twin
+from drivetwin.files.twin_conversion import load_twin
 from tests.cli.conftest import Files
 
 
@@ -30,7 +30,7 @@ def test_suggestions_and_profile(
     assert max(profile["rise"]) > 3.84
     friction = json.loads((tmp_path / "asked" / "friction.json").read_text())
     curve = friction["friction"]["B3"]
-    assert Twin.load(tmp_path / "asked" / "twin.toml").friction["B3"].mu.tolist() == curve["mu"]
+    assert load_twin(tmp_path / "asked" / "twin.toml").friction["B3"].mu.tolist() == curve["mu"]
     departures = json.loads((tmp_path / "asked" / "departures.json").read_text())
     assert {one["kind"] for one in departures["departures"]} == {"drag", "pressure"}
 

@@ -11,13 +11,14 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.export.parameters.content import Scalar
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
+from drivetwin.files.twin_conversion import save_twin
 from tests.export.parameters.sample import twin
 
 
 @pytest.fixture
 def twin_file(tmp_path: Path) -> Path:
     path = tmp_path / "truck.toml"
-    twin().save(path)
+    save_twin(path, twin())
     return path
 
 

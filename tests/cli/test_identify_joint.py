@@ -16,7 +16,7 @@ from drivetwin.cli import main
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.files.result_file import load_result
-from drivetwin.twin.twin import Twin
+from drivetwin.files.twin_conversion import load_twin
 from tests.estimation.multi_log.fixtures import LEVEL, LOADS, scenario
 
 
@@ -53,7 +53,7 @@ def test_result_report_and_a_twin_of_each_log_are_written(written: Written) -> N
         "run1.twin.toml",
         "run2.twin.toml",
     }
-    second = Twin.load(written.folder / "run2.twin.toml")
+    second = load_twin(written.folder / "run2.twin.toml")
     assert second.value("Tv_over_if", 0.0) == pytest.approx(LOADS[1], rel=5e-3)
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.files.result_file import save_result
-from drivetwin.twin.twin import Twin
+from drivetwin.files.twin_conversion import save_twin
+from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import with_fit
 from tests.cli.conftest import Files
 from tests.report.sample import card, identification, validation
@@ -23,7 +24,7 @@ def made(tmp_path: Path) -> tuple[Path, Path]:
     found = with_fit(identification(), [validation()])
     for name in ("first", "second"):
         save_result(tmp_path / name / "result.json", found)
-        Twin.from_identification(found, card()).save(tmp_path / name / "twin.toml")
+        save_twin(tmp_path / name / "twin.toml", build_twin(found, card()))
     return tmp_path / "first", tmp_path / "second"
 
 

@@ -19,6 +19,8 @@ from drivetwin.export.parameters.json_file import json_text
 from drivetwin.export.parameters.of_twin import parameters_of
 from drivetwin.files.result_file import ResultFile
 from drivetwin.files.schemas import FileKind, json_schema
+from drivetwin.files.twin_conversion import save_twin
+from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report import sample
 
@@ -37,7 +39,7 @@ def fenced(page: Path, language: str) -> list[str]:
 
 
 def twin() -> Twin:
-    return Twin.from_identification(sample.identification(), sample.card())
+    return build_twin(sample.identification(), sample.card())
 
 
 def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
@@ -65,7 +67,7 @@ def _toml(kind: FileKind, folder: Path) -> list[str]:
         case FileKind.FLEET_RULES:
             return fenced(ROOT / "docs" / "howto" / "fleet.md", "toml")[:1]
         case _:
-            twin().save(folder / "twin.toml")
+            save_twin(folder / "twin.toml", twin())
             return toml_files(folder)
 
 

@@ -10,7 +10,8 @@ import pytest
 import tomlkit
 
 from drivetwin.errors import ResultFileError
-from drivetwin.twin.twin import Twin
+from drivetwin.files.twin_conversion import load_twin, save_twin
+from drivetwin.twin.build import build_twin
 from tests.report.sample import card, identification
 
 
@@ -29,7 +30,7 @@ from tests.report.sample import card, identification
 )
 def test_a_wrong_entry_is_told_by_its_key(tmp_path: Path, key: str, value: Any, says: str) -> None:
     path = tmp_path / "twin.toml"
-    Twin.from_identification(identification(), card()).save(path)
+    save_twin(path, build_twin(identification(), card()))
     document = tomlkit.parse(path.read_text(encoding="utf-8"))
     table: Any = document
     *parents, last = key.split(".")
@@ -38,7 +39,7 @@ def test_a_wrong_entry_is_told_by_its_key(tmp_path: Path, key: str, value: Any, 
     table[last] = list(reversed(table[last])) if value is None else value
     path.write_text(tomlkit.dumps(document), encoding="utf-8")
     with pytest.raises(ResultFileError) as refused:
-        Twin.load(path)
+        load_twin(path)
     assert key in str(refused.value)
     assert says in str(refused.value)
 
@@ -52,9 +53,9 @@ def test_a_wrong_entry_is_told_by_its_key(tmp_path: Path, key: str, value: Any, 
 )
 def test_a_misspelt_name_is_told(tmp_path: Path, table: str, old: str, new: str, says: str) -> None:
     path = tmp_path / "twin.toml"
-    Twin.from_identification(identification(), card()).save(path)
+    save_twin(path, build_twin(identification(), card()))
     document: Any = tomlkit.parse(path.read_text(encoding="utf-8"))
     document[table][new] = document[table].pop(old)
     path.write_text(tomlkit.dumps(document), encoding="utf-8")
     with pytest.raises(ResultFileError, match=says):
-        Twin.load(path)
+        load_twin(path)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin._util.version import program_version
 from drivetwin.estimation.result.method import Method
-from drivetwin.files.records import program_version
 from drivetwin.fleet.guarded_worker import Cell
 from drivetwin.fleet.task import (
     Finished,

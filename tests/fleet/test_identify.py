@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin._util.version import program_version
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.errors import FileFormatError, StoreError
 from drivetwin.estimation.result.method import Method
-from drivetwin.files.records import program_version
 from drivetwin.fleet.identify import identify_log
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.scan import inputs_of

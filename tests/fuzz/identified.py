@@ -30,7 +30,7 @@ from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import usable_shifts
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import validated
 from drivetwin.vehicle.card import load_card
 from tests.fuzz import harness
@@ -94,7 +94,7 @@ def identified(log: Path, card: Path, method: Method) -> Identification:
     vehicle = load_card(card)
     recording = read_log(log, vehicle)
     found = identify(recording, vehicle, usable_shifts(recording, vehicle), method)
-    return validated(found, Twin.from_identification(found, vehicle), recording)
+    return validated(found, build_twin(found, vehicle), recording)
 
 
 def moved(found: Identification, sound: Identification, limit: float = 1.0) -> list[str]:

@@ -17,6 +17,7 @@ from drivetwin.dyno.scenarios import paper_steps
 from drivetwin.observer.result import FloatArray, Observation
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Trajectory
+from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -57,8 +58,8 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     card = drivetwin.load_card(card_file)
     log = drivetwin.read_log(first, card)
     found = drivetwin.identify_shifts(log, card, drivetwin.find_shifts(log, card))
-    twin = Twin.from_identification(found, card)
-    twin.save(folder / "twin.toml")
+    twin = build_twin(found, card)
+    drivetwin.save_twin(folder / "twin.toml", twin)
     other = run(paper_steps().with_torque_reduction(0.3), seed=2)
     second, _, _ = write_run(folder / "second.csv", other)
     log = drivetwin.read_log(second, card)

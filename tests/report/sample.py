@@ -12,7 +12,7 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import fit_of, phases_of
 from drivetwin.vehicle.card import ElementSpec, Gear, PriorValue, VehicleCard
 
@@ -169,7 +169,7 @@ def validation() -> Validation:
     }
     return Validation(
         shift=SHIFT,
-        model=Twin.from_identification(identification(), card()).dual_clutch(SHIFT),
+        model=build_twin(identification(), card()).dual_clutch(SHIFT),
         phases=phases_of(SHIFT, (0.0, 2.999)),
         engine_torque=Signal(TIME, measured["engine_torque"].values),
         pressures={name: _pressure(measured, name) for name in ("B2", "B3")},

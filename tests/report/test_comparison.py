@@ -15,6 +15,7 @@ from drivetwin.report.find_reports import Candidate, Trial
 from drivetwin.report.sections.blocks import FigureBlock, TableBlock
 from drivetwin.report.sections.comparison import agreement_section, trial_sections
 from drivetwin.report.style import candidate_style
+from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report.sample import SHIFT, card, friction, identification, log, validation
 from tests.report.test_find_reports import candidate
@@ -22,7 +23,7 @@ from tests.report.test_find_reports import candidate
 
 @cache
 def twins() -> dict[str, Twin]:
-    good = Twin.from_identification(identification(), card())
+    good = build_twin(identification(), card())
     poor = replace(good, parameters={k: v for k, v in good.parameters.items() if k != "k_o"})
     return {"good": good, "poor": poor}
 

@@ -14,7 +14,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.files.result_file import ResultFile
 from drivetwin.report.find_reports import Candidate, agreements
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import with_fit
 from tests.report.sample import card, identification, validation
 
@@ -90,7 +90,7 @@ def found() -> Identification:
 
 def test_result_and_twin_tell_the_same_parameters() -> None:
     result = Candidate.of_result("a", ResultFile.of(found()))
-    twin = Candidate.of_twin("b", Twin.from_identification(found(), card()))
+    twin = Candidate.of_twin("b", build_twin(found(), card()))
     assert list(result.estimates) == list(twin.estimates)
     assert result.fit["output_torque"]["all"].fit_percent > 90.0
     assert twin.fit == {}

@@ -12,7 +12,7 @@ from drivetwin.channels.shiftlog import Channel, Quantity
 from drivetwin.estimation.artifacts import Evidence
 from drivetwin.estimation.identification import Identification
 from drivetwin.report.notebook import figure_of, summary_of
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import with_fit
 from tests.report.sample import card, identification, log, validation
 
@@ -51,7 +51,7 @@ def test_an_identification_without_simulation_shows_its_intervals() -> None:
 
 
 def test_a_twin_shows_its_friction() -> None:
-    twin = Twin.from_identification(found(), card())
+    twin = build_twin(found(), card())
     assert [trace.name for trace in twin.plot().data if trace.name] == ["B3"]
     assert "Twin of sample truck" in str(twin.summary())
 

@@ -15,7 +15,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
 from drivetwin.shifts.detect import usable_shifts
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.build import build_twin
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario
 from tests.support.shared_results import shared
 
@@ -62,7 +62,7 @@ def test_each_shift_has_its_own_load_and_the_parameters_do_not_feel_it(method: M
 
 def test_each_shift_is_simulated_on_its_own_grade() -> None:
     one, log = found(Method.LIKELIHOOD), hilly()
-    twin = Twin.from_identification(one, card())
+    twin = build_twin(one, card())
     own = drivetwin.validated(one, twin, log)
     flat = replace(one, evidence=replace(one.evidence, loads=()))
     shared = drivetwin.validated(flat, twin, log)

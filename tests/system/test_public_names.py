@@ -43,7 +43,7 @@ def test_files_may_be_named_by_text(tmp_path: Path) -> None:
     found = sample.identification()
     drivetwin.save_result(f"{place}/result.json", found)
     assert load_result(f"{place}/result.json").parameters.keys() == found.estimates.keys()
-    drivetwin.Twin.from_identification(found, sample.card()).save(f"{place}/twin.toml")
-    assert drivetwin.Twin.load(f"{place}/twin.toml").parameters.keys() == found.estimates.keys()
+    drivetwin.save_twin(f"{place}/twin.toml", drivetwin.build_twin(found, sample.card()))
+    assert drivetwin.load_twin(f"{place}/twin.toml").parameters.keys() == found.estimates.keys()
     drivetwin.save_report(f"{place}/report.html", found, sample.log())
     assert (tmp_path / "report.html").stat().st_size > 0

@@ -12,15 +12,17 @@ import pytest
 from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.errors import InputError, MissingParameterError, ResultFileError
 from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
+from drivetwin.files.twin_conversion import load_twin, save_twin
 from drivetwin.parameters import OVER_ETA
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
+from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report.sample import SHIFT, STRIBECK, card, identification
 
 
 @pytest.fixture
 def twin() -> Twin:
-    return Twin.from_identification(identification(), card())
+    return build_twin(identification(), card())
 
 
 def test_identifiable_engine_side_inertia_is_kept(twin: Twin) -> None:
@@ -36,17 +38,17 @@ def test_a_load_that_grows_with_speed_holds_the_told_value_at_the_mean_speed(
     twin: Twin, tmp_path: Path
 ) -> None:
     law = LoadLaw(aero=4.8, std=0.1, mean_speed=14.3)
-    replace(twin, load_law=law).save(tmp_path / "twin.toml")
-    load = Twin.load(tmp_path / "twin.toml").dual_clutch(SHIFT).load
+    save_twin(tmp_path / "twin.toml", replace(twin, load_law=law))
+    load = load_twin(tmp_path / "twin.toml").dual_clutch(SHIFT).load
     assert load.at(14.3) == pytest.approx(2300.0 * 5.38)
     assert load.at(20.0) - load.at(10.0) == pytest.approx(4.8 * (20.0**2 - 10.0**2))
 
 
 def test_a_twin_of_the_schema_before_has_a_constant_load(twin: Twin, tmp_path: Path) -> None:
     path = tmp_path / "twin.toml"
-    twin.save(path)
+    save_twin(path, twin)
     path.write_text(path.read_text().replace("drivetwin/twin-2", "drivetwin/twin-1"))
-    assert Twin.load(path).dual_clutch(SHIFT).load == twin.dual_clutch(SHIFT).load
+    assert load_twin(path).dual_clutch(SHIFT).load == twin.dual_clutch(SHIFT).load
 
 
 def without_scale(twin: Twin, eta: float) -> Twin:
@@ -117,7 +119,7 @@ def test_a_twin_is_made_with_the_efficiency_from_design_in_friction_and_load() -
     curve = replace(curve, over_eta=True)
     law = LoadLaw(aero=4.8, std=0.1, mean_speed=14.3, over_eta=True)
     told = replace(found, estimates={**found.estimates, "eta": design}, friction={"B3": curve})
-    made = Twin.from_identification(replace(told, load=law), card())
+    made = build_twin(replace(told, load=law), card())
     one, load = made.friction["B3"], made.load_law
     assert not one.over_eta
     assert one.mu == pytest.approx(eta * curve.mu)
@@ -173,8 +175,8 @@ def test_identified_drum_goes_before_the_cards(twin: Twin, tmp_path: Path) -> No
     assert [one.drum_inertia for one in twin.dual_clutch(SHIFT).elements] == [0.0, 0.05]
     drum = Estimate("drum.B3", 0.07, 0.01, Verdict.IDENTIFIED, "likelihood")
     told = replace(twin, parameters={**twin.parameters, "drum.B3": drum})
-    told.save(tmp_path / "twin.toml")
-    for one in (told, Twin.load(tmp_path / "twin.toml")):
+    save_twin(tmp_path / "twin.toml", told)
+    for one in (told, load_twin(tmp_path / "twin.toml")):
         assert one.dual_clutch(SHIFT).elements[1].drum_inertia == 0.07
         assert one.elements["B3"].drum == 0.05
         other = one.dual_clutch(SHIFT, overrides={"drum.B3": 5.0})
@@ -228,8 +230,8 @@ def test_covariance_is_total(twin: Twin) -> None:
 
 def test_the_card_it_carries_reads_a_log_as_the_vehicles_own(twin: Twin, tmp_path: Path) -> None:
     spec = ChannelSpec("TQ_OUT", unit="N*m", sign=-1, group="fast")
-    replace(twin, channels={"output_torque": spec}).save(tmp_path / "twin.toml")
-    carried, given = Twin.load(tmp_path / "twin.toml").card(), card()
+    save_twin(tmp_path / "twin.toml", replace(twin, channels={"output_torque": spec}))
+    carried, given = load_twin(tmp_path / "twin.toml").card(), card()
     for gear in given.gears:
         assert carried.ratio(gear.name) == pytest.approx(given.ratio(gear.name))
         assert carried.element_of(gear.name) == given.element_of(gear.name)
@@ -241,16 +243,16 @@ def test_the_card_it_carries_reads_a_log_as_the_vehicles_own(twin: Twin, tmp_pat
 
 
 def test_round_trip(twin: Twin, tmp_path: Path) -> None:
-    twin.save(tmp_path / "twin.toml")
-    back = Twin.load(tmp_path / "twin.toml")
+    save_twin(tmp_path / "twin.toml", twin)
+    back = load_twin(tmp_path / "twin.toml")
     assert back.dual_clutch(SHIFT) == twin.dual_clutch(SHIFT)
     assert back.parameters["te_delay"] == twin.parameters["te_delay"]
     assert back.covariance == pytest.approx(twin.covariance)
     assert back.gears == twin.gears
     assert back.validity == twin.validity
     assert back.inputs == twin.inputs
-    back.save(tmp_path / "again.toml")
-    assert Twin.load(tmp_path / "again.toml").dual_clutch(SHIFT) == twin.dual_clutch(SHIFT)
+    save_twin(tmp_path / "again.toml", back)
+    assert load_twin(tmp_path / "again.toml").dual_clutch(SHIFT) == twin.dual_clutch(SHIFT)
 
 
 @pytest.mark.parametrize(
@@ -268,18 +270,18 @@ def test_damaged_or_newer_files_are_refused(tmp_path: Path, text: str, says: str
     path = tmp_path / "twin.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ResultFileError, match=says):
-        Twin.load(path)
+        load_twin(path)
 
 
 def test_faults_of_a_file_are_told_by_key_and_path(twin: Twin, tmp_path: Path) -> None:
     path = tmp_path / "twin.toml"
-    twin.save(path)
+    save_twin(path, twin)
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("i_in = ", "i_in = 'x' # ", 1), encoding="utf-8")
     with pytest.raises(ResultFileError, match=r"twin\.toml, key 'transmission.i_in': ") as found:
-        Twin.load(path)
+        load_twin(path)
     assert "pydantic" not in str(found.value)
     with pytest.raises(ResultFileError, match="cannot read the file: No such file") as absent:
-        Twin.load(tmp_path / "absent.toml")
+        load_twin(tmp_path / "absent.toml")
     assert "check the path" in absent.value.remedy
     assert absent.value.where.file == str(tmp_path / "absent.toml")

@@ -15,7 +15,7 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import Method
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
 from drivetwin.export.targets import Target
-from drivetwin.twin.twin import Twin
+from drivetwin.files.twin_conversion import load_twin
 from drivetwin.workbench.exports import Record, produce
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.session import Session
@@ -55,7 +55,7 @@ def test_every_form_has_a_button() -> None:
 def test_own_files_are_read_back(identified: Session, tmp_path: Path) -> None:
     twin = tmp_path / "twin.toml"
     twin.write_bytes(produce(identified.work, Record.TWIN, tmp_path).content)
-    assert Twin.load(twin).parameters.keys() == identified.work.require_twin().parameters.keys()
+    assert load_twin(twin).parameters.keys() == identified.work.require_twin().parameters.keys()
     result = json.loads(produce(identified.work, Record.RESULT, tmp_path).content)
     assert "k_o" in result["parameters"]
     mapping = tmp_path / "m.toml"

@@ -1,35 +1,50 @@
 # SPDX-License-Identifier: MIT
-"""What results offer in a notebook: `plot()`, `summary()` and a rich representation.
+"""`plot()`, `summary()` and the notebook representation of results.
 
-The one place where a result asks the report, which stands above it, to draw it; the import waits
-until somebody asks.
+The report draws results and stands above them. The package registers the report's presenter here
+when it is imported, so that results do not import the report.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
-
-    from drivetwin.report.notebook import Summary
+from collections.abc import Callable
+from typing import Any, Protocol
 
 
-class Shown:
-    """Base of what can be looked at: a log, its shifts, an identification, a twin, a validation."""
+class Presenter(Protocol):
+    """Figures and summaries of results, by type of the result."""
 
-    def plot(self) -> go.Figure:
-        """Figure of it, the same as in the report."""
-        from drivetwin.report.notebook import figure_of
+    def figure_of(self, shown: Any, /) -> Any:
+        """Return the Plotly figure of a result."""
 
-        return figure_of(self)
+    def summary_of(self, shown: Any, /) -> Any:
+        """Return the summary of a result, as text and HTML."""
 
-    def summary(self) -> Summary:
-        """What it says in a few lines: text for `print`, a table in a notebook."""
-        from drivetwin.report.notebook import summary_of
 
-        return summary_of(self)
+_loaders: list[Callable[[], Any]] = []
+
+
+def register_presenter(load: Callable[[], Any]) -> None:
+    """Register the function that imports the presenter; it is called at the first display."""
+    _loaders[:] = [load]
+
+
+def _load_presenter() -> Presenter:
+    presenter: Presenter = _loaders[0]()
+    return presenter
+
+
+class DisplayMixin:
+    """Base of displayable results: log, shifts, identification, twin, validation."""
+
+    def plot(self) -> Any:
+        """Return the Plotly figure of the report."""
+        return _load_presenter().figure_of(self)
+
+    def summary(self) -> Any:
+        """Return a summary in a few lines: text for `print`, a table in a notebook."""
+        return _load_presenter().summary_of(self)
 
     def _repr_html_(self) -> str:
-        """Representation in a notebook."""
-        return self.summary().html
+        """Return the HTML representation for notebooks."""
+        return str(self.summary().html)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.rich_display import Shown
+from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.channels.pressure_roles import pressure_role
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.simulation.dual_clutch import LATEST
@@ -116,7 +116,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class ShiftLog(Shown):
+class ShiftLog(DisplayMixin):
     """All mapped channels of one recording, by role.
 
     `source` is its file and `sha256` that of the content, `mappings` the SHA-256 by name of the

@@ -61,7 +61,7 @@ for entry in (*app.registered_commands, *fleet.registered_commands):
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from drivetwin.files.records import program_version
+        from drivetwin._util.version import program_version
 
         typer.echo(f"drivetwin {program_version()}")
         raise typer.Exit

@@ -144,14 +144,14 @@ def _friction(outcome: Outcome, shape: Shape) -> Answer:
     from drivetwin.estimation.analysis.friction_shape import shaped_friction
     from drivetwin.estimation.data.prepare import tolerances_of
     from drivetwin.files.analysis_files import friction_text
-    from drivetwin.twin.twin import Twin
+    from drivetwin.twin.build import build_twin
 
     found = outcome.found
     with step(f"fitting {shape} friction"):
         tolerances = tolerances_of(outcome.log, outcome.card, found.shifts[0])
         one = shaped_friction(found, shape, tolerances)
     shaped = replace(found, friction={**found.friction, **one.curves})
-    twin = Twin.from_identification(shaped, outcome.card)
+    twin = build_twin(shaped, outcome.card)
     return Answer(FRICTION, friction_text(one), friction_table(one.curves), twin)
 
 
@@ -159,6 +159,7 @@ def _write(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     """Write all files or none."""
     from drivetwin.cli.atomic_outputs import staged
     from drivetwin.cli.identify_run import TWIN
+    from drivetwin.files.twin_conversion import save_twin
 
     names: list[str] = []
     with staged(folder) as beside:
@@ -166,7 +167,7 @@ def _write(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
             (beside / one.file).write_text(one.text, encoding="utf-8", newline="\n")
             names.append(one.file)
             if one.twin is not None:
-                one.twin.save(beside / TWIN)
+                save_twin(beside / TWIN, one.twin)
                 names.append(TWIN)
     return tuple(folder / name for name in names)
 

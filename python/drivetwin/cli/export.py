@@ -79,9 +79,9 @@ def export(
     the Standard Library's components.
     Parameter files (ssv, cdfx, dcm, m, json, csv) hold what is known, with units and intervals.
     """
-    from drivetwin.twin.twin import Twin
+    from drivetwin.files.twin_conversion import load_twin
 
-    model = Twin.load(twin)
+    model = load_twin(twin)
     path = output or Path(f"{twin.stem}.{to.ending}")
     with step(f"writing {path.name}"):
         match to:

@@ -87,6 +87,7 @@ def write(outcome: Joined, folder: Path) -> tuple[Path, ...]:
     `twin.toml` is that of the first log; of several each has `NAME-OF-LOG.twin.toml` besides.
     """
     from drivetwin.files.result_file import save_result
+    from drivetwin.files.twin_conversion import save_twin
     from drivetwin.report.together import save_together
 
     twins = list(outcome.made.twins.items())
@@ -96,7 +97,7 @@ def write(outcome: Joined, folder: Path) -> tuple[Path, ...]:
     with step("writing the report"), staged(folder) as beside:
         save_result(beside / RESULT, outcome.found)
         for name, twin in named.items():
-            twin.save(beside / name)
+            save_twin(beside / name, twin)
         save_together(beside / REPORT, outcome.found, outcome.made.fitted)
     return tuple(folder / name for name in (RESULT, *named, REPORT))
 

@@ -39,7 +39,7 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
     from drivetwin.estimation.analysis.experiment_design import examined
     from drivetwin.estimation.identify import identify
     from drivetwin.shifts.detect import usable_shifts
-    from drivetwin.twin.twin import Twin
+    from drivetwin.twin.build import build_twin
     from drivetwin.validation.simulate_log import validated
 
     with step(f"reading {log.name}"):
@@ -47,7 +47,7 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
         shifts = usable_shifts(recording, card)
     with step(f"identifying by the {method} method"):
         found = identify(recording, card, shifts, method)
-        twin = Twin.from_identification(found, card)
+        twin = build_twin(found, card)
     with step("simulating the shifts"):
         found = validated(found, twin, recording)
     with step("comparing experiments"):
@@ -58,10 +58,11 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
 def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
     """Write result, twin and report into `folder`, all or none; returns their paths."""
     from drivetwin.files.result_file import save_result
+    from drivetwin.files.twin_conversion import save_twin
     from drivetwin.report.html import save_report
 
     with step("writing the report"), staged(folder) as beside:
         save_result(beside / RESULT, outcome.found)
-        outcome.twin.save(beside / TWIN)
+        save_twin(beside / TWIN, outcome.twin)
         save_report(beside / REPORT, outcome.found, outcome.log)
     return tuple(folder / name for name in (RESULT, TWIN, REPORT))

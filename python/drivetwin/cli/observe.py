@@ -52,14 +52,14 @@ def observe(
     For logs without torque sensors. An output torque in the log is not used.
     """
     from drivetwin._util.atomic import write_text
+    from drivetwin.files.twin_conversion import load_twin
     from drivetwin.logs.read import read_log
     from drivetwin.observer.observe import observed
     from drivetwin.report.observer import render_observations
     from drivetwin.shifts.detect import usable_shifts
-    from drivetwin.twin.twin import Twin
     from drivetwin.vehicle.card import load_card
 
-    model = Twin.load(twin)
+    model = load_twin(twin)
     with step(f"reading {log.name}"):
         card = model.card() if vehicle is None else load_card(vehicle)
         recording = read_log(log, card, channels)

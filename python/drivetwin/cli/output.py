@@ -80,7 +80,7 @@ def table_of(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
 
 def print_json(value: Mapping[str, Any]) -> None:
     """Print one strict JSON document on stdout; NaN and infinities become null."""
-    from drivetwin.files.result_file import plain
+    from drivetwin._util.plain_values import plain
 
     text = json.dumps(plain(dict(value)), allow_nan=False, ensure_ascii=False, indent=2)
     sys.stdout.write(text + "\n")

@@ -119,22 +119,22 @@ def _names(made: Sequence[Path]) -> dict[str, Path]:
 def _candidate(name: str, source: Path) -> Candidate:
     from drivetwin.cli.identify_run import RESULT
     from drivetwin.files.result_file import load_result
+    from drivetwin.files.twin_conversion import load_twin
     from drivetwin.report.find_reports import Candidate
-    from drivetwin.twin.twin import Twin
 
     if source.suffix == ".toml":
-        return Candidate.of_twin(name, Twin.load(source))
+        return Candidate.of_twin(name, load_twin(source))
     return Candidate.of_result(name, load_result(source / RESULT if source.is_dir() else source))
 
 
 def _twin(source: Path) -> Twin:
     """The twin behind a source: the file itself, or the one beside its result."""
     from drivetwin.cli.identify_run import TWIN
-    from drivetwin.twin.twin import Twin
+    from drivetwin.files.twin_conversion import load_twin
 
     if source.suffix == ".toml":
-        return Twin.load(source)
-    return Twin.load(source / TWIN if source.is_dir() else source.with_name(TWIN))
+        return load_twin(source)
+    return load_twin(source / TWIN if source.is_dir() else source.with_name(TWIN))
 
 
 def _trials(twins: Mapping[str, Twin], log: Path, channels: Path | None) -> list[Trial]:

@@ -57,13 +57,13 @@ def simulate(
     from drivetwin._util.atomic import write_text
     from drivetwin.cli.tables import fit_table
     from drivetwin.export.fixed_step import Stepping, stepped_again
+    from drivetwin.files.twin_conversion import load_twin
     from drivetwin.logs.read import read_log
     from drivetwin.shifts.detect import usable_shifts
-    from drivetwin.twin.twin import Twin
     from drivetwin.validation.simulate_log import validate
     from drivetwin.vehicle.card import load_card
 
-    model = Twin.load(twin) if parameters is None else _edited(Twin.load(twin), parameters)
+    model = load_twin(twin) if parameters is None else _edited(load_twin(twin), parameters)
     with step(f"simulating {log.name}"):
         card = model.card() if vehicle is None else load_card(vehicle)
         recording = read_log(log, card, channels)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from drivetwin._util.rich_display import Shown
+from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.estimation.artifacts import Evidence
 from drivetwin.estimation.result.estimate import (
     Estimate,
@@ -20,7 +20,7 @@ from drivetwin.shifts.shift import RejectedShift, Shift
 
 
 @dataclass(frozen=True, eq=False)
-class Identification(Shown):
+class Identification(DisplayMixin):
     """Everything one `identify` run found. Immutable; the twin, report and exports read it.
 
     `fit[signal][phase]` with signals `output_torque`, `input_speed`, `output_speed` and phases

@@ -6,13 +6,13 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from drivetwin._util.plain_values import plain
 from drivetwin.estimation.analysis.bootstrap import Bootstrap
 from drivetwin.estimation.analysis.friction_dependence import UNITS, Departure
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
 from drivetwin.estimation.analysis.profile_likelihood import Profile
 from drivetwin.estimation.result.suggestion import Suggestion
 from drivetwin.files.records import FrictionRecord, SuggestionRecord
-from drivetwin.files.result_file import plain
 from drivetwin.parameters import spec_of
 
 

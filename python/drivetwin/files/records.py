@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cache
-from importlib import metadata
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
 
+from drivetwin._util.plain_values import finite_or_none
 from drivetwin.estimation.result.estimate import (
     OF_RATIO,
     Estimate,
@@ -24,12 +23,6 @@ from drivetwin.estimation.result.estimate import (
 from drivetwin.estimation.result.suggestion import Experiment, Suggestion
 from drivetwin.parameters import spec_of
 from drivetwin.simulation.dual_clutch import Stribeck
-
-
-def finite_or_none(value: object) -> object:
-    """Turn NaN and infinities into None: neither exists in JSON."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
 
 OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(finite_or_none)]
 Interval = tuple[FiniteFloat, FiniteFloat]
@@ -244,12 +237,3 @@ class SuggestionRecord(Record):
             text=one.text,
             experiments=[ProspectRecord(**vars(each)) for each in one.prospects],
         )
-
-
-@cache
-def program_version() -> str:
-    """Version of the installed distribution; `unknown` when run from a source tree."""
-    try:
-        return metadata.version("drivetwin")
-    except metadata.PackageNotFoundError:
-        return "unknown"

@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 import json
-from enum import Enum
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 from pydantic import Field, FiniteFloat
 
 from drivetwin._util.atomic import write_text
+from drivetwin._util.plain_values import plain
+from drivetwin._util.version import program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.multi_log_records import HeldOutRecord, SeveralRecord
@@ -26,9 +26,7 @@ from drivetwin.files.records import (
     Record,
     SchemaName,
     SuggestionRecord,
-    finite_or_none,
     fit_records,
-    program_version,
 )
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
 
@@ -133,21 +131,6 @@ def _correlation(found: Identification) -> dict[str, dict[str, float]]:
     return {
         row: dict(zip(ids, found.correlation[i].tolist(), strict=True)) for i, row in enumerate(ids)
     }
-
-
-def plain(value: Any) -> Any:
-    """Reduce settings to what JSON and TOML know: enums to values, arrays to lists, NaN to None."""
-    if isinstance(value, Enum):
-        return plain(value.value)
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(item) for item in value]
-    if isinstance(value, bool | int | str | None):
-        return value
-    return finite_or_none(value) if isinstance(value, float) else str(value)
 
 
 def save_result(path: Path | str, identification: Identification) -> None:

@@ -27,7 +27,7 @@ from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.read import read_log
 from drivetwin.parameters import spec_of
 from drivetwin.shifts.detect import FoundShifts, usable_shifts
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import validated
 from drivetwin.vehicle.card import VehicleCard, load_card
 
@@ -59,7 +59,7 @@ def identify_log(task: Task) -> Found:
         )
     found_shifts = usable_shifts(log, card)
     found = identify(log, card, found_shifts, recipe.method)
-    twin = Twin.from_identification(found, card)
+    twin = build_twin(found, card)
     found = validated(found, twin, log)
     _artefacts(task, found, log)
     rows = [*_means(task, mapping), *result_rows(found, card, recipe.mu_slip)]

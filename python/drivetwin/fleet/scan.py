@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from drivetwin._util.version import program_version
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.errors import DrivetwinError, FileFormatError, Where
 from drivetwin.estimation.result.method import Method
-from drivetwin.files.records import program_version
 from drivetwin.fleet.index import FileRow
 from drivetwin.fleet.rules import RulesFile, rule_for
 from drivetwin.fleet.sources import Source, Sources

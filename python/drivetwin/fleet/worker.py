@@ -19,8 +19,8 @@ from queue import SimpleQueue
 from time import perf_counter
 from typing import Any
 
+from drivetwin._util.version import program_version
 from drivetwin.errors import DrivetwinError, StoreError
-from drivetwin.files.records import program_version
 from drivetwin.fleet.parts import write_part, writing
 from drivetwin.fleet.rows import Found
 from drivetwin.fleet.task import Outcome, State, Task, memory_exceeded

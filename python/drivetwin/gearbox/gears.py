@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from drivetwin import _native
+from drivetwin._native import gear_statics as native_gear_statics
 from drivetwin.errors import InputError
 from drivetwin.gearbox.network import as_json
 from drivetwin.gearbox.spec import Gearbox
@@ -63,7 +63,7 @@ def gear_statics(gearbox: Gearbox, gear: str) -> GearStatics:
     """Solve one gear. Raises InputError where its elements do not make one ratio."""
     entry = gearbox.gear(gear)
     try:
-        speeds, torques, (power, torque) = _native.gear_statics(
+        speeds, torques, (power, torque) = native_gear_statics(
             as_json(gearbox), list(entry.elements), gearbox.input, gearbox.output
         )
     except ValueError as error:

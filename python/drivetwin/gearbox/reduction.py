@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from drivetwin import _native
+from drivetwin._native import reduce_shift as native_reduce_shift
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.dual import dual_clutch
@@ -136,7 +136,7 @@ def reduce(gearbox: Gearbox, from_gear: str, to_gear: str) -> Reduction:
     """
     old, new = gearbox.gear(from_gear), gearbox.gear(to_gear)
     try:
-        off_going, on_coming, common, members = _native.reduce_shift(
+        off_going, on_coming, common, members = native_reduce_shift(
             as_json(gearbox),
             list(old.elements),
             list(new.elements),

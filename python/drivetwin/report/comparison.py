@@ -8,10 +8,10 @@ from pathlib import Path
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.progress import tell
+from drivetwin._util.version import program_version
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.files.records import program_version
 from drivetwin.report.find_reports import Candidate, Trial
 from drivetwin.report.html import render_page
 from drivetwin.report.sections.comparison import (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Figures and summaries of results for notebooks: what `Shown` objects answer with."""
+"""Figures and summaries of results for notebooks: what `DisplayMixin` objects answer with."""
 
 from __future__ import annotations
 

@@ -15,7 +15,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin import _native
+from drivetwin._native import batch_sensitivities as native_batch_sensitivities
+from drivetwin._native import simulate_batch as native_simulate_batch
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
@@ -111,7 +112,7 @@ def simulate_batch(
     asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
     values = np.empty(asked.shape)
     try:
-        ends = _native.simulate_batch(
+        ends = native_simulate_batch(
             as_json(model),
             asked.scenarios,
             asked.sets,
@@ -148,7 +149,7 @@ def batch_sensitivities(
         require_delays(inputs_of(scenario.engine_torque, scenario.pressures), by)
     asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
     try:
-        ends, (values, derivatives, last_lock, grazing) = _native.batch_sensitivities(
+        ends, (values, derivatives, last_lock, grazing) = native_batch_sensitivities(
             as_json(model),
             asked.scenarios,
             asked.sets,

@@ -14,7 +14,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin import _native
+from drivetwin._native import sensitivities as native_sensitivities
+from drivetwin._native import simulate as native_simulate
 from drivetwin.errors import InputError
 from drivetwin.simulation.serialize import as_array, as_json, as_names
 
@@ -313,7 +314,7 @@ def simulate(
     accuracy = accuracy or Accuracy()
     options = (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit)
     try:
-        columns, events, status, energy = _native.simulate(
+        columns, events, status, energy = native_simulate(
             as_json(model),
             samples(inputs_of(engine_torque, pressures)),
             plain_start(start),
@@ -349,7 +350,7 @@ def sensitivities(
     require_delays(inputs, parameters)
     options = (Accuracy().tolerance, parameters)
     try:
-        columns, events, status, derivatives, event_derivatives = _native.sensitivities(
+        columns, events, status, derivatives, event_derivatives = native_sensitivities(
             as_json(model), delayed_samples(inputs), plain_start(start), run_time(time), options
         )
     except ValueError as error:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from drivetwin import _native
+from drivetwin._native import linearise as native_linearise
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray
 from drivetwin.simulation.network import Element
@@ -153,7 +153,7 @@ def linearise(
     locked, points = as_names(locked), dict(slipping or {})
     _check(locked, points, outputs)
     try:
-        matrices, states, inputs = _native.linearise(
+        matrices, states, inputs = native_linearise(
             as_json(driveline if elements is None else elements),
             locked,
             [(name, p.slip, p.pressure) for name, p in points.items()],

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from drivetwin import _native
+from drivetwin._native import simulate_network as native_simulate_network
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
@@ -97,7 +97,7 @@ def simulate(
         if isinstance(sine, Sine)
     ]
     try:
-        columns, events, status, energy = _native.simulate_network(
+        columns, events, status, energy = native_simulate_network(
             as_json(list(elements)),
             json.dumps([{kind: name} for kind, name in outputs]),
             (samples(sampled), sines),

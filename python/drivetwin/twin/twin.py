@@ -5,15 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from drivetwin._util.rich_display import Shown
+from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.errors import InputError, MissingParameterError, Where
-from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import (
     Estimate,
     FloatArray,
@@ -74,7 +72,7 @@ class TwinElement:
 
 
 @dataclass(frozen=True, eq=False)
-class Twin(Shown):
+class Twin(DisplayMixin):
     """What is known of one driveline after an identification; immutable, SI.
 
     `parameters` by id (see parameters.py), also those that could not be told; `friction` by
@@ -106,28 +104,6 @@ class Twin(Shown):
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
     load_law: LoadLaw | None = None
     converter: Converter | None = None
-
-    @classmethod
-    def from_identification(cls, found: Identification, card: VehicleCard) -> Twin:
-        """Join what the log told with what the card knew."""
-        from drivetwin.files.twin_from_result import twin_of
-
-        return twin_of(found, card)
-
-    @classmethod
-    def load(cls, path: Path | str) -> Twin:
-        """Read `twin.toml`. Raises ResultFileError where it is damaged or of a newer schema."""
-        from drivetwin.files.twin_file import read_twin_file
-        from drivetwin.files.twin_from_result import twin_from_file
-
-        return twin_from_file(read_twin_file(path))
-
-    def save(self, path: Path | str) -> None:
-        """Write `twin.toml`; the file appears whole or not at all."""
-        from drivetwin.files.twin_file import write_twin_file
-        from drivetwin.files.twin_from_result import file_of
-
-        write_twin_file(path, file_of(self))
 
     def dual_clutch(
         self,

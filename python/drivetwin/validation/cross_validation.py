@@ -20,7 +20,7 @@ from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.coverage import near, recorded
 from drivetwin.shifts.lockup_clutch import behind_converter, require_closed
 from drivetwin.shifts.shift import Shift
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import validate
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -55,7 +55,7 @@ def _one(
         told = _expected(fit, card, log, shift, number)
         mine, own = _of_log(found, log, number, told)
         mine, notes = _with_law(mine, shift)
-        twin = Twin.from_identification(mine, card)
+        twin = build_twin(mine, card)
         start = None if told is None else (told.time, told.start)
         run = validate(twin, log, shift, start=start)
     except DrivetwinError as fault:

@@ -17,6 +17,7 @@ from drivetwin.estimation.result.validation import HeldOut
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.split_gears import apart
+from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.cross_validation import hold_out
 from drivetwin.validation.simulate_log import validated, with_fit
@@ -114,12 +115,12 @@ def _simulated(
     """The identification with the fit over all logs, each with what it has of its own."""
     several = found.evidence.several
     if several is None:
-        twin = Twin.from_identification(found, card)
+        twin = build_twin(found, card)
         return validated(found, twin, logs[0]), {logs[0].source: twin}
     twins, views = {}, []
     for share, log in zip(several.logs, logs, strict=True):
         mine = of_one_log(replace(found, warnings=()), share)
-        twins[log.source] = Twin.from_identification(mine, card)
+        twins[log.source] = build_twin(mine, card)
         views.append(validated(mine, twins[log.source], log))
     shares = tuple(
         replace(share, fit=view.fit) for share, view in zip(several.logs, views, strict=True)

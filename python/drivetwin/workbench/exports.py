@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from drivetwin.errors import InputError
 from drivetwin.estimation.identification import Identification
 from drivetwin.export.targets import Target
+from drivetwin.files.twin_conversion import save_twin
 from drivetwin.workbench import jobs
 from drivetwin.workbench.identifying import report_of
 from drivetwin.workbench.session_state import Work
@@ -88,7 +89,7 @@ def _record(work: Work, wanted: Record, scratch: Path) -> bytes:
     path = scratch / wanted.value
     match wanted:
         case Record.TWIN:
-            work.require_twin().save(path)
+            save_twin(path, work.require_twin())
         case Record.RESULT:
             from drivetwin.files.result_file import save_result
 

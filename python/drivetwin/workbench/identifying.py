@@ -14,6 +14,7 @@ from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
+from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import validated
 from drivetwin.vehicle.card import VehicleCard
@@ -78,7 +79,7 @@ def _tried(task: Task, shifts: FoundShifts, method: Method) -> Outcome | Refusal
 
 def _outcome(task: Task, shifts: FoundShifts, method: Method) -> Outcome:
     found = identify(task.log, task.card, shifts, method)
-    twin = Twin.from_identification(found, task.card)
+    twin = build_twin(found, task.card)
     return Outcome(method, twin, examined(validated(found, twin, task.log)))
 
 

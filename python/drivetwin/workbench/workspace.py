@@ -13,14 +13,14 @@ from pydantic import Field, ValidationError, field_validator
 
 from drivetwin._util.atomic import write_bytes, write_text
 from drivetwin._util.toml import StrictModel, key_path
+from drivetwin._util.version import program_version
 from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import quantity_of
 from drivetwin.errors import RefusedError, Where
 from drivetwin.estimation.result.method import Method
-from drivetwin.files.records import program_version
+from drivetwin.files.twin_conversion import file_of, twin_from_file
 from drivetwin.files.twin_file import TwinFile
-from drivetwin.files.twin_from_result import file_of, twin_from_file
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.locks import Lock, LockKind
 from drivetwin.workbench.phases import Boundary

@@ -6,13 +6,14 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report.sample import card, identification
 
 
 def twin() -> Twin:
     """The made-up identification as a twin."""
-    return Twin.from_identification(identification(), card())
+    return build_twin(identification(), card())
 
 
 _NUMBERS = st.floats(allow_nan=False, allow_infinity=False)

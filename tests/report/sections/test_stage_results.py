@@ -17,7 +17,7 @@ from drivetwin.report.html import render_report
 from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, TableBlock, Tone
 from drivetwin.report.sections.stage_results import evidence_sections
 from drivetwin.shifts.detect import find_shifts
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import validated
 from drivetwin.vehicle.card import load_card
 from tests.report.sample import identification
@@ -33,7 +33,7 @@ def given() -> tuple[Identification, ShiftLog]:
     card = load_card(ROOT / "examples" / "vehicles" / "paper_like.toml")
     log = read_log(LOG, card)
     found = identify(log, card, find_shifts(log, card))
-    return validated(found, Twin.from_identification(found, card), log), log
+    return validated(found, build_twin(found, card), log), log
 
 
 def test_each_question_shows_both_methods(given: tuple[Identification, ShiftLog]) -> None:

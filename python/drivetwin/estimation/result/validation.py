@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
-from drivetwin._util.rich_display import Shown
+from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, SignalFit
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
@@ -26,7 +26,7 @@ class SignalTrace:
 
 
 @dataclass(frozen=True, eq=False)
-class Validation(Shown):
+class Validation(DisplayMixin):
     """One shift simulated from its measured inputs.
 
     `phases` maps `before`, `torque`, `inertia`, `after` to their intervals [s]; `fit` is by signal

@@ -8,11 +8,11 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from drivetwin._util.version import program_version
 from drivetwin.export.fmu.units import display_unit, fmi_unit, unit_definitions
 from drivetwin.export.fmu.variables import ENUMERATIONS, Kind, Role, Variable
 from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.xml_text import document
-from drivetwin.files.records import program_version
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivetwin._util.display_units import BAR, NM, RAD_PER_S, RPM, Display, significant
+from drivetwin._util.plain_values import plain
+from drivetwin._util.version import program_version
 from drivetwin.estimation.identification import Identification
-from drivetwin.files.records import program_version
-from drivetwin.files.result_file import plain
-from drivetwin.files.twin_from_result import borrowed_friction
 from drivetwin.report.sections.blocks import Block, Cell, NotesBlock, Section, TableBlock, cells
+from drivetwin.twin.build import borrowed_friction
 
 _RANGES: dict[str, tuple[str, Display]] = {
     "slip": ("slip", RAD_PER_S),

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""Construction of a twin from an identification and the vehicle card."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from drivetwin._util.plain_values import plain
+from drivetwin._util.version import program_version
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw
+from drivetwin.estimation.result.verdict import KNOWN, designed
+from drivetwin.twin.twin import Twin, TwinElement, TwinGear
+
+if TYPE_CHECKING:
+    from drivetwin.simulation.dual_clutch import LossLaw
+    from drivetwin.vehicle.vehicle_card import VehicleCard
+
+
+def build_twin(found: Identification, card: VehicleCard) -> Twin:
+    """Build the twin from the estimates of an identification and the design data of the card."""
+    parameters = dict(found.estimates)
+    assumptions = list(found.assumptions)
+    if "J_out" not in parameters and card.J_out is not None:
+        parameters["J_out"] = designed("J_out", card.J_out.value, card.J_out.std, KNOWN)
+        assumptions.append("Jo′ is the vehicle card's value")
+    assumptions += borrowed_friction(found)
+    friction, load = _absolute(found)
+    ids, covariance = _covariance(found)
+    loss_law: LossLaw = "dissipative" if found.loss_law == "dissipative" else "paper"
+    return Twin(
+        name=card.name,
+        method=found.method,
+        loss_law=loss_law,
+        i_in=card.i_in,
+        final_drive=card.final_drive,
+        gears={
+            gear.name: TwinGear(card.ratio(gear.name), card.element_of(gear.name))
+            for gear in card.gears
+        },
+        elements={name: _element(card, name) for name in card.elements},
+        J_prime_range=card.J_prime_range,
+        J_vehicle_range=card.J_vehicle_range,
+        parameters=parameters,
+        friction=friction,
+        validity=found.validity,
+        inputs=found.inputs,
+        settings=plain(found.settings),
+        assumptions=tuple(assumptions),
+        version=program_version(),
+        covariance_ids=ids,
+        covariance=covariance,
+        channels=card.channels,
+        load_law=load,
+        converter=card.converter,
+    )
+
+
+def _element(card: VehicleCard, name: str) -> TwinElement:
+    """Design data of an element."""
+    spec = card.elements[name]
+    i_c, i_out = card.clutch_ratios(name)
+    P0, drum = spec.P0.value, spec.drum_inertia.value
+    return TwinElement(spec.kind, i_c, i_out, spec.gain, P0, spec.peak, drum)
+
+
+def _absolute(found: Identification) -> tuple[dict[str, FrictionCurve], LoadLaw | None]:
+    """Friction and load law; what is over η times η where that is known, as the parameters are."""
+    eta, load = found.estimates.get("eta"), found.load
+    if eta is None or eta.value is None:
+        return found.friction, load
+    by = (eta.value, eta.std_total or 0.0)
+    friction = {n: one.times(*by) if one.over_eta else one for n, one in found.friction.items()}
+    return friction, load.times(*by) if load is not None and load.over_eta else load
+
+
+def borrowed_friction(found: Identification) -> list[str]:
+    """Say which elements run on their partner's curve because they never slipped under load."""
+    pairs = {
+        (a, b)
+        for shift in found.shifts
+        for a, b in ((shift.offgoing, shift.oncoming), (shift.oncoming, shift.offgoing))
+        if a not in found.friction and b in found.friction
+    }
+    return [f"friction of {a} is taken to be that of {b}" for a, b in sorted(pairs)]
+
+
+def _covariance(found: Identification) -> tuple[tuple[str, ...], FloatArray | None]:
+    """Covariance from the correlation and the total standard deviations, where all are known."""
+    if found.correlation is None:
+        return (), None
+    stds = {i: found.estimates[i].std_total for i in found.correlation_ids if i in found.estimates}
+    kept = [i for i in found.correlation_ids if stds.get(i) is not None]
+    if not kept:
+        return (), None
+    index = [found.correlation_ids.index(i) for i in kept]
+    scale = np.array([stds[i] for i in kept], dtype=float)
+    correlation = found.correlation[np.ix_(index, index)]
+    return tuple(kept), correlation * np.outer(scale, scale)
