@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import base64
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +22,6 @@ from drivetwin.app.replay import (
 from drivetwin.app.session import Session
 from drivetwin.driveline import FloatArray, FrictionTable, Stribeck
 from drivetwin.errors import MissingParameterError
-from drivetwin.identify.method import Method
 from drivetwin.validate import validate
 
 
@@ -142,17 +140,6 @@ def test_the_figure_shows_the_run_and_follows_it(identified: Session) -> None:
 
 def _unpacked(packed: dict[str, str]) -> FloatArray:
     return np.frombuffer(base64.b64decode(packed["bdata"]), packed["dtype"]).astype(np.float64)
-
-
-def test_a_move_takes_less_than_a_tenth_of_a_second(identified: Session) -> None:
-    identified.simulation()
-    spent = []
-    for stiffness in (1.3e5, 1.4e5, 1.5e5):
-        start = time.process_time()
-        identified.slide({"k_o": stiffness})
-        spent.append(time.process_time() - start)
-    identified.choose_method(Method.INTEGRAL)
-    assert min(spent) < 0.1
 
 
 def test_what_the_log_could_not_tell_is_named(identified: Session) -> None:
