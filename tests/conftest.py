@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Settings of all tests: property tests depend on no clock, and in CI on no chance."""
+"""Settings of all tests: one thread of BLAS, property tests without clock and, in CI, chance."""
 
 from __future__ import annotations
 
 import os
 
 from hypothesis import HealthCheck, settings
+
+# The matrices are small: threads that wait for each other take several times as much CPU time.
+# Set before NumPy is imported; processes that tests start inherit it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Tests share the cores, so the duration of an example is no property of the code.
 settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import pytest
 from scipy.stats import binom
 
 CLAIMED = 0.95
@@ -13,6 +14,16 @@ LEVEL = 0.01
 """Probability on each side that intervals of the claimed coverage are rejected."""
 POWER = 0.90
 """Least probability that intervals of coverage `TOO_LOW` are rejected."""
+
+COARSE, FULL = 60, 400
+"""Draws that reject a coverage of 80 %, and of 90 %, with `POWER`."""
+LOWEST = {COARSE: 0.80, FULL: TOO_LOW}
+
+
+def vary_draws(*, short: bool = False) -> pytest.MarkDecorator:
+    """Parametrise a test by `draws`: a coarse case for every run, the full one for its suite."""
+    marks = [pytest.mark.statistical, *([pytest.mark.short] if short else [])]
+    return pytest.mark.parametrize("draws", [COARSE, pytest.param(FULL, marks=marks)])
 
 
 def compute_bounds(draws: int, claimed: float = CLAIMED) -> tuple[int, int]:
@@ -25,18 +36,16 @@ def compute_power(draws: int, claimed: float = CLAIMED, too_low: float = TOO_LOW
     return float(binom.cdf(compute_bounds(draws, claimed)[0] - 1, draws, too_low))
 
 
-def assert_covers(
-    inside: int, draws: int, *, too_low: float = TOO_LOW, conservative: bool = False
-) -> None:
+def assert_covers(inside: int, draws: int, *, conservative: bool = False) -> None:
     """Reject a coverage that differs from 95 %, given `inside` of `draws` independent intervals.
 
-    Both tails are tested at `LEVEL`. With `conservative` the intervals claim at least 95 %, and
-    only the lower tail is tested. `too_low` is the coverage that has to be rejected with `POWER`;
-    too few draws for it are an error of the test.
+    Both tails are tested at `LEVEL`; with `conservative`, where intervals claim at least 95 %, only
+    the lower one. Too few draws to reject the coverage in `LOWEST` with `POWER` are an error.
     """
-    assert compute_power(draws, too_low=too_low) >= POWER, (
-        f"{draws} draws reject a coverage of {too_low:.0%} in only "
-        f"{compute_power(draws, too_low=too_low):.0%} of cases"
+    lowest = LOWEST.get(draws, TOO_LOW)
+    power = compute_power(draws, too_low=lowest)
+    assert power >= POWER, (
+        f"{draws} draws reject a coverage of {lowest:.0%} in {power:.0%} of cases"
     )
     least, most = compute_bounds(draws)
     assert least <= inside <= (draws if conservative else most), (

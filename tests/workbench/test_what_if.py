@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import base64
-import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drivetwin.errors import MissingParameterError
-from drivetwin.estimation.result.method import Method
 from drivetwin.simulation.dual_clutch import FloatArray, FrictionTable, Stribeck
 from drivetwin.validation.simulate_log import validate
 from drivetwin.workbench.session import Session
@@ -142,17 +140,6 @@ def test_the_figure_shows_the_run_and_follows_it(identified: Session) -> None:
 
 def _unpacked(packed: dict[str, str]) -> FloatArray:
     return np.frombuffer(base64.b64decode(packed["bdata"]), packed["dtype"]).astype(np.float64)
-
-
-def test_a_move_takes_less_than_a_tenth_of_a_second(identified: Session) -> None:
-    identified.simulation()
-    spent = []
-    for stiffness in (1.3e5, 1.4e5, 1.5e5):
-        start = time.process_time()
-        identified.slide({"k_o": stiffness})
-        spent.append(time.process_time() - start)
-    identified.choose_method(Method.INTEGRAL)
-    assert min(spent) < 0.1
 
 
 def test_what_the_log_could_not_tell_is_named(identified: Session) -> None:

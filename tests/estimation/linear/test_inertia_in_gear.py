@@ -10,6 +10,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import Sampled
 from drivetwin.estimation.linear.inertia_in_gear import HeldGear, held_gear
 from drivetwin.estimation.result.estimate import Verdict
+from tests.support.coverage import assert_covers, vary_draws
 
 TRUE, LOAD, RATIO, ETA = 64.0, 90.0, 1.406, 0.9
 
@@ -38,15 +39,16 @@ def told(seed: int, length: float = 20.0, swing: float = 250.0, grade: float = 1
     )
 
 
-def test_the_interval_covers_the_truth() -> None:
-    found = [told(seed) for seed in range(20)]
+@vary_draws()
+def test_the_interval_covers_the_truth(draws: int) -> None:
+    found = [told(seed) for seed in range(draws)]
     assert all(one.verdict is not Verdict.NOT_IDENTIFIABLE for one in found)
-    missed = sum(
-        abs(one.value - TRUE / ETA) > one.half
+    inside = sum(
+        abs(one.value - TRUE / ETA) <= one.half
         for one in found
         if one.value is not None and one.half is not None
     )
-    assert missed <= 3
+    assert_covers(inside, draws)
     assert np.median([one.half / one.value for one in found if one.half and one.value]) < 0.2
 
 

@@ -17,6 +17,7 @@ from drivetwin.estimation.linear.ringdown import (
     stiffness_and_damping,
 )
 from drivetwin.estimation.paper.ringdown import paper_ringdown
+from tests.support.coverage import assert_covers, vary_draws
 
 TIME = np.arange(0.0, 2.0, 1e-3)
 RATE, OMEGA = 4.5, 75.0
@@ -27,18 +28,20 @@ def ring(amplitude: float = 2000.0) -> FloatArray:
     return np.asarray(1800.0 + 50.0 * TIME + wave, dtype=float)
 
 
-def test_fit_is_unbiased_and_its_intervals_cover() -> None:
-    rates, omegas, inside = [], [], 0
-    for seed in range(30):
+@vary_draws()
+def test_fit_is_unbiased_and_its_intervals_cover(draws: int) -> None:
+    rates, omegas, inside = [], [], np.zeros(2, dtype=int)
+    for seed in range(draws):
         noise = 30.0 * np.random.default_rng(seed).standard_normal(TIME.size)
         found = fit_ringdown(Sampled(TIME, ring() + noise, 30.0), 0.0, 2.0, None)
         rates.append(found.decay_rate)
         omegas.append(found.omega_d)
-        inside += abs(found.f_d - OMEGA / (2 * np.pi)) < 1.96 * found.f_d_std
-        inside += abs(found.zeta - RATE / np.hypot(RATE, OMEGA)) < 1.96 * found.zeta_std
+        inside[0] += abs(found.f_d - OMEGA / (2 * np.pi)) < 1.96 * found.f_d_std
+        inside[1] += abs(found.zeta - RATE / np.hypot(RATE, OMEGA)) < 1.96 * found.zeta_std
     assert np.mean(omegas) == pytest.approx(OMEGA, rel=5e-4)
     assert np.mean(rates) == pytest.approx(RATE, rel=0.01)
-    assert inside >= 53
+    for count in inside:
+        assert_covers(count, draws)
 
 
 HIGH_RATE, HIGH_OMEGA = 28.9, 190.5
@@ -52,14 +55,15 @@ def high_gear(amplitude: float, seed: int) -> Sampled:
     return Sampled(time, 1000.0 + 40.0 * time + wave + noise, 20.0)
 
 
-def test_a_ring_of_three_samples_a_period_is_told_with_intervals_that_cover() -> None:
-    found = [fit_ringdown(high_gear(400.0, k), 0.0, 1.6, None, after=0.015) for k in range(40)]
+@vary_draws()
+def test_a_ring_of_three_samples_a_period_is_told_with_intervals_that_cover(draws: int) -> None:
+    found = [fit_ringdown(high_gear(400.0, k), 0.0, 1.6, None, after=0.015) for k in range(draws)]
     rates = np.array([ring.decay_rate for ring in found])
     std = np.sqrt([ring.covariance[0, 0] for ring in found])
     omegas = np.array([ring.omega_d for ring in found])
     assert np.mean(rates) == pytest.approx(HIGH_RATE, rel=0.08)
     assert np.mean(omegas) == pytest.approx(HIGH_OMEGA, rel=0.01)
-    assert np.count_nonzero(np.abs(rates - HIGH_RATE) < 1.96 * std) >= 34
+    assert_covers(int(np.count_nonzero(np.abs(rates - HIGH_RATE) < 1.96 * std)), draws)
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 160.0])
@@ -103,16 +107,18 @@ def jittering(own: float, seen: float, seed: int) -> tuple[Sampled, Drive]:
     return Sampled(TIME, torque, 3.0), Drive(Sampled(knots, measured, seen), 1.0)
 
 
+@vary_draws()
 @pytest.mark.parametrize(("own", "seen"), [(0.0, JITTER), (JITTER, 1.0), (JITTER, JITTER)])
-def test_intervals_cover_under_a_torque_that_jitters(own: float, seen: float) -> None:
+def test_intervals_cover_under_a_torque_that_jitters(own: float, seen: float, draws: int) -> None:
     """White noise in their place would have the two values in 55 to 75 % of 95 % intervals."""
-    inside = 0
-    for seed in range(40):
+    inside = np.zeros(2, dtype=int)
+    for seed in range(draws):
         torque, drive = jittering(own, seen, seed)
         found = fit_ringdown(torque, 0.0, 2.0, drive)
         errors = np.array([found.decay_rate - RATE, found.omega_d - OMEGA])
-        inside += int(np.sum(np.abs(errors) < 1.96 * np.sqrt(np.diag(found.covariance))))
-    assert inside >= 68
+        inside += np.abs(errors) < 1.96 * np.sqrt(np.diag(found.covariance))
+    for count in inside:
+        assert_covers(count, draws)
 
 
 def test_paper_reads_the_extremes() -> None:
