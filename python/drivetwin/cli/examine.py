@@ -86,7 +86,7 @@ def examine(
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked beside the experiments."""
+    """Analyses requested in addition to the experiments."""
 
     profiles: tuple[str, ...]
     bootstrap: int

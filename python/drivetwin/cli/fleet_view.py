@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a run of a fleet shows: a live view in a terminal, lines in a file, JSON for machines."""
+"""Progress of a fleet run: a live view in a terminal, lines in a file, JSON for machines."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _RATE_SPAN = 60.0
 
 
 class Tally:
-    """What happened so far: counts by state and reason, the present rate, the time left."""
+    """Running totals: counts by state and reason, the present rate, the time left."""
 
     def __init__(self) -> None:
         self.files = 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How numbers are printed: in display units, with as many digits as their interval supports."""
+"""Number format: display units, with the digits that the confidence interval supports."""
 
 from __future__ import annotations
 

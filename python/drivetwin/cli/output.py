@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What commands share in talking to the user: results on stdout, progress and errors on stderr."""
+"""User output of all commands: results on stdout, progress and errors on stderr."""
 
 from __future__ import annotations
 

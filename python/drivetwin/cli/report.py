@@ -62,7 +62,7 @@ def report(
 
 
 def _is_made(source: Path) -> bool:
-    """Whether a source is what an identification wrote; all others are taken for logs."""
+    """Return True if a source was written by an identification; all others are read as logs."""
     return source.is_dir() or source.suffix in (".json", ".toml")
 
 
@@ -100,7 +100,7 @@ def _compare(
 
 
 def _names(made: Sequence[Path]) -> dict[str, Path]:
-    """What tables call each source: its folder or file, numbered where two are called the same."""
+    """Name each source by its folder or file; number the names that occur twice."""
     plain = [
         (source if source.is_dir() or source.stem not in ("result", "twin") else source.parent)
         for source in made

@@ -53,7 +53,7 @@ def shifts(
 
 
 class _Seen(NamedTuple):
-    """What the speeds tell of a log without output torque; nothing of another log."""
+    """Quantities computed from the speeds of a log without output torque; empty for other logs."""
 
     gears: tuple[HeldGear, ...] = ()
     swings: tuple[tuple[Shift, Resonance | str], ...] = ()

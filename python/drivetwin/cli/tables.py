@@ -77,7 +77,7 @@ def parameter_table(estimates: Mapping[str, Estimate], title: str) -> Table:
 
 
 def remarks(estimates: Mapping[str, Estimate]) -> list[str]:
-    """What stands behind each verdict: one numbered line for each reason given."""
+    """List the reasons of the verdicts as numbered lines, each reason once."""
     return [f"({number}) {reason}" for reason, number in _numbers(estimates).items()]
 
 

@@ -29,8 +29,10 @@ _BACK_OFF = 0.5
 
 @dataclass(frozen=True)
 class Wishes:
-    """How a run goes about: `attempts` a log has when workers are lost; `retry` what is in
-    quarantine; whether single reports and traces are wanted.
+    """Options of a fleet run.
+
+    `attempts` is the number of tries of a log after lost workers. `retry` selects the quarantined
+    logs. The other fields request single reports and traces.
     """
 
     attempts: int = 3
@@ -40,7 +42,7 @@ class Wishes:
 
 
 class Coordinator:
-    """One run over the files of `sources` into `store`; `run` does it."""
+    """Scheduler of one run: `run` processes the files of `sources` into `store`."""
 
     def __init__(self, store: Store, pool: Pool, wishes: Wishes, tell: Listener) -> None:
         self._store = store

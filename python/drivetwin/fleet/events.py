@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a run tells while it is going on: one event after the other, for people and machines."""
+"""Events of a fleet run in order of time, for people and machines."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def drift_figure(one: JointEstimate) -> go.Figure:
 
 
 def _after_change(one: JointEstimate) -> NDArray[np.bool_]:
-    """Which of the points are of a unit that changed, from its change on."""
+    """Return the mask of points that belong to a changed unit after its change."""
     units, found = np.array(one.points.unit), np.zeros(one.points.value.size, np.bool_)
     for change in one.changes:
         found |= (units == change.unit) & (one.points.reading >= change.after)

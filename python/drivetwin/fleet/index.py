@@ -146,7 +146,7 @@ class Index:
         return None
 
     def seen_in_this_run(self, path: str) -> bool:
-        """Whether `put_file` was called for the path since this index was opened."""
+        """Return True if `put_file` was called for the path since this index was opened."""
         return bool(
             self._one("SELECT count(*) FROM files WHERE path = ? AND run = ?", path, self.run)
         )
@@ -161,13 +161,13 @@ class Index:
         )
 
     def state(self, log: str) -> State | None:
-        """Where a log stands; None where it is not known yet."""
+        """Return the state of a log; None if the log is not in the index."""
         for (state,) in self.select("SELECT state FROM logs WHERE log = ?", log):
             return State(state)
         return None
 
     def outcome(self, log: str) -> Outcome:
-        """What became of a log, without its shifts."""
+        """Return the outcome of a log, without its shifts."""
         (row,) = self.select("SELECT state, error, what, remedy FROM logs WHERE log = ?", log)
         return Outcome(State(row[0]), (), *row[1:])
 
@@ -220,7 +220,7 @@ class Index:
         return {part for (part,) in self.select("SELECT DISTINCT part FROM logs WHERE part != ''")}
 
     def count(self, state: State) -> int:
-        """How many logs stand so."""
+        """Count the logs in a state."""
         return int(self._one("SELECT count(*) FROM logs WHERE state = ?", state.value))
 
     def _write(self, sql: str, values: list[tuple[Any, ...]]) -> None:

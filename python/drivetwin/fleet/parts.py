@@ -45,7 +45,7 @@ def write_part(path: Path, log: str, outcome: Outcome, rows: Sequence[Row]) -> N
 
 @contextmanager
 def writing() -> Iterator[None]:
-    """What a worker cannot write, as a StoreError: no log is to blame, and the run stops."""
+    """Convert a worker's write error to a StoreError: no log caused it, and the run stops."""
     try:
         yield
     except OSError as fault:
@@ -54,7 +54,7 @@ def writing() -> Iterator[None]:
 
 
 def read_outcome(path: Path) -> Outcome | None:
-    """What a part says of its log; None where it does not exist or is no whole part."""
+    """Read the outcome of a log from its part; None if the part is missing or incomplete."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -89,9 +89,10 @@ def read_rows(path: Path, kinds: Sequence[RowKind] = ()) -> Any:
 
 
 def prefixes(count: int) -> list[str]:
-    """How the keys of `count` logs are divided into large parts: by their first digits.
+    """Return the prefixes by which the keys of `count` logs are divided into large parts.
 
-    Depends on the number alone, so that the same logs end in the same parts, however they came.
+    The prefixes depend on the number alone, so that the same logs end in the same parts in any
+    order.
     """
     found = [""]
     while count > _LOGS_PER_PART * len(found):

@@ -59,7 +59,7 @@ class RuleTable(StrictModel):
         return self
 
     def fits(self, path: str, unit: str, channels: frozenset[str]) -> bool:
-        """Whether a log with this path, unit and names of channels is of this rule."""
+        """Return True if the rule applies to a log with this path, unit and channel names."""
         if self.path is not None and not fnmatchcase(path, self.path):
             return False
         if self.units is not None and unit not in self.units:
@@ -139,7 +139,7 @@ class RulesFile(StrictModel):
 
 
 def is_date(field: str) -> bool:
-    """Whether a field holds dates."""
+    """Return True if a field holds dates."""
     return field == "date" or field.endswith("_date")
 
 

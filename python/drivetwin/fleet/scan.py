@@ -132,7 +132,7 @@ def inputs_of(vehicle: str, channels: str | None) -> tuple[tuple[str, str], ...]
 
 
 def settings_document(recipe: Recipe) -> str:
-    """What decides the rows of a log besides its content, as JSON; paths do not count."""
+    """Return as JSON the settings that determine a log's rows; paths are not included."""
     tree = {k: v for k, v in asdict(recipe).items() if k not in ("vehicle", "channels")}
     return json.dumps({**tree, "rows": ROWS_FORMAT}, sort_keys=True)
 

@@ -110,19 +110,19 @@ class Store:
                 file.unlink()
 
     def part(self, log: str) -> Path:
-        """Where a log's own part stands."""
+        """Return the path of a log's own part."""
         return self.folder / parts.part_of(log)
 
     def report(self, log: str) -> Path:
-        """Where the report of a single log stands."""
+        """Return the path of a single log's report."""
         return self.folder / REPORTS / f"{log}.html"
 
     def traces(self, log: str) -> Path:
-        """Where the traces of a single log stand."""
+        """Return the path of a single log's traces."""
         return self.folder / TRACES / f"{log}.parquet"
 
     def misses(self, task: Task) -> bool:
-        """Whether a report or traces that are wanted are not there."""
+        """Return True if a requested report or trace file is missing."""
         return any(
             one is not None and not Path(one).is_file() for one in (task.report, task.traces)
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a comparison compares: several identifications, and their simulations of common logs."""
+"""Inputs of a comparison: several identifications, and their simulations of common logs."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class Candidate:
 
     @classmethod
     def of_twin(cls, name: str, twin: Twin) -> Candidate:
-        """What a twin file tells."""
+        """Create a candidate from a twin file."""
         return cls(name, twin.method, twin.parameters, twin.friction, {}, twin.inputs, twin.version)
 
     @classmethod
     def of_result(cls, name: str, content: ResultFile) -> Candidate:
-        """What a result file tells."""
+        """Create a candidate from a result file."""
         nan = float("nan")
         fit = {
             signal: {
@@ -97,7 +97,7 @@ class Agreement:
 
     @property
     def agrees(self) -> bool | None:
-        """Whether the values agree within their uncertainty; None where that cannot be said."""
+        """True if the values agree within their uncertainty; None if the uncertainty is unknown."""
         return None if self.apart is None else self.apart <= DIFFER
 
 

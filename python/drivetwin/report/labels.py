@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How parameters and channels are called in tables and figures."""
+"""Labels of parameters and channels in tables and figures."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ PHASE_NUMBER = {"before": "1", "torque": "2", "inertia": "3", "after": "4"}
 
 @dataclass(frozen=True)
 class CandidateStyle:
-    """How one of several compared things is drawn: colour, its pale form, dash and marker."""
+    """Drawing style of one compared item: colour, pale colour, dash and marker."""
 
     colour: str
     fill: str

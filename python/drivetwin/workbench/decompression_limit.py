@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""How large a compressed MATLAB file says it becomes, told before anything of it is expanded.
+"""Limit on the decompressed size of MATLAB files, checked before decompression.
 
-The reader would expand a file of a few megabytes for half a minute before it fails.
+The reader would otherwise expand a file of a few megabytes for half a minute before it fails.
 """
 
 from __future__ import annotations

@@ -35,19 +35,19 @@ _PAUSE = 0.1
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a job failed, as it passes through the pipe."""
+    """Error of a job in a form that can be sent through the pipe."""
 
     what: str
     remedy: str
     where: Where = field(default_factory=Where)
 
     def error(self) -> InputError:
-        """The same as an exception."""
+        """Convert the fault to an exception."""
         return InputError(self.what, self.remedy, self.where)
 
 
 def fault_of(error: Exception) -> Fault:
-    """What is told of an error; of one that nobody raised on purpose the terminal has more."""
+    """Convert an exception to a fault; print the traceback of an unexpected error."""
     match error:
         case DrivetwinError():
             return Fault(error.what, error.remedy, error.where)
@@ -91,7 +91,7 @@ class Job:
         return time.monotonic() - self.started
 
     def results(self) -> list[Any]:
-        """What has come in since the last call; never waits."""
+        """Return the results received since the last call, without waiting."""
         found: list[Any] = []
         while not self.finished and self.pipe.poll():
             try:

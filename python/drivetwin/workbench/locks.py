@@ -15,7 +15,7 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 class LockKind(StrEnum):
-    """How much is known of a parameter before the log is looked at."""
+    """Kind of prior knowledge of a parameter: unknown, uncertain or exact."""
 
     FREE = "free"
     PRIOR = "prior"
@@ -33,7 +33,7 @@ bar. Where the card's P0 is larger, so is the deviation."""
 
 @dataclass(frozen=True)
 class Lock:
-    """What is known: nothing, `value` ± `std` (1 sigma), or exactly `value`; SI."""
+    """Prior of a parameter: none, `value` ± `std` (1 sigma), or exactly `value`; SI."""
 
     kind: LockKind
     value: float = 0.0
@@ -45,7 +45,7 @@ class Lock:
 
 
 def lockable(parameter_id: str) -> bool:
-    """Whether a parameter can be locked."""
+    """Return True if the parameter can be fixed."""
     try:
         return spec_of(parameter_id).stem in LOCKABLE
     except InputError:

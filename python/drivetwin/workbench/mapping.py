@@ -29,7 +29,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Entry:
-    """What the user states of one column, in the order of the rows."""
+    """User input for one column, in the order of the rows."""
 
     role: str
     unit: str

@@ -26,7 +26,7 @@ _DECIMALS = 4
 
 
 class Boundary(StrEnum):
-    """What can be moved, in order of time."""
+    """Movable phase boundary, in order of time."""
 
     START = "before_start"
     TORQUE = "torque_start"

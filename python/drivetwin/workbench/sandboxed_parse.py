@@ -39,9 +39,9 @@ AT_ALL = 600.0
 
 @dataclass(frozen=True, eq=False)
 class Opened:
-    """What a log holds and how it is read.
+    """Contents of a log, and the mapping it was read with.
 
-    `log` and `found` are None where it cannot be read as mapped, `fault` then says why.
+    `log` and `found` are None if the log cannot be read as mapped; `fault` then holds the reason.
     """
 
     survey: Survey
@@ -53,9 +53,9 @@ class Opened:
 
 @dataclass(frozen=True)
 class Request:
-    """What to open: files, and the channels as the user has corrected them.
+    """Files to open, and the channels as corrected by the user.
 
-    The labels are what the files are called in messages and results.
+    The labels name the files in messages and results.
     """
 
     log: Path

@@ -36,7 +36,7 @@ MOST_UPLOADS = 8
 
 @dataclass(frozen=True, eq=False)
 class Live:
-    """What the sliders move: the run as identified, the present run and the figure of both."""
+    """State of the sliders' simulation: identified run, present run and the figure of both."""
 
     identified: Validation
     present: Validation

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What one session is at: files, mapping, phases, locks, results, sliders; immutable."""
+"""Immutable state of one session: files, mapping, phases, fixed parameters, results, sliders."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Work:
         return locked(self.require_card(), self.locks)
 
     def require_opened(self) -> Opened:
-        """What was opened; raises InputError before that."""
+        """Return the opened log; raise InputError if none is open."""
         if self.opened is None:
             raise InputError("no log is open", "open a log and its vehicle card first")
         return self.opened

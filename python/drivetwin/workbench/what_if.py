@@ -68,7 +68,7 @@ class Slider:
 
 
 def sliders_of(twin: Twin, shift: Shift) -> list[Slider]:
-    """What the simulation of a shift can be told, as far as the log could tell it."""
+    """List the sliders of a shift's simulation: its identifiable parameters."""
     inertia = f"J_prime_{twin.inertia_gear(shift)}"
     names = ("eta", inertia, "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
     elements = (shift.offgoing, shift.oncoming)
@@ -82,7 +82,7 @@ def sliders_of(twin: Twin, shift: Shift) -> list[Slider]:
 
 
 def display_for(slider_id: str) -> Display:
-    """How the number of a slider is shown; friction factors as they are."""
+    """Return the display format of a slider's number; friction factors stay unscaled."""
     if slider_id.startswith(FRICTION):
         return Display("× identified")
     return display_of(spec_of(slider_id).unit)

@@ -45,7 +45,7 @@ class Folder:
         return path
 
     def new_file(self, name: str, suffix: str) -> Path:
-        """Where a file called `name` is to be written; the ending `suffix` is added if missing.
+        """Return the path of a new file called `name`; append `suffix` if it is missing.
 
         Raises RefusedError for a path that leads outside or into a folder that does not exist.
         """

@@ -117,8 +117,10 @@ def estimate(seen: Observed, known: Mapping[str, LogFacts]) -> JointEstimate | N
 
 @dataclass(frozen=True, eq=False)
 class _Settled:
-    """What the conclusions are drawn from: groups are units, or what became of them after a step
-    at the reading `since`; `sound` (n,) tells the logs that took part.
+    """Basis of the conclusions.
+
+    The groups are units; a unit is divided at a step, which lies at the reading `since`. `sound`
+    (n,) is the mask of the logs that took part.
     """
 
     data: _Data

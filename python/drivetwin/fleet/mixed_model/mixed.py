@@ -29,8 +29,10 @@ _SMALLEST, _LARGEST = 1e-3, 1e3
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """What is known: `y` (n,) with its stated standard deviations `std` (n,), the unit of each
-    (n,) as a number from 0, fixed effects `x` (n, p) and random ones `z` (n, q).
+    """Data of the mixed model.
+
+    `y` (n,) are the values, with stated standard deviations `std` (n,). The unit of each is a
+    number (n,) from 0. `x` (n, p) are the fixed effects and `z` (n, q) the random effects.
     """
 
     y: FloatArray
@@ -41,7 +43,7 @@ class Observations:
 
     @property
     def units(self) -> int:
-        """How many units there are."""
+        """Number of units."""
         return int(self.unit.max()) + 1
 
 
@@ -204,7 +206,7 @@ def _minimum(likelihood: _Likelihood) -> FloatArray:
 
 
 def _profile(likelihood: _Likelihood, best: FloatArray, place: int) -> tuple[float, float]:
-    """Where the deviance, least over all else, is 3.84 above its minimum: a 95 % interval of σ."""
+    """Find where the profile deviance is 3.84 above its minimum: a 95 % interval of σ."""
     others = [k for k in range(best.size) if k != place]
     bounds = [_bounds(best.size - 1)[k] for k in others]
     lowest = likelihood.deviance(best)

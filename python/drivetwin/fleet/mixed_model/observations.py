@@ -18,8 +18,9 @@ from drivetwin.fleet.store import Store
 
 @dataclass(frozen=True)
 class LogFacts:
-    """What is known of a log: a file of it, its unit, its fields, channel means included, and the
-    hash of the settings it was identified with.
+    """Facts of a log: a file of it, its unit and its fields.
+
+    The fields include the channel means. The settings hash is that of the identification.
     """
 
     path: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a joint estimate of one parameter says; SI, fields in the unit of their name."""
+"""Joint estimate of one parameter; SI, fields in the unit of their name."""
 
 from __future__ import annotations
 

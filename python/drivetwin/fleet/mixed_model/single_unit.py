@@ -55,5 +55,5 @@ def single(store: Store, log: str, folder: Path) -> str:
 
 
 def cut(count: int) -> str:
-    """What a caption says of a table that would be longer."""
+    """Return the caption of a truncated table."""
     return f", the first {MOST_ROWS} of {count:,}" if count > MOST_ROWS else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How narrowly each parameter is known: relative intervals side by side, and correlations."""
+"""Parameter precision: relative confidence intervals side by side, and correlations."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def validation_figure(validation: Validation) -> go.Figure:
 
 
 def validation_panels(validation: Validation) -> list[Panel]:
-    """What `validation_figure` shows, from top to bottom."""
+    """Return the panels of `validation_figure` from top to bottom."""
     shift = validation.shift
     torque = validation.engine_torque
     pressures = [

@@ -213,7 +213,7 @@ def _trial_table(trial: Trial, shift: Shift) -> TableBlock:
 
 
 def origin_section(candidates: Sequence[Candidate]) -> Section:
-    """Which files stand behind each candidate."""
+    """List the source files of each candidate."""
     rows = [
         cells(one.name, one.method, one.version, file, digest)
         for one in candidates

@@ -36,7 +36,7 @@ from drivetwin.shifts.shift import shift_labels
 
 
 def likelihood_sections(found: Identification) -> list[Section]:
-    """How well the fit explains the log, and its sensitivity to each sensor; empty without one."""
+    """Build the sections on goodness of fit and sensor sensitivity; empty without a fit."""
     fit = found.evidence.likelihood
     if fit is None:
         return []

@@ -43,7 +43,7 @@ _TOGETHER = "together"
 
 
 def several_section(found: Identification, several: Several) -> Section:
-    """What each log tells alone beside what they tell together, and whether they agree."""
+    """Compare the estimates of each log with the joint estimate, and test their agreement."""
     tested = several.consistency
     tone = Tone.GOOD if tested.agree else Tone.DOUBTFUL
     word = "agree" if tested.agree else "disagree"

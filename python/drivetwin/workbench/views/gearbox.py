@@ -31,7 +31,7 @@ _FIRST = "three-set-4000cr"
 
 
 def layout() -> list[Component]:
-    """Which gearbox, and what it is."""
+    """Return the controls for choosing a gearbox, and its description."""
     names = builtin_gearboxes()
     return [
         hint(

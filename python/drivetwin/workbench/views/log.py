@@ -107,7 +107,7 @@ def register(app: Dash, sessions: Sessions) -> None:
     )
     @told
     def show(_: int, key: str) -> tuple[Any, ...]:
-        """What is open."""
+        """Render the open log."""
         session = sessions.get(key)
         work, folder = session.work, session.folder
         content = [] if work.opened is None else _content(work.opened)

@@ -301,7 +301,7 @@ def _locks(work: Work) -> list[Component]:
 
 
 def _usual_ids(work: Work) -> list[str]:
-    """What can be locked before anything is identified."""
+    """List the parameters that can be fixed before an identification."""
     gears = dict.fromkeys(g for s in work.shifts for g in (s.start_gear, s.end_gear))
     elements = dict.fromkeys(e for s in work.shifts for e in (s.offgoing, s.oncoming))
     return [

@@ -27,7 +27,7 @@ from drivetwin.workbench.views.widgets import Topic, announce, attributes, due_i
 
 @dataclass(frozen=True)
 class Start:
-    """What a session begins with: files that were named on the command line."""
+    """Files named on the command line, opened when a session begins."""
 
     log: Source | None = None
     card: Source | None = None

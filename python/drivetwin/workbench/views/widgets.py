@@ -87,7 +87,7 @@ def tell_read(how: str, fault: str, shifts: int) -> None:
 
 
 def told(callback: Callable[P, R]) -> Callable[P, R]:
-    """A callback whose faults become the message of the page; it then changes nothing."""
+    """Wrap a callback: an error becomes the page's message, and the outputs stay unchanged."""
 
     @functools.wraps(callback)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -101,7 +101,7 @@ def told(callback: Callable[P, R]) -> Callable[P, R]:
 
 
 def acted(callback: Callable[P, None]) -> Callable[P, None]:
-    """The same for a callback without outputs."""
+    """Like `shows_message`, for callbacks that have no outputs."""
 
     @functools.wraps(callback)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> None:
@@ -114,7 +114,7 @@ def acted(callback: Callable[P, None]) -> Callable[P, None]:
 
 
 def _words(fault: DrivetwinError | OSError) -> str:
-    """A typed error, or what the system refuses, as it is told; files by their names alone."""
+    """Format a typed error or an OS error as a message; files without their folders."""
     if isinstance(fault, DrivetwinError):
         return str(fault)
     where = Where(file=None if fault.filename is None else Path(fault.filename).name)
