@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin fleet`: many logs into a store, and what can be asked of the store."""
+"""`drivetwin fleet`: identification of many logs into a store, and queries of the store."""
 
 from __future__ import annotations
 

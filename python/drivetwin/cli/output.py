@@ -90,7 +90,7 @@ def print_json(value: Mapping[str, Any]) -> None:
 def step(text: str) -> Iterator[None]:
     """Show on stderr, while it runs and where that is a terminal, what the program is doing.
 
-    With the share done and the time left where the computation tells them, else the time passed.
+    The text contains share and time left if the computation reports them, else the elapsed time.
     """
     from rich.progress import Progress, SpinnerColumn, TextColumn
 

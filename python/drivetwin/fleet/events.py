@@ -22,7 +22,7 @@ class Started:
 
 @dataclass(frozen=True)
 class Settled:
-    """A file has its outcome. `computed` tells whether this run computed it."""
+    """Outcome of a file. `computed` is True if this run computed it."""
 
     event: ClassVar[str] = "log"
     path: str

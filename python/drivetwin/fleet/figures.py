@@ -142,7 +142,7 @@ def units_figure(one: JointEstimate) -> go.Figure:
 
 
 def unit_label(one: JointEstimate, unit: UnitValue) -> str:
-    """A unit, or what became of it after a change."""
+    """Format the label of a unit, before or after a change."""
     if unit.since is None:
         return unit.unit
     return f"{unit.unit} from {reading_text(one.drifts[0].field, unit.since)}"
@@ -151,7 +151,7 @@ def unit_label(one: JointEstimate, unit: UnitValue) -> str:
 def _shown(
     field: str, readings: FloatArray
 ) -> FloatArray | np.ndarray[tuple[int], np.dtype[np.object_]]:
-    """Readings as they are drawn: dates as such."""
+    """Convert readings for plotting; date fields become dates."""
     if not is_date(field):
         return readings
     return np.array([moment(each) for each in readings], dtype=object)

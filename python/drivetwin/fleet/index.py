@@ -62,7 +62,7 @@ its old path in the index; a log that stands at two places counts once.
 """
 
 RUN_COLUMNS = frozenset({"attempts", "seconds", "modified", "run"})
-"""What tells of the runs rather than of the logs: it differs where all else is equal."""
+"""Columns that describe the runs, not the logs; they differ between equal results."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Index:
                 self._db.close()
 
     def commit(self) -> None:
-        """Make all that was written last."""
+        """Commit all writes."""
         with self._told():
             if self._db.in_transaction:
                 self._db.execute("COMMIT")
@@ -152,7 +152,7 @@ class Index:
         )
 
     def put_file(self, file: FileRow) -> None:
-        """Remember a file; replaces what was known of its path."""
+        """Store a file; replace the earlier entry of its path."""
         fields = json.dumps(dict(file.fields))
         values = (file.path, file.log, file.content, file.size, file.modified, file.rule, file.unit)
         self._write(
@@ -172,7 +172,7 @@ class Index:
         return Outcome(State(row[0]), (), *row[1:])
 
     def put_settings(self, settings: str, version: str, document: str) -> None:
-        """Remember what a settings hash stands for."""
+        """Store the settings of a hash."""
         row = (settings, version, document)
         self._write("INSERT OR IGNORE INTO settings VALUES (?, ?, ?)", [row])
 
@@ -183,11 +183,11 @@ class Index:
         self._write(f"{sql} VALUES (?, ?, ?, ?, ?)", [values])
 
     def put_attempts(self, log: str, attempts: int) -> None:
-        """Remember how often a log was tried."""
+        """Store the number of attempts of a log."""
         self._write("UPDATE logs SET attempts = ? WHERE log = ?", [(attempts, log)])
 
     def put_outcome(self, log: str, outcome: Outcome, seconds: float) -> None:
-        """Write what became of a log, and its shifts."""
+        """Store the outcome of a log, and its shifts."""
         self._write(
             "UPDATE logs SET state = ?, error = ?, what = ?, remedy = ?, seconds = ? WHERE log = ?",
             [(outcome.state, outcome.error, outcome.what, outcome.remedy, seconds, log)],
@@ -200,18 +200,18 @@ class Index:
         )
 
     def reset(self, logs: Iterable[str]) -> None:
-        """Let logs wait again."""
+        """Reset logs to the waiting state."""
         sql = "UPDATE logs SET state = ?, error = '', what = '', remedy = '', part = ''"
         values = [(State.WAITING.value, log) for log in logs]
         self._write(f"{sql} WHERE log = ?", values)
 
     def done(self, prefix: str = "") -> Iterator[tuple[str, str]]:
-        """Key and large part of the logs that are done and whose keys begin so, by key."""
+        """Iterate over key and large part of the done logs whose keys have the prefix, by key."""
         sql = "SELECT log, part FROM logs WHERE state = ? AND log >= ? AND log < ? ORDER BY log"
         yield from self.select(sql, State.DONE.value, prefix, prefix + _AFTER_HEX)
 
     def put_part(self, prefix: str, part: str) -> None:
-        """Let `part` hold the rows of all logs that are done and whose keys begin so."""
+        """Assign `part` to all done logs whose keys have the prefix."""
         sql = "UPDATE logs SET part = ? WHERE state = ? AND log >= ? AND log < ?"
         self._write(sql, [(part, State.DONE.value, prefix, prefix + _AFTER_HEX)])
 
@@ -235,7 +235,7 @@ class Index:
 
     @contextmanager
     def _told(self) -> Iterator[None]:
-        """SQLite's errors as ours."""
+        """Convert SQLite errors to StoreError."""
         try:
             yield
         except sqlite3.Error as fault:

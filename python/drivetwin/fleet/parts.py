@@ -103,7 +103,7 @@ def prefixes(count: int) -> list[str]:
 def merge(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path]) -> str:
     """Write the large part of `logs` (sorted keys) from the parts that hold them; its name.
 
-    The name tells its logs, so that a part of the same logs is never written twice.
+    The name is a hash of its logs, so that a part of the same logs is never written twice.
     Raises OSError and StoreError.
     """
     import pyarrow as pa
@@ -119,7 +119,7 @@ def merge(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path
 
 
 def _by_log(rows: Any) -> Iterator[tuple[str, Any]]:
-    """The rows of each log of a part, as a record batch without a copy; they stand together."""
+    """Iterate over the adjacent rows of each log of a part, as record batches without a copy."""
     import pyarrow.compute as pc
 
     for batch in rows.combine_chunks().to_batches():

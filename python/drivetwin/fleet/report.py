@@ -58,7 +58,7 @@ def save_fleet_report(store: Store, path: Path) -> list[JointEstimate]:
 def render_fleet(
     store: Store, found: Sequence[JointEstimate], folder: Path, library: str | None = None
 ) -> str:
-    """HTML text of the page, which will stand in `folder`: links count from there."""
+    """Return the HTML text of the page; links are relative to `folder`."""
     sections = [
         _overview(store),
         _parameters(found, untold(store, found)),

@@ -96,7 +96,7 @@ class RulesFile(StrictModel):
     @field_validator("fields")
     @classmethod
     def _names_of_their_own(cls, fields: dict[str, FieldTable]) -> dict[str, FieldTable]:
-        """Fields become columns beside those of files and rows; SQL knows no case."""
+        """Check that field names differ from other columns; SQL ignores case."""
         taken = {*FILE_COLUMNS, *ROW_COLUMNS}
         for name in fields:
             if name.casefold() in taken:
@@ -119,7 +119,7 @@ class RulesFile(StrictModel):
         return str(found[1])
 
     def fields_of(self, source: Source) -> dict[str, float]:
-        """The fields that path and list tell, in the order of the rules."""
+        """Return the fields found in path and list, in the order of the rules."""
         found = {}
         for name, table in self.fields.items():
             text = None

@@ -34,7 +34,7 @@ _KEY = 40
 
 @dataclass(frozen=True)
 class Scanned:
-    """A file that was looked at. `recipe` is None where `fault` says why it cannot be used."""
+    """A scanned file. `recipe` is None if it cannot be used; `fault` then holds the reason."""
 
     file: FileRow
     settings: str
@@ -50,7 +50,7 @@ class Skipped:
 
 
 Known = Callable[[str], FileRow | None]
-"""Finds what the index knows of a path."""
+"""Looks up the index entry of a path."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def _unreadable(fault: OSError, path: str) -> DrivetwinError:
 
 
 def _refused(path: str, unit: str, content: _Content, error: DrivetwinError) -> Scanned:
-    """A file that no task can be made of; it is looked at anew in the next run."""
+    """Return a file that cannot become a task; the next run scans it again."""
     outcome = Outcome(State.BAD, (), type(error).__name__, error.what, error.remedy)
     log = _key("refused", content.digest or path, unit, error.what)
     file = FileRow(path, log, content.digest, content.size, content.modified, "", unit, {})

@@ -19,7 +19,7 @@ _PATH = "path"
 
 @dataclass(frozen=True)
 class Source:
-    """A file, and what the list says of it by column."""
+    """A file, and its list entries by column."""
 
     path: Path
     told: Mapping[str, str] = field(default_factory=dict)

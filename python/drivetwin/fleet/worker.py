@@ -33,7 +33,7 @@ for what grows too fast to be seen there."""
 
 
 def answer(work: Work, task: Task, memory: int) -> dict[str, Any]:
-    """Do a task, write its part, and say what became of it; see `Cell` for the keys."""
+    """Run a task, write its part, and return its outcome; see `GuardedWorker` for the keys."""
     started = perf_counter()
     if task.recipe.version != program_version():
         versions = f"{program_version()} where the worker is, {task.recipe.version} here"
@@ -83,7 +83,7 @@ def _unexpected(fault: Exception) -> Outcome:
 
 
 def limit_memory(memory: int) -> None:
-    """Let allocations beyond the limit fail [bytes]; where the system cannot, do nothing."""
+    """Make allocations beyond the limit [bytes] fail, if the system supports it."""
     try:
         import resource
     except ImportError:

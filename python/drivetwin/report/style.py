@@ -29,7 +29,7 @@ VERDICT_COLOURS = {
 }
 
 DIVERGING = [[0.0, "#D55E00"], [0.5, "#f4f4f4"], [1.0, "#0072B2"]]
-"""From vermilion over white to blue, told apart in every kind of colour vision."""
+"""From vermilion over white to blue, distinguishable in every kind of colour vision."""
 
 PHASE_FILL = {
     "before": "rgba(0,0,0,0)",

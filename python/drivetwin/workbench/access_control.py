@@ -78,7 +78,7 @@ def is_loopback(host: str) -> bool:
 
 
 def refusal(status: int, text: str) -> Response:
-    """An answer that says why there is none."""
+    """Return a response with the reason of the refusal."""
     return Response(json.dumps({"error": text}), status, mimetype="application/json")
 
 

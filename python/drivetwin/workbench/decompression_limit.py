@@ -41,7 +41,7 @@ def refuse_expansion(path: Path, label: str, limit: int) -> None:
 
 
 def _claim(packed: bytes, order: str) -> int:
-    """Bytes that a compressed variable says it has; 0 where its beginning cannot be read."""
+    """Read the declared size [bytes] of a compressed variable; 0 if its header cannot be read."""
     try:
         tag = zlib.decompressobj().decompress(packed, _TAG)
     except zlib.error:

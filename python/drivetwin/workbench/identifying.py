@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The identification as a job: one method after the other, each result told when it is there."""
+"""The identification as a job: one method after the other, each result reported when complete."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Work in a process of its own: it tells how far it is, may be cancelled, and may die alone.
+"""Jobs in separate processes: they report progress, can be cancelled, and crash separately.
 
 What is handed in and comes back are dataclasses of the program itself, through a pipe between
 parent and child; bytes of a user's file never take that way.
@@ -28,7 +28,7 @@ Work = Callable[..., None]
 
 _PRELOADED = ["drivetwin.workbench.sandboxed_parse", "drivetwin.workbench.identifying"]
 _PATIENCE = 2.0
-"""Time [s] that a process gets to end after it was told to."""
+"""Time [s] that a process may take to end after the request."""
 _PAUSE = 0.1
 """Shortest time [s] between two messages about progress."""
 
@@ -75,7 +75,7 @@ class _Done:
 
 @dataclass
 class Job:
-    """A running process. `share` and `text` say how far it is, `fault` why it ended early."""
+    """A running process. `share` and `text` are its progress, `fault` the cause of an early end."""
 
     process: Any
     pipe: Connection

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Locks: what the identification is to take as known of a parameter."""
+"""Prior knowledge of parameters set by the user: free, uncertain or fixed."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def _asserted(entry: Entry, column: Column) -> str | None:
 
 
 def _refuse_set_aside(survey: Survey, found: Mapping[str, ChannelSpec]) -> None:
-    """A column whose name tells its role would be recognised again by the reader."""
+    """Raise if a column is set aside although the reader would recognise its role by its name."""
     for role, spec in survey.mapping.items():
         used = any(one.source == spec.source for one in found.values())
         if role not in found and not used:

@@ -107,7 +107,7 @@ def open_gearbox(emit: Emit, path: Path, label: str) -> None:
 
 
 def bound_memory() -> None:
-    """Let this process take `MEMORY` more than it has; where the system cannot, nothing happens."""
+    """Limit the memory of this process to `MEMORY` more than its present use, if supported."""
     status = Path("/proc/self/statm")
     if sys.platform == "win32" or not status.exists():
         return
@@ -119,7 +119,7 @@ def bound_memory() -> None:
 
 @contextmanager
 def _labelled(labels: Mapping[Path, str]) -> Iterator[None]:
-    """Errors call files by their labels: uploads stand under names of ours."""
+    """Replace paths in errors by the files' labels, because uploads have internal names."""
     try:
         yield
     except DrivetwinError as error:

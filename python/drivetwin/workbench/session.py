@@ -29,9 +29,9 @@ from drivetwin.workbench.session_state import Source, Work
 from drivetwin.workbench.workspace_folder import Folder
 
 MOST_SESSIONS = 16
-"""Sessions held; the one that was idle longest goes when another is opened."""
+"""Maximum number of sessions; opening another closes the one that was idle longest."""
 MOST_UPLOADS = 8
-"""Uploads kept for one session; the oldest goes that is not open."""
+"""Maximum number of uploads of a session; the oldest one that is not open is deleted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class Session:
         return Source(self.folder.name_of(path), path)
 
     def open(self, log: Source, card: Source, mapping: Path | None = None) -> None:
-        """Open a log with its card; what was done with the one before goes.
+        """Open a log with its card; discard the work on the previous log.
 
         Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
@@ -93,7 +93,7 @@ class Session:
             self._set(work)
 
     def correct(self, entries: Sequence[Entry]) -> None:
-        """Read the log again with the mapping as corrected; what was found before goes.
+        """Read the log again with the corrected mapping; discard the previous results.
 
         Raises MappingError, UnitError; the work stays as it was then, and goes on.
         """

@@ -33,7 +33,7 @@ _HEAD = 4096
 
 @dataclass(frozen=True)
 class Upload:
-    """A file that was received: the label it came under, and where it stands."""
+    """A received file: its label and its path."""
 
     name: str
     path: Path

@@ -46,7 +46,7 @@ _HEIGHT = 980
 
 @dataclass(frozen=True)
 class Slider:
-    """One parameter to be moved: where it stands as identified, its range and its unit.
+    """One adjustable parameter: its identified value, range and unit.
 
     Numbers are in the display unit and multiples of `step`, so that they read well.
     """
@@ -89,9 +89,9 @@ def display_for(slider_id: str) -> Display:
 
 
 def model_of(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClutch:
-    """The model of a shift with some parameters changed (SI, by slider id).
+    """Build the model of a shift with some parameters changed (SI, by slider id).
 
-    Raises MissingParameterError where the log could not tell a parameter and nothing replaces it.
+    Raises MissingParameterError if a parameter was not identified and has no replacement.
     """
     overrides = {
         name: value
@@ -183,7 +183,7 @@ def _scaled(element: ShiftElement, factor: float) -> ShiftElement:
 
 
 def _delayed(twin: Twin, changes: Mapping[str, float]) -> Twin:
-    """The twin with the age of the engine torque that the sliders say."""
+    """Return the twin with the engine-torque signal delay of the sliders."""
     if "te_delay" not in changes or "te_delay" not in twin.parameters:
         return twin
     estimate = replace(twin.parameters["te_delay"], value=changes["te_delay"])

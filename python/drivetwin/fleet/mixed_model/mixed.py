@@ -4,7 +4,7 @@
     y_ij = x_ij·β + z_ij·b_i + e_ij,   b_i ~ N(0, diag(σ²)),   e_ij ~ N(0, d_ij)
 
 i counts units, j the logs of one. d is the variance that a log states of itself, all scaled down
-where the logs scatter less than they say, with a common variance added where they scatter more.
+if the logs scatter less than they state, with a common variance added if they scatter more.
 Restricted likelihood after Harville, J. Am. Stat. Assoc. 72 (1977) 320; intervals of σ from its
 profile. Per unit only q × q matrices occur (Woodbury), so that the cost is linear in the logs.
 """

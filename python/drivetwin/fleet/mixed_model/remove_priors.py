@@ -36,7 +36,7 @@ def free_friction(
 ) -> FreeFriction | None:
     """Friction at `slip` [rad/s] and P0 of an element without the card's prior of P0.
 
-    None where the method leaves no covariance of the two, or the log says nothing of P0 itself.
+    None if the method yields no covariance of the two, or the log has no data on P0 itself.
     """
     posterior = _posterior(found, element)
     if posterior is None:

@@ -18,7 +18,7 @@ _MAKE_THEM = " `drivetwin fleet … --reports` writes a report of each, which is
 
 
 def singles(store: Store, folder: Path) -> Section:
-    """Logs that are done, the poorest fits first; `folder` is where the page will stand."""
+    """Build the table of done logs, poorest fits first; `folder` is the folder of the page."""
     fits = output_fits(store)
     known = facts(store)
     done = [log for log, _ in store.index.done() if log in known]

@@ -67,9 +67,9 @@ def half_width_percent(value: float | None, std: float | None) -> float | None:
 
 
 def correlation_figure(ids: Sequence[str], correlation: FloatArray) -> go.Figure:
-    """Correlation matrix (n, n) of the estimates; pairs near ±1 cannot be told apart well.
+    """Correlation matrix (n, n) of the estimates; pairs near ±1 are hard to separate.
 
-    A parameter that is known from design correlates with none and is left out.
+    A fixed parameter has no correlation and is omitted.
     """
     shown = np.count_nonzero(correlation, axis=0) > 1
     ids = [one for one, kept in zip(ids, shown, strict=True) if kept]

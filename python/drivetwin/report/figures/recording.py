@@ -32,7 +32,7 @@ QUANTITIES: dict[Quantity, tuple[str, Display]] = {
     Quantity.TEMPERATURE: ("temperature", Display("K")),
     Quantity.STATE: ("state", Display("–")),
 }
-"""What the axis of a quantity says, and its unit."""
+"""Axis title and unit of each quantity."""
 _COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 
 

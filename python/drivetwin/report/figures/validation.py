@@ -17,7 +17,7 @@ OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
     "input_speed": ("input speed", RPM, 1.1),
     "output_speed": ("output speed", RPM, 1.1),
 }
-"""Compared signals: what their axis says, their unit, the height of their panel."""
+"""Compared signals: axis title, unit and panel height."""
 
 
 def validation_figure(validation: Validation) -> go.Figure:

@@ -34,7 +34,7 @@ from drivetwin.shifts.shift import Shift
 
 
 def agreement_section(candidates: Sequence[Candidate]) -> Section:
-    """Parameters side by side: who says what, and whether they can be the same."""
+    """Build the section that compares the parameters and tests their agreement."""
     found = agreements(candidates)
     judged = [one for one in found if one.agrees is not None]
     differing = [one for one in judged if not one.agrees]

@@ -63,7 +63,7 @@ def limits_section(found: Identification) -> Section:
 
 
 def _remarks(found: Identification) -> Iterator[TableBlock]:
-    """One row for each reason that stands behind verdicts."""
+    """Build a table with one row for each reason of a verdict."""
     remarked: dict[tuple[Verdict, str], list[str]] = {}
     for one in found.estimates.values():
         if one.reason:

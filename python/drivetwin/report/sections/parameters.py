@@ -97,7 +97,7 @@ def _headline(found: Identification) -> str:
 
 
 def _answer(found: Identification) -> str:
-    """The answer in a word, with what stands against a plain yes."""
+    """Return the one-word answer, with the objections to a plain yes."""
     count, (passed, tests) = _verdicts(found), residual_score(found)
     against = []
     if not found.fit:

@@ -46,7 +46,7 @@ _Kind = TypeVar("_Kind")
 
 @dataclass(frozen=True)
 class _Stages(Generic[_Kind]):
-    """One method's stages on one shift; `by` says which method, and of several shifts which."""
+    """One method's stages on one shift; `by` names the method and, of several shifts, which."""
 
     by: str
     stages: _Kind
@@ -142,7 +142,7 @@ def _load_blocks(found: Identification, shifts: Iterable[_Stages[IntegralShift]]
 
 
 def _grid_blocks(by: str, fit: GridFit, doubt: str | None, labels: WlseLabels) -> list[Block]:
-    """Figure and table of a grid search; a doubt about it stands between the two."""
+    """Build figure and table of a grid search, with any doubt about it between the two."""
     text = (
         f"{by}, weighted least squares (Fig. 6): samples whose own quotient lies in the plausible "
         "range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise in the "

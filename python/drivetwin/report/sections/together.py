@@ -108,7 +108,7 @@ def _log_table(found: Identification, several: Several) -> TableBlock:
 
 
 def _numbered(plain: str, own: dict[str, tuple[str, int]]) -> str:
-    """The first id that stands for `plain` in one of the logs."""
+    """Return the first log-specific id of the parameter `plain`."""
     return next(key for key, (name, number) in own.items() if name == plain and number)
 
 

@@ -71,7 +71,7 @@ def register(app: Dash, sessions: Sessions) -> None:
             prevent_initial_call=True,
         )
         def arrived(upload: dict[str, str]) -> str:
-            """An upload stands in the field of its path."""
+            """Put the name of an upload into the path field."""
             return _UPLOADED + upload["name"]
 
     @app.callback(

@@ -145,7 +145,7 @@ def _register_sliders(app: Dash, sessions: Sessions) -> None:
     def slide(
         values: Sequence[float | str | None], ids: Sequence[dict[str, str]], key: str
     ) -> tuple[Any, Any]:
-        """Simulate with the parameters as they stand."""
+        """Simulate with the parameters of the sliders."""
         begun = time.perf_counter()
         session = sessions.get(key)
         positions = {

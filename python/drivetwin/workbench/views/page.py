@@ -191,7 +191,7 @@ def _show_status(app: Dash, sessions: Sessions) -> None:
         prevent_initial_call=True,
     )
     def status(_log: int, _results: int, key: str | None) -> list[Component | str]:
-        """One line that says what is open and what is known."""
+        """Format the status line: open files and available results."""
         if key not in sessions:
             return []
         work = sessions.get(key).work

@@ -151,7 +151,7 @@ def button(text: str, id: Id, *, main: bool = False, **options: Any) -> Componen
 
 
 def upload_button(text: str, purpose: str, target: str) -> Component:
-    """A button that lets the browser send a file; the store `target` then holds key and name."""
+    """Build a button that uploads a file; the store `target` then holds key and name."""
     return html.Button(
         text,
         type="button",
@@ -200,7 +200,7 @@ def hint(text: str) -> Component:
 
 
 def graph(id: str, label: str, figure: go.Figure, **config: Any) -> Component:
-    """A figure; `label` says to a screen reader what it is."""
+    """Build a figure; `label` is its description for screen readers."""
     options: Any = {
         "displaylogo": False,
         "responsive": True,
