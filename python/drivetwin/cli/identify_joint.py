@@ -128,7 +128,7 @@ def _log_table(several: Several) -> Table:
 
 
 def _held_table(held: Sequence[HeldOut], found: Identification) -> Table:
-    """Fit % of each prediction beside that of what was fitted, and what its noise allows."""
+    """Tabulate the fit in % of predictions, of the fitted shifts, and of the noise limit."""
     table = table_of(
         "Held out: predicted, not fitted",
         "shift", "signal", "fit %", "fitted %", "rmse", "allowed", "verdict",

@@ -15,7 +15,7 @@ _OUTPUTS = frozenset(("output", "figure", "write_mapping", "modelica"))
 
 
 def keeping_inputs(command: Callable[..., None]) -> Callable[..., None]:
-    """Return the command so that it raises InputError instead of writing over what it reads."""
+    """Wrap a command: it raises InputError instead of overwriting a file that it reads."""
 
     @wraps(command)
     def careful(**given: Any) -> None:

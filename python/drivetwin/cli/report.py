@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin report`: where the report of an identification is, and comparisons of several."""
+"""`drivetwin report`: path of an identification's report, and comparison of several."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _candidate(name: str, source: Path) -> Candidate:
 
 
 def _twin(source: Path) -> Twin:
-    """The twin behind a source: the file itself, or the one beside its result."""
+    """Load the twin of a source: the file itself, or the twin file next to its result."""
     from drivetwin.cli.identify_run import TWIN
     from drivetwin.twin.twin import Twin
 

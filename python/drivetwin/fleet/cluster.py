@@ -98,7 +98,7 @@ class DaskPool:
         future.add_done_callback(lambda done: self._replies.put((number, done)))
 
     def next(self, timeout: float) -> tuple[Task, Reply] | None:
-        """The next answer, None where none comes within `timeout` [s].
+        """Return the next reply, or None after `timeout` [s].
 
         Raises SchedulerError where the scheduler stays away.
         """

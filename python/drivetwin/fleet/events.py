@@ -12,7 +12,7 @@ from drivetwin.fleet.task import State
 
 @dataclass(frozen=True)
 class Started:
-    """A run begins: so many files, where the rows go, where the work can be watched."""
+    """Start of a run: number of files, store folder, dashboard address."""
 
     event: ClassVar[str] = "started"
     files: int

@@ -96,7 +96,7 @@ def _add_line(figure: go.Figure, one: JointEstimate, drift: Drift) -> None:
 
 
 def units_figure(one: JointEstimate) -> go.Figure:
-    """Deviations of the units with 95 % intervals, sorted; those beyond chance stand out."""
+    """Plot the sorted deviations of the units with 95 % intervals; highlight the outliers."""
     display = display_of(one.si_unit)
     units = sorted(one.units, key=lambda unit: unit.deviation)
     figure = go.Figure()

@@ -55,7 +55,7 @@ class _GoneError(Exception):
 
 
 class Cell:
-    """A worker process that is made when needed and made anew when it is gone.
+    """Worker process, started on demand and restarted after its end.
 
     For use by one thread; only `kill` may be called by others.
     """
@@ -99,7 +99,7 @@ class Cell:
             self._end()
 
     def _start(self) -> Lost | Stopped | None:
-        """Have a worker that is ready; where none will start, it is no fault of the log.
+        """Start a worker and wait until it is ready; a failed start is not counted against the log.
 
         One that ends by itself will do so again; one that was killed may have been unlucky.
         """

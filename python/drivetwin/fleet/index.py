@@ -67,7 +67,7 @@ RUN_COLUMNS = frozenset({"attempts", "seconds", "modified", "run"})
 
 @dataclass(frozen=True)
 class FileRow:
-    """A log file as it was last seen: size [bytes], time of change [ns], where it belongs."""
+    """Log file at its last scan: size [bytes], modification time [ns], unit and log key."""
 
     path: str
     log: str
@@ -177,7 +177,7 @@ class Index:
         self._write("INSERT OR IGNORE INTO settings VALUES (?, ?, ?)", [row])
 
     def put_waiting(self, log: str, content: str, settings: str, version: str) -> None:
-        """Add a log that is to be done; one that is there already stays as it is."""
+        """Add a log in the waiting state; an existing log is unchanged."""
         sql = "INSERT OR IGNORE INTO logs (log, content, settings, version, state)"
         values = (log, content, settings, version, State.WAITING.value)
         self._write(f"{sql} VALUES (?, ?, ?, ?, ?)", [values])

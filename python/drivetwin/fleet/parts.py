@@ -140,7 +140,7 @@ def _bytes(whole: Any) -> bytes:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in a folder last through a power cut, where the system can."""
+    """Synchronise a folder to disk, if the system supports it, to survive a power failure."""
     if os.name != "posix":
         return
     handle = os.open(folder, os.O_RDONLY)

@@ -30,7 +30,7 @@ class Pool(Protocol):
         """Give out a task."""
 
     def next(self, timeout: float) -> tuple[Task, Reply] | None:
-        """The next answer, None where none comes within `timeout` [s]."""
+        """Return the next reply, or None after `timeout` [s]."""
 
     def close(self) -> None:
         """End all work at once."""
@@ -44,7 +44,7 @@ def usable_cores() -> int:
 
 
 class LocalPool:
-    """Worker processes of this machine, each watched by a thread of its own."""
+    """Worker processes of this machine, each with a supervising thread."""
 
     address = None
 

@@ -221,7 +221,7 @@ def _drift_text(one: JointEstimate, whole: float) -> str:
 
 
 def _own(one: JointEstimate) -> float:
-    """The error that a log states of its own, in the middle."""
+    """Return the median standard error of the logs."""
     return float(np.median(one.points.std))
 
 

@@ -122,7 +122,7 @@ class Scan:
 
 
 def inputs_of(vehicle: str, channels: str | None) -> tuple[tuple[str, str], ...]:
-    """SHA-256 of a card, a channel mapping and the DBC files behind it, as they are now."""
+    """Compute the SHA-256 of a card, a channel mapping and the DBC files of the mapping."""
     inputs = [("vehicle", _digest(Path(vehicle)))]
     if channels is not None:
         inputs.append(("channels", _digest(Path(channels))))

@@ -116,7 +116,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Finished:
-    """A worker's answer: the outcome and the time [s] that it took."""
+    """Reply of a worker: the outcome and the computing time [s]."""
 
     outcome: Outcome
     seconds: float

@@ -88,7 +88,7 @@ def axis(title: str, **extra: Any) -> dict[str, Any]:
 
 
 def layout(height: int, **extra: Any) -> dict[str, Any]:
-    """Layout common to all figures; transparent, so that the page's theme shows through."""
+    """Return the common layout of all figures; the background is transparent."""
     return {
         "template": go.layout.Template(),
         "height": height,

@@ -19,7 +19,7 @@ _MAGIC = b"MATLAB 5.0"
 
 
 def refuse_expansion(path: Path, label: str, limit: int) -> None:
-    """Raise RefusedError where the variables of a MATLAB 5 file claim more than `limit` bytes."""
+    """Raise RefusedError if the variables of a MATLAB 5 file declare more than `limit` bytes."""
     total = 0
     with path.open("rb") as file:
         head = file.read(_HEADER)

@@ -36,7 +36,7 @@ class Record(StrEnum):
 
 @dataclass(frozen=True)
 class Product:
-    """A file to be handed over."""
+    """Exported file."""
 
     name: str
     content: bytes

@@ -112,7 +112,7 @@ class Job:
         return found
 
     def wait(self, limit: float) -> list[Any]:
-        """All results; raises InputError where the job fails or takes longer than `limit` [s]."""
+        """Wait for all results; raise InputError on failure or after `limit` [s]."""
         found: list[Any] = []
         while not self.finished:
             left = limit - self.elapsed
@@ -151,7 +151,7 @@ class Job:
 
 
 def start(work: Work, *arguments: object) -> Job:
-    """Run `work(emit, *arguments)` in a process of its own."""
+    """Run `work(emit, *arguments)` in a separate process."""
     context = _context()
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(  # type: ignore[attr-defined]
@@ -163,7 +163,7 @@ def start(work: Work, *arguments: object) -> Job:
 
 
 def call(work: Work, *arguments: object, limit: float) -> Any:
-    """The one result of `work` in a process of its own; raises as `Job.wait` does."""
+    """Run `work` in a separate process; return its only result. Raises InputError on failure."""
     return start(work, *arguments).wait(limit)[-1]
 
 

@@ -53,7 +53,7 @@ def lockable(parameter_id: str) -> bool:
 
 
 def checked(parameter_id: str, lock: Lock) -> Lock:
-    """The lock itself; raises InputError where the parameter cannot have it."""
+    """Return the lock; raise InputError if the parameter does not support it."""
     spec = spec_of(parameter_id)
     where = Where(key=parameter_id)
     if spec.stem not in LOCKABLE:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mapping as it is shown and corrected: one row for each column of the file."""
+"""Editable channel mapping: one row for each column of the file."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _spec_for(column: Column, mapping: Mapping[str, ChannelSpec]) -> tuple[str, 
 
 
 def _asserted(entry: Entry, column: Column) -> str | None:
-    """The unit where it is not the file's own; checked against the role."""
+    """Return the unit if it differs from the file's unit; check it against the role."""
     unit = entry.unit.strip()
     if unit == (column.unit or ""):
         return None

@@ -70,7 +70,7 @@ class Session:
         return key
 
     def uploaded(self, key: str) -> Source:
-        """An upload by its key. Raises RefusedError where it is no longer there."""
+        """Return an upload by its key. Raises RefusedError if it was deleted."""
         upload = self.uploads.get(key)
         if upload is None:
             raise RefusedError("this upload is no longer there", "upload the file again")
@@ -114,7 +114,7 @@ class Session:
             self.work = self.work.with_lock(parameter_id, lock)
 
     def identify(self, methods: Sequence[Method]) -> None:
-        """Start the identification in a process of its own. Raises InputError where it cannot."""
+        """Start the identification in a separate process. Raises InputError on failure."""
         with self.lock:
             if self.job is not None:
                 raise InputError("an identification is running", "wait for it or cancel it")
@@ -149,14 +149,14 @@ class Session:
                 self.job = None
 
     def choose_shift(self, index: int) -> None:
-        """Show another shift of the log. Raises InputError where there is none such."""
+        """Select another shift of the log. Raises InputError if it does not exist."""
         with self.lock:
             if not 0 <= index < len(self.work.shifts):
                 raise InputError("there is no such shift", "choose one that is listed")
             self._set(replace(self.work, shift=index, changes={}))
 
     def choose_method(self, method: Method) -> None:
-        """Show the result of another method. Raises InputError where it found none."""
+        """Select the result of another method. Raises InputError if it has no result."""
         with self.lock:
             if method not in self.work.results:
                 raise InputError("there is no such result", "choose one that is listed")

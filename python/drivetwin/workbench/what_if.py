@@ -106,7 +106,7 @@ def model_of(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClut
 
 
 def changes_of(sliders: Sequence[Slider], positions: Mapping[str, float]) -> dict[str, float]:
-    """Parameters (SI) by slider id that were moved away from where they were identified."""
+    """Return the parameters (SI) by slider id that differ from their identified values."""
     return {
         one.id: positions[one.id] / display_for(one.id).factor
         for one in sliders

@@ -99,7 +99,7 @@ class _Data:
 
 
 def estimate(seen: Observed, known: Mapping[str, LogFacts]) -> JointEstimate | None:
-    """Estimate one parameter; None where there are too few logs."""
+    """Estimate one parameter; None if there are too few logs."""
     data = _data(seen, known)
     if data is None:
         return None

@@ -49,7 +49,7 @@ def _row(fact: LogFacts, fields: list[str], fit: float | None, href: str) -> tup
 
 
 def single(store: Store, log: str, folder: Path) -> str:
-    """Link from a page in `folder` to the report of a single log; empty where there is none."""
+    """Return the link from a page in `folder` to the report of a log; empty without a report."""
     report = store.report(log)
     return Path(os.path.relpath(report, folder)).as_posix() if report.is_file() else ""
 

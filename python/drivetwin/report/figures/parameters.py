@@ -62,7 +62,7 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
 
 
 def half_width_percent(value: float | None, std: float | None) -> float | None:
-    """Half width of the 95 % interval in per cent of the value; None where it has none."""
+    """Return the half width of the 95 % interval in per cent of the value; None if undefined."""
     return 196.0 * abs(std / value) if value and std else None
 
 

@@ -80,7 +80,7 @@ def _is_time(result_id: str) -> bool:
 
 
 def _percent(change: FloatArray, value: float) -> FloatArray:
-    """Change (e,) in per cent of the value; of a value of 0 there is none, but where none is."""
+    """Convert a change (e,) to per cent of the value; undefined for 0 unless the change is 0."""
     if value == 0.0:
         return np.where(change == 0.0, 0.0, np.nan)
     return 100.0 * change / abs(value)

@@ -109,7 +109,7 @@ def _parameter_table(candidates: Sequence[Candidate], found: Sequence[Agreement]
 
 
 def value_cell(one: Estimate | None, display: Display) -> Cell:
-    """A value with its total 95 % half width below; a dash where there is none."""
+    """Format a value with its total 95 % half width below; a dash without a value."""
     if one is None or one.value is None:
         return Cell("–", number=True, note="" if one is None else one.verdict.value)
     half = None if one.std_total is None else Z95 * one.std_total * display.factor

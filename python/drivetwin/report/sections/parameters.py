@@ -231,7 +231,7 @@ def fit_table(found: Identification) -> TableBlock:
 
 
 def fit_cell(fit: SignalFit | None, display: Display) -> Cell:
-    """Fit % with the error in its unit below; a dash where there is none."""
+    """Format the fit in % with the error in its unit below; a dash without a fit."""
     if fit is None:
         return Cell("–", number=True)
     note = f"{significant(fit.rmse * display.factor, 3)} {display.label}"

@@ -105,7 +105,7 @@ def evidence_sections(found: Identification) -> list[Section]:
 
 
 def _stages(found: Identification, stages: Sequence[_Kind], method: str) -> list[_Stages[_Kind]]:
-    """Evidence of one method, each with the shift it is of where there are several."""
+    """Collect the stage results of one method, with the shift names if there are several."""
     names = [f"Shift {name}, {method}" for name in shift_labels(found.shifts)]
     if len(stages) < 2 or len(stages) != len(names):
         names = [method[0].upper() + method[1:]] * len(stages)

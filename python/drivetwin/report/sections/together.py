@@ -154,7 +154,7 @@ def _shared_table(
 
 
 def held_out_section(found: Identification, held: Sequence[HeldOut]) -> Section:
-    """Every shift that was predicted: its fit beside the fitted ones, and what noise allows."""
+    """Compare the fit of each predicted shift with the fitted shifts and the noise limit."""
     tiles = [
         Tile(one.name, _torque_fit(one), _TONES[one.outcome], one.outcome.value) for one in held
     ]

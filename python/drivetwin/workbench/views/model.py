@@ -83,7 +83,7 @@ def _register_bench(app: Dash, sessions: Sessions) -> None:
     )
     @told
     def show(_: int, key: str) -> list[Component]:
-        """Sliders beside the figure."""
+        """Render the sliders next to the figure."""
         session = sessions.get(key)
         if session.work.method is None or not session.work.shifts:
             return [hint("Nothing is identified yet.")]

@@ -177,7 +177,7 @@ def table(
 
 
 def notes(title: str, texts: Iterable[str], tone: str = "doubtful") -> Component:
-    """A list of sentences under a heading; nothing where there are none."""
+    """Build a list of sentences under a heading; empty without sentences."""
     items = [html.Li(text) for text in dict.fromkeys(texts)]
     if not items:
         return html.Div()
