@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What results offer in a notebook: `plot()`, `summary()` and a rich representation.
+"""Mixin of results: `plot()`, `summary()` and a rich representation in notebooks.
 
-The one place where a result asks the report, which stands above it, to draw it; the import waits
-until somebody asks.
+The report draws the result. It is a higher layer, so it is imported only on use.
 """
 
 from __future__ import annotations
@@ -19,13 +18,13 @@ class Shown:
     """Base of what can be looked at: a log, its shifts, an identification, a twin, a validation."""
 
     def plot(self) -> go.Figure:
-        """Figure of it, the same as in the report."""
+        """Plot the result as in the report."""
         from drivetwin.report.notebook import figure_of
 
         return figure_of(self)
 
     def summary(self) -> Summary:
-        """What it says in a few lines: text for `print`, a table in a notebook."""
+        """Summarise the result in a few lines: text for `print`, a table in a notebook."""
         from drivetwin.report.notebook import summary_of
 
         return summary_of(self)
