@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.update_raster import find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.simulation.dual_clutch import LATEST
 
@@ -91,6 +93,21 @@ class Channel:
     def step(self) -> float:
         """Median sample interval [s]."""
         return float(np.median(np.diff(self.time)))
+
+    @cached_property
+    def updates(self) -> Channel:
+        """The channel reduced to the instants at which its value was updated.
+
+        The value at such an instant is the newest that the sender had, `te_delay` old. A channel
+        that is not `held` is returned as it is.
+        """
+        if not self.held or self.quantity is Quantity.STATE:
+            return self
+        found = find_updates(self.time, self.values)
+        if found is None:
+            return self
+        time, samples = found
+        return replace(self, time=time, values=self.values[samples], held=False)
 
     def at(self, time: FloatArray) -> FloatArray:
         """Values at `time` (m,): linear between samples, held for states.

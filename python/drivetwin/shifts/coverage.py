@@ -19,7 +19,6 @@ import numpy as np
 from drivetwin.channels.pressure_roles import pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, open_ends
 from drivetwin.errors import DamagedChannelError, Where
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE, open_spans
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
@@ -122,7 +121,7 @@ def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[
     found = []
     whole = (shift.before[0], shift.after[1])
     if "engine_torque" in log:
-        torque = fresh_samples(log["engine_torque"])
+        torque = log["engine_torque"].updates
         gaps = (*torque.gaps, *open_ends(torque.time, whole))
         found += [_Gap(torque, gap, (gap[0] - OLDEST, gap[1] + YOUNGEST)) for gap in gaps]
     for name, fill in fills.items():

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.logs.quality.outliers import staircase
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 FloatArray = NDArray[np.float64]
@@ -69,7 +68,7 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
 
     Without an input speed the engine speed over i_in stands in (exact with lock-up engaged);
     without an output speed the wheel speed times the final drive, which the twisting shaft
-    separates from the true one. Both are reported in `warnings`. Raises MissingChannelError, and
+    separates from the true one. Both are told in `warnings`. Raises MissingChannelError, and
     TimeError where the two share no time.
     """
     warnings: list[str] = []
@@ -109,8 +108,8 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
 
 
 def _finite(channel: Channel) -> Channel:
-    """Return the finite samples of a channel; for a held channel only the updated samples."""
-    channel = fresh_samples(channel)
+    """The numbers of a channel, of a held one its fresh values only."""
+    channel = channel.updates
     keep = np.isfinite(channel.values)
     if np.count_nonzero(keep) < 2:
         raise MissingChannelError(

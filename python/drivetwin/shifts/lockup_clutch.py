@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.logs.quality.outliers import runs
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.shifts.kinematics import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.tcu_flags import set_spans
@@ -102,8 +101,8 @@ def behind_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog
     """
     if card.converter is None or open_slip(log, card, shift) is None:
         return log
-    engine = fresh_samples(log["engine_speed"])
-    turbine = card.i_in * fresh_samples(log["input_speed"]).at(engine.time)
+    engine = log["engine_speed"].updates
+    turbine = card.i_in * log["input_speed"].updates.at(engine.time)
     known = np.isfinite(turbine) & (engine.values > 0.0)
     ratio = np.divide(turbine, engine.values, out=np.zeros_like(turbine), where=known)
     first, last = card.converter.speed_ratio[0], card.converter.speed_ratio[-1]

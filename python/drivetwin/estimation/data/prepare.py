@@ -16,7 +16,6 @@ from drivetwin.estimation.data.shift_data import (
     ShiftSignals,
     TorqueOfSpeeds,
 )
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.shifts.lockup_clutch import behind_converter
 from drivetwin.shifts.pressures import shift_pressures
 from drivetwin.shifts.shift import Shift
@@ -74,7 +73,7 @@ SECANT = 1e-3
 
 def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
     """A channel's finite samples times `factor`, with their noise estimated from themselves."""
-    fresh = fresh_samples(channel)
+    fresh = channel.updates
     good = np.isfinite(fresh.values)
     values = factor * fresh.values[good]
     floor = resolution(values) / np.sqrt(12.0)

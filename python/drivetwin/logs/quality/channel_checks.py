@@ -28,7 +28,7 @@ from drivetwin.logs.quality.outliers import (
     stale,
     stuck,
 )
-from drivetwin.logs.quality.update_raster import find_raster, fresh_samples
+from drivetwin.logs.quality.update_raster import find_raster
 
 MIN_SAMPLES = 10
 """Fewer samples cannot show a shift."""
@@ -182,7 +182,7 @@ def _at_rest(channel: Channel) -> list[str]:
     """Words for an engine torque that stays at one number where chance would have moved it."""
     if channel.role != "engine_torque":
         return []
-    fresh = fresh_samples(replace(channel, held=find_raster(channel) is not None))
+    fresh = replace(channel, held=find_raster(channel) is not None).updates
     span = longest_rest(fresh.time, fresh.values)
     if span is None:
         return []
@@ -245,7 +245,7 @@ def _beyond(channel: Channel) -> Damage | None:
 def _of_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> Damage | None:
     """Apply `look` to the updated samples of a channel; include the samples that repeat them."""
     held = find_raster(channel) is not None
-    fresh = fresh_samples(replace(channel, held=held))
+    fresh = replace(channel, held=held).updates
     found = look(fresh)
     if found is None or not held:
         return found

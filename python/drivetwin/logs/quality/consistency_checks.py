@@ -11,7 +11,6 @@ from drivetwin.channels.roles import AUXILIARY, quantity_of
 from drivetwin.channels.shiftlog import Channel, open_ends
 from drivetwin.errors import PlausibilityError, TimeError, Where
 from drivetwin.logs.quality.time_alignment import SIGNIFICANT, speed_ratio
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 STARTS_APART = 0.05
@@ -73,7 +72,7 @@ def partly_recorded(channels: Mapping[str, Channel]) -> list[str]:
     return [
         f"channel {channel.source_name!r}: no samples from {low:.3f} s to {high:.3f} s"
         for channel in measured
-        for low, high in open_ends(fresh_samples(channel).time, whole)
+        for low, high in open_ends(channel.updates.time, whole)
         if high - low > STARTS_APART
     ]
 

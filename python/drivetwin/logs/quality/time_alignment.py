@@ -15,7 +15,6 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from drivetwin.channels.shiftlog import Channel, FloatArray
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 GRID = 0.01
@@ -172,14 +171,14 @@ def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[s
     """Return warnings for significant delays and drifts of speeds against the input speed."""
     if "input_speed" not in channels:
         return []
-    inlet = fresh_samples(channels["input_speed"])
+    inlet = channels["input_speed"].updates
     texts: list[str] = []
     if "output_speed" in channels:
-        outlet = fresh_samples(channels["output_speed"])
+        outlet = channels["output_speed"].updates
         found = speed_delay(inlet, outlet, [gear.ratio for gear in card.gears])
         texts += _told(found, outlet, inlet)
     if "engine_speed" in channels:
-        engine = fresh_samples(channels["engine_speed"])
+        engine = channels["engine_speed"].updates
         found = speed_delay(engine, inlet, [card.i_in])
         turned = None if found is None else replace(found, value=-found.value, drift=-found.drift)
         texts += _told(turned, engine, inlet)
