@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.shifts.changepoint import Hinge, Moving, fit_hinge
 from drivetwin.shifts.kinematics import GearboxSpeeds
 from drivetwin.shifts.settings import ShiftSettings
@@ -133,8 +134,7 @@ def _slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
     rounding = speeds.rounding(ratio)
     noise = max(noise, floor, rounding)
     root = float(np.sqrt(width))
-    mean = np.convolve(np.pad(error - level, width // 2, mode="edge"), np.ones(width), "same")
-    mean = np.abs(mean[width // 2 : width // 2 + len(error)]) / width
+    mean = np.abs(compute_moving_mean(error - level, width))
     stairs = rounding > _white(error[rest])
     return _Slip(speeds.time, error, level, floor, noise, mean * root / noise, root, stairs)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.logs.quality.outliers import runs
@@ -199,7 +200,7 @@ def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
     width = round(_HOLD / _STEP / 3.0)
     if time.size < 4 * width:
         return ()
-    mean = np.convolve(np.where(np.isfinite(slip), slip, 1.0), np.ones(width) / width, "same")
+    mean = compute_moving_mean(np.where(np.isfinite(slip), slip, 1.0), width)
     closed = np.abs(mean) < CLOSED
     for first, stop in runs(~closed):
         # A late engine speed looks like slip while a shift changes the speeds.
@@ -231,7 +232,7 @@ def _spans(
     width = round(_HOLD / _STEP / 3.0)
     if time.size < 4 * width:
         return ()
-    mean = np.convolve(np.where(np.isfinite(slip), slip, 0.0), np.ones(width) / width, "same")
+    mean = compute_moving_mean(np.where(np.isfinite(slip), slip, 0.0), width)
     return tuple(
         (float(time[first]), float(time[stop - 1]))
         for first, stop in runs(shows(mean))
