@@ -47,9 +47,9 @@ class Boundary:
 def break_away(
     speeds: GearboxSpeeds, ratio: float, held: tuple[int, int], stop: int, settings: ShiftSettings
 ) -> Boundary | None:
-    """Where the gear of `ratio`, held in samples `held`, lets go; None if it cannot be told.
+    """Locate break-away from the gear of `ratio`, engaged in samples `held`; None if not found.
 
-    `stop` is the first sample at which the next gear is held.
+    `stop` is the first sample at which the next gear is engaged.
     """
     first, last = held
     rest = slice(max(first, last + 1 - speeds.samples(_REST, 8)), last + 1)
@@ -75,9 +75,9 @@ def break_away(
 def lock_up(
     speeds: GearboxSpeeds, ratio: float, held: tuple[int, int], start: int, settings: ShiftSettings
 ) -> Boundary | None:
-    """Where the gear of `ratio`, held in samples `held`, is reached; None if it cannot be told.
+    """Locate lock-up of the gear of `ratio`, engaged in samples `held`; None if not found.
 
-    `start` is the last sample at which the gear before is held.
+    `start` is the last sample at which the previous gear is engaged.
     """
     first, last = held
     rest = slice(first, min(last + 1, first + speeds.samples(_REST, 8)))
@@ -95,7 +95,7 @@ def lock_up(
 
 
 def _is_sparse(speeds: GearboxSpeeds, settings: ShiftSettings) -> bool:
-    """Whether the fewest samples of a fit would take longer than any curve can follow."""
+    """Return True if the minimum number of samples of a fit exceeds the longest fit window."""
     return _LEAST * speeds.step > 2.0 * settings.hinge_window
 
 

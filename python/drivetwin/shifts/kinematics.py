@@ -69,7 +69,7 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
 
     Without an input speed the engine speed over i_in stands in (exact with lock-up engaged);
     without an output speed the wheel speed times the final drive, which the twisting shaft
-    separates from the true one. Both are told in `warnings`. Raises MissingChannelError, and
+    separates from the true one. Both are reported in `warnings`. Raises MissingChannelError, and
     TimeError where the two share no time.
     """
     warnings: list[str] = []
@@ -109,7 +109,7 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
 
 
 def _finite(channel: Channel) -> Channel:
-    """The numbers of a channel, of a held one its fresh values only."""
+    """Return the finite samples of a channel; for a held channel only the updated samples."""
     channel = fresh_samples(channel)
     keep = np.isfinite(channel.values)
     if np.count_nonzero(keep) < 2:

@@ -92,12 +92,12 @@ def _crossing(pressure: Smoothed, level: float, break_away: float) -> float | No
 
 
 def torque_dip_onset(torque: Smoothed, break_away: float, step: float) -> Boundary | None:
-    """Where the output torque begins to fall towards break-away; None if it does not clearly.
+    """Locate the onset of the torque dip towards break-away; None if there is no clear onset.
 
     Only for power-on upshifts, whose torque phase lowers the output torque by the ratios' `step`
-    (new over old) at a steady engine torque. The onset lies where the last such fall begins, since
-    an earlier fall is the driver's, and before the hinge by what the shaft delays it. Sigma is that
-    of the hinge fit, doubled because the fall need not be smooth, and that delay again.
+    (new over old) at a steady engine torque. The onset is the start of the last such fall,
+    since an earlier fall is caused by the driver; the delay of the shaft is subtracted. Sigma is
+    that of the hinge fit, doubled because the fall need not be smooth, and that delay again.
     """
     keep = torque.time <= break_away
     time, values = torque.time[keep], torque.values[keep]

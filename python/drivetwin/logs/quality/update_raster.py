@@ -4,7 +4,7 @@
 Only the instants of update carry information: a value is fresh there and stale until the next.
 Rounding can make an update repeat the old value, so the updates are not the changes; they lie on a
 regular raster of which the changes show a part. A logger whose step does not divide the period, as
-2 ms for 5 ms, shows each update up to a step late; the raster tells when it came.
+2 ms for 5 ms, records each update up to a step late; the raster gives its instant.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def _step(channel: Channel) -> float:
 
 
 def _changed(channel: Channel) -> NDArray[np.bool_]:
-    """Whether each sample but the first brings a new value (n-1,); after a pause none can tell."""
+    """Mask (n-1,) of the samples, from the second on, with a new value; False after a pause."""
     pause = np.diff(channel.time) > _PAUSE * channel.step
     return np.asarray((np.diff(channel.values) != 0.0) & ~pause)
 
@@ -148,7 +148,7 @@ def _fit(changes: FloatArray, period: float, step: float) -> Raster | None:
 
 
 def _fit_between(changes: FloatArray, period: float, step: float) -> Raster | None:
-    """The same for a period that the step does not divide: a change shows up to a step late."""
+    """Fit the raster if the step does not divide the period; changes are up to a step late."""
     found = _line(changes, period)
     if found is None:
         return None
@@ -167,21 +167,21 @@ def _raster(start: float, period: float, step: float, late: FloatArray) -> Raste
 
 
 def _no_chance(most: float, period: float, changes: int) -> bool:
-    """Whether chance would hardly put all of so many changes within `most` [s] of a raster."""
+    """Return True if changes within `most` [s] of a raster are unlikely to be a coincidence."""
     return (2.0 * most / period) ** (changes - 2) < _CHANCE
 
 
 def _early(period: float, step: float, late: FloatArray) -> float:
-    """How long before the raster updates come [s] that are shown `late` (n,) after it.
+    """Estimate the lead [s] of updates over the raster, given delays `late` (n,) after it.
 
-    Where the step does not divide the period, some come just in time for a sample. Where it does,
-    all are as late as each other, and how late nobody knows: they count as in time.
+    If the step does not divide the period, some updates arrive just before a sample. Otherwise the
+    delay is constant and cannot be estimated; it is taken as zero.
     """
     return -float(np.quantile(late, _IN_TIME)) if _uneven(period, step) else 0.0
 
 
 def _uneven(period: float, step: float) -> bool:
-    """Whether the step does not divide the period."""
+    """Return True if the period is not a multiple of the step."""
     steps = period / step
     return abs(steps - round(steps)) > _UNEVEN
 
@@ -246,10 +246,10 @@ def fresh_samples(channel: Channel) -> Channel:
 
 
 def shown_late(channels: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
-    """The channels by role, those `late` that a coarse table shows on, and what to say of it.
+    """Mark channels with repeated values of a coarse table as `late`; return them with warnings.
 
-    Nobody knows when within a row their messages came. Where each has stamps of its own, they are
-    those of the messages.
+    The arrival time of a message within a row is unknown. Channels with their own stamps have the
+    stamps of the messages.
     """
     measured = {role: one for role, one in channels.items() if one.quantity not in AUXILIARY}
     held = [one for one in measured.values() if one.held]
