@@ -74,8 +74,8 @@ def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> di
     from drivetwin.files.result_file import RejectedRecord, ShiftRecord
 
     return {
-        "shifts": [ShiftRecord.of(one).model_dump(by_alias=True) for one in found.shifts],
-        "rejected": [RejectedRecord.of(one).model_dump() for one in found.rejected],
+        "shifts": [ShiftRecord.from_result(one).model_dump(by_alias=True) for one in found.shifts],
+        "rejected": [RejectedRecord.from_result(one).model_dump() for one in found.rejected],
         "lock_ups": [asdict(one) for one in closings],
         "resonances": [_swing(*pair) for pair in seen.swings],
         "held_gears": [asdict(one) for one in seen.gears],
