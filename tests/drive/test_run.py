@@ -24,11 +24,11 @@ from drivetwin.drive import (
 )
 from drivetwin.drive.network import LOCK_UP
 from drivetwin.drive.result import Maneuver
-from drivetwin.drive.shift import ShiftKind
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, gear_statics, load_gearbox
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import find_shifts
+from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.drive.bus import REFERENCE, candump
 from tests.shifts.fixtures import make_card
 

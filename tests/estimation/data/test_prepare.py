@@ -16,7 +16,8 @@ from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.linear.multi_shift import disturbed
 from drivetwin.shifts.coverage import AFTER, BEFORE
 from drivetwin.shifts.detect import FoundShifts
-from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
+from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.shifts.fixtures import make_card
 

@@ -12,7 +12,8 @@ from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
 from drivetwin.estimation.data.load_stationarity import own_load
 from drivetwin.estimation.data.select_shifts import MOST, chosen
 from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import make_card
 
