@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.noise import resolution, white_noise
+from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin.estimation.data.noise import white_noise
 from drivetwin.estimation.data.shift_data import Coupling, Driveline, Sampled, ShiftSignals
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
@@ -151,7 +152,7 @@ class Run:
         torque = step * np.round((torque + 4.0 * rng.standard_normal(fresh.size)) / step)
         sigma = max(white_noise(torque), step / np.sqrt(12.0))
         s["engine_torque"] = Sampled(fresh, torque, sigma)
-        return self._pack(s, resolution(torque))
+        return self._pack(s, estimate_rounding_step(torque))
 
     def _pack(self, s: dict[str, Sampled], step: float) -> ShiftSignals:
         m = self.manoeuvre

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.estimation.data.noise import resolution
 from drivetwin.estimation.data.prepare import sampled
 from drivetwin.estimation.data.shift_data import Coupling, Driveline, ShiftSignals
 from drivetwin.shifts.shift import Shift
@@ -95,5 +95,5 @@ def _sample_signals(made: DynoRun) -> ShiftSignals:
         channels["wheel_speed"],
         {n: channels[f"pressure.{n}"] for n in (scenario.offgoing, scenario.oncoming)},
         shift,
-        resolution(channels["engine_torque"].values),
+        estimate_rounding_step(channels["engine_torque"].values),
     )

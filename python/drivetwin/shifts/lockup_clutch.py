@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.signal_processing import compute_moving_mean
+from drivetwin._util.signal_processing import compute_moving_mean, find_true_runs
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import IdentificationError, Where
-from drivetwin.logs.quality.outliers import runs
 from drivetwin.shifts.kinematics import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.tcu_flags import set_spans
@@ -202,13 +201,13 @@ def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
         return ()
     mean = compute_moving_mean(np.where(np.isfinite(slip), slip, 1.0), width)
     closed = np.abs(mean) < CLOSED
-    for first, stop in runs(~closed):
+    for first, stop in find_true_runs(~closed):
         # A late engine speed looks like slip while a shift changes the speeds.
         if first > 0 and (stop - first) * _STEP < _HOLD:
             closed[first:stop] = True
     return tuple(
         LockUp(float(time[first]), _HOLD / 6.0, float(time[stop - 1]))
-        for first, stop in runs(closed)
+        for first, stop in find_true_runs(closed)
         if (stop - first) * _STEP >= _HOLD and first > width
     )
 
@@ -235,7 +234,7 @@ def _spans(
     mean = compute_moving_mean(np.where(np.isfinite(slip), slip, 0.0), width)
     return tuple(
         (float(time[first]), float(time[stop - 1]))
-        for first, stop in runs(shows(mean))
+        for first, stop in find_true_runs(shows(mean))
         if (stop - first) * _STEP >= least
     )
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin._util.signal_processing import find_true_runs
 from drivetwin.channels.shiftlog import Channel, ShiftLog, open_ends
-from drivetwin.logs.quality.outliers import runs
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 Span = tuple[float, float]
@@ -28,11 +28,13 @@ def set_spans(flag: Channel) -> tuple[Span, ...]:
     """
     on, ends = flag.values > 0.5, np.append(flag.time, flag.time[-1] + flag.step)
     for state in (False, True):
-        for first, stop in runs(on == state):
+        for first, stop in find_true_runs(on == state):
             inside = first > 0 and stop < on.size
             if inside and ends[stop] - ends[first] < _GLITCH:
                 on[first:stop] = not state
-    return tuple((float(flag.time[first]), float(flag.time[stop - 1])) for first, stop in runs(on))
+    return tuple(
+        (float(flag.time[first]), float(flag.time[stop - 1])) for first, stop in find_true_runs(on)
+    )
 
 
 def flag_before(log: ShiftLog, time: float, reach: float) -> float | None:

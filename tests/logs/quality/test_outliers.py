@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivetwin._util.signal_processing import find_true_runs
 from drivetwin.channels.shiftlog import FloatArray, Quantity
 from drivetwin.logs.quality.outliers import (
     beyond,
@@ -16,7 +17,6 @@ from drivetwin.logs.quality.outliers import (
     longest_rest,
     missing,
     pulses,
-    runs,
     spikes,
     staircase,
     stale,
@@ -62,7 +62,7 @@ def test_spikes_are_found_to_the_sample(width: int, height: float) -> None:
         values[start : start + width] += height
     found = spikes(TIME, values, Quantity.SPEED)
     assert found is not None
-    assert runs(found.mask) == [(start, start + width) for start in (300, 1030, 1700)]
+    assert find_true_runs(found.mask) == [(start, start + width) for start in (300, 1030, 1700)]
     assert found.text.startswith("3 spikes left out, ")
 
 
@@ -81,7 +81,7 @@ def test_a_torque_that_jumps_and_jumps_back_is_found(height: float, width: int) 
         values[start : start + width] += height
     found = pulses(TIME, values)
     assert found is not None
-    assert runs(found.mask) == [(start, start + width) for start in (300, 700, 1600)]
+    assert find_true_runs(found.mask) == [(start, start + width) for start in (300, 700, 1600)]
 
 
 def test_a_torque_that_knocks_steps_or_stays_away_is_no_pulse() -> None:
@@ -103,7 +103,7 @@ def test_a_stuck_signal_is_found_until_it_jumps() -> None:
     values[400:700] = values[400]
     found = stuck(TIME, values, Quantity.SPEED)
     assert found is not None
-    assert runs(found.mask) == [(401, 700)]
+    assert find_true_runs(found.mask) == [(401, 700)]
     assert "from 0.802 s to 1.398 s" in found.text
 
 
@@ -112,7 +112,7 @@ def test_a_fine_signal_that_stays_to_the_end_is_stuck() -> None:
     values[1500:] = values[1500]
     found = stuck(TIME, values, Quantity.SPEED)
     assert found is not None
-    assert runs(found.mask) == [(1501, TIME.size)]
+    assert find_true_runs(found.mask) == [(1501, TIME.size)]
 
 
 def test_a_noisy_torque_that_rests_shortly_is_stuck() -> None:
@@ -120,7 +120,7 @@ def test_a_noisy_torque_that_rests_shortly_is_stuck() -> None:
     values[600:650] = values[600]
     found = stuck(TIME, values, Quantity.TORQUE)
     assert found is not None
-    assert runs(found.mask) == [(601, 650)]
+    assert find_true_runs(found.mask) == [(601, 650)]
 
 
 def test_a_pressure_without_noise_may_rest_and_fall_at_once() -> None:
@@ -135,7 +135,7 @@ def test_dropouts_to_zero_are_found() -> None:
     values[900] = 0.0
     found = dropouts(TIME, values)
     assert found is not None
-    assert runs(found.mask) == [(400, 407), (900, 901)]
+    assert find_true_runs(found.mask) == [(400, 407), (900, 901)]
     assert dropouts(TIME, np.where(TIME < 1.0, 0.0, 40.0 * (TIME - 1.0))) is None
     assert dropouts(TIME, speed()) is None
 
@@ -148,7 +148,7 @@ def test_a_short_dropout_out_of_a_calm_torque_is_found() -> None:
     values[980:996] = 0.0
     found = dropouts(TIME, values)
     assert found is not None
-    assert runs(found.mask) == [(980, 996)]
+    assert find_true_runs(found.mask) == [(980, 996)]
     assert dropouts(TIME, sound) is None
 
 
@@ -171,7 +171,7 @@ def test_numbers_far_beyond_all_others_are_found(value: float, width: int, every
         values[start : start + width] = value
     found = beyond(time, values)
     assert found is not None
-    assert runs(found.mask) == [(start, start + width) for start in (20, 120)]
+    assert find_true_runs(found.mask) == [(start, start + width) for start in (20, 120)]
     assert "far beyond all other numbers" in found.text
 
 
@@ -182,7 +182,7 @@ def test_numbers_far_beyond_all_others_are_found_at_the_ends(value: float) -> No
     values[:100] = values[-70:] = value
     found = beyond(TIME, values)
     assert found is not None
-    assert runs(found.mask) == [(0, 100), (TIME.size - 70, TIME.size)]
+    assert find_true_runs(found.mask) == [(0, 100), (TIME.size - 70, TIME.size)]
     released = np.where(TIME < 0.3, 14.0, np.round(5.0 * np.sin(TIME), 1))
     assert beyond(TIME, released) is None
 
@@ -224,7 +224,7 @@ def test_a_number_that_the_signal_jumped_to_is_stuck_from_its_first_sample(start
     values[start : start + 50] = -9999.0
     found = stuck(TIME, values, Quantity.TORQUE)
     assert found is not None
-    assert runs(found.mask) == [(start, start + 50)]
+    assert find_true_runs(found.mask) == [(start, start + 50)]
 
 
 def test_a_coarse_signal_in_steady_driving_is_not_stuck() -> None:
@@ -259,7 +259,7 @@ def test_saturation_is_found() -> None:
 def _rests(mask: np.typing.NDArray[np.bool_]) -> np.typing.NDArray[np.bool_]:
     """Only stretches of three or more."""
     kept = np.zeros(mask.size, np.bool_)
-    for start, end in runs(mask):
+    for start, end in find_true_runs(mask):
         kept[start:end] = end - start >= 3
     return kept
 
@@ -284,7 +284,7 @@ def test_late_times_are_told_to_the_millisecond() -> None:
 def test_runs_cover_exactly_what_is_true(flags: list[bool]) -> None:
     mask = np.array(flags, np.bool_)
     rebuilt = np.zeros(mask.size, np.bool_)
-    for start, end in runs(mask):
+    for start, end in find_true_runs(mask):
         assert start < end
         rebuilt[start:end] = True
     assert np.array_equal(rebuilt, mask)

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.channels.shiftlog import Channel, ShiftLog
-from drivetwin.estimation.data.noise import resolution, white_noise
+from drivetwin.estimation.data.noise import white_noise
 from drivetwin.estimation.data.shift_data import (
     Coupling,
     Driveline,
@@ -76,7 +77,7 @@ def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
     fresh = channel.updates
     good = np.isfinite(fresh.values)
     values = factor * fresh.values[good]
-    floor = resolution(values) / np.sqrt(12.0)
+    floor = estimate_rounding_step(values) / np.sqrt(12.0)
     return Sampled(fresh.time[good], values, max(white_noise(values), float(floor)))
 
 
@@ -134,7 +135,7 @@ def _whole_signals(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSigna
         wheel_speed=sampled(log["wheel_speed"]) if "wheel_speed" in log else None,
         pressures=pressures_of(log, shift),
         shift=shift,
-        torque_resolution=resolution(engine_torque.values),
+        torque_resolution=estimate_rounding_step(engine_torque.values),
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.channels.units import BAR, RPM, lookup, usual_units
@@ -22,8 +23,6 @@ from drivetwin.logs.quality.outliers import (
     longest_rest,
     missing,
     pulses,
-    resolution,
-    runs,
     spikes,
     stale,
     stuck,
@@ -163,7 +162,7 @@ def _at_limit(channel: Channel) -> list[str]:
     share = float(np.mean(at_limit))
     if channel.role != "engine_torque" or not MAX_AT_LIMIT < share < 1.0:
         return []
-    rests = runs(np.diff(channel.values) == 0.0)
+    rests = find_true_runs(np.diff(channel.values) == 0.0)
     there, elsewhere = (
         max((channel.time[b] - channel.time[a] for a, b in rests if at_limit[a] == at), default=0.0)
         for at in (True, False)
@@ -196,7 +195,7 @@ def _coarse(channel: Channel) -> list[str]:
     """Words for a measured channel that was rounded so much that nothing precise rests on it."""
     # Not from one sample to the next: along a ramp of a slow channel all may be many steps apart.
     numbers = np.unique(channel.values[np.isfinite(channel.values)])
-    step, largest = resolution(numbers), float(np.abs(numbers).max(initial=0.0))
+    step, largest = estimate_resolution(numbers), float(np.abs(numbers).max(initial=0.0))
     if channel.quantity in AUXILIARY or step <= COARSE * largest or _switched(channel.values):
         return []
     return [

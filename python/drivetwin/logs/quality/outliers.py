@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 from scipy.special import erf
 
+from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
 from drivetwin.channels.shiftlog import FloatArray, Quantity
 
 Mask = NDArray[np.bool_]
@@ -119,18 +120,12 @@ class Damage:
     text: str
 
 
-def runs(mask: Mask) -> list[tuple[int, int]]:
-    """Return first index and end (one past the last) of each stretch of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
 def missing(time: FloatArray, values: FloatArray) -> Damage | None:
     """Samples without a number."""
     mask = ~np.isfinite(values)
     if not mask.any():
         return None
-    found = runs(mask)
+    found = find_true_runs(mask)
     if all(end - start <= _CLIPPED_SAMPLES for start, end in found):
         first = float(time[found[0][0]])
         return Damage(
@@ -158,7 +153,9 @@ def spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage |
             mask[start : start + width] = True
     if not mask.any():
         return None
-    return Damage(mask, f"{len(runs(mask))} spikes left out, {_spans(time, runs(mask))}")
+    return Damage(
+        mask, f"{len(find_true_runs(mask))} spikes left out, {_spans(time, find_true_runs(mask))}"
+    )
 
 
 def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: float) -> list[int]:
@@ -206,7 +203,9 @@ def pulses(time: FloatArray, values: FloatArray) -> Damage | None:
             mask[first + 1 : last + 1] = True
     if not mask.any():
         return None
-    return Damage(mask, f"jumped up or down and back {_spans(time, runs(mask))}, left out")
+    return Damage(
+        mask, f"jumped up or down and back {_spans(time, find_true_runs(mask))}, left out"
+    )
 
 
 def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
@@ -219,7 +218,7 @@ def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | 
     steps = np.diff(values)
     same, moving = steps == 0.0, np.abs(steps)
     usual = float(np.median(moving[~same])) if (~same).any() else np.inf
-    long = [(start, end) for start, end in runs(same) if end - start >= _STUCK_SAMPLES]
+    long = [(start, end) for start, end in find_true_runs(same) if end - start >= _STUCK_SAMPLES]
     outside = steps.size - sum(end - start for start, end in long)
     fine = outside >= _ENOUGH and np.count_nonzero(~same) > _MOVING * outside
     mask = np.zeros(values.size, np.bool_)
@@ -236,7 +235,7 @@ def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | 
             mask[start if jumped else start + 1 : end + 1] = True
     if not mask.any():
         return None
-    return Damage(mask, f"stuck at one number {_spans(time, runs(mask))}, left out")
+    return Damage(mask, f"stuck at one number {_spans(time, find_true_runs(mask))}, left out")
 
 
 def stale(time: FloatArray, values: FloatArray) -> Damage | None:
@@ -249,8 +248,8 @@ def stale(time: FloatArray, values: FloatArray) -> Damage | None:
     if values.size < 4 * _SURROUNDINGS:
         return None
     noise = float(np.median(np.abs(np.diff(values, 3)))) / _THIRD_DIFFERENCE
-    size, least = np.abs(steps), _MOVES * max(resolution(np.unique(values)), noise)
-    for start, end in runs(steps == 0.0):
+    size, least = np.abs(steps), _MOVES * max(estimate_resolution(values), noise)
+    for start, end in find_true_runs(steps == 0.0):
         if start == 0 or end == steps.size or end - start > _LOST:
             continue
         before, after, lost = size[start - 1], size[end], end - start
@@ -265,7 +264,7 @@ def stale(time: FloatArray, values: FloatArray) -> Damage | None:
     return Damage(
         mask,
         f"{count} {what} the one before while the signal moves on, as where a message is lost: "
-        f"left out, {_spans(time, runs(mask))}",
+        f"left out, {_spans(time, find_true_runs(mask))}",
     )
 
 
@@ -282,7 +281,7 @@ def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | 
     the rounded one, so that is what the chance of so long a rest is reckoned for.
     """
     still = np.diff(values) == 0.0
-    found = runs(still)
+    found = find_true_runs(still)
     if not found or still.all():
         return None
     start, end = max(found, key=lambda run: run[1] - run[0])
@@ -290,20 +289,14 @@ def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | 
     moving = np.diff(elsewhere) != 0.0
     if values[start] == 0.0 or moving.size < _ENOUGH or np.mean(moving) < _JITTER:
         return None
-    noise = _noise(elsewhere / resolution(elsewhere))
+    noise = _noise(elsewhere / estimate_resolution(elsewhere))
     unlikely = (end - start) * np.log(erf(0.5 / (np.sqrt(2.0) * noise))) if noise > 0.0 else 0.0
     return (float(time[start]), float(time[end])) if unlikely < _UNLIKELY else None
 
 
-def resolution(values: FloatArray) -> float:
-    """Smallest step between two samples in a row; 0 where there is none."""
-    steps = np.abs(np.diff(values))
-    return float(steps[steps > 0.0].min()) if steps.any() else 0.0
-
-
 def staircase(values: FloatArray) -> float:
     """Resolution of a signal that goes in stairs, being rounded beyond its noise; else 0."""
-    step = resolution(values)
+    step = estimate_resolution(values)
     if step == 0.0 or np.mean(np.diff(values) == 0.0) < _REPEATING:
         return 0.0
     return step if _noise(values / step) < _DITHER else 0.0
@@ -326,7 +319,7 @@ def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
     level = float(np.percentile(np.abs(values), 98.0))
     moving = np.abs(np.diff(values))
     mask = np.zeros(values.size, np.bool_)
-    for start, end in runs(values == 0.0):
+    for start, end in find_true_runs(values == 0.0):
         if start == 0 or end == values.size:
             continue
         least = _DROP * level
@@ -339,7 +332,7 @@ def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
             mask[start:end] = True
     if not mask.any():
         return None
-    return Damage(mask, f"fell to zero {_spans(time, runs(mask))}, left out")
+    return Damage(mask, f"fell to zero {_spans(time, find_true_runs(mask))}, left out")
 
 
 def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damage | None:
@@ -356,7 +349,7 @@ def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damag
     far = np.flatnonzero(sizes[1:] > BEYOND * sizes[:-1])
     for largest in sizes[far[sizes[far] >= np.median(size)]]:
         mask = size > largest
-        found = runs(mask)
+        found = find_true_runs(mask)
         if (
             np.unique(values[~mask]).size >= _OTHERS
             and _are_put_in(time, values, found, float(largest))
@@ -393,16 +386,16 @@ def _may_be_commanded(values: FloatArray, run: tuple[int, int], possible: float)
     if start == 0 or end == values.size:
         return True
     before = values[max(0, start - max(end - start, _SURROUNDINGS)) : start]
-    usual = max(float(np.ptp(before)), resolution(values))
+    usual = max(float(np.ptp(before)), estimate_resolution(values))
     return float(values[end] - values[start - 1]) > _LIFT * usual
 
 
 def clipped(time: FloatArray, values: FloatArray) -> Damage | None:
     """Samples at the largest or smallest number, where a fine signal rests there repeatedly."""
-    same = runs(np.diff(values) == 0.0)
+    same = find_true_runs(np.diff(values) == 0.0)
     for limit in (float(values.max()), float(values.min())):
         at_limit = values == limit
-        rests = [run for run in runs(at_limit) if run[1] - run[0] >= _CLIPPED_SAMPLES]
+        rests = [run for run in find_true_runs(at_limit) if run[1] - run[0] >= _CLIPPED_SAMPLES]
         elsewhere = sum(
             end - start + 1 >= _CLIPPED_SAMPLES for start, end in same if values[start] != limit
         )

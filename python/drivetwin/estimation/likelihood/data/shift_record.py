@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray, Span
+from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.noise import resolution
 from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals, TorqueOfSpeeds
 from drivetwin.estimation.likelihood.data.input_smoothing import (
     bend_of,
@@ -350,7 +350,9 @@ def record_of(
 def _rounding(signals: ShiftSignals) -> dict[str, Rounding]:
     """Compute the quantization errors of the inputs by name; those of the torque as extended by
     `_held`."""
-    found = {n: rounding_of(p, resolution(p.values)) for n, p in signals.pressures.items()}
+    found = {
+        n: rounding_of(p, estimate_rounding_step(p.values)) for n, p in signals.pressures.items()
+    }
     torque = rounding_of(signals.engine_torque, signals.torque_resolution)
     if torque is not None:
         found[TORQUE] = replace(torque, stay=np.pad(torque.stay, 1, mode="edge"))
