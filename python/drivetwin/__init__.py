@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
 """drivetwin: from gear-shift logs to validated driveline models.
 
-The names below are the whole of what a script needs, in the order of use; each is imported when
-it is first asked for, so that `import drivetwin` costs nothing.
+The public names below are sufficient for a script, in the order of use. Each is imported on first
+access, so that `import drivetwin` is fast.
 
-    card = drivetwin.load_card(path)                             what is known from design
+    card = drivetwin.load_card(path)                             design data
     log = drivetwin.read_log(path, card)                         channels, SI
     found = drivetwin.find_shifts(log, card)                     shifts and their phases
     result = drivetwin.identify_shifts(log, card, found)         estimates with verdicts
     twin = drivetwin.Twin.from_identification(result, card)      the model
-    run = drivetwin.validate_shift(twin, log, found.shifts[0])   simulation over measurement
-    result = drivetwin.validated(result, twin, log)              the same of all shifts, into result
-    result = drivetwin.examined(result)                          what would tell more, into result
+    run = drivetwin.validate_shift(twin, log, found.shifts[0])   simulation against measurement
+    result = drivetwin.validated(result, twin, log)              result with all shifts simulated
+    result = drivetwin.examined(result)                          result with ranked experiments
     drivetwin.save_result(path, result)                          result.json
     drivetwin.save_report(path, result, log)                     report.html
 

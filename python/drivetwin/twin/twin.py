@@ -68,21 +68,21 @@ class TwinElement:
     drum: float
 
     def spec(self, name: str) -> ElementSpec:
-        """The same as on a vehicle card, all of it taken as known."""
+        """Return the element as on a vehicle card, with all values exact."""
         P0, drum = PriorValue(self.P0), PriorValue(self.drum)
         return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
 
 
 @dataclass(frozen=True, eq=False)
 class Twin(Shown):
-    """What is known of one driveline after an identification; immutable, SI.
+    """Identified model of one driveline; immutable, SI.
 
-    `parameters` by id (see parameters.py), also those that could not be told; `friction` by
-    element; `covariance` (n, n) over `covariance_ids`, total; `validity` the ranges of slip,
-    pressure, torque and speed that the log covered; `inputs` file name -> SHA-256. The design
-    ranges [kg m^2] and `channels` by role are those of the vehicle card. `load_law` says how the
-    load torque grows with speed; None where it is constant. `converter` is the card's map of the
-    torque converter, None where it has none.
+    `parameters` by id (see parameters.py) include those not identifiable. `friction` is by
+    element. `covariance` (n, n) over `covariance_ids` is the total one. `validity` contains the
+    ranges of slip, pressure, torque and speed in the log. `inputs` maps file name to SHA-256. The
+    design ranges [kg m^2] and `channels` by role are those of the vehicle card. `load_law` is the
+    growth of the load torque with speed; None for a constant load. `converter` is the card's
+    torque converter map; None without one.
     """
 
     name: str
@@ -225,7 +225,7 @@ class Twin(Shown):
 
     @property
     def over_eta(self) -> bool:
-        """Whether torque-like quantities are known over η only: no output torque was measured."""
+        """True if torque-like quantities are known divided by η only (no output torque)."""
         return self._known("J_vehicle") is None and self._known("J_vehicle" + OVER_ETA) is not None
 
     def _known(self, parameter_id: str) -> float | None:
