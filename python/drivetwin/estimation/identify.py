@@ -58,7 +58,7 @@ GROWS = "grows with the square of the wheel speed and else "
 
 
 class Shifts(Protocol):
-    """What shift detection hands over."""
+    """Protocol for the result of shift detection."""
 
     @property
     def shifts(self) -> tuple[Shift, ...]:
@@ -133,9 +133,9 @@ def identify(
 def _of_card(
     found: Conclusions, card: VehicleCard, method: Method, is_open: bool
 ) -> tuple[str, ...]:
-    """What is said of the card: a map that counts as exact, inertias outside its design ranges.
+    """Return warnings about the card: a map used as exact, inertias outside their design ranges.
 
-    The paper's method doubts each value by itself; behind a converter J′ is without the engine.
+    The paper's method checks each value separately. Behind a converter, J′ excludes the engine.
     """
     exact = (MAP_EXACT,) if is_open and "engine_torque" not in card.sensors else ()
     elsewhere = method is Method.PAPER or is_open
@@ -225,7 +225,7 @@ def _without_torque(
     card: VehicleCard,
     method: Method,
 ) -> tuple[Conclusions, Evidence]:
-    """What a log without an output torque tells: only the likelihood method does without it.
+    """Estimate from a log without an output torque; only the likelihood method supports this.
 
     Raises IdentificationError for the other methods.
     """

@@ -67,7 +67,7 @@ def _one(
 def _expected(
     fit: LikelihoodFit | None, card: VehicleCard, log: ShiftLog, shift: Shift, number: int
 ) -> Expected | None:
-    """What the likelihood leads one to expect; None for another method."""
+    """Predict the misfit expected by the likelihood; None for another method."""
     if fit is None:
         return None
     signals = replace(signals_of(log, card, shift), log=number)

@@ -57,7 +57,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """What came of it: the identification, the logs fitted, and a twin of each by its source."""
+    """Result of a joint identification: the identification, the fitted logs, a twin by source."""
 
     found: Identification
     fitted: tuple[ShiftLog, ...]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Which shifts of a whole drive are fitted: those that can be, as many as tell something new.
+"""Selection of the shifts of a whole drive that are fitted.
 
-On a road the vehicle is braked and hills come and go, which no channel tells. A shift over which
-the load is not constant spoils the fit of all others, so it is left out where others do without.
-Beyond MOST shifts the sensors' tolerances decide, and time and memory of a fit grow with them:
-every change of gears then counts first with the shift that leaves least of the load unexplained.
+On a road the driver brakes and the slope changes, and no channel records either. A shift with a
+varying load biases the fit of all others, so it is dropped if enough other shifts remain. Beyond
+MOST shifts the sensor tolerances dominate the intervals, while time and memory of a fit still
+grow. For each gear change, the shifts with the smallest load residual are therefore used first.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the estimators see: sampled signals with their noise, and the ratios of one shift."""
+"""Input data of the estimators: sampled signals with their noise, and the ratios of one shift."""
 
 from __future__ import annotations
 
@@ -145,12 +145,11 @@ class ShiftSignals:
 
     @property
     def output_gaps(self) -> tuple[Span, ...]:
-        """Where something compared with the equations is unrecorded: output torque, a speed of the
-        gearbox."""
+        """Spans in which a measured output is missing: output torque or a speed."""
         compared = (self.output_torque, self.engine_speed, self.output_speed)
         return tuple(gap for signal in compared for gap in signal.unrecorded)
 
     @property
     def scale_known(self) -> bool:
-        """Whether an output torque gives all torque-like quantities their common scale."""
+        """True if an output torque fixes the common scale of all torque-like quantities."""
         return self.output_torque.time.size > 0

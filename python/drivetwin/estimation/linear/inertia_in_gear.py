@@ -51,10 +51,11 @@ BLOCKS = 8
 
 @dataclass(frozen=True)
 class HeldGear:
-    """What one gear held over `span` [s] tells; `value` [kg m^2] ± `half` (95 %), or None and why.
+    """Inertia estimate from one gear engaged over `span` [s].
 
-    `load` [N m] is T_load/η at the output shaft at the mean speed; `explained` the share of the
-    torque's variance that the balance explains.
+    `value` [kg m^2] has the half width `half` (95 %), or is None with a reason. `load` [N m] is
+    T_load/η at the output shaft at the mean speed. `explained` is the share of the torque's
+    variance that the balance explains.
     """
 
     gear: str
@@ -68,10 +69,10 @@ class HeldGear:
 
 
 def held_gears(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> tuple[HeldGear, ...]:
-    """What the gears before and between the shifts of a log tell, while the converter is closed.
+    """Estimate the inertia in each gear engaged before and between shifts with a locked converter.
 
-    Of a log without shifts the gears that it holds. Empty without an engine torque or an output
-    speed.
+    For a log without shifts, all its gears are used. The result is empty without an engine torque
+    or an output speed.
     """
     if not {"engine_torque", "output_speed"} <= log.channels.keys():
         return ()

@@ -41,7 +41,7 @@ def systematic_std(
 
 
 def disturbed(signals: ShiftSignals, role: str, error: SensorTolerance) -> ShiftSignals:
-    """The same signals with one sensor reading too much, or values that are older, by `error`."""
+    """Copy the signals with the gain, offset or delay `error` applied to one sensor."""
 
     def changed(s: Sampled) -> Sampled:
         values = s.values * (1.0 + error.gain) + error.offset
@@ -71,9 +71,9 @@ def disturbed(signals: ShiftSignals, role: str, error: SensorTolerance) -> Shift
 def integral_method(
     signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
 ) -> tuple[Conclusions, tuple[IntegralShift, ...]]:
-    """What the noise lets the method conclude, and its stages on each shift.
+    """Estimate the parameters by the integral method, with the stages of each shift.
 
-    Raises IdentificationError where a shift does not carry it.
+    Raises IdentificationError if a shift does not support the method.
     """
     start, shifts = middle_of(card.J_prime_range), []
     load_at = growing_from(signals, card.final_drive)

@@ -50,7 +50,7 @@ class Contradiction:
 
     @property
     def text(self) -> str:
-        """The same in words."""
+        """The contradiction as a sentence."""
         unit = spec_of(self.id).unit
         card, log = (in_units(one.value, unit, one.std) for one in (self.design, self.log))
         return (
@@ -119,7 +119,7 @@ def held_against(
 
 
 def outside_ranges(estimates: Mapping[str, Estimate], card: VehicleCard) -> tuple[str, ...]:
-    """What is said of inertias whose whole interval lies outside the card's design range."""
+    """Describe inertias whose whole interval lies outside the card's design range."""
     ranges = {"J_prime": card.J_prime_range, "J_vehicle": card.J_vehicle_range}
     texts = []
     for name, one in estimates.items():
@@ -158,7 +158,7 @@ def without_gain(
 
 
 def outside(symbol: str, value: float, design: tuple[float, float]) -> str:
-    """What is said of an inertia [kg m^2] outside its design range; empty where it lies within."""
+    """Describe an inertia [kg m^2] outside its design range; an empty text if it is inside."""
     if design[0] <= value <= design[1]:
         return ""
     return (
