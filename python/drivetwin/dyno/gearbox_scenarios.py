@@ -73,7 +73,7 @@ class _Shift:
         )
 
     def vibration(self) -> Vibration:
-        """What the valve adds in the inertia phase, as in Fig. 4."""
+        """Pressure oscillation of the valve in the inertia phase, as in Fig. 4."""
         return Vibration(2.0e4, 18.0, self.at + self.handover, self.at + 0.7)
 
     def reduction(self) -> TorqueReduction:
@@ -101,7 +101,7 @@ def gearbox(drum: float = DRUM) -> Scenario:
 
 
 def gearbox_chain(drum: float = DRUM) -> Scenario:
-    """The same on a lighter load, and a shift to 4th gear after throttle steps in 3rd."""
+    """Scenario `gearbox` with a lighter load, and a shift to 4th gear after steps in 3rd."""
     first, second = torque_steps(0.3, 0.24, _STEPS), torque_steps(3.7, 0.2, _STEPS)
     demand = Program((*first.knots, *second.knots[1:]))
     shifts = (_TWO_THREE, _THREE_FOUR)

@@ -19,12 +19,12 @@ from drivetwin.simulation.dual_clutch import Stribeck
 _DEAD_TIME, _LAG = 0.012, 0.020
 _MAIN, _KISS = 1.4e6, 7.6e4
 _WORN = Stribeck(mu_c=0.100, mu_s=0.115, v_s=20.0, mu_v=2e-4)
-"""Friction of B2, another than that of B3: the log has to tell both apart."""
+"""Friction of B2; differs from that of B3, so that an identification must separate both."""
 _SECOND, _THIRD = HeldGear("2", "B2"), HeldGear("3", "B3")
 
 
 def power_on_down() -> Scenario:
-    """Kick-down 3-2: B3 is lowered until the engine climbs, B2 takes hold at the speed of 2nd."""
+    """Kick-down 3-2: B3 slips until the engine has the speed of 2nd gear, then B2 engages."""
     demand = torque_steps(0.3, 0.24, (900.0, 1400.0, 500.0, 1300.0, 400.0, 1200.0, 700.0, 1000.0))
     offgoing = Program(((2.15, _MAIN), (2.20, 2.6e5), (2.35, 1.25e5), (3.30, 1.15e5), (3.40, 0.0)))
     oncoming = Program(
@@ -40,7 +40,7 @@ def power_on_down() -> Scenario:
 
 
 def power_off_up() -> Scenario:
-    """Upshift 2-3 with the pedal closed: B2 lets go, the engine falls, B3 takes hold."""
+    """Upshift 2-3 with the pedal closed: B2 opens, the engine speed falls, B3 engages."""
     demand = torque_steps(0.3, 0.2, (900.0, 1500.0, 400.0, 1200.0, 1600.0, 600.0, -150.0))
     offgoing = Program(((2.15, _MAIN), (2.25, 1.6e5), (2.35, 0.0)))
     oncoming = Program(
@@ -56,7 +56,7 @@ def power_off_up() -> Scenario:
 
 
 def power_off_down() -> Scenario:
-    """Coast-down 3-2 with the pedal closed: B3 lets go, B2 drags the engine up to 2nd."""
+    """Coast-down 3-2 with the pedal closed: B3 opens, B2 accelerates the engine to 2nd gear."""
     demand = torque_steps(0.3, 0.2, (600.0, 1200.0, 300.0, 1000.0, 1300.0, 500.0, -150.0))
     offgoing = Program(((2.15, _MAIN), (2.25, 1.4e5), (2.35, 0.0)))
     oncoming = Program(
