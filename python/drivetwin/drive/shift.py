@@ -4,7 +4,7 @@
 Where the input torque would slow the shift down (power-on up, power-off down), the on-coming
 element takes the torque over first and then brings the input to its new speed. Where the input
 torque itself changes the speed the right way (power-off up, power-on down), the off-going element
-lets go as far as the pace wants it, and the on-coming one takes over at synchronism. All torques
+slips at the required rate, and the on-coming one takes over at synchronism. All torques
 are those of the dual-clutch form (THEORY section 2): η = 1, `J ω_in' = T_in - Σ T_k / i_c,k`.
 """
 
@@ -73,12 +73,12 @@ class ShiftPlan:
 
     @property
     def kind(self) -> ShiftKind:
-        """Which of the four kinds it is."""
+        """Kind of the shift."""
         return kind_of(self.torque, self.swing)
 
     @property
     def torque_first(self) -> bool:
-        """Whether the on-coming element takes the torque before the speed changes."""
+        """True if the on-coming element takes the torque before the speed changes."""
         return self.kind in (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_DOWN)
 
     @property
@@ -110,7 +110,7 @@ class ShiftPlan:
         return schedule.go(new.element, self.filled, *self._pulling(0.0))
 
     def _taken(self, pace: float) -> float:
-        """What both elements take from the input [N m] at `pace`, relative to the mean swing."""
+        """Torque of both elements on the input [N m] at `pace`, relative to the mean swing."""
         return self.torque - pace * self.inertia * self.swing / self.drive.inertia_phase
 
     def _pulling(self, after: float) -> Knots:
