@@ -67,7 +67,7 @@ def measure_identify(_argument: str) -> Iterator[Figure]:
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.scenarios import throttle_steps
-    from drivetwin.estimation.identify import identify
+    from drivetwin.pipeline import identify
     from drivetwin.estimation.result.method import Method
     from drivetwin.logs.read import read_log
     from drivetwin.shifts.detect import find_shifts

@@ -21,7 +21,7 @@ from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
 from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
+from drivetwin.pipeline import identify
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, record_of
 from drivetwin.estimation.likelihood.objective import Part
 from drivetwin.estimation.likelihood.parametrization import LAW, TE_OFFSET
