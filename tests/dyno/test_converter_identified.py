@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli.synth import write_run
-from drivetwin.dyno.converter_scenario import open_converter
 from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.identify import MAP_EXACT
 from drivetwin.logs.read import read_log
@@ -21,7 +21,7 @@ KINDS = "samples are means"
 
 
 def test_noise_that_turbine_and_its_torque_share_is_no_sign_of_means(tmp_path: Path) -> None:
-    made = run(open_converter(), seed=0)
+    made = run(load_scenario("open_converter"), seed=0)
     path, card_path, _ = write_run(tmp_path / "open.csv", made)
     card = load_card(card_path)
     log = read_log(path, card)

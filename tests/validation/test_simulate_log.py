@@ -22,7 +22,7 @@ from drivetwin.validation.initial_state import start_state
 from drivetwin.validation.simulate_log import compared, fit_of, validate, validated, with_fit
 from tests.report.sample import identification
 
-REFERENCE = Path(__file__).parents[2] / "shared" / "reference"
+REFERENCE = Path(__file__).parents[3] / "shared" / "reference"
 CASE = "dual_clutch_upshift"
 _ROLES = {
     "T_e_Nm": ("engine_torque", Quantity.TORQUE),

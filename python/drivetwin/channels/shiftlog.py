@@ -32,7 +32,7 @@ def gap_limit(time: FloatArray) -> float:
 
 
 def open_ends(time: FloatArray, span: tuple[float, float]) -> tuple[tuple[float, float], ...]:
-    """What of `span` [s] lies before the first or after the last sample, where more than a gap."""
+    """Return the parts of `span` [s] outside the samples that are longer than a gap."""
     limit = gap_limit(time)
     first, last = float(time[0]), float(time[-1])
     ends = ((span[0], min(first, span[1])), (max(last, span[0]), span[1]))
@@ -46,7 +46,7 @@ def pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
 
 
 class Quantity(StrEnum):
-    """What a channel measures; decides its SI unit and how it may be interpolated."""
+    """Physical quantity of a channel; determines its SI unit and interpolation."""
 
     TORQUE = "torque"
     PRESSURE = "pressure"
@@ -128,7 +128,7 @@ class Channel:
 
     @property
     def gaps(self) -> tuple[tuple[float, float], ...]:
-        """Spans [s] in which `at` knows nothing, from the sample before to the one after."""
+        """Spans [s] without samples, from the sample before to the sample after."""
         return () if self.quantity is Quantity.STATE else pauses(self.time)
 
 

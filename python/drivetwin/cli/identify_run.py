@@ -23,7 +23,7 @@ RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one log gave: the log and card themselves, the identification, its twin."""
+    """Result of one log: the log, its card, the identification and the twin."""
 
     log: ShiftLog
     card: VehicleCard

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin shifts LOG`: the shifts of a log, their phases, and what the speeds alone tell."""
+"""`drivetwin shifts LOG`: the shifts of a log, their phases, and results from speeds alone."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def shifts(
 
 
 class _Seen(NamedTuple):
-    """What the speeds tell of a log without output torque; nothing of another log."""
+    """Quantities computed from the speeds of a log without output torque; empty for other logs."""
 
     gears: tuple[HeldGear, ...] = ()
     swings: tuple[tuple[Shift, Resonance | str], ...] = ()
@@ -78,8 +78,8 @@ def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> di
     from drivetwin.files.result_file import RejectedRecord, ShiftRecord
 
     return {
-        "shifts": [ShiftRecord.of(one).model_dump(by_alias=True) for one in found.shifts],
-        "rejected": [RejectedRecord.of(one).model_dump() for one in found.rejected],
+        "shifts": [ShiftRecord.from_result(one).model_dump(by_alias=True) for one in found.shifts],
+        "rejected": [RejectedRecord.from_result(one).model_dump() for one in found.rejected],
         "lock_ups": [asdict(one) for one in closings],
         "resonances": [_swing(*pair) for pair in seen.swings],
         "held_gears": [asdict(one) for one in seen.gears],
@@ -87,7 +87,7 @@ def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> di
 
 
 def _tell(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> None:
-    """All that is to be said behind the table of the shifts, in words and further tables."""
+    """Print the details below the table of the shifts: text and further tables."""
     from drivetwin.cli.tables import quality_tables
 
     for table in quality_tables(found.shifts):

@@ -83,17 +83,6 @@ class ConverterRecord(Record):
     capacity: list[FiniteFloat]
     torque_ratio: list[FiniteFloat]
 
-    @classmethod
-    def of(cls, converter: Converter | None) -> ConverterRecord | None:
-        """Record of a map; None stays None."""
-        if converter is None:
-            return None
-        return cls(
-            speed_ratio=list(converter.speed_ratio),
-            capacity=list(converter.capacity),
-            torque_ratio=list(converter.torque_ratio),
-        )
-
     def converter(self) -> Converter:
         """Return the map."""
         return Converter(tuple(self.speed_ratio), tuple(self.capacity), tuple(self.torque_ratio))

@@ -73,7 +73,7 @@ def _card(recipe: Recipe) -> VehicleCard:
 
 
 def _check_inputs(recipe: Recipe) -> None:
-    """Raise StoreError where card or mapping are no longer those that the log's key stands for."""
+    """Raise StoreError if card or mapping changed after the log's key was computed."""
     try:
         same = inputs_of(recipe.vehicle, recipe.channels) == recipe.inputs
     except (OSError, InputError):
@@ -103,7 +103,7 @@ def _artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
 def _means(task: Task, mapping: Path | None) -> Iterator[Row]:
     """Mean of each channel that is a field of the log, in the file's unit.
 
-    Of a channel without any value there is none: a warning says so. Raises MissingChannelError.
+    A channel without any value has no mean and gets a warning. Raises MissingChannelError.
     """
     if not task.recipe.means:
         return

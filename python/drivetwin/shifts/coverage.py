@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The part of a shift over which all that drives it was recorded, and that one load holds for.
 
-A gap in the engine torque or in a pressure is no input that a model could be driven by, so the
+A gap in the engine torque or in a pressure cannot drive a model, so the
 gears held before and after the shift are cut at it, and a shift with a gap inside is refused. A
 pressure counts only while an element may slip: one that stays above or below P0 on both sides of
-its gap, while the speeds show a held gear, decides nothing. An input that starts after the gear
-before the shift, or ends before the gear after it, has a gap there. So has the torque that drives
-the gearbox where the converter is open: the engine torque is not it.
+its gap, while the speeds are those of an engaged gear, is ignored. An input that starts
+after the gear before the shift, or ends before the gear after it, has a gap there. With an
+open converter the turbine torque drives the gearbox and is checked in the same way.
 """
 
 from __future__ import annotations
@@ -85,9 +85,9 @@ def recorded(
 ) -> Shift:
     """Return `shift` with `before` and `after` cut to what its inputs were recorded for.
 
-    `fills` is P0 [Pa] of both elements by name, `i_in` the ratio of the input gear. A cut is told
-    in the warnings of the shift. Raises DamagedChannelError where a gap lies in the shift itself or
-    leaves less than LEAST of a gear.
+    `fills` is P0 [Pa] of both elements by name, `i_in` the ratio of the input gear. A cut is
+    reported in the warnings of the shift. Raises DamagedChannelError where a gap lies in the shift
+    itself or leaves less than LEAST of a gear.
     """
     gaps = _gaps(log, shift, fills)
     gaps += [
@@ -134,7 +134,7 @@ def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[
 
 
 def _decides(pressure: Channel, gap: Span, shift: Shift, fill: PriorValue) -> bool:
-    """Whether an element might have begun to carry torque, or to slip, within a gap."""
+    """Return True if an element may have started to transmit torque, or to slip, in a gap."""
     if gap[1] > shift.before[1] and gap[0] < shift.lockup_time:
         return True
     beside = np.interp(gap, pressure.time, pressure.values) - fill.value

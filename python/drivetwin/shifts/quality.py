@@ -158,7 +158,7 @@ def _speed_excess(
 def _slip_left(
     speeds: GearboxSpeeds, ratios: tuple[float, float], shift: Shift
 ) -> dict[str, float]:
-    """What is left of the slip once the on-coming element is locked."""
+    """Residual slip after lock-up of the on-coming element."""
     i_c, i_out = ratios
     held = (speeds.time >= shift.lockup_time) & (speeds.time <= shift.lockup_time + _REFERENCE)
     if not held.any():

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from drivetwin.channels import shiftlog
 from drivetwin.channels.shiftlog import Channel, FloatArray, ShiftLog
 from drivetwin.channels.update_raster import find_updates
-from drivetwin.dyno.scenarios import paper
 from drivetwin.estimation.data import prepare
 from drivetwin.estimation.result.method import Method
 from drivetwin.pipeline import identify
@@ -39,7 +38,7 @@ def hold(channel: Channel) -> Channel:
 def test_each_channel_and_each_shift_is_prepared_once(
     method: Method, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    log, card = record_log(paper)
+    log, card = record_log("paper")
     log = replace(log, channels={role: hold(one) for role, one in log.channels.items()})
     columns: list[FloatArray] = []
     referred: list[Shift] = []

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.dyno.scenarios import throttle_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.likelihood.pipeline import DISAGREE, likelihood
@@ -22,7 +22,7 @@ GROWTH = 40.0
 
 
 def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> None:
-    base = throttle_steps()
+    base = load_scenario("throttle_steps")
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
     made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     signals, drivelines = [made.signals], [made.driveline]
@@ -43,7 +43,7 @@ def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> N
 def test_a_vehicle_that_cannot_be_is_no_start(
     factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = record_bench(throttle_steps(), 0, Knowledge())
+    made = record_bench(load_scenario("throttle_steps"), 0, Knowledge())
     found = identify_shift(made.signals, made.driveline, 5.0)
     values = found.values.copy()
     values[found.ids.index("J_vehicle")] *= factor

@@ -21,7 +21,7 @@ from drivetwin.shifts.shift import Shift, ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.synthetic import Run, Truth, run, smooth_steps, upshift
 
-REFERENCE = Path(__file__).parents[3] / "shared" / "reference"
+REFERENCE = Path(__file__).parents[4] / "shared" / "reference"
 SLIPS = np.array([15.0, 30.0, 40.0, 50.0])
 
 

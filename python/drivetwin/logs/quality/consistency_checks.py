@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the channels of one log must satisfy together: one clock, speeds that fit the gearing."""
+"""Consistency checks between channels of a log: common clock, speeds, gear ratios, torques."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
 
 
 def partly_recorded(channels: Mapping[str, Channel]) -> list[str]:
-    """Tell which channels start later or end earlier than the log."""
+    """Return a warning for the channels that start later or end earlier than the log."""
     measured = [one for role, one in channels.items() if quantity_of(role) not in AUXILIARY]
     if not measured:
         return []
@@ -115,7 +115,7 @@ def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str)
 
 
 def final_drive_held(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
-    """Tell where output and wheel speed are not in the ratio of the final drive."""
+    """Return a warning if the ratio of output and wheel speed is not the final drive."""
     if "output_speed" not in channels or "wheel_speed" not in channels:
         return []
     outlet, wheel, final = channels["output_speed"], channels["wheel_speed"], card.final_drive
@@ -149,7 +149,7 @@ def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
 
 
 def torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
-    """Tell where output and engine torque do not fit the ratio of the gear that is held."""
+    """Return a warning if output and engine torque do not match the ratio of the engaged gear."""
     roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
     if not all(role in channels for role in roles):
         return []

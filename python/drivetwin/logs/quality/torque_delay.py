@@ -86,10 +86,10 @@ def _delay(fit: Fit) -> Delay | None:
 
 
 def torque_warnings(channels: Mapping[str, Channel]) -> list[str]:
-    """Tell a delay between output torque and speeds that is beyond doubt.
+    """Return warnings for a significant delay between output torque and speeds.
 
-    One against all speeds that there are is the torque's, else the speed's. Of a value that is
-    repeated until the next one comes, the first counts.
+    A delay against all speeds is attributed to the torque, else to the speed. Only the first sample
+    of a repeated value is used.
     """
     if "output_torque" not in channels:
         return []

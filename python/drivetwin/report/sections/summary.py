@@ -45,7 +45,7 @@ OF_SPEEDS = (
 
 
 def phase_key(kind: ShiftKind) -> str:
-    """What the numbers of the four phases stand for in a shift of this kind."""
+    """Describe the numbers of the four phases in a shift of this kind."""
     up = kind in (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_UP)
     return (
         f"1 gear held before the shift · 2 torque phase: {_TORQUE_PHASE[kind]} · 3 inertia phase: "

@@ -64,7 +64,7 @@ def _group(entries: dict[str, tuple[str, str]]) -> Component:
 
 
 def register(app: Dash, sessions: Sessions) -> None:
-    """Making the file that is asked for."""
+    """Register the callback that writes the requested file."""
 
     @app.callback(
         Output("download", "data"),
@@ -74,7 +74,7 @@ def register(app: Dash, sessions: Sessions) -> None:
     )
     @told
     def hand_over(clicks: list[int | None], key: str) -> Any:
-        """Write the file and let the browser keep it."""
+        """Write the file and send it to the browser."""
         if not isinstance(ctx.triggered_id, dict) or not any(clicks):
             return no_update
         session = sessions.get(key)

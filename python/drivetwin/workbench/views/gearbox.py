@@ -31,7 +31,7 @@ _FIRST = "three-set-4000cr"
 
 
 def layout() -> list[Component]:
-    """Which gearbox, and what it is."""
+    """Return the controls for choosing a gearbox, and its description."""
     names = builtin_gearboxes()
     return [
         hint(
@@ -196,7 +196,7 @@ def _error(found: ReducedShift) -> Component:
 
 
 def _number(value: float) -> str:
-    """Four digits; what is round-off beside 1 is nothing."""
+    """Format a number to four digits; round-off relative to 1 becomes zero."""
     return "0" if abs(value) < _ROUND_OFF else f"{value:.4g}"
 
 

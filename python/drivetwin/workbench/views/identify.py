@@ -149,7 +149,7 @@ def _register_progress(app: Dash, sessions: Sessions) -> None:
     )
     @told
     def show(_: str, key: str) -> list[Component]:
-        """What is known so far."""
+        """Render the present results."""
         return _content(sessions.get(key).work)
 
 
@@ -175,7 +175,7 @@ def _content(work: Work) -> list[Component]:
 
 
 def _before(work: Work) -> Component:
-    """What the next run takes as given."""
+    """Describe the inputs of the next run."""
     rows = []
     for index, times in work.moves.items():
         shift = work.shifts[index]

@@ -71,7 +71,7 @@ def register(app: Dash, sessions: Sessions) -> None:
             prevent_initial_call=True,
         )
         def arrived(upload: dict[str, str]) -> str:
-            """An upload stands in the field of its path."""
+            """Put the name of an upload into the path field."""
             return _UPLOADED + upload["name"]
 
     @app.callback(
@@ -107,7 +107,7 @@ def register(app: Dash, sessions: Sessions) -> None:
     )
     @told
     def show(_: int, key: str) -> tuple[Any, ...]:
-        """What is open."""
+        """Render the open log."""
         session = sessions.get(key)
         work, folder = session.work, session.folder
         content = [] if work.opened is None else _content(work.opened)

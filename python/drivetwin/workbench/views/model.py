@@ -83,7 +83,7 @@ def _register_bench(app: Dash, sessions: Sessions) -> None:
     )
     @told
     def show(_: int, key: str) -> list[Component]:
-        """Sliders beside the figure."""
+        """Render the sliders next to the figure."""
         session = sessions.get(key)
         if session.work.method is None or not session.work.shifts:
             return [hint("Nothing is identified yet.")]
@@ -145,7 +145,7 @@ def _register_sliders(app: Dash, sessions: Sessions) -> None:
     def slide(
         values: Sequence[float | str | None], ids: Sequence[dict[str, str]], key: str
     ) -> tuple[Any, Any]:
-        """Simulate with the parameters as they stand."""
+        """Simulate with the parameters of the sliders."""
         begun = time.perf_counter()
         session = sessions.get(key)
         positions = {
@@ -301,7 +301,7 @@ def _locks(work: Work) -> list[Component]:
 
 
 def _usual_ids(work: Work) -> list[str]:
-    """What can be locked before anything is identified."""
+    """List the parameters that can be fixed before an identification."""
     gears = dict.fromkeys(g for s in work.shifts for g in (s.start_gear, s.end_gear))
     elements = dict.fromkeys(e for s in work.shifts for e in (s.offgoing, s.oncoming))
     return [

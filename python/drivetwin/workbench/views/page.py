@@ -27,7 +27,7 @@ from drivetwin.workbench.views.widgets import Topic, announce, attributes, due_i
 
 @dataclass(frozen=True)
 class Start:
-    """What a session begins with: files that were named on the command line."""
+    """Files named on the command line, opened when a session begins."""
 
     log: Source | None = None
     card: Source | None = None
@@ -191,7 +191,7 @@ def _show_status(app: Dash, sessions: Sessions) -> None:
         prevent_initial_call=True,
     )
     def status(_log: int, _results: int, key: str | None) -> list[Component | str]:
-        """One line that says what is open and what is known."""
+        """Format the status line: open files and available results."""
         if key not in sessions:
             return []
         work = sessions.get(key).work

@@ -87,7 +87,7 @@ def tell_read(how: str, fault: str, shifts: int) -> None:
 
 
 def told(callback: Callable[P, R]) -> Callable[P, R]:
-    """A callback whose faults become the message of the page; it then changes nothing."""
+    """Wrap a callback: an error becomes the page's message, and the outputs stay unchanged."""
 
     @functools.wraps(callback)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -101,7 +101,7 @@ def told(callback: Callable[P, R]) -> Callable[P, R]:
 
 
 def acted(callback: Callable[P, None]) -> Callable[P, None]:
-    """The same for a callback without outputs."""
+    """Like `shows_message`, for callbacks that have no outputs."""
 
     @functools.wraps(callback)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> None:
@@ -114,7 +114,7 @@ def acted(callback: Callable[P, None]) -> Callable[P, None]:
 
 
 def _words(fault: DrivetwinError | OSError) -> str:
-    """A typed error, or what the system refuses, as it is told; files by their names alone."""
+    """Format a typed error or an OS error as a message; files without their folders."""
     if isinstance(fault, DrivetwinError):
         return str(fault)
     where = Where(file=None if fault.filename is None else Path(fault.filename).name)
@@ -151,7 +151,7 @@ def button(text: str, id: Id, *, main: bool = False, **options: Any) -> Componen
 
 
 def upload_button(text: str, purpose: str, target: str) -> Component:
-    """A button that lets the browser send a file; the store `target` then holds key and name."""
+    """Build a button that uploads a file; the store `target` then holds key and name."""
     return html.Button(
         text,
         type="button",
@@ -177,7 +177,7 @@ def table(
 
 
 def notes(title: str, texts: Iterable[str], tone: str = "doubtful") -> Component:
-    """A list of sentences under a heading; nothing where there are none."""
+    """Build a list of sentences under a heading; empty without sentences."""
     items = [html.Li(text) for text in dict.fromkeys(texts)]
     if not items:
         return html.Div()
@@ -200,7 +200,7 @@ def hint(text: str) -> Component:
 
 
 def graph(id: str, label: str, figure: go.Figure, **config: Any) -> Component:
-    """A figure; `label` says to a screen reader what it is."""
+    """Build a figure; `label` is its description for screen readers."""
     options: Any = {
         "displaylogo": False,
         "responsive": True,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Workspace: the session saved as a file, and gone on with later."""
+"""Workspace: save the session as a file and reopen it later."""
 
 from __future__ import annotations
 

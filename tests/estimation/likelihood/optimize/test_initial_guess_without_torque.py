@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.dyno.files import card_text
-from drivetwin.dyno.scenarios import paper
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import DesignData, Sampled
 from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque import (
     guess_without_torque,
@@ -29,7 +29,7 @@ def _design(file: Path) -> DesignData:
 
 
 def test_noise_of_the_speeds_does_not_make_the_vehicle_light(tmp_path: Path) -> None:
-    scenario = paper()
+    scenario = load_scenario("paper")
     loud = tuple(
         replace(one, noise=NOISY * one.noise) if one.role.endswith("speed") else one
         for one in scenario.sensors
@@ -45,7 +45,7 @@ def test_noise_of_the_speeds_does_not_make_the_vehicle_light(tmp_path: Path) -> 
 
 
 def test_a_gear_held_too_briefly_leaves_the_start_to_the_other(tmp_path: Path) -> None:
-    scenario = paper()
+    scenario = load_scenario("paper")
     made = record_bench(scenario, 0, Knowledge())
     file = tmp_path / "card.toml"
     file.write_text(card_text(scenario), encoding="utf-8")
