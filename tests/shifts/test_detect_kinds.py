@@ -14,8 +14,8 @@ from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import find_shifts
-from drivetwin.shifts.shift import ShiftKind
 from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 KINDS = {

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from drivetwin.errors import InputError
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, State
 from drivetwin.twin.twin import Twin
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 DEFAULT_ENGINE_SPEED = 150.0
 """Default engine speed [rad/s] at the start, for a twin without recorded speeds."""

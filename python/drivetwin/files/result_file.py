@@ -27,7 +27,7 @@ from drivetwin.files.records import (
     SchemaName,
     SuggestionRecord,
 )
-from drivetwin.shifts.shift import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 RESULT_SCHEMA = "drivetwin/result-3"
 

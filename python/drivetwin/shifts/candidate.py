@@ -15,9 +15,10 @@ from drivetwin.shifts.gear_runs import Run
 from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds
 from drivetwin.shifts.pressures import one_clutch
 from drivetwin.shifts.settings import ShiftSettings
-from drivetwin.shifts.shift import Shift, ShiftKind, shift_kind
+from drivetwin.shifts.shift import Shift, shift_kind
 from drivetwin.shifts.tcu_flags import flag_before
 from drivetwin.shifts.torque_onset import SMOOTH, pressure_onset, smoothed, torque_dip_onset
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _RATIO_DRIFT = 0.002

@@ -11,7 +11,8 @@ from scipy.signal import butter, sosfiltfilt
 
 from drivetwin.channels.shiftlog import Channel, ShiftLog, gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, gear_ratios, gearbox_speeds
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import middle_of
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

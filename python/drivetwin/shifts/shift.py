@@ -5,20 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 import numpy as np
 
 from drivetwin.channels.shiftlog import ShiftLog
-
-
-class ShiftKind(StrEnum):
-    """Direction and power state of a shift."""
-
-    POWER_ON_UP = "power-on upshift"
-    POWER_OFF_UP = "power-off upshift"
-    POWER_ON_DOWN = "power-on downshift"
-    POWER_OFF_DOWN = "power-off downshift"
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 
 @dataclass(frozen=True)
@@ -78,9 +69,7 @@ def shift_kind(log: ShiftLog, up: bool, break_away: float) -> tuple[ShiftKind, t
     else:
         power_on = True
         warnings = ("no torque or pedal channel tells the power state: taken as power on",)
-    if up:
-        return (ShiftKind.POWER_ON_UP if power_on else ShiftKind.POWER_OFF_UP), warnings
-    return (ShiftKind.POWER_ON_DOWN if power_on else ShiftKind.POWER_OFF_DOWN), warnings
+    return ShiftKind.from_direction(up=up, power_on=power_on), warnings
 
 
 def _mean(log: ShiftLog, role: str, end: float) -> float:

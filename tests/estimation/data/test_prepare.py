@@ -17,7 +17,8 @@ from drivetwin.estimation.data.shift_data import PreparedLog, ShiftSignals
 from drivetwin.estimation.linear.multi_shift import disturbed
 from drivetwin.shifts.coverage import AFTER, BEFORE
 from drivetwin.shifts.detect import FoundShifts
-from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
+from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import make_card
