@@ -67,9 +67,9 @@ def measure_identify(_argument: str) -> Iterator[Figure]:
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.scenario_file import load_scenario
-    from drivetwin.estimation.identify import identify
     from drivetwin.estimation.result.method import Method
     from drivetwin.logs.read import read_log
+    from drivetwin.pipeline import identify
     from drivetwin.shifts.detect import find_shifts
     from drivetwin.vehicle.card import load_card
 

@@ -11,14 +11,16 @@ import numpy as np
 from scipy.signal import lfilter
 
 import drivetwin
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.fit import spread_of
 from drivetwin.estimation.result.method import Method
+from drivetwin.pipeline import identify
+from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.shared_results import shared
 
 DURATION = 3.3
@@ -26,7 +28,8 @@ RATE = 400.0
 """Hz of the logger: less than usual, so that the many fits of a test take less time."""
 
 
-def _identified(scenario: str, method: Method, P0_std: float = 0.0) -> Identification:
+def record_log(scenario: str, P0_std: float = 0.0) -> tuple[ShiftLog, VehicleCard]:
+    """Record a scenario and read its log; the card leaves P0 a spread of `P0_std` [Pa]."""
     base = load_scenario(scenario)
     sensors = tuple(replace(s, rate=min(s.rate, RATE)) for s in base.sensors)
     made = run(replace(base, duration=DURATION, sensors=sensors), seed=3)
@@ -40,8 +43,12 @@ def _identified(scenario: str, method: Method, P0_std: float = 0.0) -> Identific
         card = replace(card, elements=elements)
         mapping = Path(folder) / "rows.toml"
         mapping.write_text("[time]\nsimultaneous = true\n", encoding="utf-8")
-        log = drivetwin.read_log(log_file, card, mapping)
-        return identify(log, card, drivetwin.find_shifts(log, card), method)
+        return drivetwin.read_log(log_file, card, mapping), card
+
+
+def _identified(scenario: str, method: Method, P0_std: float = 0.0) -> Identification:
+    log, card = record_log(scenario, P0_std)
+    return identify(log, card, drivetwin.find_shifts(log, card), method)
 
 
 @shared

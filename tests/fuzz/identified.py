@@ -26,9 +26,9 @@ from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import usable_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import validated

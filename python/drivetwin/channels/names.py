@@ -39,7 +39,7 @@ def is_time_name(name: str) -> bool:
 
 
 def may_be_time(unit: str | None) -> bool:
-    """Return True if a column of this unit may be a time: no unit, a time unit, or an unknown one."""
+    """Return True if a column of this unit may be a time: none, a time unit or an unknown one."""
     return unit is None or is_time_unit(unit) or lookup(unit) is None
 
 

@@ -60,14 +60,18 @@ class _Seen(NamedTuple):
 
 
 def _from_speeds(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> _Seen:
+    from drivetwin.estimation.data.prepare_gears import prepare_gears, prepare_input_speed
     from drivetwin.estimation.linear.inertia_in_gear import held_gears
     from drivetwin.estimation.linear.resonance import after_shift
 
     if "output_torque" in log:
         return _Seen()
     with step("looking at the gears held"):
-        gears = held_gears(log, card, shifts)
-        return _Seen(gears, tuple((shift, after_shift(log, shift)) for shift in shifts))
+        gears = held_gears(prepare_gears(log, card, shifts))
+        if not shifts:
+            return _Seen(gears)
+        speed = prepare_input_speed(log)
+        return _Seen(gears, tuple((shift, after_shift(speed, shift)) for shift in shifts))
 
 
 def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> dict[str, Any]:

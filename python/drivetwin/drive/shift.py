@@ -57,12 +57,12 @@ class ShiftPlan:
 
     @property
     def kind(self) -> ShiftKind:
-        """Which of the four kinds it is."""
+        """Kind of the shift."""
         return ShiftKind.from_direction(up=self.swing < 0.0, power_on=self.torque > 0.0)
 
     @property
     def torque_first(self) -> bool:
-        """Whether the on-coming element takes the torque before the speed changes."""
+        """True if the on-coming element takes the torque before the speed changes."""
         return self.kind.has_torque_phase_first
 
     @property

@@ -176,9 +176,10 @@ SchemaName = Annotated[str, Field(alias="schema")]
 
 
 class ProspectRecord(Record):
-    """What an experiment, so many times repeated, would make of the 95 % half width.
+    """Expected 95 % half width after repeating an experiment a given number of times.
 
-    `shift` is the shift of the log that it is built on, by its gears; empty where all are alike.
+    `shift` is the shift of the log on which the experiment is based, by its gears. It is empty if
+    all shifts give the same.
     """
 
     experiment: Experiment

@@ -89,7 +89,7 @@ class ConverterRecord(Record):
 
 
 class TransmissionRecord(Record):
-    """What the vehicle card knew from design."""
+    """Transmission design data from the vehicle card."""
 
     i_in: FiniteFloat = Field(gt=0)
     final_drive: FiniteFloat = Field(gt=0)

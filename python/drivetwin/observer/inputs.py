@@ -37,9 +37,9 @@ RATE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What an observer sees of one shift: fresh samples, SI; `pressures` only where there are any.
+    """Measured input of an observer for one shift: fresh samples, SI; `pressures` may be empty.
 
-    `time` (N,) holds every stamp of `speeds`, which goes by `engine_speed`, `output_speed` and
+    `time` (N,) contains every stamp of `speeds`. Its keys are `engine_speed`, `output_speed` and
     `wheel_speed`; the last may be missing.
     """
 
@@ -105,10 +105,10 @@ def _floored(signal: Sampled) -> Sampled:
 
 
 def is_driving(model: DualClutch, seen: Recorded, delay: float) -> BoolArray:
-    """Whether power flows from the engine over each step (N-1,): T_g = T_e - J1·ω_e' ≥ 0.
+    """Determine if power flows from the engine over each step (N-1,): T_g = T_e - J1·ω_e' ≥ 0.
 
-    The sign of T_e does not tell it: with a closed pedal the engine still drives while it is slowed
-    down. `delay` [s] is the age of the engine torque.
+    The sign of T_e alone is not sufficient: with a released pedal a decelerating engine still
+    drives. `delay` [s] is the delay of the engine torque.
     """
     middle = 0.5 * (seen.time[1:] + seen.time[:-1])
     before = np.maximum(middle - RATE, seen.time[0])

@@ -214,7 +214,7 @@ def _moved(channel: Channel, shift: float) -> Signal:
 
 
 def simulated_signals(model: DualClutch, run: Trajectory) -> dict[str, FloatArray]:
-    """What a run says of each of SIGNALS (n,) on its own time; SI."""
+    """Compute each of SIGNALS (n,) from a run, on its own time; SI."""
     return {
         "output_torque": run.shaft_torque,
         "input_speed": run.engine_speed / model.i_in,

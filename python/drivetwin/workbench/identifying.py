@@ -10,8 +10,8 @@ from drivetwin._util.progress import part
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.analysis.experiment_design import examined
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.build import build_twin

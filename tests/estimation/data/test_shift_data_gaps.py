@@ -18,10 +18,10 @@ from drivetwin.dyno.files import card_text, log_text
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import DamagedChannelError
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.vehicle_card import VehicleCard

@@ -92,8 +92,10 @@ def off_going_free(
 
 
 def _vented(pressure: Sampled, shift: Shift) -> tuple[float, float]:
-    """What is left of an off-going pressure after lock-up [Pa], and how near is as good as there:
-    what noise makes of a mean of so many samples, and a hundredth of the whole fall."""
+    """Residual off-going pressure after lock-up [Pa] and the tolerance for reaching it.
+
+    The tolerance is the standard error of the mean plus a hundredth of the whole pressure drop.
+    """
     spans = (np.linspace(*span, 100) for span in (shift.before, shift.after))
     before, rest = (float(np.median(pressure.at(time))) for time in spans)
     return rest, 5.0 * pressure.sigma / float(np.sqrt(SMOOTH)) + 0.01 * abs(before - rest)

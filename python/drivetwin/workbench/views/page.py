@@ -22,7 +22,15 @@ from drivetwin.workbench.views import (
     phases,
     workspace,
 )
-from drivetwin.workbench.views.widgets import Topic, announce, attributes, due_id, told, topic_id
+from drivetwin.workbench.views.widgets import (
+    Page,
+    Topic,
+    announce,
+    attributes,
+    due_id,
+    told,
+    topic_id,
+)
 
 
 @dataclass(frozen=True)
@@ -93,7 +101,7 @@ def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
     _enter(app, sessions, start)
     _show_status(app, sessions)
     for _, view in VIEWS.values():
-        view.register(app, sessions)
+        view.register(Page(app, sessions))
 
 
 def _layout() -> Component:

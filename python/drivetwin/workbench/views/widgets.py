@@ -10,15 +10,18 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 import plotly.graph_objects as go
-from dash import dcc, html, no_update, set_props
+from dash import Dash, Output, State, dcc, html, no_update, set_props
+from dash.dependencies import DashDependency
 from dash.development.base_component import Component
 
 from drivetwin.errors import DrivetwinError, Where
+from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.uploads import LIMITS
 
 P = ParamSpec("P")
@@ -86,8 +89,8 @@ def tell_read(how: str, fault: str, shifts: int) -> None:
         tell(f"{how}, but holds no usable shift: the view Log says why", fault=True)
 
 
-def told(callback: Callable[P, R]) -> Callable[P, R]:
-    """Wrap a callback: an error becomes the page's message, and the outputs stay unchanged."""
+def told(callback: Callable[P, R], unchanged: object = no_update) -> Callable[P, R]:
+    """Return the callback with its errors as the message of the page, and `unchanged` then."""
 
     @functools.wraps(callback)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -95,22 +98,42 @@ def told(callback: Callable[P, R]) -> Callable[P, R]:
             return callback(*args, **kwargs)
         except (DrivetwinError, OSError) as fault:
             tell(_words(fault), fault=True)
-            return cast(R, no_update)
+            return cast(R, unchanged)
 
     return guarded
 
 
-def acted(callback: Callable[P, None]) -> Callable[P, None]:
-    """Like `shows_message`, for callbacks that have no outputs."""
+@dataclass(frozen=True)
+class Page:
+    """The application, and the sessions on which its callbacks act."""
 
-    @functools.wraps(callback)
-    def guarded(*args: P.args, **kwargs: P.kwargs) -> None:
-        try:
-            callback(*args, **kwargs)
-        except (DrivetwinError, OSError) as fault:
-            tell(_words(fault), fault=True)
+    app: Dash
+    sessions: Sessions
 
-    return guarded
+    def callback(
+        self, *arguments: DashDependency, busy: str = "", initially: bool = False
+    ) -> Callable[[Callable[..., R]], Callable[..., R]]:
+        """Register a function of the tab's session and of the values of `arguments`.
+
+        Its errors become the message of the page. The button `busy` is disabled while it runs.
+        """
+        silent = not any(isinstance(one, Output) for one in arguments)
+        running = [(Output(busy, "disabled"), True, False)] if busy else None
+
+        def register(callback: Callable[..., R]) -> Callable[..., R]:
+            def act(*values: Any) -> R:
+                *given, key = values
+                return callback(self.sessions.get(key), *given)
+
+            self.app.callback(
+                *arguments,
+                State("session", "data"),
+                running=running,
+                prevent_initial_call=not initially,
+            )(told(act, None if silent else no_update))
+            return callback
+
+        return register
 
 
 def _words(fault: DrivetwinError | OSError) -> str:

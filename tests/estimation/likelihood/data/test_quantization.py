@@ -11,11 +11,11 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.data.quantization import rounding_of
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 
