@@ -7,14 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from drivetwin.channels.mapping import ChannelSpec, Mapped, guess, spec_of
 from drivetwin.channels.pressure_roles import pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.roles import NEEDED, quantity_of
-from drivetwin.channels.shiftlog import Quantity
-from drivetwin.logs.raw import Recording
-from drivetwin.logs.summary import ColumnSummary, summarise
+from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.errors import DamagedChannelError
+from drivetwin.logs.quality.update_raster import find_raster
+from drivetwin.logs.raw import RawChannel, Recording
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
@@ -77,8 +80,7 @@ def survey(recording: Recording, source: str, card: VehicleCard | None, stated: 
     Raises the typed errors of the readers, but none for channels that are missing or ambiguous:
     these become notes.
     """
-    summary = summarise(recording)
-    columns = [one.column for one in summary.columns]
+    columns = list(recording.columns)
     specs = {**({} if card is None else card.channels), **stated.channels}
     kinds = {} if card is None else {name: spec.kind for name, spec in card.elements.items()}
     free = [one for one in columns if not any(spec.picks(one) for spec in specs.values())]
@@ -91,27 +93,44 @@ def survey(recording: Recording, source: str, card: VehicleCard | None, stated: 
         for role, found in candidates.items()
         if len(found) == 1
     }
-    faults = [f"{one.column}: {one.fault}" for one in summary.columns if one.fault]
+    looked: list[Column] = []
+    faults: list[str] = []
+    for index, column in enumerate(columns):
+        roles = tuple(role for role, found in candidates.items() if column in found)
+        try:
+            looked.append(_make_column(column, recording.load(index), roles))
+        except DamagedChannelError as fault:
+            faults.append(f"{column}: {fault.what}")
     return Survey(
         source=source,
-        columns=tuple(_column(one, candidates) for one in summary.columns if not one.fault),
+        columns=tuple(looked),
         mapping=mapping,
         options=stated.options,
-        notes=(*summary.warnings, *faults, *_notes(candidates, card)),
+        notes=(*recording.warnings, *faults, *_notes(candidates, card)),
     )
 
 
-def _column(summary: ColumnSummary, candidates: Mapping[str, Sequence[LogColumn]]) -> Column:
-    column = summary.column
+def _make_column(column: LogColumn, channel: RawChannel, roles: tuple[str, ...]) -> Column:
     return Column(
         name=column.name,
         group=column.group,
         unit=column.unit,
-        rate=summary.rate,
-        range=summary.range,
-        gaps=summary.gaps,
-        roles=tuple(role for role, found in candidates.items() if column in found),
+        rate=_estimate_update_rate(channel),
+        range=channel.range,
+        gaps=int(np.count_nonzero(~np.isfinite(channel.values))) + channel.pauses,
+        roles=roles,
     )
+
+
+def _estimate_update_rate(channel: RawChannel) -> float | None:
+    """Return the updates per second; for a held signal the rate of the sender."""
+    step = channel.step
+    if step is None or step <= 0.0:
+        return None
+    is_ordered = np.isfinite(channel.time).all() and np.all(np.diff(channel.time) > 0.0)
+    sent = Channel("", Quantity.FRACTION, channel.time, channel.values, channel.name, "")
+    raster = find_raster(sent) if is_ordered else None
+    return 1.0 / (step if raster is None else raster.period)
 
 
 def _notes(candidates: Mapping[str, Sequence[LogColumn]], card: VehicleCard | None) -> list[str]:
