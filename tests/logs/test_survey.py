@@ -11,13 +11,13 @@ import pytest
 from drivetwin.channels.mapping import Mapped
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.raw import RawChannel
-from drivetwin.logs.survey import Survey, survey
+from drivetwin.logs.survey import Survey, survey_recording
 from drivetwin.logs.write import write_log
 
 
 def surveyed(path: Path) -> Survey:
     with open_recording(path) as recording:
-        return survey(recording, str(path), None, Mapped({}))
+        return survey_recording(recording, str(path), None, Mapped({}))
 
 
 def test_rate_range_and_gaps(tmp_path: Path) -> None:

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.channels.mapping import ChannelSpec, Mapped, guess, spec_of
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.mapping import ChannelSpec, Mapped, infer_candidates, make_spec
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.channels.roles import NEEDED, quantity_of
+from drivetwin.channels.roles import NEEDED, get_quantity
 from drivetwin.channels.shiftlog import Channel, Quantity
 from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.quality.update_raster import find_raster
@@ -36,7 +36,7 @@ class Column:
     gaps: int
     roles: tuple[str, ...]
 
-    def document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """For JSON and tables."""
         return asdict(self)
 
@@ -61,20 +61,22 @@ class Survey:
             if not (column.unit or "").strip()
             and role in self.mapping
             and self.mapping[role].unit is None
-            and quantity_of(role) is not Quantity.STATE
+            and get_quantity(role) is not Quantity.STATE
         )
 
-    def document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "source": self.source,
-            "columns": [column.document() for column in self.columns],
+            "columns": [column.to_document() for column in self.columns],
             "mapping": {role: asdict(spec) for role, spec in self.mapping.items()},
             "notes": self.notes,
         }
 
 
-def survey(recording: Recording, source: str, card: VehicleCard | None, stated: Mapped) -> Survey:
+def survey_recording(
+    recording: Recording, source: str, card: VehicleCard | None, stated: Mapped
+) -> Survey:
     """Look at an open log; the card names the pressures, what is `stated` overrides guesses.
 
     Raises the typed errors of the readers, but none for channels that are missing or ambiguous:
@@ -83,13 +85,13 @@ def survey(recording: Recording, source: str, card: VehicleCard | None, stated: 
     columns = list(recording.columns)
     specs = {**({} if card is None else card.channels), **stated.channels}
     kinds = {} if card is None else {name: spec.kind for name, spec in card.elements.items()}
-    free = [one for one in columns if not any(spec.picks(one) for spec in specs.values())]
+    free = [one for one in columns if not any(spec.matches(one) for spec in specs.values())]
     candidates = {
-        **guess(free, kinds),
-        **{role: [one for one in columns if spec.picks(one)] for role, spec in specs.items()},
+        **infer_candidates(free, kinds),
+        **{role: [one for one in columns if spec.matches(one)] for role, spec in specs.items()},
     }
     mapping = {
-        role: specs.get(role) or spec_of(found[0], columns)
+        role: specs.get(role) or make_spec(found[0], columns)
         for role, found in candidates.items()
         if len(found) == 1
     }
@@ -106,7 +108,7 @@ def survey(recording: Recording, source: str, card: VehicleCard | None, stated: 
         columns=tuple(looked),
         mapping=mapping,
         options=stated.options,
-        notes=(*recording.warnings, *faults, *_notes(candidates, card)),
+        notes=(*recording.warnings, *faults, *_describe_open_roles(candidates, card)),
     )
 
 
@@ -133,14 +135,19 @@ def _estimate_update_rate(channel: RawChannel) -> float | None:
     return 1.0 / (step if raster is None else raster.period)
 
 
-def _notes(candidates: Mapping[str, Sequence[LogColumn]], card: VehicleCard | None) -> list[str]:
+def _describe_open_roles(
+    candidates: Mapping[str, Sequence[LogColumn]], card: VehicleCard | None
+) -> list[str]:
     """Roles that no column, or more than one, could play."""
     notes = [
         f"{role} may be any of {', '.join(map(str, found))}: name one in a channel mapping"
         for role, found in candidates.items()
         if len(found) > 1
     ]
-    wanted = [*NEEDED, *(pressure_role(element) for element in (card.elements if card else ()))]
+    wanted = [
+        *NEEDED,
+        *(make_pressure_role(element) for element in (card.elements if card else ())),
+    ]
     missing = [role for role in wanted if not candidates.get(role)]
     if missing:
         notes.append(f"no column for {', '.join(missing)}: name it in a channel mapping")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin._util.signal_processing import estimate_rounding_step
-from drivetwin.estimation.data.noise import white_noise
+from drivetwin.estimation.data.noise import estimate_white_noise
 
 
 def test_noise_is_found_under_a_driveline_oscillation_and_a_step() -> None:
@@ -17,7 +17,7 @@ def test_noise_is_found_under_a_driveline_oscillation_and_a_step() -> None:
     time = np.arange(0.0, 6.0, 1e-3)
     signal = 2000.0 + 1500.0 * np.sin(2 * np.pi * 12.0 * time) + 3000.0 * (time > 3.0)
     noisy = signal + 30.0 * rng.standard_normal(time.size)
-    assert white_noise(noisy) == pytest.approx(30.0, rel=0.05)
+    assert estimate_white_noise(noisy) == pytest.approx(30.0, rel=0.05)
 
 
 def test_rounding_step_is_found_and_none_where_values_are_continuous() -> None:

@@ -120,7 +120,7 @@ class Damage:
     text: str
 
 
-def missing(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_missing(time: FloatArray, values: FloatArray) -> Damage | None:
     """Samples without a number."""
     mask = ~np.isfinite(values)
     if not mask.any():
@@ -132,10 +132,10 @@ def missing(time: FloatArray, values: FloatArray) -> Damage | None:
             mask,
             f"{int(mask.sum())} samples without a number left out, the first at {first:.3f} s",
         )
-    return Damage(mask, f"no number {_spans(time, found)}")
+    return Damage(mask, f"no number {_describe_runs(time, found)}")
 
 
-def spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
+def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
     """Up to three samples that leave the signal and return to it, far beyond its usual steps."""
     mask = np.zeros(values.size, np.bool_)
     if quantity is Quantity.STATE or values.size < 4 * _SURROUNDINGS:
@@ -149,16 +149,19 @@ def spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage |
     for width in range(1, _SPIKE_WIDTH + 1):
         if quantity is not Quantity.SPEED and width * interval > _SPIKE_TIME:
             break
-        for start in _spike_starts(values, steps, width, least):
+        for start in _find_spike_starts(values, steps, width, least):
             mask[start : start + width] = True
     if not mask.any():
         return None
     return Damage(
-        mask, f"{len(find_true_runs(mask))} spikes left out, {_spans(time, find_true_runs(mask))}"
+        mask,
+        f"{len(find_true_runs(mask))} spikes left out, {_describe_runs(time, find_true_runs(mask))}",
     )
 
 
-def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: float) -> list[int]:
+def _find_spike_starts(
+    values: FloatArray, steps: FloatArray, width: int, least: float
+) -> list[int]:
     """First samples of spikes of one width: both neighbours agree, the rest around is calm."""
     before, after = values[: -width - 1], values[width + 1 :]
     base, apart = 0.5 * (before + after), np.abs(after - before)
@@ -176,7 +179,7 @@ def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: floa
     return (np.flatnonzero(found) + 1).tolist()
 
 
-def pulses(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
     """Stretches, longer than spikes, that a calm torque jumps to and back from in one sample each.
 
     In between it goes on as it would have without the jump, as where an amplifier is disturbed. A
@@ -204,11 +207,11 @@ def pulses(time: FloatArray, values: FloatArray) -> Damage | None:
     if not mask.any():
         return None
     return Damage(
-        mask, f"jumped up or down and back {_spans(time, find_true_runs(mask))}, left out"
+        mask, f"jumped up or down and back {_describe_runs(time, find_true_runs(mask))}, left out"
     )
 
 
-def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
+def find_stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
     """Stretches in which a varying signal repeats one number as it never does elsewhere.
 
     Noise stops at the start or comes back at the end, or it is a speed, which cannot jump, and
@@ -228,17 +231,19 @@ def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | 
         slow = quantity is Quantity.SPEED and time[end] - time[start] >= _STUCK_TIME
         released = end < moving.size and moving[end] > _STUCK_RELEASE * usual
         beside = (steps[max(0, start - _BEFORE) : start], steps[end : end + _BEFORE])
-        noisy = any(_restless(some, usual) for some in beside)
+        noisy = any(_is_noisy(some, usual) for some in beside)
         if (slow and released) or (fine and noisy):
             # The first is the last that was measured, unless the signal jumped to it.
             jumped = start == 0 or moving[start - 1] > _STUCK_RELEASE * usual
             mask[start if jumped else start + 1 : end + 1] = True
     if not mask.any():
         return None
-    return Damage(mask, f"stuck at one number {_spans(time, find_true_runs(mask))}, left out")
+    return Damage(
+        mask, f"stuck at one number {_describe_runs(time, find_true_runs(mask))}, left out"
+    )
 
 
-def stale(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_stale(time: FloatArray, values: FloatArray) -> Damage | None:
     """Updates (n,) that repeat the one before while the signal moves on and then catches up.
 
     Lost messages cause such repeats. Where the signal turns or rests, a repeat may be genuine.
@@ -264,17 +269,17 @@ def stale(time: FloatArray, values: FloatArray) -> Damage | None:
     return Damage(
         mask,
         f"{count} {what} the one before while the signal moves on, as where a message is lost: "
-        f"left out, {_spans(time, find_true_runs(mask))}",
+        f"left out, {_describe_runs(time, find_true_runs(mask))}",
     )
 
 
-def _restless(steps: FloatArray, usual: float) -> bool:
+def _is_noisy(steps: FloatArray, usual: float) -> bool:
     """Return True if successive steps are as large as usual and turn as noise does."""
     turns = np.count_nonzero(np.diff(np.sign(steps)))
     return bool(turns >= _RESTLESS and np.median(np.abs(steps)) > _ALIVE * usual)
 
 
-def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | None:
+def find_longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | None:
     """Longest span [s] of one number, if a signal that jitters would not rest so by itself.
 
     Noise below the resolution rests where the true value lies in the middle between two changes of
@@ -289,20 +294,20 @@ def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | 
     moving = np.diff(elsewhere) != 0.0
     if values[start] == 0.0 or moving.size < _ENOUGH or np.mean(moving) < _JITTER:
         return None
-    noise = _noise(elsewhere / estimate_resolution(elsewhere))
+    noise = _estimate_noise(elsewhere / estimate_resolution(elsewhere))
     unlikely = (end - start) * np.log(erf(0.5 / (np.sqrt(2.0) * noise))) if noise > 0.0 else 0.0
     return (float(time[start]), float(time[end])) if unlikely < _UNLIKELY else None
 
 
-def staircase(values: FloatArray) -> float:
+def detect_quantization(values: FloatArray) -> float:
     """Resolution of a signal that goes in stairs, being rounded beyond its noise; else 0."""
     step = estimate_resolution(values)
     if step == 0.0 or np.mean(np.diff(values) == 0.0) < _REPEATING:
         return 0.0
-    return step if _noise(values / step) < _DITHER else 0.0
+    return step if _estimate_noise(values / step) < _DITHER else 0.0
 
 
-def _noise(codes: FloatArray) -> float:
+def _estimate_noise(codes: FloatArray) -> float:
     """Standard deviation of the noise before rounding to whole `codes` (n,), in their unit.
 
     Alternation between two adjacent codes is no evidence of noise, since the true value may lie
@@ -314,7 +319,7 @@ def _noise(codes: FloatArray) -> float:
     return float(np.interp(np.mean(turns & wide), _WIDE_TURNS, _NOISES))
 
 
-def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
     """Stretches of exact zeros that the signal falls to, and leaves, in one step."""
     level = float(np.percentile(np.abs(values), 98.0))
     moving = np.abs(np.diff(values))
@@ -332,10 +337,10 @@ def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
             mask[start:end] = True
     if not mask.any():
         return None
-    return Damage(mask, f"fell to zero {_spans(time, find_true_runs(mask))}, left out")
+    return Damage(mask, f"fell to zero {_describe_runs(time, find_true_runs(mask))}, left out")
 
 
-def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damage | None:
+def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damage | None:
     """Short stretches of one number far beyond all others, entered and left in one step.
 
     Numbers that stand for no value, as -9999, and those of a message that was not received; at the
@@ -352,14 +357,16 @@ def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damag
         found = find_true_runs(mask)
         if (
             np.unique(values[~mask]).size >= _OTHERS
-            and _are_put_in(time, values, found, float(largest))
-            and not any(_may_be_commanded(values, run, possible) for run in found)
+            and _has_only_inserted_runs(time, values, found, float(largest))
+            and not any(_can_be_fill_pulse(values, run, possible) for run in found)
         ):
-            return Damage(mask, f"far beyond all other numbers {_spans(time, found)}, left out")
+            return Damage(
+                mask, f"far beyond all other numbers {_describe_runs(time, found)}, left out"
+            )
     return None
 
 
-def _are_put_in(
+def _has_only_inserted_runs(
     time: FloatArray, values: FloatArray, found: Sequence[tuple[int, int]], largest: float
 ) -> bool:
     """Return True if each stretch is constant, short, and surrounded by other values.
@@ -374,7 +381,7 @@ def _are_put_in(
     )
 
 
-def _may_be_commanded(values: FloatArray, run: tuple[int, int], possible: float) -> bool:
+def _can_be_fill_pulse(values: FloatArray, run: tuple[int, int], possible: float) -> bool:
     """Return True if a constant stretch may be a clutch fill pulse or is cut off by the log's ends.
 
     A fill pulse starts from rest and ends at a higher pressure. After an invalid-value code the
@@ -390,7 +397,7 @@ def _may_be_commanded(values: FloatArray, run: tuple[int, int], possible: float)
     return float(values[end] - values[start - 1]) > _LIFT * usual
 
 
-def clipped(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_clipping(time: FloatArray, values: FloatArray) -> Damage | None:
     """Samples at the largest or smallest number, where a fine signal rests there repeatedly."""
     same = find_true_runs(np.diff(values) == 0.0)
     for limit in (float(values.max()), float(values.min())):
@@ -403,11 +410,11 @@ def clipped(time: FloatArray, values: FloatArray) -> Damage | None:
             mask = np.zeros(values.size, np.bool_)
             for start, end in rests:
                 mask[start:end] = True
-            return Damage(mask, f"saturated at one number {_spans(time, rests)}, left out")
+            return Damage(mask, f"saturated at one number {_describe_runs(time, rests)}, left out")
     return None
 
 
-def _spans(time: FloatArray, found: Sequence[tuple[int, int]]) -> str:
+def _describe_runs(time: FloatArray, found: Sequence[tuple[int, int]]) -> str:
     """`from 0.200 s to 0.290 s` of the first stretches, and how many more."""
     parts = [
         f"at {time[start]:.3f} s"
