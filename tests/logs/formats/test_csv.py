@@ -7,7 +7,6 @@ import re
 
 import numpy as np
 import pytest
-from drivetwin.logs.formats.csv import read_csv
 
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.errors import (
@@ -18,6 +17,7 @@ from drivetwin.errors import (
     TimeError,
     UnitError,
 )
+from drivetwin.logs.formats.csv import read_csv
 from drivetwin.logs.raw import RawLog
 
 

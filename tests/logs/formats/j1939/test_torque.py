@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drivetwin.logs.formats.j1939 import torque
 
+from drivetwin.logs.formats.j1939 import torque
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
