@@ -66,15 +66,17 @@ def measure_identify(_argument: str) -> Iterator[Figure]:
     """
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run
-    from drivetwin.dyno.scenarios import throttle_steps
-    from drivetwin.estimation.identify import identify
+    from drivetwin.dyno.scenario_file import load_scenario
     from drivetwin.estimation.result.method import Method
     from drivetwin.logs.read import read_log
+    from drivetwin.pipeline import identify
     from drivetwin.shifts.detect import find_shifts
     from drivetwin.vehicle.card import load_card
 
     with tempfile.TemporaryDirectory() as folder:
-        log, card, _ = write_run(Path(folder) / "steps.csv", run(throttle_steps(), seed=1))
+        log, card, _ = write_run(
+            Path(folder) / "steps.csv", run(load_scenario("throttle_steps"), seed=1)
+        )
         vehicle = load_card(card)
         recording = read_log(log, vehicle)
     found = find_shifts(recording, vehicle)
@@ -94,14 +96,14 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
 
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run
-    from drivetwin.dyno.scenarios import paper_steps
+    from drivetwin.dyno.scenario_file import load_scenario
     from drivetwin.estimation.result.method import Method
     from drivetwin.workbench.session import Sessions
     from drivetwin.workbench.workspace_folder import Folder
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        log, card, _ = write_run(folder / "bench.csv", run(paper_steps(), seed=1))
+        log, card, _ = write_run(folder / "bench.csv", run(load_scenario("paper_steps"), seed=1))
         sessions = Sessions(Folder.at(folder))
         session = sessions.get(sessions.new())
         session.open(session.in_folder(log.name), session.in_folder(card.name))

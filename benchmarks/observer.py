@@ -21,7 +21,7 @@ import drivetwin
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.observe import observed
 from drivetwin.shifts.detect import find_shifts
@@ -43,12 +43,12 @@ def measure(rounds: int) -> dict[tuple[str, str, str], list[Row]]:
 
 
 def _measure(folder: Path, seed: int, found: dict[tuple[str, str, str], list[Row]]) -> None:
-    first, card_file, _ = write_run(folder / "first.csv", run(paper_steps(), seed))
+    first, card_file, _ = write_run(folder / "first.csv", run(load_scenario("paper_steps"), seed))
     card = drivetwin.load_card(card_file)
     log = drivetwin.read_log(first, card)
     identified = drivetwin.identify_shifts(log, card, find_shifts(log, card))
     twin = build_twin(identified, card)
-    other = run(paper_steps().with_torque_reduction(0.3), 1000 + seed)
+    other = run(load_scenario("paper_steps").with_torque_reduction(0.3), 1000 + seed)
     second, _, _ = write_run(folder / "second.csv", other)
     log = drivetwin.read_log(second, card)
     kept = {k: v for k, v in log.channels.items() if not k.startswith("pressure.")}

@@ -24,7 +24,7 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.validation import Outcome
 from drivetwin.parameters import log_of
@@ -54,7 +54,7 @@ class Outcomes:
 
 def make_lower_load() -> Scenario:
     """Return the paper's vehicle at less torque and load."""
-    base = paper_steps()
+    base = load_scenario("paper_steps")
     torque = Program(tuple((time, LEVEL * value) for time, value in base.engine_torque.knots))
     load = RoadLoad(constant=LOAD * base.model.i_f)
     return replace(base, engine_torque=torque, model=replace(base.model, load=load))
@@ -63,7 +63,7 @@ def make_lower_load() -> Scenario:
 def measure_pair(seed: int) -> Outcomes:
     """Make three logs, fit two, predict the third. Jo′ of the card is drawn from its prior."""
     with tempfile.TemporaryDirectory() as folder:
-        made = [paper_steps(), make_lower_load(), paper_steps()]
+        made = [load_scenario("paper_steps"), make_lower_load(), load_scenario("paper_steps")]
         files = [
             write_run(Path(folder) / f"log{k}.csv", run(one, seed=3 * seed + k))
             for k, one in enumerate(made)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.dyno.scenarios import paper
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.export.c.loaded import CModel, CObserver, Estimates
 from drivetwin.export.subject import Subject, steady_start
 from drivetwin.simulation.dual_clutch import (
@@ -183,7 +183,7 @@ def one_shift(plant: Plant, controller: Controller, observer: CObserver) -> Shif
 
 def drive(adaptive: bool, shifts: int = SHIFTS, seed: int = 0) -> list[Shift]:
     """Shift after shift while the friction fades from 1 to `FADED`."""
-    twin = paper().model
+    twin = load_scenario("paper").model
     rng = np.random.default_rng(seed)
     start = steady_start(twin, twin.elements[0].name, ENGINE_SPEED)
     exported = CModel(Subject("paper", twin, start))

@@ -18,7 +18,7 @@ from plotly.io import to_html
 from drivetwin.cli.identify_run import Outcome, run
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.report.figures.validation import validation_figure
 from drivetwin.report.html import save_report
@@ -35,7 +35,7 @@ OPTIONS = (
 
 def identify_demo(folder: Path) -> Outcome:
     """Write the log of the demo into `folder` and identify it."""
-    log, card, _ = write_run(folder / "shift.csv", run_dyno(paper_steps(), seed=0))
+    log, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=0))
     return run(log, card, None, DEFAULT_METHOD)
 
 

@@ -21,7 +21,7 @@ from benchmarks.estimation.study import run_study
 from benchmarks.estimation.unseen import identify_unseen
 from drivetwin._util.atomic import write_text
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import SCENARIOS
+from drivetwin.dyno.scenario_file import load_scenario
 from tests.support.bench import Knowledge
 
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
@@ -62,7 +62,7 @@ def main() -> int:
     for place, (name, know, text) in enumerate(CASES):
         if str(place + 1) in asked.only:
             seeds = range(place * APART, place * APART + asked.count)
-            _write(format_study(run_study(SCENARIOS[name](), know, seeds), text))
+            _write(format_study(run_study(load_scenario(name), know, seeds), text))
     if STARTS in asked.only:
         _write(format_starts(count_outcomes(asked.tries)))
     if UNSEEN in asked.only:

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.estimation.study import START_INERTIA, fit_likelihood, read_fit
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.scenarios import gearbox, throttle_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.linear.multi_shift import disturbed
 from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
@@ -51,7 +51,7 @@ class Shift:
 
 def delay_torque() -> Scenario:
     """Return `throttle_steps` with an engine torque that is 15 ms old."""
-    base = throttle_steps()
+    base = load_scenario("throttle_steps")
     sensors = [replace(s, delay=0.015) if s.role == "engine_torque" else s for s in base.sensors]
     return replace(base, sensors=tuple(sensors))
 
@@ -59,14 +59,15 @@ def delay_torque() -> Scenario:
 PRESSURE = ("pressure.B3", SensorTolerance(offset=2e4))
 ENGINE_TORQUE = ("engine_torque", SensorTolerance(gain=0.03))
 OUTPUT_TORQUE = ("output_torque", SensorTolerance(gain=0.01))
-DRUMLESS = partial(gearbox, 0.0)
+DRUMLESS = partial(load_scenario, "gearbox", 0.0)
+THROTTLE_STEPS = partial(load_scenario, "throttle_steps")
 FAULTS = (
-    Fault("drums of 0.05 kg m²", DRUMLESS, partial(gearbox, 0.05)),
-    Fault("drums of 0.2 kg m²", DRUMLESS, partial(gearbox, 0.2)),
-    Fault("pressure of B3 +20 kPa", throttle_steps, throttle_steps, PRESSURE),
-    Fault("engine torque 15 ms late", throttle_steps, delay_torque),
-    Fault("engine torque +3 %", throttle_steps, throttle_steps, ENGINE_TORQUE),
-    Fault("output torque +1 %", throttle_steps, throttle_steps, OUTPUT_TORQUE),
+    Fault("drums of 0.05 kg m²", DRUMLESS, partial(load_scenario, "gearbox", 0.05)),
+    Fault("drums of 0.2 kg m²", DRUMLESS, partial(load_scenario, "gearbox", 0.2)),
+    Fault("pressure of B3 +20 kPa", THROTTLE_STEPS, THROTTLE_STEPS, PRESSURE),
+    Fault("engine torque 15 ms late", THROTTLE_STEPS, delay_torque),
+    Fault("engine torque +3 %", THROTTLE_STEPS, THROTTLE_STEPS, ENGINE_TORQUE),
+    Fault("output torque +1 %", THROTTLE_STEPS, THROTTLE_STEPS, OUTPUT_TORQUE),
 )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.estimation.study import build_guess, read_fit
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import SCENARIOS
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.selection.select_model import choose
@@ -46,7 +46,7 @@ def count_outcomes(count: int) -> Counter[Outcome]:
 
 def try_start(seed: int, off: float = OFF) -> Outcome:
     """Fit the realisation `seed` from start values up to `off` (relative) away from the truth."""
-    bench = record_bench(SCENARIOS[TRIED[seed % len(TRIED)]](), seed, KNOW)
+    bench = record_bench(load_scenario(TRIED[seed % len(TRIED)]), seed, KNOW)
     truth = build_guess(bench)
     try:
         found = _fit(bench, draw_start(truth, bench, seed, off))

@@ -21,7 +21,6 @@ from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
 from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, record_of
 from drivetwin.estimation.likelihood.objective import Part
 from drivetwin.estimation.likelihood.parametrization import LAW, TE_OFFSET
@@ -33,6 +32,7 @@ from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.estimation.result.verdict import DELAY_IDENTIFIED
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.simulation.dual_clutch import DualClutch, Stribeck
 from drivetwin.vehicle.card import load_card

@@ -28,11 +28,11 @@ from drivetwin._util.rich_display import register_presenter
 if TYPE_CHECKING:
     from drivetwin.errors import DrivetwinError
     from drivetwin.estimation.analysis.experiment_design import examined
-    from drivetwin.estimation.identify import identify as identify_shifts
     from drivetwin.estimation.result.method import Method
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_conversion import load_twin, save_twin
     from drivetwin.logs.read import read_log
+    from drivetwin.pipeline import identify as identify_shifts
     from drivetwin.report.html import save_report
     from drivetwin.shifts.detect import find_shifts
     from drivetwin.simulation.dual_clutch import DualClutch, simulate
@@ -52,7 +52,7 @@ _HOME = {
     "build_twin": ("twin.build", "build_twin"),
     "examined": ("estimation.analysis.experiment_design", "examined"),
     "find_shifts": ("shifts.detect", "find_shifts"),
-    "identify_shifts": ("estimation.identify", "identify"),
+    "identify_shifts": ("pipeline", "identify"),
     "load_card": ("vehicle.card", "load_card"),
     "load_twin": ("files.twin_conversion", "load_twin"),
     "read_log": ("logs.read", "read_log"),

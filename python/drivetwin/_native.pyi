@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The compiled core. Private: use `drivetwin.driveline`, `.network` and `.gearbox`."""
+"""The compiled core. Private: use `drivetwin.simulation` and `drivetwin.gearbox`."""
 
 from collections.abc import Sequence
 

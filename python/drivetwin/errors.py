@@ -11,7 +11,7 @@ INTERRUPTED = 130
 
 @dataclass(frozen=True)
 class Where:
-    """Where a fault sits: file, channel, time [s] or key path; any part may be unknown."""
+    """Location of a fault: file, channel, time [s] or key path; each part is optional."""
 
     file: str | None = None
     channel: str | None = None

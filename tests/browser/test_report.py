@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page
 from drivetwin.cli.identify_run import run
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.report.comparison import save_comparison, trials_of
 from drivetwin.report.find_reports import Candidate
@@ -36,7 +36,7 @@ STATE = """() => [...document.querySelectorAll(".plot")].filter((plot) => plot.c
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Report of an identification by the default method."""
     folder = tmp_path_factory.mktemp("report")
-    shift, card, _ = write_run(folder / "shift.csv", run_dyno(paper_steps(), seed=1))
+    shift, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=1))
     outcome = run(shift, card, None, DEFAULT_METHOD)
     save_report(folder / "report.html", outcome.found, outcome.log)
     twin = {"first": outcome.twin, "second": outcome.twin}

@@ -19,7 +19,7 @@ from playwright.sync_api import Browser, BrowserContext, FloatRect, Locator, Pag
 
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from tests.browser.watch import Watch, grave_findings
 from tests.workbench.bad_files import bad_files
 
@@ -76,7 +76,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
         log.write_bytes(GIVEN.read_bytes())
         card.write_bytes((ROOT / "examples" / "vehicles" / "truck_a.toml").read_bytes())
     else:
-        log, card, _ = write_run(folder / "bench.csv", run(paper_steps(), seed=1))
+        log, card, _ = write_run(folder / "bench.csv", run(load_scenario("paper_steps"), seed=1))
     wrong = _with_wrong_unit(log)
     command = [sys.executable, "-m", "drivetwin", "app", "--port", "0", "--no-browser"]
     server = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)

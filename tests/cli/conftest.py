@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 
 
 @dataclass(frozen=True)
@@ -26,4 +26,4 @@ class Files:
 def bench_files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     """Log, card and truth of the `paper_steps` scenario with its noise."""
     folder = tmp_path_factory.mktemp("bench")
-    return Files(*write_run(folder / "bench.csv", run(paper_steps(), seed=1)))
+    return Files(*write_run(folder / "bench.csv", run(load_scenario("paper_steps"), seed=1)))

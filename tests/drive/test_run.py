@@ -24,11 +24,11 @@ from drivetwin.drive import (
 )
 from drivetwin.drive.network import LOCK_UP
 from drivetwin.drive.result import Maneuver
-from drivetwin.drive.shift import ShiftKind
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, gear_statics, load_gearbox
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import find_shifts
+from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.drive.bus import REFERENCE, candump
 from tests.shifts.fixtures import make_card
 
@@ -204,7 +204,7 @@ def test_every_shift_is_found_in_what_the_bus_tells(
     assert found.rejected == ()
     assert [
         (f"{shift.start_gear}→{shift.end_gear}", str(shift.kind)) for shift in found.shifts
-    ] == [(each.action.label, f"{each.action.kind}shift") for each in made]
+    ] == [(each.action.label, str(each.action.kind)) for each in made]
     for shift, each in zip(found.shifts, made, strict=True):
         begun = _slip_begun(drive, each, gear_statics(gearbox, shift.start_gear).ratio)
         assert shift.inertia_phase == pytest.approx((begun, each.lock), abs=0.05)

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from drivetwin.drive.schedule import Schedule
-from drivetwin.drive.shift import FILL, RAMP, ShiftKind, ShiftPlan, kind_of, pressure
+from drivetwin.drive.shift import FILL, RAMP, ShiftPlan, pressure
 from drivetwin.gearbox import Gearbox, reduce
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 
 @pytest.fixture
@@ -34,21 +35,6 @@ def schedule() -> Schedule:
 
 def value(found: Schedule, name: str, time: float) -> float:
     return float(found.at(name, np.array([time]))[0])
-
-
-@pytest.mark.parametrize(
-    ("torque", "swing", "kind"),
-    [
-        (900.0, -40.0, ShiftKind.POWER_ON_UP),
-        (-150.0, -40.0, ShiftKind.POWER_OFF_UP),
-        (900.0, 40.0, ShiftKind.POWER_ON_DOWN),
-        (-150.0, 40.0, ShiftKind.POWER_OFF_DOWN),
-    ],
-)
-def test_kind_is_told_by_torque_and_speed_change(
-    torque: float, swing: float, kind: ShiftKind
-) -> None:
-    assert kind_of(torque, swing) is kind
 
 
 def test_pressure_inverts_the_capacity(gearbox: Gearbox) -> None:

@@ -7,13 +7,13 @@ import tomllib
 
 import numpy as np
 
-from drivetwin.dyno.car_scenarios import dual_clutch, manual
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text
+from drivetwin.dyno.scenario_file import load_scenario
 
 
 def test_the_dual_clutch_gearbox_hands_over_without_a_gap() -> None:
-    made = run(dual_clutch(), noise=0.0)
+    made = run(load_scenario("dual_clutch"), noise=0.0)
     motion = made.trajectory
     start, end = made.truth.torque_start or 0.0, made.truth.lockup or 0.0
     between = (motion.time > start) & (motion.time < end)
@@ -22,7 +22,7 @@ def test_the_dual_clutch_gearbox_hands_over_without_a_gap() -> None:
 
 
 def test_the_manual_gearbox_has_one_clutch_and_a_gap() -> None:
-    made = run(manual(), noise=0.0)
+    made = run(load_scenario("manual"), noise=0.0)
     roles = [channel.role for channel in made.channels]
     assert [role for role in roles if role.startswith("pressure.")] == ["pressure.K2"]
     pressure = next(c for c in made.channels if c.role == "pressure.K2")
@@ -36,7 +36,7 @@ def test_the_manual_gearbox_has_one_clutch_and_a_gap() -> None:
 
 
 def test_the_card_of_a_manual_gearbox_maps_one_column_to_both_elements() -> None:
-    card = tomllib.loads(card_text(manual()))
+    card = tomllib.loads(card_text(load_scenario("manual")))
     sources = {one["source"] for one in card["channels"]["pressure"].values()}
     assert sources == {"PrsClutch"}
     ratios = [gear["ratio"] for gear in card["gears"]]

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from drivetwin.cli.synth import write_run
-from drivetwin.dyno.converter_scenario import open_converter
 from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.simulation.dual_clutch import Signal, simulate
 from drivetwin.vehicle.card import load_card
 
 
 def test_the_turbine_torque_moves_the_dual_clutch_as_the_converter_does() -> None:
-    made = run(open_converter(), noise=0.0)
+    made = run(load_scenario("open_converter"), noise=0.0)
     scenario, motion = made.scenario, made.trajectory
     assert scenario.converter is not None
     crank = next(each for each in made.channels if each.role == "engine_speed")
@@ -37,7 +37,7 @@ def test_the_turbine_torque_moves_the_dual_clutch_as_the_converter_does() -> Non
 
 
 def test_all_inertias_of_the_model_turn_behind_the_converter() -> None:
-    scenario = open_converter()
+    scenario = load_scenario("open_converter")
     assert scenario.converter is not None
     model = replace(scenario.model, eta=1.0, i_in=1.2, J1=2.0, J2e=1.5)
     time = np.linspace(0.0, 0.5, 501)
@@ -59,7 +59,7 @@ def test_all_inertias_of_the_model_turn_behind_the_converter() -> None:
 
 
 def test_the_engine_starts_where_its_torque_is_steady() -> None:
-    scenario = open_converter()
+    scenario = load_scenario("open_converter")
     assert scenario.converter is not None
     engine, turbine = scenario.converter.steady(1545.0, 140.0)
     assert scenario.converter.converter.pump_torque(engine, 140.0) == pytest.approx(1545.0)
@@ -67,7 +67,7 @@ def test_the_engine_starts_where_its_torque_is_steady() -> None:
 
 
 def test_the_card_has_the_map(tmp_path: Path) -> None:
-    scenario = open_converter()
+    scenario = load_scenario("open_converter")
     _, card, _ = write_run(tmp_path / "open.csv", run(scenario, seed=0))
     found = load_card(card).converter
     assert scenario.converter is not None

@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli.synth import write_run
-from drivetwin.dyno.converter_scenario import open_converter
 from drivetwin.dyno.dyno import run
-from drivetwin.estimation.data.prepare import driveline_behind
-from drivetwin.estimation.identify import MAP_EXACT, identify
+from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.estimation.data.prepare import prepare
+from drivetwin.estimation.identify import MAP_EXACT
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 
@@ -20,11 +21,12 @@ KINDS = "samples are means"
 
 
 def test_noise_that_turbine_and_its_torque_share_is_no_sign_of_means(tmp_path: Path) -> None:
-    made = run(open_converter(), seed=0)
+    made = run(load_scenario("open_converter"), seed=0)
     path, card_path, _ = write_run(tmp_path / "open.csv", made)
     card = load_card(card_path)
     log = read_log(path, card)
-    found = identify(log, card, find_shifts(log, card))
+    shifts = find_shifts(log, card)
+    found = identify(log, card, shifts)
     # Taken for noise of its own, Q fell by 32 for means of all outputs, and J_prime_2 was 3 σ off.
     assert not [text for text in found.warnings if KINDS in text]
     assert MAP_EXACT in found.warnings
@@ -33,5 +35,5 @@ def test_noise_that_turbine_and_its_torque_share_is_no_sign_of_means(tmp_path: P
         assert one.value is not None
         assert one.std_noise is not None
         assert one.value == pytest.approx(truth, abs=2.0 * one.std_noise), name
-    (signals,) = found.evidence.signals
-    assert driveline_behind(card, signals).known["te_delay"].std == 0.0
+    (driveline,) = prepare(log, card, shifts).drivelines
+    assert driveline.known["te_delay"].std == 0.0

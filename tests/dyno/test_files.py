@@ -11,14 +11,14 @@ import pytest
 
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.files import card_text, log_text, truth_text
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.card import load_card
 
 
 @pytest.fixture(scope="module")
 def bench() -> DynoRun:
-    return run(paper_steps(), seed=3)
+    return run(load_scenario("paper_steps"), seed=3)
 
 
 def test_log_and_card_read_back(bench: DynoRun, tmp_path: Path) -> None:

@@ -10,12 +10,12 @@ import pytest
 
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.dyno.scenario_file import load_scenario
 
 
 @pytest.fixture(scope="module", params=[ScenarioName.GEARBOX, ScenarioName.GEARBOX_CHAIN])
 def bench(request: pytest.FixtureRequest) -> DynoRun:
-    return run(scenario_of(request.param), noise=0.0)
+    return run(load_scenario(request.param), noise=0.0)
 
 
 def test_each_shift_has_its_phases_in_order(bench: DynoRun) -> None:
@@ -58,7 +58,7 @@ def test_the_on_coming_element_fills_before_it_carries(bench: DynoRun) -> None:
 
 
 def test_torque_intervention_acts_in_every_shift() -> None:
-    scenario = scenario_of(ScenarioName.GEARBOX_CHAIN)
+    scenario = load_scenario(ScenarioName.GEARBOX_CHAIN)
     plain, cut = (run(each, noise=0.0) for each in (scenario, scenario.with_torque_reduction(0.3)))
     for whole, reduced in zip(plain.truth.shifts, cut.truth.shifts, strict=True):
         assert whole.lockup is not None

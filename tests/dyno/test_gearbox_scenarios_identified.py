@@ -11,11 +11,11 @@ import pytest
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.files import card_text, log_text
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 from tests.support.coverage import COARSE, assert_covers
@@ -42,7 +42,7 @@ def test_truth_lies_in_the_intervals_where_the_card_states_the_drums(tmp_path: P
     """Of all 95 % intervals nine in ten hold at least, and none misses by its own width."""
     held = []
     for seed in SEEDS:
-        bench = run(scenario_of(ScenarioName.GEARBOX), seed)
+        bench = run(load_scenario(ScenarioName.GEARBOX), seed)
         found = identified(bench, tmp_path, Method.LIKELIHOOD, drums=True)
         assert found.method is Method.LIKELIHOOD
         for name, true in bench.truth.parameters.items():
@@ -103,7 +103,7 @@ def test_unstated_drums_show_as_less_friction_and_hardly_elsewhere(
 
     About a percent of μ for 0.05 kg m^2, in proportion to the drum; the rest moves little.
     """
-    plain, faulty = (run(scenario_of(ScenarioName.GEARBOX, d), SEEDS[0]) for d in (0.0, drum))
+    plain, faulty = (run(load_scenario(ScenarioName.GEARBOX, d), SEEDS[0]) for d in (0.0, drum))
     base, found = (
         identified(each, tmp_path, Method.INTEGRAL, drums=False) for each in (plain, faulty)
     )
@@ -113,6 +113,6 @@ def test_unstated_drums_show_as_less_friction_and_hardly_elsewhere(
         assert values[0] is not None
         assert values[1] is not None
         assert abs(values[1] / values[0] - 1.0) < 0.05 * drum, name
-    expected = predicted_bias(run(scenario_of(ScenarioName.GEARBOX, drum), noise=0.0))
+    expected = predicted_bias(run(load_scenario(ScenarioName.GEARBOX, drum), noise=0.0))
     assert expected < 0.0
     assert np.mean(mu[1] / mu[0]) - 1.0 == pytest.approx(expected, rel=0.25)

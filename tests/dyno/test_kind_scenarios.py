@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.dyno.dyno import DynoRun, run
-from drivetwin.dyno.kind_scenarios import input_gear, power_off_down, power_off_up, power_on_down
 from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenario_file import load_scenario
 
 
 def _exact(scenario: Scenario) -> DynoRun:
@@ -24,10 +24,9 @@ def _at(made: DynoRun, column: str, time: float) -> float:
     return float(np.interp(time, made.trajectory.time, values))
 
 
-@pytest.mark.parametrize("scenario", [power_on_down, power_off_down], ids=["power on", "off"])
-def test_a_downshift_brings_the_engine_up(scenario: object) -> None:
-    assert callable(scenario)
-    made = _exact(scenario())
+@pytest.mark.parametrize("scenario", ["power_on_down", "power_off_down"])
+def test_a_downshift_brings_the_engine_up(scenario: str) -> None:
+    made = _exact(load_scenario(scenario))
     shift = made.truth.shifts[0]
     assert (shift.start_gear, shift.end_gear) == ("3", "2")
     start, end = shift.inertia_start or 0.0, shift.lockup or 0.0
@@ -35,7 +34,7 @@ def test_a_downshift_brings_the_engine_up(scenario: object) -> None:
 
 
 def test_in_a_kick_down_the_element_that_lets_go_carries_the_torque() -> None:
-    made = _exact(power_on_down())
+    made = _exact(load_scenario("power_on_down"))
     shift = made.truth.shifts[0]
     middle = (shift.inertia_start or 0.0) + 0.4
     motion = made.trajectory
@@ -45,7 +44,7 @@ def test_in_a_kick_down_the_element_that_lets_go_carries_the_torque() -> None:
 
 
 def test_with_the_power_off_the_engine_falls_before_the_upshift_takes_hold() -> None:
-    made = _exact(power_off_up())
+    made = _exact(load_scenario("power_off_up"))
     fill = made.truth.torque_start
     assert fill is not None
     assert fill > (made.truth.inertia_start or 0.0)
@@ -54,7 +53,7 @@ def test_with_the_power_off_the_engine_falls_before_the_upshift_takes_hold() -> 
 
 
 def test_an_input_gear_stands_between_engine_and_gearbox() -> None:
-    made = _exact(input_gear())
+    made = _exact(load_scenario("input_gear"))
     speed = next(c for c in made.channels if c.role == "input_speed")
     expected = np.interp(speed.time, made.trajectory.time, made.trajectory.engine_speed) / 1.2
     assert speed.values == pytest.approx(expected, rel=1e-9)

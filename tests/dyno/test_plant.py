@@ -12,7 +12,7 @@ from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.plant import Surroundings, form_of, plant_of
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox import gear_statics, load_gearbox, reduce
 from drivetwin.simulation import dual_clutch
@@ -33,7 +33,7 @@ def difference(a: FloatArray, b: FloatArray) -> float:
 @pytest.mark.parametrize("name", [ScenarioName.GEARBOX, ScenarioName.GEARBOX_CHAIN])
 @pytest.mark.parametrize("drum", [0.0, 0.2])
 def test_brake_drums_are_the_drums_of_the_form(name: ScenarioName, drum: float) -> None:
-    whole, form = both(scenario_of(name, drum))
+    whole, form = both(load_scenario(name, drum))
     assert difference(whole.shaft_torque, form.shaft_torque) < 1e-9
     assert difference(whole.engine_speed, form.engine_speed) < 1e-9
     for element in form.slip:
@@ -45,7 +45,7 @@ def test_brake_drums_are_the_drums_of_the_form(name: ScenarioName, drum: float) 
 
 def test_the_drum_of_an_open_element_that_is_no_shift_element_breaks_the_form() -> None:
     """C2 = R3 turns with both shafts; the form keeps its diagonal parts only."""
-    scenario = scenario_of(ScenarioName.GEARBOX)
+    scenario = load_scenario(ScenarioName.GEARBOX)
     assert scenario.plant is not None
     box = scenario.plant.gearbox
     heavy = plant_of(replace(box, inertias={**box.inertias, "R3-C2": 0.2}), scenario.plant.gears)
@@ -61,7 +61,7 @@ def test_the_drum_of_an_open_element_that_is_no_shift_element_breaks_the_form() 
 
 def test_inertia_of_a_gear_is_the_kinetic_energy_of_its_members() -> None:
     """2·E/ω_in² of all members but the open drums, the engine's counted η times."""
-    scenario = scenario_of(ScenarioName.GEARBOX_CHAIN)
+    scenario = load_scenario(ScenarioName.GEARBOX_CHAIN)
     assert scenario.plant is not None
     box, model = scenario.plant.gearbox, scenario.model
     truth = run(scenario, noise=0.0).truth.parameters
@@ -77,7 +77,7 @@ def test_inertia_of_a_gear_is_the_kinetic_energy_of_its_members() -> None:
 
 
 def test_what_is_simulated_starts_without_a_jerk() -> None:
-    trajectory = run(scenario_of(ScenarioName.GEARBOX), noise=0.0).trajectory
+    trajectory = run(load_scenario(ScenarioName.GEARBOX), noise=0.0).trajectory
     early = trajectory.shaft_torque[trajectory.time < 0.25]
     assert np.ptp(early) < 5e-3 * early.mean()
 
@@ -88,7 +88,7 @@ def test_double_transitions_have_no_plant() -> None:
 
 
 def test_a_form_is_a_driveline_that_runs() -> None:
-    scenario = scenario_of(ScenarioName.GEARBOX)
+    scenario = load_scenario(ScenarioName.GEARBOX)
     time = np.linspace(0.0, 0.2, 21)
     held = {name: Signal(time, np.full(21, 1e6)) for name in ("C4", "C3")}
     held["C3"] = Signal(time, np.zeros(21))

@@ -8,7 +8,7 @@ import pytest
 
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import SCENARIOS, paper, scenario_of
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.dyno.truth import lockup_oscillation
 from drivetwin.errors import InputError
 
@@ -17,7 +17,7 @@ DUAL = (ScenarioName.PAPER, ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEP
 
 @pytest.fixture(scope="module", params=DUAL)
 def bench(request: pytest.FixtureRequest) -> DynoRun:
-    return run(SCENARIOS[request.param](), noise=0.0)
+    return run(load_scenario(request.param), noise=0.0)
 
 
 def test_phases_come_in_the_order_of_a_power_on_upshift(bench: DynoRun) -> None:
@@ -62,7 +62,7 @@ def test_start_is_quasi_steady(bench: DynoRun) -> None:
 
 
 def test_paper_truth_is_the_published_set() -> None:
-    values = run(paper(), noise=0.0).truth.parameters
+    values = run(load_scenario("paper"), noise=0.0).truth.parameters
     assert values["eta"] == 0.85
     assert values["J_prime_2"] == pytest.approx(17.50, abs=0.005)
     assert values["J_prime_3"] == pytest.approx(17.69, abs=0.01)
@@ -86,7 +86,7 @@ def test_lockup_oscillation_rings_at_its_closed_form_frequency(bench: DynoRun) -
 
 
 def test_torque_reduction_shortens_the_inertia_phase() -> None:
-    whole = paper()
+    whole = load_scenario("paper")
     reduced = whole.with_torque_reduction(0.4)
     plain, cut = (run(scenario, noise=0.0) for scenario in (whole, reduced))
     torque = next(c for c in cut.channels if c.role == "engine_torque")
@@ -98,10 +98,10 @@ def test_torque_reduction_shortens_the_inertia_phase() -> None:
 
 def test_every_name_has_a_scenario_of_that_name() -> None:
     for name in ScenarioName:
-        assert SCENARIOS[name]().name == name
+        assert load_scenario(name).name == name
 
 
 @pytest.mark.parametrize(("name", "drum"), [("paper", 0.05), ("gearbox", -0.1)])
 def test_a_drum_needs_a_gearbox(name: str, drum: float) -> None:
     with pytest.raises(InputError, match="gearbox, gearbox_chain"):
-        scenario_of(ScenarioName(name), drum)
+        load_scenario(ScenarioName(name), drum)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,15 +11,16 @@ import numpy as np
 from scipy.signal import lfilter
 
 import drivetwin
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.scenarios import paper, paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.fit import spread_of
 from drivetwin.estimation.result.method import Method
+from drivetwin.pipeline import identify
+from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.shared_results import shared
 
 DURATION = 3.3
@@ -28,10 +28,9 @@ RATE = 400.0
 """Hz of the logger: less than usual, so that the many fits of a test take less time."""
 
 
-def _identified(
-    scenario: Callable[[], Scenario], method: Method, P0_std: float = 0.0
-) -> Identification:
-    base = scenario()
+def record_log(scenario: str, P0_std: float = 0.0) -> tuple[ShiftLog, VehicleCard]:
+    """Record a scenario and read its log; the card leaves P0 a spread of `P0_std` [Pa]."""
+    base = load_scenario(scenario)
     sensors = tuple(replace(s, rate=min(s.rate, RATE)) for s in base.sensors)
     made = run(replace(base, duration=DURATION, sensors=sensors), seed=3)
     with tempfile.TemporaryDirectory() as folder:
@@ -44,32 +43,36 @@ def _identified(
         card = replace(card, elements=elements)
         mapping = Path(folder) / "rows.toml"
         mapping.write_text("[time]\nsimultaneous = true\n", encoding="utf-8")
-        log = drivetwin.read_log(log_file, card, mapping)
-        return identify(log, card, drivetwin.find_shifts(log, card), method)
+        return drivetwin.read_log(log_file, card, mapping), card
+
+
+def _identified(scenario: str, method: Method, P0_std: float = 0.0) -> Identification:
+    log, card = record_log(scenario, P0_std)
+    return identify(log, card, drivetwin.find_shifts(log, card), method)
 
 
 @shared
 def still() -> Identification:
     """A log at constant engine torque: it cannot tell the torque's age."""
-    return _identified(paper, Method.LIKELIHOOD)
+    return _identified("paper", Method.LIKELIHOOD)
 
 
 @shared
 def stepped() -> Identification:
     """The same driveline with throttle steps before the shift."""
-    return _identified(paper_steps, Method.LIKELIHOOD)
+    return _identified("paper_steps", Method.LIKELIHOOD)
 
 
 @shared
 def uncertain_fills() -> Identification:
     """The log at constant engine torque, by a card that leaves P0 a tenth of a bar of spread."""
-    return _identified(paper, Method.LIKELIHOOD, P0_std=1e4)
+    return _identified("paper", Method.LIKELIHOOD, P0_std=1e4)
 
 
 @shared
 def by_the_paper() -> Identification:
     """The same by a method without a likelihood."""
-    return _identified(paper, Method.PAPER)
+    return _identified("paper", Method.PAPER)
 
 
 def slowed(found: Identification) -> Identification:

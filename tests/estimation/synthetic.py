@@ -15,7 +15,8 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.noise import resolution, white_noise
 from drivetwin.estimation.data.shift_data import Coupling, Driveline, Sampled, ShiftSignals
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 
 Input = Callable[[float], float]

@@ -15,13 +15,14 @@ from drivetwin.errors import IdentificationError, NoShiftError
 from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
 from drivetwin.estimation.data.prepare import driveline_of
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import ALL_BEFORE_LOSS, identify
+from drivetwin.estimation.identify import ALL_BEFORE_LOSS
 from drivetwin.estimation.likelihood.estimates import WITH_ETA, conclude
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import FoundShifts, find_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance

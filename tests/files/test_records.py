@@ -15,7 +15,9 @@ from tests.estimation.asked import still
 def test_what_would_narrow_an_open_parameter_stands_in_the_result() -> None:
     found = still()
     told = suggest(found)
-    made = ResultFile.of(replace(found, evidence=replace(found.evidence, suggestions=told)))
+    made = ResultFile.from_result(
+        replace(found, evidence=replace(found.evidence, suggestions=told))
+    )
     assert [one.parameter for one in made.suggestions] == [one.parameter for one in told]
     (age,) = (one for one in made.suggestions if one.parameter == "te_delay")
     assert age.half_width is None
@@ -27,4 +29,4 @@ def test_what_would_narrow_an_open_parameter_stands_in_the_result() -> None:
 
 
 def test_a_result_without_them_has_none() -> None:
-    assert ResultFile.of(still()).suggestions == []
+    assert ResultFile.from_result(still()).suggestions == []

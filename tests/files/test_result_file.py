@@ -61,7 +61,7 @@ def test_total_interval_holds_the_noise_interval(tmp_path: Path) -> None:
 def test_not_a_number_never_reaches_json() -> None:
     empty_phase = SignalFit(float("nan"), float("nan"))
     found = replace(identification(), fit={"output_torque": {"torque": empty_phase}})
-    text = ResultFile.of(found).to_json()
+    text = ResultFile.from_result(found).to_json()
     assert "NaN" not in text
     tree = json.loads(text)
     assert tree["fit"]["output_torque"]["torque"] == {"rmse": None, "fit_percent": None}
@@ -72,14 +72,14 @@ def test_a_value_that_cannot_be_told_is_never_a_bare_number() -> None:
     found = identification()
     bare = replace(found.estimates["eta"], verdict=Verdict.NOT_IDENTIFIABLE)
     with pytest.raises(ValidationError, match="not identifiable"):
-        ResultFile.of(replace(found, estimates={"eta": bare}))
+        ResultFile.from_result(replace(found, estimates={"eta": bare}))
 
 
 def test_round_trip(tmp_path: Path) -> None:
     found = identification()
     save_result(tmp_path / "result.json", found)
     back = load_result(tmp_path / "result.json")
-    assert back == ResultFile.of(found)
+    assert back == ResultFile.from_result(found)
     assert back.parameters["k_o"].estimate("k_o").std_total == pytest.approx(
         found.estimates["k_o"].std_total
     )

@@ -24,7 +24,7 @@ from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report import sample
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "drivetwin"
 REFERENCE = ROOT / "docs" / "reference"
 
@@ -46,7 +46,7 @@ def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
     """Files of a kind that the program itself reads or writes."""
     match kind:
         case FileKind.RESULT:
-            yield json.loads(ResultFile.of(sample.identification()).to_json())
+            yield json.loads(ResultFile.from_result(sample.identification()).to_json())
         case FileKind.PARAMETERS:
             yield json.loads(json_text(parameters_of(twin())))
         case _:

@@ -12,7 +12,7 @@ import pytest
 from drivetwin._util.version import program_version
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import FileFormatError, StoreError
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.identify import identify_log
@@ -25,7 +25,7 @@ from drivetwin.fleet.task import Recipe, Task
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log with a column `TOil` that says 80 and 90 degC in turn, and an empty one, `TGear`."""
     path = tmp_path_factory.mktemp("fleet") / "bench.csv"
-    write_run(path, run(paper_steps(), seed=1))
+    write_run(path, run(load_scenario("paper_steps"), seed=1))
     head, units, *lines = path.read_text().splitlines()
     filled = [f"{line},{80 + 10 * (k % 2)}," for k, line in enumerate(lines[: len(lines) // 2 * 2])]
     path.write_text("\n".join([f"{head},TOil,TGear", f"{units},degC,degC", *filled]) + "\n")

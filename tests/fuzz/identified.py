@@ -23,12 +23,12 @@ from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text, recorded_channels
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import usable_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import validated
@@ -50,7 +50,7 @@ AGE = "te_delay"
 
 def table_of(name: ScenarioName) -> tuple[Table, str]:
     """A log of a built-in scenario as a table, and its vehicle card."""
-    bench = run(scenario_of(name), seed=5)
+    bench = run(load_scenario(name), seed=5)
     channels = recorded_channels(bench)
     count = int(channels[0].time[-1] / STEP)
     time = np.linspace(0.0, STEP * (count - 1), count).round(6)

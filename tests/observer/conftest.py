@@ -13,7 +13,7 @@ import drivetwin
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.observer.result import FloatArray, Observation
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Trajectory
@@ -54,13 +54,13 @@ def brief(log: ShiftLog, card: VehicleCard) -> Shift:
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     """The driveline of `paper_steps`: identified with one log, observed in another."""
     folder = tmp_path_factory.mktemp("observer")
-    first, card_file, _ = write_run(folder / "first.csv", run(paper_steps(), seed=1))
+    first, card_file, _ = write_run(folder / "first.csv", run(load_scenario("paper_steps"), seed=1))
     card = drivetwin.load_card(card_file)
     log = drivetwin.read_log(first, card)
     found = drivetwin.identify_shifts(log, card, drivetwin.find_shifts(log, card))
     twin = build_twin(found, card)
     drivetwin.save_twin(folder / "twin.toml", twin)
-    other = run(paper_steps().with_torque_reduction(0.3), seed=2)
+    other = run(load_scenario("paper_steps").with_torque_reduction(0.3), seed=2)
     second, _, _ = write_run(folder / "second.csv", other)
     log = drivetwin.read_log(second, card)
     shift = brief(log, card)

@@ -12,7 +12,7 @@ import drivetwin
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.observer.inputs import is_driving, recorded
 from tests.observer.conftest import brief
 
@@ -20,7 +20,7 @@ from tests.observer.conftest import brief
 @pytest.mark.parametrize("name", [ScenarioName.POWER_OFF_UP, ScenarioName.POWER_OFF_DOWN], ids=str)
 def test_power_flows_by_the_torque_at_the_gears(name: ScenarioName, tmp_path: Path) -> None:
     """T_g = T_e - J1·ω_e': in a power-off upshift the engine drives although T_e is negative."""
-    bench = run(scenario_of(name), seed=1)
+    bench = run(load_scenario(name), seed=1)
     file, card_file, _ = write_run(tmp_path / "log.csv", bench)
     card = drivetwin.load_card(card_file)
     log = drivetwin.read_log(file, card)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.observer.linear_model import (
     ENGINE,
     LOAD,
@@ -26,7 +26,7 @@ GRID = 2e-4
 
 
 def _run(model: DualClutch) -> tuple[Trajectory, Signal]:
-    scenario = paper_steps()
+    scenario = load_scenario("paper_steps")
     grid = np.arange(int(scenario.duration * 1000) + 1) / 1000.0
     torque = Signal(grid, scenario.torque(grid))
     pressures = {n: Signal(grid, a.pressure(grid)) for n, a in scenario.actuators.items()}
@@ -39,7 +39,7 @@ def _run(model: DualClutch) -> tuple[Trajectory, Signal]:
 @pytest.mark.parametrize("drum", [0.0, 0.05])
 def test_follows_the_core_through_all_phases(drum: float) -> None:
     """Given what slipping elements carry, each step ends where the core's does."""
-    model = paper_steps().model
+    model = load_scenario("paper_steps").model
     model = replace(
         model, elements=tuple(replace(one, drum_inertia=drum) for one in model.elements)
     )
@@ -76,7 +76,7 @@ def test_follows_the_core_through_all_phases(drum: float) -> None:
 
 def test_the_dissipative_law_divides_by_eta_where_power_flows_back() -> None:
     """Whichever sign the engine's own torque has: while it is slowed down it drives."""
-    model = replace(paper_steps().model, loss_law="dissipative", J2e=2.2)
+    model = replace(load_scenario("paper_steps").model, loss_law="dissipative", J2e=2.2)
     time = np.array([0.0, 1e-3, 2e-3])
     off = {one.name: np.zeros(2, dtype=bool) for one in model.elements}
     none = {name: np.zeros(2) for name in off}

@@ -10,11 +10,12 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import SignalTrace, Validation
-from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
+from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import fit_of, phases_of
 from drivetwin.vehicle.card import ElementSpec, Gear, PriorValue, VehicleCard
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 TIME = np.arange(0.0, 3.0, 1e-3)
 STRIBECK = Stribeck(mu_c=0.11, mu_s=0.135, v_s=15.0, mu_v=1e-4)

@@ -89,7 +89,7 @@ def found() -> Identification:
 
 
 def test_result_and_twin_tell_the_same_parameters() -> None:
-    result = Candidate.of_result("a", ResultFile.of(found()))
+    result = Candidate.of_result("a", ResultFile.from_result(found()))
     twin = Candidate.of_twin("b", build_twin(found(), card()))
     assert list(result.estimates) == list(twin.estimates)
     assert result.fit["output_torque"]["all"].fit_percent > 90.0

@@ -23,7 +23,8 @@ from drivetwin.shifts.coverage import (
     recorded,
 )
 from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 
 FILLS = {"B2": PriorValue(8e4, 5e3), "B3": PriorValue(8e4, 5e3)}

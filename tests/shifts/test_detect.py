@@ -15,7 +15,8 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MissingChannelError, TimeError
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.shifts.settings import ShiftSettings
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.shifts.fixtures import P0_MADE, Plan, make_card, make_log
 
 _UP = Plan(gears=(("2", 1.91), ("3", 1.43)), break_aways=(1.5,))

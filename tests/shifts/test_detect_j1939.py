@@ -11,8 +11,8 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.shifts.lockup_clutch import lock_ups
-from drivetwin.shifts.shift import ShiftKind
 from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import ROOT, shared
 

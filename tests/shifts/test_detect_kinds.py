@@ -11,11 +11,11 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text, log_text
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import find_shifts
-from drivetwin.shifts.shift import ShiftKind
 from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 KINDS = {
@@ -30,7 +30,7 @@ KINDS = {
 def recording(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[ShiftLog, VehicleCard, ShiftKind]:
-    bench = run(scenario_of(request.param), seed=2)
+    bench = run(load_scenario(request.param), seed=2)
     folder = tmp_path_factory.mktemp("kind")
     (folder / "log.csv").write_text(log_text(bench))
     (folder / "card.toml").write_text(card_text(bench.scenario))

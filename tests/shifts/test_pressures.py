@@ -9,7 +9,8 @@ import pytest
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import MissingChannelError
 from drivetwin.shifts.pressures import one_clutch, shift_pressures
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 TIME = np.linspace(0.0, 4.0, 401)
 PRESSURE = np.interp(TIME, [1.9, 2.1, 2.5, 2.8], [1e6, 0.0, 0.0, 8e5])

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.shifts.quality import QUALITY_UNITS, shift_quality
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from tests.shifts.fixtures import load_reference, make_card, make_log
 

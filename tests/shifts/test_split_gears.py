@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.split_gears import apart, divided, own_samples
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 
 def shift(start: float, lockup: float, gears: tuple[float, float]) -> Shift:

@@ -13,7 +13,7 @@ from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.shifts.torque_onset import pressure_onset, smoothed, torque_dip_onset
 from drivetwin.vehicle.card import load_card
@@ -104,7 +104,7 @@ def test_a_fall_of_the_engine_torque_before_is_not_taken_for_the_shift() -> None
 def test_without_pressures_the_output_torque_tells_the_onset(
     name: ScenarioName, tmp_path: Path
 ) -> None:
-    bench = run(scenario_of(name), seed=0)
+    bench = run(load_scenario(name), seed=0)
     (tmp_path / "card.toml").write_text(card_text(bench.scenario))
     roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
     channels = {one.role: one for one in bench.channels if one.role in roles}

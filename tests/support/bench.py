@@ -12,7 +12,8 @@ from drivetwin.dyno.scenario import Scenario
 from drivetwin.estimation.data.noise import resolution
 from drivetwin.estimation.data.prepare import sampled
 from drivetwin.estimation.data.shift_data import Coupling, Driveline, ShiftSignals
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 
 SHIFT_SIGMA = {"torque_start": 0.01, "inertia_start": 0.001, "lockup": 0.0005}

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin.dyno.actuators import Program
-from drivetwin.dyno.dual_scenarios import paper_steps
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text, log_text
 from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.simulation.dual_clutch import Stribeck
 
 UNITS = 60
@@ -135,7 +135,7 @@ DAMAGES: dict[str, Callable[[str], bytes]] = {
 
 def _make_aged(mu: float, P0: float) -> Scenario:
     """Return the paper's driveline with throttle steps; its on-coming element has μ and P0."""
-    base = paper_steps()
+    base = load_scenario("paper_steps")
     (element,) = (each for each in base.model.elements if each.name == ELEMENT)
     law = element.friction
     assert isinstance(law, Stribeck)

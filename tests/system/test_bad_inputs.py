@@ -14,7 +14,7 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text, log_text
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 
 Rows = list[list[str]]
 NAMES = ["time", "EngTrq", "PrsBrk2", "PrsBrk3", "TrqOut", "SpdIn", "SpdOut", "SpdWhl"]
@@ -23,7 +23,7 @@ NAMES = ["time", "EngTrq", "PrsBrk2", "PrsBrk3", "TrqOut", "SpdIn", "SpdOut", "S
 @pytest.fixture(scope="module")
 def good() -> tuple[str, str]:
     """Text of a usable log, thinned to 250 Hz for speed, and of its card."""
-    bench = run(paper_steps(), seed=1)
+    bench = run(load_scenario("paper_steps"), seed=1)
     head, units, *rows = log_text(bench).splitlines()
     return "\n".join([head, units, *rows[::4]]) + "\n", card_text(bench.scenario)
 

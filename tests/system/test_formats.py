@@ -10,7 +10,7 @@ import pytest
 from drivetwin.cli.identify_run import run
 from drivetwin.dyno import dyno
 from drivetwin.dyno.files import card_text, recorded_channels
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.write import write_log
@@ -20,7 +20,7 @@ ROUND_OFF = 1e-9
 
 
 def results(folder: Path, method: Method) -> dict[str, Identification]:
-    bench = dyno.run(paper_steps(), seed=4)
+    bench = dyno.run(load_scenario("paper_steps"), seed=4)
     card = folder / "card.toml"
     card.write_text(card_text(bench.scenario))
     found = {}

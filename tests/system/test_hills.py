@@ -12,8 +12,8 @@ import pytest
 import drivetwin
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import usable_shifts
 from drivetwin.twin.build import build_twin
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario

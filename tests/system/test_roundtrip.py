@@ -13,7 +13,7 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno import dyno
 from drivetwin.dyno.files import card_text
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import SCENARIOS
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.dyno.truth import Truth
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FrictionCurve, Verdict
@@ -29,7 +29,7 @@ WITHIN_HALF_A_PERCENT = (
 def _identified(
     folder: Path, scenario: ScenarioName, method: Method, noise: float
 ) -> tuple[Identification, Truth]:
-    bench = dyno.run(SCENARIOS[scenario](), seed=11, noise=noise)
+    bench = dyno.run(load_scenario(scenario), seed=11, noise=noise)
     log, card, _ = write_run(folder / "run.csv", bench)
     return run(log, card, None, method).found, bench.truth
 
@@ -132,7 +132,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Identification:
         folder / "log.csv", rows, fmt="%.12g", delimiter=",", header="\n".join(head), comments=""
     )
     card = folder / "card.toml"
-    card.write_text(card_text(SCENARIOS[ScenarioName.PAPER]()), encoding="utf-8")
+    card.write_text(card_text(load_scenario(ScenarioName.PAPER)), encoding="utf-8")
     return run(folder / "log.csv", card, None, Method.INTEGRAL).found
 
 
@@ -140,7 +140,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Identification:
 def test_log_cut_from_a_reference_solution_returns_its_parameters(
     parameter: str, reference: Identification
 ) -> None:
-    truth = dyno.run(SCENARIOS[ScenarioName.PAPER](), noise=0.0).truth
+    truth = dyno.run(load_scenario(ScenarioName.PAPER), noise=0.0).truth
     value = reference.estimates[parameter].value
     assert value == pytest.approx(truth.parameters[parameter], rel=5e-3)
 
@@ -148,5 +148,5 @@ def test_log_cut_from_a_reference_solution_returns_its_parameters(
 def test_log_cut_from_a_reference_solution_returns_its_friction(
     reference: Identification,
 ) -> None:
-    law = dyno.run(SCENARIOS[ScenarioName.PAPER](), noise=0.0).truth.friction["B3"]
+    law = dyno.run(load_scenario(ScenarioName.PAPER), noise=0.0).truth.friction["B3"]
     assert _friction_error(reference.friction["B3"], law) < 0.01

@@ -14,7 +14,7 @@ from drivetwin.cli import main
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import scenario_of
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from tests.support.coverage import compute_bounds
 
@@ -82,6 +82,6 @@ def test_a_twin_of_an_open_converter_is_simulated_behind_it(
 
 
 def _slower(name: ScenarioName, seed: int) -> DynoRun:
-    scenario = scenario_of(name)
+    scenario = load_scenario(name)
     sensors = tuple(replace(s, rate=min(s.rate, RATE)) for s in scenario.sensors)
     return run(replace(scenario, sensors=sensors), seed=seed)

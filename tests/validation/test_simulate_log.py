@@ -15,14 +15,15 @@ from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import DamagedChannelError
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 from drivetwin.validation.initial_state import start_state
 from drivetwin.validation.simulate_log import compared, fit_of, validate, validated, with_fit
+from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.report.sample import identification
 
-REFERENCE = Path(__file__).parents[2] / "shared" / "reference"
+REFERENCE = Path(__file__).parents[3] / "shared" / "reference"
 CASE = "dual_clutch_upshift"
 _ROLES = {
     "T_e_Nm": ("engine_torque", Quantity.TORQUE),

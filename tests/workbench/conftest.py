@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.result.method import Method
 from drivetwin.workbench.session import Session, Sessions
 from drivetwin.workbench.workspace_folder import Folder
@@ -23,7 +23,7 @@ LOG, CARD = "bench.csv", "bench.card.toml"
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with `bench.csv` and its card."""
     folder = tmp_path_factory.mktemp("workbench")
-    write_run(folder / LOG, run(paper_steps(), seed=1))
+    write_run(folder / LOG, run(load_scenario("paper_steps"), seed=1))
     return folder
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from drivetwin.errors import DamagedChannelError
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.workbench import identifying

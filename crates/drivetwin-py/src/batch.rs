@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Many runs of the dual-clutch driveline; see `drivetwin.batch.simulate_batch`.
+//! Many runs of the dual-clutch driveline; see `drivetwin.simulation.batch`.
 
 use crate::dual_clutch::{Delayed, Start, model_of, start_of};
 use drivetwin_core::network::Network;

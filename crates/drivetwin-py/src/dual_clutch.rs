@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Simulation of the dual-clutch driveline; see `drivetwin.driveline.simulate`.
+//! Simulation of the dual-clutch driveline; see `drivetwin.simulation.dual_clutch`.
 
 use crate::plain::{Audit, Event, as_tuple, events_of};
 use drivetwin_core::model::DualClutch;

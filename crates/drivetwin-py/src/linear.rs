@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! The linear system about an operating point; see `drivetwin.linear`.
+//! The linear system about an operating point; see `drivetwin.simulation.linearize`.
 
 use crate::dual_clutch::model_of;
 use crate::network::parse;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Simulation of any network of elements; see `drivetwin.network.simulate`.
+//! Simulation of any network of elements; see `drivetwin.simulation.network`.
 
 use crate::plain::{Audit, Event, as_tuple, events_of};
 use drivetwin_core::model::{Driveline, Element};

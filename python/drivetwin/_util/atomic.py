@@ -22,9 +22,9 @@ _kept: ContextVar[frozenset[_Identity]] = ContextVar("kept", default=frozenset()
 
 @contextmanager
 def keeping(files: Iterable[Path]) -> Iterator[None]:
-    """Let nothing that is written in the block take the place of one of `files`.
+    """Protect `files` from being overwritten inside the block.
 
-    What is no file is passed over.
+    Paths that are no files are ignored.
     """
     identities = (_identity(file) for file in files)
     token = _kept.set(frozenset(one for one in identities if one is not None))

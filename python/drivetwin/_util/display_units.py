@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Display:
-    """How a quantity is shown: `label` of the unit, and the factor from SI to it."""
+    """Display unit of a quantity: `label`, and the factor from SI."""
 
     label: str
     factor: float = 1.0

@@ -53,7 +53,7 @@ class _Muted:
 
 @contextmanager
 def _unheard() -> Iterator[None]:
-    """Let nothing be heard of what this thread's libraries print, warn of and cannot raise."""
+    """Suppress printed output, warnings and unraisable errors of libraries in this thread."""
     with _one_at_a_time:
         hook = sys.unraisablehook
         try:
@@ -71,7 +71,7 @@ def foreign_parser(kind: str, path: Path) -> Iterator[None]:
 
     Such parsers check little: a flipped bit shows as any exception at all. What they print, warn
     of, and complain about when a half-built object is freed would reach the user without any use.
-    Of several threads one at a time goes on.
+    Only one thread at a time runs inside the block.
     """
     with _unheard():
         try:

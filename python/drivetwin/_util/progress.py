@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How far a long computation is, told to whoever listens.
+"""Progress of long computations, reported to a listener.
 
-A computation says `tell(0.4)` where it knows that much of itself to be done, and `with part(...)`
-gives a piece of it its place in the whole; without a listener both do nothing. A listener that
-raises stops the computation: that is how it is cancelled.
+A computation reports its completed share by `tell(0.4)`; `with part(...)` maps the share of a step
+to the share of the whole. Without a listener both do nothing. A listener cancels the computation by
+raising an exception.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Listener = Callable[[float, str], None]
 
 @dataclass
 class _Highest:
-    """The largest share told so far: a search that starts again does not turn the clock back."""
+    """Largest share reported so far; keeps progress monotonic when a search restarts."""
 
     share: float = 0.0
 
@@ -40,7 +40,7 @@ _present: ContextVar[_Span | None] = ContextVar("drivetwin_progress", default=No
 
 @contextmanager
 def listening(listener: Listener) -> Iterator[None]:
-    """Tell `listener` of all computations of this thread inside the block."""
+    """Report the progress of this thread inside the block to `listener`."""
     token = _present.set(_Span(listener, 0.0, 1.0, "", _Highest()))
     try:
         yield
@@ -50,9 +50,9 @@ def listening(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def part(start: float, end: float, text: str = "") -> Iterator[None]:
-    """What is told inside the block counts from `start` to `end` of the present piece.
+    """Map progress inside the block to `start` to `end` of the current part.
 
-    `text` says what is being done; empty keeps what was said before.
+    `text` describes the step; empty keeps the previous text.
     """
     span = _present.get()
     if span is None:
@@ -75,7 +75,7 @@ def part(start: float, end: float, text: str = "") -> Iterator[None]:
 
 
 def tell(share: float) -> None:
-    """Say that `share` (0 to 1) of the present piece is done."""
+    """Report that `share` (0 to 1) of the current part is done."""
     span = _present.get()
     if span is None:
         return

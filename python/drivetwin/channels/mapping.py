@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which column of a file is which role: as stated by the user, else guessed from its name."""
+"""Assignment of file columns to roles: stated by the user, else inferred from the names."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from drivetwin.errors import MappingError, MissingChannelError, Where
 
 @dataclass(frozen=True)
 class ChannelSpec:
-    """How a role is read: value = sign·(scale·column + offset) in `unit`, then in SI.
+    """Conversion of a column to a role: sign·(scale·column + offset) in `unit`, then in SI.
 
     `unit` asserts the unit against the file (None: as the file says). `time_shift` [s] is added to
     the time stamps. `group` chooses among columns of one name (None: the name is unique).
@@ -31,7 +31,7 @@ class ChannelSpec:
     group: str | None = None
 
     def picks(self, column: Column) -> bool:
-        """Tell whether this is the column meant."""
+        """Return True if the spec refers to this column."""
         return column.name == self.source and self.group in (None, column.group)
 
 
@@ -122,7 +122,7 @@ def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, l
 
 
 def _first(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
-    """Columns whose name has the first of the `forms` that any has.
+    """Return the columns that match the first pattern of `forms` that matches any column.
 
     The last part of a name like `log.EngTrq` counts only where no whole name has any.
     """
@@ -143,7 +143,7 @@ def _with_numbers(candidates: list[Column]) -> list[Column]:
 
 
 def _whole(words: str) -> str:
-    """Those of the alternatives that are more than an abbreviation."""
+    """Drop the abbreviations from a pattern of alternatives."""
     return "|".join(word for word in words.split("|") if len(word) > 2)
 
 
@@ -174,9 +174,10 @@ def resolve(
 ) -> Mapped:
     """Decide the column of every role from the `columns` of a file.
 
-    What is `stated` holds; the rest is guessed. Raises MappingError where a stated column does not
-    exist or a role has several candidates (a warning for throttle, gear and flags that nobody
-    needs), MissingChannelError where a needed role and its stand-in have none.
+    The `stated` specs take precedence; other roles are inferred. Raises MappingError
+    where a stated column does not exist or a role has several candidates (only a warning for
+    throttle, gear and flags that are not needed), MissingChannelError where a needed role and its
+    stand-in have none.
     """
     needed = frozenset(needed)
     _refuse_unknown_elements(stated, elements, file)
@@ -206,7 +207,7 @@ def resolve(
 
 
 def _choice(role: str, candidates: Sequence[Column]) -> str:
-    """How to choose among the candidates of a role: by name, or by group where that is one."""
+    """Suggest how to choose among the candidates of a role: by name, or by group."""
     if len(set(candidates)) < len(candidates):
         return "rename the repeated column in the file"
     if len({one.name for one in candidates}) > 1:
@@ -219,7 +220,7 @@ def _choice(role: str, candidates: Sequence[Column]) -> str:
 
 
 def _others(chosen: Column, columns: Sequence[Column]) -> list[str]:
-    """Words for the strange senders of a signal."""
+    """Return a warning for other senders of the same signal."""
     others = [one for one in columns if one.aside and not one.silent and one.name == chosen.name]
     if not others:
         return []

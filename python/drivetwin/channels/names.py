@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the name of a column tells beside its name: a unit in brackets, that it is time."""
+"""Unit and time detection from column names."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def name_and_unit(cell: str) -> tuple[str, str | None]:
 
 
 def is_time_name(name: str) -> bool:
-    """Tell whether a column of this name is taken for time."""
+    """Return True if a column of this name is taken for time."""
     return re.sub(r"[^a-z]", "", name.casefold()) in _TIME_NAMES
 
 
 def may_be_time(unit: str | None) -> bool:
-    """Tell whether a column of this unit may hold time: none is stated, or none of another kind."""
+    """Return True if a column of this unit may be a time: none, a time unit or an unknown one."""
     return unit is None or is_time_unit(unit) or lookup(unit) is None
 
 
@@ -80,7 +80,7 @@ def time_index(
 
 
 def _in_another_unit(names: Sequence[str], units: Sequence[str | None]) -> str:
-    """What to say of columns that have a name for time and a unit that is none of time."""
+    """Describe the columns that have a name for time but another unit."""
     told = [
         f"{name!r} is in {unit!r}"
         for name, unit in zip(names, units, strict=True)

@@ -11,10 +11,10 @@ from pathlib import Path
 class Column:
     """A column of a file by name, unit as written (None: none) and group.
 
-    The group is what tells equal names apart: raster of a measurement file, message and sender on a
+    The group distinguishes equal names: raster of a measurement file, message and sender on a
     bus; blank where the format has none. `empty`: it holds too few numbers for any role. `silent`:
-    its sender says throughout that there is no value; it is no candidate for any role. `aside`:
-    the unit that it belongs to tells it too; a candidate only where no other is.
+    its sender never sends a value; it is no candidate for any role. `aside`: the responsible
+    control unit sends it too; a candidate only if there is no other.
     """
 
     name: str
@@ -30,9 +30,9 @@ class Column:
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """Which column holds time and in what unit, where the user states it (None: as found).
+    """Time column and its unit as stated by the user (None: detected).
 
-    `simultaneous` says that all values of a row are of its stamp, however coarse the rows.
+    `simultaneous`: all values of a row belong to its stamp, however coarse the rows.
     """
 
     source: str | None = None
@@ -42,10 +42,10 @@ class TimeColumn:
 
 @dataclass(frozen=True)
 class BusOptions:
-    """How a bus log is decoded, where the user states it.
+    """Options for decoding a bus log.
 
-    `databases` are DBC files (none: the built-in J1939 messages); `reference_torque` [N·m] is what
-    percent torque refers to, against the one that the bus tells.
+    `databases` are DBC files (none: the built-in J1939 messages); `reference_torque` [N·m] is the
+    100 % value of percent torques and overrides the one on the bus.
     """
 
     databases: tuple[Path, ...] = ()
@@ -54,7 +54,7 @@ class BusOptions:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What the user states about the file as a whole."""
+    """Options for reading a file."""
 
     time: TimeColumn = field(default_factory=TimeColumn)
     bus: BusOptions = field(default_factory=BusOptions)

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.update_raster import find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.simulation.dual_clutch import LATEST
 
@@ -30,7 +32,7 @@ def gap_limit(time: FloatArray) -> float:
 
 
 def open_ends(time: FloatArray, span: tuple[float, float]) -> tuple[tuple[float, float], ...]:
-    """What of `span` [s] lies before the first or after the last sample, where more than a gap."""
+    """Return the parts of `span` [s] outside the samples that are longer than a gap."""
     limit = gap_limit(time)
     first, last = float(time[0]), float(time[-1])
     ends = ((span[0], min(first, span[1])), (max(last, span[0]), span[1]))
@@ -44,7 +46,7 @@ def pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
 
 
 class Quantity(StrEnum):
-    """What a channel measures; decides its SI unit and how it may be interpolated."""
+    """Physical quantity of a channel; determines its SI unit and interpolation."""
 
     TORQUE = "torque"
     PRESSURE = "pressure"
@@ -92,6 +94,21 @@ class Channel:
         """Median sample interval [s]."""
         return float(np.median(np.diff(self.time)))
 
+    @cached_property
+    def updates(self) -> Channel:
+        """The channel reduced to the instants at which its value was updated.
+
+        The value at such an instant is the newest that the sender had, `te_delay` old. A channel
+        that is not `held` is returned as it is.
+        """
+        if not self.held or self.quantity is Quantity.STATE:
+            return self
+        found = find_updates(self.time, self.values)
+        if found is None:
+            return self
+        time, samples = found
+        return replace(self, time=time, values=self.values[samples], held=False)
+
     def at(self, time: FloatArray) -> FloatArray:
         """Values at `time` (m,): linear between samples, held for states.
 
@@ -111,7 +128,7 @@ class Channel:
 
     @property
     def gaps(self) -> tuple[tuple[float, float], ...]:
-        """Spans [s] in which `at` knows nothing, from the sample before to the one after."""
+        """Spans [s] without samples, from the sample before to the sample after."""
         return () if self.quantity is Quantity.STATE else pauses(self.time)
 
 

@@ -161,7 +161,7 @@ def lookup(spelling: str) -> Unit | None:
 
 
 def is_unit(spelling: str) -> bool:
-    """Tell whether a text is a spelling of any unit, time and refused ones included."""
+    """Return True if a text is a spelling of any unit, time and refused ones included."""
     refused = _normal(spelling).casefold() in _REASONS_FOLDED
     return lookup(spelling) is not None or refused or is_time_unit(spelling)
 
@@ -170,7 +170,7 @@ def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit
     """Return the unit of a channel that measures `quantity`.
 
     A state (gear, flag) needs no unit. Raises UnitError where the unit is missing, unknown,
-    ambiguous or of another quantity; the text says how to assert it.
+    ambiguous or of another quantity; the message explains how to state it.
     """
     if quantity is Quantity.STATE:
         return Unit(1.0, 0.0, Quantity.STATE)
@@ -198,7 +198,7 @@ def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit
 
 
 def is_time_unit(spelling: str) -> bool:
-    """Tell whether a text is a spelling of a unit of time."""
+    """Return True if a text is a spelling of a unit of time."""
     return _normal(spelling).casefold() in _TIME
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The program `drivetwin`: its commands, and the one place where errors become exit codes."""
+"""The program `drivetwin`: its commands, and the conversion of errors to exit codes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Arguments that several commands share, and how they become a log and a card."""
+"""Arguments common to several commands, and the loading of log and card."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def staged(folder: Path) -> Iterator[Path]:
 
 
 def _told(file: object, beside: Path, folder: Path) -> str | None:
-    """The path of a file in `beside` as it will be in `folder`; any other as it is."""
+    """Map a path in `beside` to its final path in `folder`; return other paths unchanged."""
     if file is None:
         return None
     path = Path(str(file))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Truth of a synthetic log beside what the methods found in it."""
+"""Comparison of the true values of a synthetic log with the estimates of the methods."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SLIPS = (10.0, 30.0, 50.0, 80.0)
 
 @dataclass(frozen=True)
 class Found:
-    """Value and 95 % interval (total) by one method; None where it gives none."""
+    """Value and total 95 % interval of one method; None if not estimated."""
 
     value: float | None = None
     interval: tuple[float, float] | None = None

@@ -35,9 +35,9 @@ def demo(
     from drivetwin.cli.identify_run import REPORT, run, write
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run as run_dyno
-    from drivetwin.dyno.scenarios import SCENARIOS
+    from drivetwin.dyno.scenario_file import load_scenario
 
-    bench = run_dyno(SCENARIOS[scenario](), seed, noise=noise)
+    bench = run_dyno(load_scenario(scenario), seed, noise=noise)
     log, card, _ = write_run(output / f"{scenario}.csv", bench)
     outcomes = {method: run(log, card, None, method) for method in _METHODS}
     for method, outcome in outcomes.items():

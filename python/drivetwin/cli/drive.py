@@ -107,7 +107,7 @@ def _shifts(motion: DriveRun, title: str) -> Table:
 
 
 def _slip_time(maneuver: Maneuver) -> str:
-    """Duration of the inertia phase, where there is one."""
+    """Format the duration of the inertia phase, if the shift has one."""
     if maneuver.break_away is None or maneuver.lock is None:
         return ""
     return f"{maneuver.lock - maneuver.break_away:.2f}"

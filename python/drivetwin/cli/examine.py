@@ -86,7 +86,7 @@ def examine(
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked beside the experiments."""
+    """Analyses requested in addition to the experiments."""
 
     profiles: tuple[str, ...]
     bootstrap: int
@@ -97,7 +97,7 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """One answer as a file and as a table; `twin` is written beside where it has one."""
+    """One answer as a file and as a table; its `twin`, if any, is written as well."""
 
     file: str
     text: str

@@ -127,7 +127,7 @@ def _write_parameters(
 def _subject(
     twin: Twin, shift: str | None, log: Path | None, channels: Path | None
 ) -> tuple[Subject, Experiment | None]:
-    """Model and start: from the shift of the log where one is given."""
+    """Load the model, and the initial state from the shift of the log if one is given."""
     from drivetwin.export.subject import subject_of
 
     gears = _gears(shift)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin fleet`: many logs into a store, and what can be asked of the store."""
+"""`drivetwin fleet`: identification of many logs into a store, and queries of the store."""
 
 from __future__ import annotations
 
@@ -236,7 +236,7 @@ def _print_estimates(found: list[JointEstimate]) -> None:
 
 
 def _change(one: JointEstimate, change: Change) -> str:
-    """What happened to a unit, in words."""
+    """Describe the change of a unit."""
     from drivetwin.fleet.readings import span_text
 
     step = _with_error(one, change.size, change.std)
@@ -245,7 +245,7 @@ def _change(one: JointEstimate, change: Change) -> str:
 
 
 def _odd(one: JointEstimate, unit: UnitValue) -> str:
-    """How far a unit is from the others, in words."""
+    """Describe the deviation of a unit from the others."""
     from drivetwin.fleet.figures import unit_label
 
     return (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a run of a fleet shows: a live view in a terminal, lines in a file, JSON for machines."""
+"""Progress of a fleet run: a live view in a terminal, lines in a file, JSON for machines."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _RATE_SPAN = 60.0
 
 
 class Tally:
-    """What happened so far: counts by state and reason, the present rate, the time left."""
+    """Running totals: counts by state and reason, the present rate, the time left."""
 
     def __init__(self) -> None:
         self.files = 0
@@ -53,7 +53,7 @@ class Tally:
         return self.states.total()
 
     def hear(self, event: Event) -> None:
-        """Take in what the run tells."""
+        """Update the totals with an event of the run."""
         if isinstance(event, Started):
             self.files, self.dashboard = event.files, event.dashboard
         elif isinstance(event, Settled):
@@ -69,14 +69,14 @@ class Tally:
             self._settled.popleft()
 
     def rate(self) -> float:
-        """Files settled each second, of late; 0 where that is not known yet."""
+        """Compute the recent rate [files/s]; 0 without enough events."""
         if len(self._settled) < 2:
             return 0.0
         (start, before), (end, after) = self._settled[0], self._settled[-1]
         return (after - before) / (end - start) if end > start else 0.0
 
     def line(self) -> str:
-        """All of it on one line."""
+        """Format the totals as one line."""
         rate = self.rate()
         left = f", {_span((self.files - self.settled) / rate)} left" if rate > 0.0 else ""
         failed = "".join(f", {count} {name}" for name, count in self.failures.most_common())
@@ -85,7 +85,7 @@ class Tally:
 
 
 def _span(seconds: float) -> str:
-    """A time in the largest units that matter."""
+    """Format a duration in its largest units."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes:02d} min" if hours else f"{minutes}:{rest:02d} min"
@@ -123,7 +123,7 @@ class _Lines:
         self._next = monotonic() + _LINE_EVERY
 
     def hear(self, event: Event) -> None:
-        """Take in what the run tells; print where it is due."""
+        """Handle an event of the run; print a line at regular intervals."""
         self._tally.hear(event)
         if isinstance(event, Started) and event.dashboard:
             say(f"dashboard: {event.dashboard}")
@@ -135,7 +135,7 @@ class _Lines:
 
 
 def _picture(tally: Tally) -> RenderableType:
-    """The live view: bar, rate and time left, failures by reason, what the run says."""
+    """Render the live view: bar, rate and time left, failures by reason, messages."""
     from rich.console import Group
     from rich.progress_bar import ProgressBar
     from rich.table import Table

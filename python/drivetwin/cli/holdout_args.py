@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `--hold-out` names: a shift by its number, a whole log, or a shift of one log."""
+"""Parser of `--hold-out`: a shift by its number, a whole log, or a shift of one log."""
 
 from __future__ import annotations
 

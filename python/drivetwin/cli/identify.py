@@ -129,7 +129,7 @@ def _document(found: Identification, files: tuple[Path, ...]) -> dict[str, Any]:
 
     from drivetwin.files.result_file import ResultFile
 
-    document: dict[str, Any] = json.loads(ResultFile.of(found).to_json())
+    document: dict[str, Any] = json.loads(ResultFile.from_result(found).to_json())
     return {**document, "files": [str(file) for file in files]}
 
 

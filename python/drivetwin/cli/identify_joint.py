@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """What came of the logs: those that were fitted or predicted, and what was identified."""
+    """Result of a joint identification: fitted and held-out logs, and the identification."""
 
     logs: tuple[ShiftLog, ...]
     made: Together
@@ -103,7 +103,7 @@ def write(outcome: Joined, folder: Path) -> tuple[Path, ...]:
 
 
 def print_together(found: Identification) -> None:
-    """What several logs say together, and how what was held out was predicted."""
+    """Print the joint estimates and the prediction of the held-out shifts."""
     several = found.evidence.several
     if several is not None:
         show(_log_table(several))
@@ -129,7 +129,7 @@ def _log_table(several: Several) -> Table:
 
 
 def _held_table(held: Sequence[HeldOut], found: Identification) -> Table:
-    """Fit % of each prediction beside that of what was fitted, and what its noise allows."""
+    """Tabulate the fit in % of predictions, of the fitted shifts, and of the noise limit."""
     table = table_of(
         "Held out: predicted, not fitted",
         "shift", "signal", "fit %", "fitted %", "rmse", "allowed", "verdict",

@@ -23,7 +23,7 @@ RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one log gave: the log and card themselves, the identification, its twin."""
+    """Result of one log: the log, its card, the identification and the twin."""
 
     log: ShiftLog
     card: VehicleCard
@@ -37,7 +37,7 @@ def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outc
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
     from drivetwin.estimation.analysis.experiment_design import examined
-    from drivetwin.estimation.identify import identify
+    from drivetwin.pipeline import identify
     from drivetwin.shifts.detect import usable_shifts
     from drivetwin.twin.build import build_twin
     from drivetwin.validation.simulate_log import validated

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a command reads, it does not write over."""
+"""Protection of input files: a command never overwrites a file that it reads."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _OUTPUTS = frozenset(("output", "figure", "write_mapping", "modelica"))
 
 
 def keeping_inputs(command: Callable[..., None]) -> Callable[..., None]:
-    """Return the command so that it raises InputError instead of writing over what it reads."""
+    """Wrap a command: it raises InputError instead of overwriting a file that it reads."""
 
     @wraps(command)
     def careful(**given: Any) -> None:
@@ -30,7 +30,7 @@ def keeping_inputs(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _paths(value: object) -> Iterator[Path]:
-    """What a parameter may name of files; some take a path or the name of a built-in."""
+    """Collect the paths in a parameter's value, which may also name a built-in."""
     for one in value if isinstance(value, list) else [value]:
         if isinstance(one, Path | str):
             yield Path(one)

@@ -83,7 +83,7 @@ def inspect(
 def _as_read(
     recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped
 ) -> tuple[tuple[str, ...], DrivetwinError | None]:
-    """What reading a log for use warns of, whatever roles it lacks; or why it is refused."""
+    """Read a log as for use, missing roles allowed; return the warnings or the error."""
     from drivetwin.logs.read import read_recording
 
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How numbers are printed: in display units, with as many digits as their interval supports."""
+"""Number format: display units, with the digits that the confidence interval supports."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivetwin._util.display_units import display_of, significant, with_uncertai
 Interval = tuple[float, float]
 
 _EXACT = 1e-5
-"""Relative half width below which a value is shown as known."""
+"""Relative half width below which a value is printed as exact."""
 
 
 def shown(value: float | None, interval: Interval | None, si_unit: str) -> tuple[str, str, str]:
@@ -46,5 +46,5 @@ def percent(value: float | None) -> str:
 
 
 def deviation(value: float | None, truth: float) -> str:
-    """Deviation from a known truth in percent; empty where either gives none."""
+    """Format the deviation from the true value in percent; empty if undefined."""
     return "" if value is None or truth == 0.0 else f"{100.0 * (value / truth - 1.0):+.2f}"

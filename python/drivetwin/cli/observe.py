@@ -87,7 +87,7 @@ def observe(
 def _each(
     shifts: Sequence[Shift], look: Callable[[Shift], Observation], by: Observer
 ) -> tuple[list[Observation], dict[str, str]]:
-    """What is observed of each shift, and why others of several are left out, by their name."""
+    """Observe each shift; return the observations, and the skip reason by shift name."""
     found: list[Observation] = []
     left_out: dict[str, str] = {}
     for shift in shifts:

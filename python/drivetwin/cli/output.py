@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What commands share in talking to the user: results on stdout, progress and errors on stderr."""
+"""User output of all commands: results on stdout, progress and errors on stderr."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ JsonFlag = Annotated[
 
 
 def console(*, stderr: bool = False) -> Console:
-    """Console of this moment; no colours and 80 columns where it is not a terminal.
+    """Create a console; without a terminal it has no colours and 80 columns.
 
     Texts are shown as they are: a unit in brackets, `[/min]`, is no markup and `:on:` no picture.
     """
@@ -88,9 +88,9 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 @contextmanager
 def step(text: str) -> Iterator[None]:
-    """Show on stderr, while it runs and where that is a terminal, what the program is doing.
+    """Display a step on stderr while it runs, if stderr is a terminal.
 
-    With the share done and the time left where the computation tells them, else the time passed.
+    The text contains share and time left if the computation reports them, else the elapsed time.
     """
     from rich.progress import Progress, SpinnerColumn, TextColumn
 
@@ -107,7 +107,7 @@ def step(text: str) -> Iterator[None]:
 
 
 def show_error(error: DrivetwinError, *, as_json: bool) -> None:
-    """Report an error: text on stderr, or as JSON on stdout where that was asked for."""
+    """Report an error: as text on stderr, or as JSON on stdout if requested."""
     if not as_json:
         from rich.text import Text
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin report`: where the report of an identification is, and comparisons of several."""
+"""`drivetwin report`: path of an identification's report, and comparison of several."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def report(
 
 
 def _is_made(source: Path) -> bool:
-    """Whether a source is what an identification wrote; all others are taken for logs."""
+    """Return True if a source was written by an identification; all others are read as logs."""
     return source.is_dir() or source.suffix in (".json", ".toml")
 
 
@@ -100,7 +100,7 @@ def _compare(
 
 
 def _names(made: Sequence[Path]) -> dict[str, Path]:
-    """What tables call each source: its folder or file, numbered where two are called the same."""
+    """Name each source by its folder or file; number the names that occur twice."""
     plain = [
         (source if source.is_dir() or source.stem not in ("result", "twin") else source.parent)
         for source in made
@@ -128,7 +128,7 @@ def _candidate(name: str, source: Path) -> Candidate:
 
 
 def _twin(source: Path) -> Twin:
-    """The twin behind a source: the file itself, or the one beside its result."""
+    """Load the twin of a source: the file itself, or the twin file next to its result."""
     from drivetwin.cli.identify_run import TWIN
     from drivetwin.files.twin_conversion import load_twin
 

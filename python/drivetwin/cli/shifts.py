@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin shifts LOG`: the shifts of a log, their phases, and what the speeds alone tell."""
+"""`drivetwin shifts LOG`: the shifts of a log, their phases, and results from speeds alone."""
 
 from __future__ import annotations
 
@@ -53,29 +53,33 @@ def shifts(
 
 
 class _Seen(NamedTuple):
-    """What the speeds tell of a log without output torque; nothing of another log."""
+    """Quantities computed from the speeds of a log without output torque; empty for other logs."""
 
     gears: tuple[HeldGear, ...] = ()
     swings: tuple[tuple[Shift, Resonance | str], ...] = ()
 
 
 def _from_speeds(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> _Seen:
+    from drivetwin.estimation.data.prepare_gears import prepare_gears, prepare_input_speed
     from drivetwin.estimation.linear.inertia_in_gear import held_gears
     from drivetwin.estimation.linear.resonance import after_shift
 
     if "output_torque" in log:
         return _Seen()
     with step("looking at the gears held"):
-        gears = held_gears(log, card, shifts)
-        return _Seen(gears, tuple((shift, after_shift(log, shift)) for shift in shifts))
+        gears = held_gears(prepare_gears(log, card, shifts))
+        if not shifts:
+            return _Seen(gears)
+        speed = prepare_input_speed(log)
+        return _Seen(gears, tuple((shift, after_shift(speed, shift)) for shift in shifts))
 
 
 def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> dict[str, Any]:
     from drivetwin.files.result_file import RejectedRecord, ShiftRecord
 
     return {
-        "shifts": [ShiftRecord.of(one).model_dump(by_alias=True) for one in found.shifts],
-        "rejected": [RejectedRecord.of(one).model_dump() for one in found.rejected],
+        "shifts": [ShiftRecord.from_result(one).model_dump(by_alias=True) for one in found.shifts],
+        "rejected": [RejectedRecord.from_result(one).model_dump() for one in found.rejected],
         "lock_ups": [asdict(one) for one in closings],
         "resonances": [_swing(*pair) for pair in seen.swings],
         "held_gears": [asdict(one) for one in seen.gears],
@@ -83,7 +87,7 @@ def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> di
 
 
 def _tell(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> None:
-    """All that is to be said behind the table of the shifts, in words and further tables."""
+    """Print the details below the table of the shifts: text and further tables."""
     from drivetwin.cli.tables import quality_tables
 
     for table in quality_tables(found.shifts):

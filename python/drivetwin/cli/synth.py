@@ -61,10 +61,10 @@ def synth(
     Beside the log NAME.csv stand NAME.truth.json and the vehicle card NAME.card.toml.
     """
     from drivetwin.dyno.dyno import run
-    from drivetwin.dyno.scenarios import scenario_of
+    from drivetwin.dyno.scenario_file import load_scenario
 
     with step(f"running {scenario}"):
-        setup = scenario_of(scenario, drum).with_torque_reduction(torque_reduction)
+        setup = load_scenario(scenario, drum).with_torque_reduction(torque_reduction)
         log, card, truth = write_run(output, run(setup, seed, noise=noise))
     if as_json:
         print_json({"log": log, "card": card, "truth": truth})

@@ -51,7 +51,7 @@ def shift_table(shifts: Sequence[Shift], source: str) -> Table:
 
 
 def quality_tables(shifts: Sequence[Shift]) -> Iterator[Table]:
-    """Figures of shift quality, one column for each shift; several tables where they are many."""
+    """Build tables of shift quality, one column for each shift; split if there are many."""
     for first in range(0, len(shifts), _BESIDE):
         part = shifts[first : first + _BESIDE]
         names = [f"{one.start_gear}→{one.end_gear}, {one.lockup_time:.2f} s" for one in part]
@@ -77,7 +77,7 @@ def parameter_table(estimates: Mapping[str, Estimate], title: str) -> Table:
 
 
 def remarks(estimates: Mapping[str, Estimate]) -> list[str]:
-    """What stands behind each verdict: one numbered line for each reason given."""
+    """List the reasons of the verdicts as numbered lines, each reason once."""
     return [f"({number}) {reason}" for reason, number in _numbers(estimates).items()]
 
 

@@ -117,7 +117,7 @@ def friction_elements(gearbox: Gearbox) -> tuple[str, ...]:
 
 
 def recorded(gearbox: Gearbox) -> Sequence[Output]:
-    """What a drive records: speeds, shaft torque, slip and torque of every shift element."""
+    """List the outputs of a drive: speeds, shaft torque, slip and torque of all shift elements."""
     nodes = (CRANK, gearbox.input, gearbox.output, WHEEL)
     elements = friction_elements(gearbox)
     return [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a drive consists of: legs with pedal and brake, each ended by a condition and an action."""
+"""Plan of a drive: legs with pedal and brake, each ended by a condition and an action."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drivetwin.gearbox import Gearbox, gear_statics
 
 
 class Watched(StrEnum):
-    """What ends a leg: time in the leg [s], speed of the gearbox input [rad/s], ν of converter."""
+    """Quantity that ends a leg: time in it [s], gearbox input speed [rad/s], converter ratio ν."""
 
     TIME = "time"
     INPUT_SPEED = "input speed"

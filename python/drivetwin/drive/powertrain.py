@@ -67,7 +67,7 @@ class Control:
 
 @dataclass(frozen=True)
 class Powertrain:
-    """What a drive needs beside the gearbox card; `source` says where the numbers are from.
+    """Engine, converter, lock-up clutch, road and control of a drive; `source` is the data origin.
 
     `mass_inertia` is that of the mass behind the road's resistances, at the wheel: m·r² [kg m^2].
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a drive shows: motion, converter, and what every shift did to its elements."""
+"""Results of a drive: motion, converter, and the friction work of every shift."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _OF_MASS = (0.75, 1.5)
 class Action:
     """A shift, or a move of the lock-up clutch, from `start` to `end` [s].
 
-    `kind` says which of the four kinds of shift it is; None where an element is not part of it.
+    `kind` is one of the four kinds of shift; None where an element is not part of it.
     """
 
     label: str
@@ -41,7 +41,7 @@ class Action:
 
 @dataclass(frozen=True)
 class ElementWork:
-    """What slip did to one element in one manoeuvre: `work` [J], `peak_power` [W]."""
+    """Friction work of one element in one manoeuvre: `work` [J], `peak_power` [W]."""
 
     element: str
     work: float
@@ -50,9 +50,10 @@ class ElementWork:
 
 @dataclass(frozen=True)
 class Maneuver:
-    """What an action did: times [s] where the off-going element broke away and the on-coming one
-    locked for good, None where that did not happen; the lowest and the highest torque of the output
-    shaft meanwhile [N m].
+    """Events and shaft torque of an action.
+
+    Times [s] at which the off-going element broke away and the on-coming one locked for good; None
+    if that did not happen. Lowest and highest torque of the output shaft meanwhile [N m].
     """
 
     action: Action
@@ -69,8 +70,8 @@ class DriveRun:
     `engine_torque` is that of the lagging map, `brake_torque` what the service brake can hold;
     `speed_ratio` and `torque_ratio` are the converter's and `turbine_torque` what it gives to the
     gearbox; `slip`, `torque`, `pressure` go by element. `work` is the friction work of each element
-    over the whole drive [J]; `warnings` name elements that slip where they should hold, and tell
-    where gearbox card and powertrain state different vehicles.
+    over the whole drive [J]; `warnings` name elements that slip outside their shifts, and
+    different vehicle inertias of gearbox card and powertrain.
     """
 
     time: FloatArray

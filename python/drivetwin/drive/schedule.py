@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inputs of a drive as they are decided: what has been is fixed, the last value holds."""
+"""Inputs of a drive, built up in time: past values are fixed, the last value is held."""
 
 from __future__ import annotations
 

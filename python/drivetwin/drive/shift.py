@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: MIT
 """Pressures of one shift of any of the four kinds, from the torque and the speeds it begins with.
 
-Where the input torque would slow the shift down (power-on up, power-off down), the on-coming
-element takes the torque over first and then brings the input to its new speed. Where the input
-torque itself changes the speed the right way (power-off up, power-on down), the off-going element
-lets go as far as the pace wants it, and the on-coming one takes over at synchronism. All torques
-are those of the dual-clutch form (THEORY section 2): η = 1, `J ω_in' = T_in - Σ T_k / i_c,k`.
+In a power-on upshift or power-off downshift the input torque opposes the change of speed: the
+on-coming element first takes over the torque, then brings the input to its new speed. In the other
+two kinds the input torque itself changes the speed: the pressure of the off-going element controls
+the pace, and the on-coming element engages at synchronism. All torques are those of the dual-clutch
+form (THEORY section 2): η = 1, `J ω_in' = T_in - Σ T_k / i_c,k`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from drivetwin.drive.schedule import Knots, Schedule
 from drivetwin.gearbox import Drive, Reduction
 from drivetwin.gearbox.spec import Capacity
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 FILL = 0.12
 """Time to fill the on-coming element, while the off-going one falls to what it has to hold, s."""
@@ -33,22 +33,6 @@ MARGIN = 1.2
 """Capacity of the off-going element before the torque phase, over the torque it holds."""
 OPEN = 0.0
 """Pressure of an open element, Pa."""
-
-
-class ShiftKind(StrEnum):
-    """Sign of the input torque and direction of the speed change."""
-
-    POWER_ON_UP = "power-on up"
-    POWER_OFF_UP = "power-off up"
-    POWER_ON_DOWN = "power-on down"
-    POWER_OFF_DOWN = "power-off down"
-
-
-def kind_of(torque: float, swing: float) -> ShiftKind:
-    """Kind of a shift from input torque [N m] and speed change of the input [rad/s]."""
-    if swing < 0.0:
-        return ShiftKind.POWER_ON_UP if torque > 0.0 else ShiftKind.POWER_OFF_UP
-    return ShiftKind.POWER_ON_DOWN if torque > 0.0 else ShiftKind.POWER_OFF_DOWN
 
 
 @dataclass(frozen=True)
@@ -73,13 +57,13 @@ class ShiftPlan:
 
     @property
     def kind(self) -> ShiftKind:
-        """Which of the four kinds it is."""
-        return kind_of(self.torque, self.swing)
+        """Kind of the shift."""
+        return ShiftKind.from_direction(up=self.swing < 0.0, power_on=self.torque > 0.0)
 
     @property
     def torque_first(self) -> bool:
-        """Whether the on-coming element takes the torque before the speed changes."""
-        return self.kind in (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_DOWN)
+        """True if the on-coming element takes the torque before the speed changes."""
+        return self.kind.has_torque_phase_first
 
     @property
     def filled(self) -> float:

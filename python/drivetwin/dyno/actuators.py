@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hydraulic actuators: what pressure a clutch sees when the TCU asks for one."""
+"""Hydraulic actuators: clutch pressure as a response to the pressure command of the TCU."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class DynoRun:
-    """What one run recorded (`channels`, each on its own time base) and what was true.
+    """Recorded `channels` of one run, each on its own time base, and their true values.
 
     `trajectory` is the exact motion at all instants that a sensor looked at.
     """
@@ -66,7 +66,7 @@ def run(scenario: Scenario, seed: int = 0, *, noise: float = 1.0) -> DynoRun:
 
 
 def _looks(sensor: Sensor, stamps: FloatArray) -> FloatArray:
-    """When a sensor looks (n, m) [s], to the nanosecond: sensors of one rate share instants."""
+    """Sampling instants (n, m) [s] of a sensor, to the nanosecond: equal rates share instants."""
     return np.asarray(np.round(sensor.looks(stamps), 9), dtype=np.float64)
 
 

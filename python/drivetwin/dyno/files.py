@@ -20,7 +20,7 @@ from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.spec import brake_ratios
 
 _J_OUT_TOLERANCE = 0.1
-"""Relative standard deviation of Jo' on a card: what a drawing tells."""
+"""Relative standard deviation of Jo' on a card, as computed from drawings."""
 
 
 def log_text(run: DynoRun) -> str:
@@ -59,7 +59,7 @@ def truth_text(run: DynoRun) -> str:
 
 
 def card_text(scenario: Scenario) -> str:
-    """A vehicle card (TOML) that knows of the driveline what design would know."""
+    """Vehicle card (TOML) with the values of the driveline that are known from design."""
     model = scenario.model
     gears = tomlkit.aot()
     for gear in sorted(scenario.gears, key=lambda gear: -scenario.ratio(gear.element)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names of the built-in scenarios; see `drivetwin.dyno.scenarios` for what they are."""
+"""Names of the built-in scenarios; see the TOML files in `scenarios/` for their data."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Plant:
         """Run the gearbox in the driveline of `model`, as `driveline.simulate` runs its form.
 
         Slip and torque of the shift elements are those of the form (eq. 15).
-        Raises InputError where the description is inconsistent; a run that fails tells its status.
+        Raises InputError where the description is inconsistent; a failed run returns its status.
         """
         end = np.array([0.0, float(time[-1])])
         idle = {name: Signal(end, np.zeros(2)) for name in self.gearbox.elements}
@@ -139,7 +139,7 @@ def plant_of(gearbox: Gearbox, gears: tuple[str, ...]) -> Plant:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is around a gearbox on the dynamometer; fields as of `DualClutch`."""
+    """Engine, shaft, vehicle and load around a gearbox; fields as in `DualClutch`."""
 
     J1: float
     eta: float

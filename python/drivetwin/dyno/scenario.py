@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What one run of the virtual dynamometer is: driveline, driver, TCU, actuators, sensors."""
+"""Scenario of the virtual dynamometer: driveline, driver, TCU, actuators, sensors."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class TorqueReduction:
             )
 
     def factor(self, time: FloatArray) -> FloatArray:
-        """What the engine torque is multiplied with at `time` (n,)."""
+        """Factor on the engine torque at `time` (n,)."""
         knots = (self.start, self.start + self.ramp, self.end, self.end + self.ramp)
         return 1.0 - self.fraction * np.interp(time, knots, (0.0, 1.0, 1.0, 0.0))
 

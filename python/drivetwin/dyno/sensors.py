@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sensors and the CAN bus: from exact trajectories to what a logger records."""
+"""Sensors and the CAN bus: from exact trajectories to recorded channels."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from drivetwin.channels.shiftlog import Channel, Quantity
 FloatArray = NDArray[np.float64]
 
 LOOKS = 20
-"""Instants within a window whose mean a sample shows: their sum is exact to its square inverse."""
+"""Instants per averaging window; the error of the mean falls with their square."""
 
 
 @dataclass(frozen=True)
 class Sensor:
     """One channel of the log.
 
-    `column` and `unit` are what the file shows; everything else is SI. A sample is the quantity at
+    `column` and `unit` are those of the file; everything else is SI. A sample is the quantity at
     its time stamp minus `delay` [s], plus white noise of `noise` (1 σ), rounded to a multiple of
-    `resolution` (0: not rounded). `rate` in Hz; a rate below the logger's shows as held values.
+    `resolution` (0: not rounded). `rate` in Hz; a rate below the logger's gives held values.
     """
 
     role: str
@@ -37,7 +37,7 @@ class Sensor:
     """Time [s] before the stamp over which a sample is the mean, as encoders on a bus send it."""
 
     def looks(self, stamps: FloatArray) -> FloatArray:
-        """Instants (n, m) [s] whose mean each sample shows; none before 0."""
+        """Instants (n, m) [s] that each sample averages; none before 0."""
         if self.window == 0.0:
             before = np.zeros(1)
         else:

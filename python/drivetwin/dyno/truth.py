@@ -86,7 +86,7 @@ def lockup_oscillation(model: DualClutch, ratio: float) -> tuple[float, float]:
 
 
 def truth_of(scenario: Scenario, trajectory: Trajectory) -> Truth:
-    """What an identification of this run should return.
+    """Compute the true parameters and instants of a run.
 
     J' and Jo' are without the drums of open elements; a member of the whole gearbox that is no such
     drum and turns with both shafts counts with its parts on the diagonal (THEORY section 2).

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What stands behind an identification, stage by stage.
+"""Stage results behind an identification.
 
-Names of types only are imported here: the stages themselves know the Identification that holds
+Only the names of types are imported here, because the stages import the Identification that holds
 their results.
 """
 

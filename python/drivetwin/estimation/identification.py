@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What an identification returns: estimates with intervals, curves, fits, evidence."""
+"""Result of an identification: estimates with intervals, curves, fits and stage results."""
 
 from __future__ import annotations
 

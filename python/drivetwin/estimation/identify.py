@@ -1,21 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""identify(): from a log, a vehicle card and its shifts to an Identification."""
+"""Identification of a driveline from the prepared shifts of one log, by one of three methods."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any, Protocol
+from typing import Any
 
 from drivetwin._util.display_units import in_units
 from drivetwin._util.progress import part
-from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.errors import IdentificationError, NoShiftError, Where
+from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.artifacts import Evidence
-from drivetwin.estimation.data.prepare import NO_AGE, driveline_of, signals_of, tolerances_of
 from drivetwin.estimation.data.segments import MomentumSettings
-from drivetwin.estimation.data.select_shifts import balanced, chosen, usable_of
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
+from drivetwin.estimation.data.select_shifts import balanced
+from drivetwin.estimation.data.shift_data import DesignData, PreparedLog, ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.pipeline import likelihood, likelihood_alone
 from drivetwin.estimation.linear.friction_points import FrictionSettings
@@ -28,9 +26,6 @@ from drivetwin.estimation.result.prior_conflict import outside_ranges, without_g
 from drivetwin.estimation.result.verdict import doubted
 from drivetwin.parameters import spec_of
 from drivetwin.shifts.coverage import AFTER, BEFORE
-from drivetwin.shifts.lockup_clutch import behind_converter, unseen
-from drivetwin.shifts.shift import RejectedShift, Shift
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 BEHIND_CONVERTER = (
     "the converter is open in the shifts: what drives the gearbox is its turbine, by the map on "
@@ -57,72 +52,40 @@ GROWS = "grows with the square of the wheel speed and else "
 """What the load does where the log shows it."""
 
 
-class Shifts(Protocol):
-    """What shift detection hands over."""
-
-    @property
-    def shifts(self) -> tuple[Shift, ...]:
-        """Usable shifts."""
-
-    @property
-    def rejected(self) -> tuple[RejectedShift, ...]:
-        """Candidates that were refused, with the reason."""
-
-
-def identify(
-    log: ShiftLog, card: VehicleCard, shifts: Shifts, method: Method = DEFAULT_METHOD
-) -> Identification:
-    """Identify the driveline from all usable shifts of a log.
+def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identification:
+    """Identify the driveline from all prepared shifts of a log.
 
     The paper's stages run beside the other methods for comparison. The likelihood method starts
     from the integral one, or alone where that has no equation, and leaves the integral result with
-    a warning where it does not converge. What each stage found is in `evidence`.
-    Raises NoShiftError without a shift, IdentificationError where the data cannot carry it,
-    MissingChannelError for a missing channel, DamagedChannelError where the inputs of the only
-    shift have gaps; of several such shifts are refused and the others used.
+    a warning where it does not converge. The results of each stage are in `evidence`.
+    Raises IdentificationError if the data cannot carry the method.
     """
-    if not shifts.shifts:
-        raise NoShiftError(
-            "the log holds no usable gear shift",
-            "record from a second before the torque phase to a second after lock-up",
-            Where(file=log.source),
-        )
-    usable, refused = usable_of(log, card, shifts.shifts)
-    with part(0.0, 0.05, "loads of the shifts"):
-        usable, left_out = chosen(log, card, usable)
-    card = replace(card, sensors=tolerances_of(log, card, usable[0]))
-    recorded_log, log = log, behind_converter(log, card, usable[0])
-    is_open = log is not recorded_log
-    if is_open:
-        card = replace(card, known={**card.known, "te_delay": NO_AGE})
-    signals = [signals_of(recorded_log, card, shift) for shift in usable]
-    drivelines = [driveline_of(card, shift) for shift in usable]
-    if all(s.scale_known for s in signals):
+    if log.scale_known:
         if method is not Method.PAPER:
-            signals, drivelines, without = balanced(signals, drivelines)
-            usable, left_out = tuple(s.shift for s in signals), (*left_out, *without)
-        found, method, evidence = _with_torque(signals, drivelines, card, method)
+            log = balanced(log)
+        found, method, evidence = _with_torque(log, method)
     else:
-        found, evidence = _without_torque(log, signals, drivelines, card, method)
-    estimates, gains = without_gain(found.estimates, card.loss_law)
-    told = (*gains, *_of_card(found, card, method, is_open), *unseen(recorded_log, card))
+        found, evidence = _without_torque(log, method)
+    shifts, design = tuple(s.shift for s in log.signals), log.design
+    estimates, gains = without_gain(found.estimates, design.loss_law)
+    told = (*gains, *_of_card(found, log, method), *log.notes)
     return Identification(
         estimates=estimates,
         friction=found.friction,
-        shifts=usable,
-        rejected=tuple(sorted((*shifts.rejected, *refused, *left_out), key=lambda one: one.time)),
+        shifts=shifts,
+        rejected=tuple(sorted(log.rejected, key=lambda one: one.time)),
         fit={},
         method=method,
-        loss_law=card.loss_law,
-        validity=_validity(signals, found),
-        inputs={**log.inputs, **card.inputs},
-        settings=_settings(card, method),
-        evidence=replace(evidence, signals=tuple(signals), loads=found.loads),
-        warnings=(*log.warnings, *_not_fitted(shifts, usable), *found.warnings, *told),
+        loss_law=design.loss_law,
+        validity=_validity(log.signals, found),
+        inputs=dict(log.inputs),
+        settings=_settings(design, method),
+        evidence=replace(evidence, signals=log.signals, loads=found.loads),
+        warnings=(*log.warnings, *_not_fitted(log), *found.warnings, *told),
         assumptions=(
-            *((BEHIND_CONVERTER,) if is_open else ()),
-            *_assumptions(card, method, found),
-            *((NEAR,) if any(one not in shifts.shifts for one in usable) else ()),
+            *((BEHIND_CONVERTER,) if log.turbine_driven else ()),
+            *_assumptions(design, method, found),
+            *((NEAR,) if any(one not in log.candidates for one in shifts) else ()),
         ),
         correlation_ids=found.correlation_ids,
         correlation=found.correlation,
@@ -130,25 +93,24 @@ def identify(
     )
 
 
-def _of_card(
-    found: Conclusions, card: VehicleCard, method: Method, is_open: bool
-) -> tuple[str, ...]:
-    """What is said of the card: a map that counts as exact, inertias outside its design ranges.
+def _of_card(found: Conclusions, log: PreparedLog, method: Method) -> tuple[str, ...]:
+    """Warn of a converter map that counts as exact and of inertias outside their design ranges.
 
     The paper's method doubts each value by itself; behind a converter J′ is without the engine.
     """
-    exact = (MAP_EXACT,) if is_open and "engine_torque" not in card.sensors else ()
-    elsewhere = method is Method.PAPER or is_open
-    return exact if elsewhere else (*exact, *outside_ranges(found.estimates, card))
+    is_exact = log.turbine_driven and "engine_torque" not in log.design.sensors
+    exact = (MAP_EXACT,) if is_exact else ()
+    elsewhere = method is Method.PAPER or log.turbine_driven
+    return exact if elsewhere else (*exact, *outside_ranges(found.estimates, log.design))
 
 
-def _not_fitted(shifts: Shifts, usable: Sequence[Shift]) -> list[str]:
-    """How many shifts that were found take no part in the fit."""
-    count = len(shifts.shifts) - len(usable)
+def _not_fitted(log: PreparedLog) -> list[str]:
+    """Count the detected shifts that take no part in the fit."""
+    count = len(log.candidates) - len(log.shifts)
     if count == 0:
         return []
     return [
-        f"{count} of {len(shifts.shifts)} shifts are not fitted: report and `rejected` of the "
+        f"{count} of {len(log.candidates)} shifts are not fitted: report and `rejected` of the "
         "result say why"
     ]
 
@@ -156,61 +118,52 @@ def _not_fitted(shifts: Shifts, usable: Sequence[Shift]) -> list[str]:
 _Stage = tuple[Conclusions, Method, Evidence]
 
 
-def _with_torque(
-    signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
-    card: VehicleCard,
-    method: Method,
-) -> _Stage:
-    """Conclusions, the method that they are from, and the evidence."""
+def _with_torque(log: PreparedLog, method: Method) -> _Stage:
+    """Return the conclusions, the method that they are from, and the evidence."""
     if method is Method.PAPER:
-        paper = _paper_shifts(signals, drivelines, card)
-        return paper_conclusions(paper, signals, drivelines), method, Evidence(paper=paper)
+        paper = _paper_shifts(log)
+        return paper_conclusions(paper, log.signals, log.drivelines), method, Evidence(paper=paper)
     likely, gave_up = method is Method.LIKELIHOOD, ""
     try:
         with part(0.05, 0.2 if likely else 0.5, "linear method"):
-            found, integral = integral_method(signals, drivelines, card)
+            found, integral = integral_method(log.signals, log.drivelines, log.design)
     except IdentificationError as error:
         if not likely:
             raise
-        return _without_linear(signals, drivelines, card, error)
+        return _without_linear(log, error)
     evidence = Evidence(integral=integral)
     if likely:
         try:
             with part(0.2, 0.9, "likelihood"):
-                found, fit = likelihood(signals, drivelines, (found, integral), card)
+                linear = found, integral
+                found, fit = likelihood(log.signals, log.drivelines, linear, log.design)
             evidence = replace(evidence, likelihood=fit)
         except IdentificationError as error:
             method, gave_up = Method.INTEGRAL, error.what
             evidence = replace(evidence, gave_up=gave_up)
     if method is Method.INTEGRAL:
         with part(0.9 if likely else 0.5, 0.95, "tolerances of the sensors"):
-            found = with_tolerances(integral, signals, drivelines, card)
+            found = with_tolerances(integral, log.signals, log.drivelines, log.design)
     if gave_up:
         text = f"likelihood: {gave_up}; the values are those of the integral method"
         estimates = {name: doubted(one, GAVE_UP) for name, one in found.estimates.items()}
         found = replace(found, estimates=estimates, warnings=(text, *found.warnings))
     try:
-        evidence = replace(evidence, paper=_paper_shifts(signals, drivelines, card))
+        evidence = replace(evidence, paper=_paper_shifts(log))
     except IdentificationError as error:
         found = replace(found, warnings=(*found.warnings, f"paper's method: {error.what}"))
     return found, method, evidence
 
 
-def _without_linear(
-    signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
-    card: VehicleCard,
-    refusal: IdentificationError,
-) -> _Stage:
-    """The likelihood method from a start of its own where the linear one has no equation: gears
-    held too briefly, or by the dissipative law a drive whose torque flows back throughout.
+def _without_linear(log: PreparedLog, refusal: IdentificationError) -> _Stage:
+    """Fit the likelihood from a start of its own where the linear method has no equation.
 
-    Raises the linear method's `refusal` where it does not converge from there either.
+    That is so for gears engaged too briefly, and by the dissipative law for a drive whose torque
+    flows back throughout. Raises the linear method's `refusal` if it does not converge either.
     """
     try:
         with part(0.2, 0.95, "likelihood"):
-            found, fit = likelihood_alone(signals, drivelines, card)
+            found, fit = likelihood_alone(log.signals, log.drivelines, log.design)
     except IdentificationError:
         raise refusal from None
     text = f"linear method: {refusal.what}; the likelihood started without it"
@@ -218,14 +171,8 @@ def _without_linear(
     return found, Method.LIKELIHOOD, Evidence(likelihood=fit)
 
 
-def _without_torque(
-    log: ShiftLog,
-    signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
-    card: VehicleCard,
-    method: Method,
-) -> tuple[Conclusions, Evidence]:
-    """What a log without an output torque tells: only the likelihood method does without it.
+def _without_torque(log: PreparedLog, method: Method) -> tuple[Conclusions, Evidence]:
+    """Fit a log without an output torque, which only the likelihood method can do.
 
     Raises IdentificationError for the other methods.
     """
@@ -236,16 +183,15 @@ def _without_torque(
             "map an output-shaft torque sensor as `output_torque`, or use the likelihood method",
             Where(file=log.source),
         )
-    found, best = likelihood_alone(signals, drivelines, card)
+    found, best = likelihood_alone(log.signals, log.drivelines, log.design)
     return found, Evidence(likelihood=best)
 
 
-def _paper_shifts(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
-) -> tuple[PaperShift, ...]:
+def _paper_shifts(log: PreparedLog) -> tuple[PaperShift, ...]:
+    design = log.design
     return tuple(
-        paper_shift(s, d, card.J_prime_range, card.J_vehicle_range)
-        for s, d in zip(signals, drivelines, strict=True)
+        paper_shift(one.signals, one.driveline, design.J_prime_range, design.J_vehicle_range)
+        for one in log.shifts
     )
 
 
@@ -267,8 +213,8 @@ def _validity(
     return ranges
 
 
-def _settings(card: VehicleCard, method: Method) -> dict[str, Any]:
-    ranges = {"J_prime_range": card.J_prime_range, "J_vehicle_range": card.J_vehicle_range}
+def _settings(design: DesignData, method: Method) -> dict[str, Any]:
+    ranges = {"J_prime_range": design.J_prime_range, "J_vehicle_range": design.J_vehicle_range}
     if method is Method.PAPER:
         return ranges
     return {
@@ -278,10 +224,10 @@ def _settings(card: VehicleCard, method: Method) -> dict[str, Any]:
     }
 
 
-def _assumptions(card: VehicleCard, method: Method, found: Conclusions) -> tuple[str, ...]:
+def _assumptions(design: DesignData, method: Method, found: Conclusions) -> tuple[str, ...]:
     grows = "" if found.load is None else GROWS
     texts = [
-        f"loss law {card.loss_law} (theory page, section 3)",
+        f"loss law {design.loss_law} (theory page, section 3)",
         "gear ratios, final drive and clutch gains are as on the card",
         f"the load torque {grows}is constant over {'each shift' if found.loads else 'the log'}",
         "the off-going element carries no torque once its pressure is below P0",
@@ -290,17 +236,17 @@ def _assumptions(card: VehicleCard, method: Method, found: Conclusions) -> tuple
         texts.append("T_c = T_o/i_out in the inertia phase (eq. 16), P0 as on the card")
     else:
         texts.append("sensor noise is white, at the level found in the log")
-    if card.loss_law == "dissipative":
+    if design.loss_law == "dissipative":
         texts.append(ALL_BEFORE_LOSS)
-    if not card.sensors:
+    if not design.sensors:
         texts.append("no sensor gain or offset tolerance is stated: intervals cover noise only")
     texts += [
         f"known beforehand: {name} = {in_units(prior.value, spec_of(name).unit, prior.std)}"
         + (" (1 sigma)" if prior.std > 0.0 else ", fixed")
-        for name, prior in card.known.items()
+        for name, prior in design.known.items()
         if method is not Method.PAPER
     ]
-    if card.J_out is not None:
-        design = in_units(card.J_out.value, "kg*m^2", card.J_out.std)
-        texts.append(f"design prior of J_out: {design} (1 sigma)")
+    if design.J_out is not None:
+        J_out = in_units(design.J_out.value, "kg*m^2", design.J_out.std)
+        texts.append(f"design prior of J_out: {J_out} (1 sigma)")
     return tuple(texts)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the exported C model cannot represent, refused before anything is written."""
+"""Reject models that the exported C code cannot represent, before files are written."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from drivetwin.simulation.serialize import as_json
 MAX_POINTS = 64
 """DT_POINTS of `dt_model.h`."""
 _NOT_ZERO = ("eta", "J_out", "J_v", "v_s", "i_in", "i_f", "i_c", "i_out")
-"""Fields that `dt_check` wants other than zero, which their range does not say."""
+"""Fields that must not be zero in `dt_check`; their range alone would admit zero."""
 
 
 def check_exportable(model: DualClutch, start: State) -> None:
-    """Raises InputError for a model that is not two shift elements with laws that C can hold, and
-    for numbers that `dt_check` would refuse.
+    """Raise InputError for a model that the C code cannot represent.
+
+    The model must have two shift elements with supported friction laws, and numbers that
+    `dt_check` accepts.
     """
     as_json(model)  # names every number that is not finite
     if len(model.elements) != 2:

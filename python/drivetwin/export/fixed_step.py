@@ -25,11 +25,11 @@ from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import compared
 
 DEFAULT_STEP = 1e-3
-"""Communication step [s] where nobody asks for another: the rate of pressure signals."""
+"""Default communication step [s]: the sampling interval of pressure signals."""
 
 
 class InputKind(StrEnum):
-    """What inputs do between two communication points."""
+    """Interpolation of inputs between two communication points."""
 
     LINEAR = "linear"
     HOLD = "hold"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is exported: the dual-clutch model of one shift of a twin, and where its runs start."""
+"""Subject of an export: the dual-clutch model of one shift of a twin, and its initial state."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from drivetwin.errors import InputError
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, State
 from drivetwin.twin.twin import Twin
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 DEFAULT_ENGINE_SPEED = 150.0
-"""Engine speed [rad/s] of a start that nothing else tells, where the twin has seen no speeds."""
+"""Default engine speed [rad/s] at the start, for a twin without recorded speeds."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +30,9 @@ class Subject:
 def subject_of(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
     """The model of the shift between two gears of a twin; by default its first upshift.
 
-    It starts in the old gear at the mean engine speed that the twin has seen, without
-    acceleration. Raises InputError for a shift that the twin does not know and
-    MissingParameterError where the log could not tell what a simulation needs.
+    It starts in the old gear at the mean engine speed of the twin's logs, without acceleration.
+    Raises InputError for a shift that the twin does not have and MissingParameterError where a
+    parameter that the simulation needs was not identified.
     """
     shift = nominal_shift(twin, gears)
     model = twin.dual_clutch(shift)

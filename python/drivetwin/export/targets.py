@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a twin can be exported to."""
+"""Export targets of a twin."""
 
 from __future__ import annotations
 

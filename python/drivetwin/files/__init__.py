@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The files an identification leaves behind: `result.json`, and the records a twin shares."""
+"""Files of an identification: `result.json`, and the records shared with the twin file."""

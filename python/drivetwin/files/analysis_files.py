@@ -18,7 +18,7 @@ from drivetwin.parameters import spec_of
 
 def suggestions_text(found: tuple[Suggestion, ...]) -> str:
     """`suggestions.json`: by parameter the experiments in order of worth; infinite widths null."""
-    rows = [SuggestionRecord.of(one).model_dump(mode="json") for one in found]
+    rows = [SuggestionRecord.from_result(one).model_dump(mode="json") for one in found]
     return _text({"suggestions": rows})
 
 
@@ -58,7 +58,8 @@ def bootstrap_text(one: Bootstrap) -> str:
 def friction_text(one: ShapedFriction) -> str:
     """`friction.json`: μ over slip of the shape asked for, by element, with its 95 % band."""
     curves = {
-        name: FrictionRecord.of(curve).model_dump(mode="json") for name, curve in one.curves.items()
+        name: FrictionRecord.from_result(curve).model_dump(mode="json")
+        for name, curve in one.curves.items()
     }
     return _text({"shape": one.shape, "gain": one.gain, "bend": one.bend, "friction": curves})
 

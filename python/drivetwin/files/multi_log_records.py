@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-from pydantic import Field, FiniteFloat
+from pydantic import Field, FiniteFloat, model_validator
 
-from drivetwin.estimation.result.multi_log import Consistency, LogShare, Move, Several
+from drivetwin.estimation.result.multi_log import LogShare
 from drivetwin.estimation.result.validation import HeldOut, Outcome
-from drivetwin.files.records import FitRecord, ParameterRecord, Record, fit_records
+from drivetwin.files.records import FitRecord, ParameterRecord, Record
 
 
 class MoveRecord(Record):
@@ -18,11 +19,6 @@ class MoveRecord(Record):
     parameter: str
     log: int
     z: FiniteFloat
-
-    @classmethod
-    def of(cls, one: Move) -> MoveRecord:
-        """Record of a move."""
-        return cls(parameter=one.parameter, log=one.log, z=one.z)
 
 
 class ConsistencyRecord(Record):
@@ -35,18 +31,6 @@ class ConsistencyRecord(Record):
     text: str
     moves: list[MoveRecord]
 
-    @classmethod
-    def of(cls, one: Consistency) -> ConsistencyRecord:
-        """Record of the test."""
-        return cls(
-            chi2=one.chi2,
-            freedom=one.freedom,
-            p=one.p,
-            agree=one.agree,
-            text=one.text,
-            moves=[MoveRecord.of(move) for move in one.moves],
-        )
-
 
 class LogRecord(Record):
     """One log of a fit of several: its number as in parameter ids, and what it tells alone."""
@@ -58,17 +42,13 @@ class LogRecord(Record):
     alone: dict[str, ParameterRecord]
     fit: dict[str, dict[str, FitRecord]]
 
+    @model_validator(mode="before")
     @classmethod
-    def of(cls, one: LogShare) -> LogRecord:
-        """Record of a log."""
-        return cls(
-            number=one.number,
-            file=Path(one.source).name,
-            sha256=one.sha256,
-            shifts=len(one.shifts),
-            alone={name: ParameterRecord.of(each) for name, each in one.alone.items()},
-            fit=fit_records(one.fit),
-        )
+    def _read_share(cls, source: Any) -> Any:
+        if not isinstance(source, LogShare):
+            return source
+        fields = {name: getattr(source, name) for name in ("number", "sha256", "alone", "fit")}
+        return fields | {"file": Path(source.source).name, "shifts": len(source.shifts)}
 
 
 class SeveralRecord(Record):
@@ -76,16 +56,6 @@ class SeveralRecord(Record):
 
     logs: list[LogRecord]
     consistency: ConsistencyRecord
-
-    @classmethod
-    def of(cls, one: Several | None) -> SeveralRecord | None:
-        """Record of the logs; None where there is one only."""
-        if one is None:
-            return None
-        return cls(
-            logs=[LogRecord.of(share) for share in one.logs],
-            consistency=ConsistencyRecord.of(one.consistency),
-        )
 
 
 class ExpectedRecord(Record):
@@ -109,26 +79,25 @@ class HeldOutRecord(Record):
     own: dict[str, ParameterRecord]
     notes: list[str]
 
+    @model_validator(mode="before")
     @classmethod
-    def of(cls, one: HeldOut) -> HeldOutRecord:
-        """Record of a prediction."""
-        fit = {} if one.validation is None else one.validation.fit
-        return cls.model_validate(
-            {
-                "file": Path(one.source).name,
-                "from": one.shift.start_gear,
-                "to": one.shift.end_gear,
-                "lockup_time": one.shift.lockup_time,
-                "outcome": one.outcome,
-                "fit": fit_records(fit),
-                "expected": {name: _expected(one, name) for name in fit},
-                "own": {name: ParameterRecord.of(each) for name, each in one.own.items()},
-                "notes": list(one.notes),
-            }
-        )
-
-
-def _expected(one: HeldOut, signal: str) -> ExpectedRecord:
-    bound = one.bounds.get(signal)
-    sizes = {} if bound is None else vars(bound)
-    return ExpectedRecord(outcome=one.outcome_of(signal), **sizes)
+    def _read_prediction(cls, source: Any) -> Any:
+        if not isinstance(source, HeldOut):
+            return source
+        fit = {} if source.validation is None else source.validation.fit
+        shift, bounds = source.shift, source.bounds
+        return {
+            "file": Path(source.source).name,
+            "from": shift.start_gear,
+            "to": shift.end_gear,
+            "lockup_time": shift.lockup_time,
+            "outcome": source.outcome,
+            "fit": fit,
+            "expected": {
+                name: {"outcome": source.outcome_of(name)}
+                | (vars(bounds[name]) if name in bounds else {})
+                for name in fit
+            },
+            "own": source.own,
+            "notes": source.notes,
+        }

@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
@@ -17,7 +16,6 @@ from drivetwin.estimation.result.estimate import (
     FloatArray,
     FrictionCurve,
     LoadLaw,
-    SignalFit,
     Verdict,
 )
 from drivetwin.estimation.result.suggestion import Experiment, Suggestion
@@ -28,10 +26,23 @@ OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(finite_or_none)]
 Interval = tuple[FiniteFloat, FiniteFloat]
 
 
+def _close_interval(value: object) -> object:
+    """Return None for an interval of an estimate that is open on a side."""
+    return None if isinstance(value, tuple) and not np.isfinite(value).all() else value
+
+
+OptionalInterval = Annotated[Interval | None, BeforeValidator(_close_interval)]
+
+
 class Record(BaseModel):
     """Base of all records: closed key set, immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+    @classmethod
+    def from_result(cls, result: object) -> Self:
+        """Build the record and those of its parts from the attributes of the fields' names."""
+        return cls.model_validate(result, from_attributes=True)
 
 
 class StribeckRecord(Record):
@@ -53,11 +64,6 @@ class LoadRecord(Record):
     std: FiniteFloat
     mean_speed: FiniteFloat
     over_eta: bool = False
-
-    @classmethod
-    def of(cls, law: LoadLaw | None) -> LoadRecord | None:
-        """Record of a law; None where the load is constant."""
-        return None if law is None else cls(**vars(law))
 
     def law(self) -> LoadLaw:
         """Back to the law."""
@@ -82,18 +88,18 @@ class FrictionRecord(Record):
             raise ValueError("slip, mu, mu_lo and mu_hi must be of one length, at least 1")
         return self
 
+    @model_validator(mode="before")
     @classmethod
-    def of(cls, curve: FrictionCurve) -> FrictionRecord:
-        """Record of a curve; its raw points stay in the report."""
-        return cls(
-            slip=curve.slip.tolist(),
-            mu=curve.mu.tolist(),
-            mu_lo=curve.mu_lo.tolist(),
-            mu_hi=curve.mu_hi.tolist(),
-            stribeck=None if curve.stribeck is None else StribeckRecord(**vars(curve.stribeck)),
-            stribeck_covariance=_rows(curve.stribeck_covariance),
-            method=curve.method_text,
-        )
+    def _read_curve(cls, source: Any) -> Any:
+        """Return the fields of a curve; its raw points stay in the report."""
+        if not isinstance(source, FrictionCurve):
+            return source
+        arrays = ("slip", "mu", "mu_lo", "mu_hi")
+        return {name: getattr(source, name).tolist() for name in arrays} | {
+            "stribeck": source.stribeck,
+            "stribeck_covariance": _rows(source.stribeck_covariance),
+            "method": source.method_text,
+        }
 
     def curve(self) -> FrictionCurve:
         """Back to the curve, without raw points."""
@@ -117,7 +123,7 @@ def _rows(matrix: FloatArray | None) -> list[list[float]] | None:
     """Nested lists of a finite matrix; None where it is unknown."""
     if matrix is None or not np.isfinite(matrix).all():
         return None
-    return [[float(item) for item in row] for row in matrix]
+    return matrix.tolist()  # type: ignore[no-any-return]
 
 
 def _array(values: list[OptionalFloat]) -> FloatArray:
@@ -130,9 +136,9 @@ class ParameterRecord(Record):
     value: OptionalFloat
     unit: str
     std_noise: OptionalFloat = None
-    ci95: Interval | None = None
+    ci95: OptionalInterval = None
     std_total: OptionalFloat = None
-    ci95_total: Interval | None = None
+    ci95_total: OptionalInterval = None
     verdict: Verdict
     method: str
     reason: str = ""
@@ -142,21 +148,6 @@ class ParameterRecord(Record):
         if (self.value is None) != (self.verdict is Verdict.NOT_IDENTIFIABLE):
             raise ValueError("value must be null exactly where the verdict is 'not identifiable'")
         return self
-
-    @classmethod
-    def of(cls, estimate: Estimate) -> Self:
-        """Record of an estimate."""
-        return cls(
-            value=estimate.value,
-            unit=estimate.unit,
-            std_noise=estimate.std_noise,
-            ci95=_finite_interval(estimate.ci95),
-            std_total=estimate.std_total,
-            ci95_total=_finite_interval(estimate.ci95_total),
-            verdict=estimate.verdict,
-            method=estimate.method,
-            reason=estimate.reason,
-        )
 
     def estimate(self, parameter_id: str) -> Estimate:
         """Back to the estimate of that id."""
@@ -181,29 +172,14 @@ class FitRecord(Record):
     fit_percent: OptionalFloat
 
 
-def fit_records(
-    fit: Mapping[str, Mapping[str, SignalFit]],
-) -> dict[str, dict[str, FitRecord]]:
-    """Records of fits by signal and phase."""
-    return {
-        signal: {phase: FitRecord(**vars(one)) for phase, one in phases.items()}
-        for signal, phases in fit.items()
-    }
-
-
-def _finite_interval(interval: tuple[float, float] | None) -> tuple[float, float] | None:
-    if interval is None or not all(map(math.isfinite, interval)):
-        return None
-    return interval
-
-
 SchemaName = Annotated[str, Field(alias="schema")]
 
 
 class ProspectRecord(Record):
-    """What an experiment, so many times repeated, would make of the 95 % half width.
+    """Expected 95 % half width after repeating an experiment a given number of times.
 
-    `shift` is the shift of the log that it is built on, by its gears; empty where all are alike.
+    `shift` is the shift of the log on which the experiment is based, by its gears. It is empty if
+    all shifts give the same.
     """
 
     experiment: Experiment
@@ -226,14 +202,11 @@ class SuggestionRecord(Record):
     text: str
     experiments: list[ProspectRecord]
 
+    @model_validator(mode="before")
     @classmethod
-    def of(cls, one: Suggestion) -> SuggestionRecord:
-        """Record of a suggestion."""
-        return cls(
-            parameter=one.parameter,
-            unit=spec_of(one.parameter).unit,
-            verdict=one.verdict,
-            half_width=one.half_width,
-            text=one.text,
-            experiments=[ProspectRecord(**vars(each)) for each in one.prospects],
-        )
+    def _read_suggestion(cls, source: Any) -> Any:
+        if not isinstance(source, Suggestion):
+            return source
+        fields = {name: getattr(source, name) for name in ("parameter", "verdict", "half_width")}
+        unit = spec_of(source.parameter).unit
+        return fields | {"unit": unit, "text": source.text, "experiments": source.prospects}

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import Field, FiniteFloat, model_validator
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.plain_values import plain
@@ -26,9 +26,8 @@ from drivetwin.files.records import (
     Record,
     SchemaName,
     SuggestionRecord,
-    fit_records,
 )
-from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 RESULT_SCHEMA = "drivetwin/result-3"
 
@@ -50,22 +49,12 @@ class ShiftRecord(Record):
     quality: dict[str, OptionalFloat]
     warnings: list[str]
 
-    @classmethod
-    def of(cls, shift: Shift) -> ShiftRecord:
-        """Record of a shift."""
-        return cls.model_validate(vars(shift))
-
 
 class RejectedRecord(Record):
     """A stretch of the log that is no usable shift, and why."""
 
     time: Interval
     reason: str
-
-    @classmethod
-    def of(cls, rejected: RejectedShift) -> RejectedRecord:
-        """Record of a rejected candidate."""
-        return cls(time=rejected.time, reason=rejected.reason)
 
 
 class ResultFile(Record):
@@ -91,37 +80,34 @@ class ResultFile(Record):
     warnings: list[str]
     assumptions: list[str]
 
+    @model_validator(mode="before")
     @classmethod
-    def of(cls, found: Identification) -> ResultFile:
-        """Collect what an identification found."""
-        return cls.model_validate(
-            {
-                "schema": RESULT_SCHEMA,
-                "version": program_version(),
-                "method": found.method,
-                "loss_law": found.loss_law,
-                "parameters": {k: ParameterRecord.of(e) for k, e in found.estimates.items()},
-                "friction": {k: FrictionRecord.of(c) for k, c in found.friction.items()},
-                "load": LoadRecord.of(found.load),
-                "shifts": [ShiftRecord.of(shift) for shift in found.shifts],
-                "rejected": [RejectedRecord.of(one) for one in found.rejected],
-                "fit": fit_records(found.fit),
-                "validity": found.validity,
-                "inputs": found.inputs,
-                "settings": plain(found.settings),
-                "correlation": _correlation(found),
-                "several": SeveralRecord.of(found.evidence.several),
-                "held_out": [HeldOutRecord.of(one) for one in found.evidence.held_out],
-                "suggestions": [SuggestionRecord.of(one) for one in found.evidence.suggestions],
-                "warnings": list(found.warnings),
-                "assumptions": list(found.assumptions),
-            }
-        )
+    def _read_identification(cls, source: Any) -> Any:
+        if not isinstance(source, Identification):
+            return source
+        evidence = source.evidence
+        return {name: getattr(source, name) for name in _SAME_NAME} | {
+            "schema": RESULT_SCHEMA,
+            "version": program_version(),
+            "parameters": source.estimates,
+            "settings": plain(source.settings),
+            "correlation": _correlation(source),
+            "several": evidence.several,
+            "held_out": evidence.held_out,
+            "suggestions": evidence.suggestions,
+        }
 
     def to_json(self) -> str:
         """Strict JSON text: no NaN, keys as in the published schema."""
         tree = self.model_dump(mode="json", by_alias=True)
         return json.dumps(tree, allow_nan=False, ensure_ascii=False, indent=2) + "\n"
+
+
+_SAME_NAME = (
+    *("method", "loss_law", "friction", "load", "shifts", "rejected", "fit", "validity", "inputs"),
+    *("warnings", "assumptions"),
+)
+"""Fields that an identification has under the same name."""
 
 
 def _correlation(found: Identification) -> dict[str, dict[str, float]]:
@@ -135,7 +121,7 @@ def _correlation(found: Identification) -> dict[str, dict[str, float]]:
 
 def save_result(path: Path | str, identification: Identification) -> None:
     """Write `result.json`; the file appears whole or not at all."""
-    write_text(path, ResultFile.of(identification).to_json())
+    write_text(path, ResultFile.from_result(identification).to_json())
 
 
 def load_result(path: Path | str) -> ResultFile:

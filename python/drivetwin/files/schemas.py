@@ -30,10 +30,10 @@ _MODELS = {
     FileKind.VEHICLE_CARD: ("vehicle.schema", "CardFile"),
     FileKind.GEARBOX_CARD: ("gearbox.schema", "GearboxFile"),
     FileKind.POWERTRAIN: ("drive.schema", "PowertrainFile"),
-    FileKind.CHANNEL_MAPPING: ("logs.profile", "MappingFile"),
+    FileKind.CHANNEL_MAPPING: ("channels.mapping_file", "MappingFile"),
     FileKind.FLEET_RULES: ("fleet.rules", "RulesFile"),
-    FileKind.RESULT: ("results.result_file", "ResultFile"),
-    FileKind.TWIN: ("results.twin_file", "TwinFile"),
+    FileKind.RESULT: ("files.result_file", "ResultFile"),
+    FileKind.TWIN: ("files.twin_file", "TwinFile"),
     FileKind.PARAMETERS: ("export.parameters.json_file", "ParameterFile"),
 }
 """Module below the package, and the model there, by which the program itself checks the file; each

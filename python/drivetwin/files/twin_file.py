@@ -83,24 +83,13 @@ class ConverterRecord(Record):
     capacity: list[FiniteFloat]
     torque_ratio: list[FiniteFloat]
 
-    @classmethod
-    def of(cls, converter: Converter | None) -> ConverterRecord | None:
-        """Record of a map; None stays None."""
-        if converter is None:
-            return None
-        return cls(
-            speed_ratio=list(converter.speed_ratio),
-            capacity=list(converter.capacity),
-            torque_ratio=list(converter.torque_ratio),
-        )
-
     def converter(self) -> Converter:
         """Return the map."""
         return Converter(tuple(self.speed_ratio), tuple(self.capacity), tuple(self.torque_ratio))
 
 
 class TransmissionRecord(Record):
-    """What the vehicle card knew from design."""
+    """Transmission design data from the vehicle card."""
 
     i_in: FiniteFloat = Field(gt=0)
     final_drive: FiniteFloat = Field(gt=0)

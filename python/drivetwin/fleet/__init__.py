@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Many logs: a store that resumes, workers that may die, joint estimates over the units."""
+"""Fleet runs: a resumable store, fault-tolerant workers, joint estimates over the units."""

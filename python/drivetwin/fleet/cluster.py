@@ -35,7 +35,7 @@ _cells = threading.local()
 
 
 def run_in_cell(task: str, spec: WorkerSpec) -> Reply:
-    """Do a task on a Dask worker, in the process that belongs to this thread."""
+    """Run a task on a Dask worker, in the guarded process of this thread."""
     if getattr(_cells, "spec", None) != spec:
         _cells.spec, _cells.cell = spec, Cell(spec)
     cell: Cell = _cells.cell
@@ -98,7 +98,7 @@ class DaskPool:
         future.add_done_callback(lambda done: self._replies.put((number, done)))
 
     def next(self, timeout: float) -> tuple[Task, Reply] | None:
-        """The next answer, None where none comes within `timeout` [s].
+        """Return the next reply, or None after `timeout` [s].
 
         Raises SchedulerError where the scheduler stays away.
         """
@@ -144,7 +144,7 @@ class DaskPool:
                 sleep(_PAUSE)
 
     def _reconnect(self) -> None:
-        """Wait for a scheduler, and let all that was given out be done again."""
+        """Wait for a scheduler, and submit all tasks in flight again."""
         self._tell(Noted(f"lost the scheduler at {self._scheduler}; waiting for it"))
         self._leave()
         self._client = self._connect(self._patience)
@@ -155,7 +155,7 @@ class DaskPool:
 
 
 def _quiet_distributed(address: str) -> Any:
-    """Dask's library; what it would log of lost connections, the run says in its own words."""
+    """Import Dask with its connection-loss log messages disabled; the run reports such losses."""
     dask = require("dask", "fleet", "a Dask cluster", Path(address))
     silent = {"distributed": "critical", "distributed.client": "critical"}
     dask.config.set({"logging": silent})
@@ -163,7 +163,7 @@ def _quiet_distributed(address: str) -> Any:
 
 
 def _reply(done: Any) -> Reply:
-    """The answer behind a future of Dask."""
+    """Return the reply of a finished Dask future."""
     try:
         if done.status == "finished":
             reply: Reply = done.result(timeout=_FIRST_CONTACT)

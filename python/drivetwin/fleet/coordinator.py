@@ -29,8 +29,10 @@ _BACK_OFF = 0.5
 
 @dataclass(frozen=True)
 class Wishes:
-    """How a run goes about: `attempts` a log has when workers are lost; `retry` what is in
-    quarantine; whether single reports and traces are wanted.
+    """Options of a fleet run.
+
+    `attempts` is the number of tries of a log after lost workers. `retry` selects the quarantined
+    logs. The other fields request single reports and traces.
     """
 
     attempts: int = 3
@@ -40,7 +42,7 @@ class Wishes:
 
 
 class Coordinator:
-    """One run over the files of `sources` into `store`; `run` does it."""
+    """Scheduler of one run: `run` processes the files of `sources` into `store`."""
 
     def __init__(self, store: Store, pool: Pool, wishes: Wishes, tell: Listener) -> None:
         self._store = store
@@ -58,7 +60,7 @@ class Coordinator:
         self._settings: set[str] = set()
 
     def run(self, scan: Scan, sources: Sources) -> Summary:
-        """Settle every file. Raises StoreError where the store cannot take what comes.
+        """Process every file. Raises StoreError if the store cannot be written.
 
         Whatever ends it early, the index holds what was learnt until then.
         """
@@ -99,7 +101,7 @@ class Coordinator:
             self._commit_if_due()
 
     def _due(self) -> Task | None:
-        """The next task to be tried again, unless its lost worker got as far as writing."""
+        """Return the next task to retry, unless its lost worker has written the result."""
         while self._later and self._later[0][0] <= monotonic():
             task = heapq.heappop(self._later)[2]
             outcome = self._store.written(task.log)
@@ -127,7 +129,7 @@ class Coordinator:
                         yield task
 
     def _task(self, one: Scanned) -> Task | None:
-        """The task of a file; None where its outcome is known, or is being worked on."""
+        """Create the task of a file; None if its outcome exists or its task is in flight."""
         file = one.file
         version = "" if one.recipe is None else one.recipe.version
         if one.recipe is not None and one.settings not in self._settings:
@@ -156,7 +158,7 @@ class Coordinator:
         )  # fmt: skip
 
     def _known(self, task: Task, file: FileRow) -> bool:
-        """Settle a log whose outcome is known and all of whose files are there."""
+        """Reuse the stored outcome of a log if all its files exist; return True if reused."""
         log = task.log
         state = self._index.state(log)
         if state is State.QUARANTINED and self._wishes.retry:
@@ -174,7 +176,7 @@ class Coordinator:
         return True
 
     def _take(self, task: Task, reply: Reply) -> None:
-        """Act on a worker's answer."""
+        """Handle the reply of a worker."""
         if isinstance(reply, Stopped):
             raise StoreError(reply.what, reply.remedy, Where(file=str(self._store.folder)))
         if isinstance(reply, Lost):
@@ -188,7 +190,7 @@ class Coordinator:
         self._settle(task.log, self._out.pop(task.log), reply, computed=True)
 
     def _lost(self, task: Task, loss: Lost) -> None:
-        """Try a log again later, or give it up when it lost too many workers."""
+        """Schedule a retry of a log, or quarantine the log after too many lost workers."""
         wait = 0.0
         if loss.blame:
             self._tries[task.log] += 1

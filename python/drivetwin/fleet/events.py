@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a run tells while it is going on: one event after the other, for people and machines."""
+"""Events of a fleet run in order of time, for people and machines."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drivetwin.fleet.task import State
 
 @dataclass(frozen=True)
 class Started:
-    """A run begins: so many files, where the rows go, where the work can be watched."""
+    """Start of a run: number of files, store folder, dashboard address."""
 
     event: ClassVar[str] = "started"
     files: int
@@ -22,7 +22,7 @@ class Started:
 
 @dataclass(frozen=True)
 class Settled:
-    """A file has its outcome. `computed` tells whether this run computed it."""
+    """Outcome of a file. `computed` is True if this run computed it."""
 
     event: ClassVar[str] = "log"
     path: str

@@ -64,7 +64,7 @@ def drift_figure(one: JointEstimate) -> go.Figure:
 
 
 def _after_change(one: JointEstimate) -> NDArray[np.bool_]:
-    """Which of the points are of a unit that changed, from its change on."""
+    """Return the mask of points that belong to a changed unit after its change."""
     units, found = np.array(one.points.unit), np.zeros(one.points.value.size, np.bool_)
     for change in one.changes:
         found |= (units == change.unit) & (one.points.reading >= change.after)
@@ -96,7 +96,7 @@ def _add_line(figure: go.Figure, one: JointEstimate, drift: Drift) -> None:
 
 
 def units_figure(one: JointEstimate) -> go.Figure:
-    """Deviations of the units with 95 % intervals, sorted; those beyond chance stand out."""
+    """Plot the sorted deviations of the units with 95 % intervals; highlight the outliers."""
     display = display_of(one.si_unit)
     units = sorted(one.units, key=lambda unit: unit.deviation)
     figure = go.Figure()
@@ -142,7 +142,7 @@ def units_figure(one: JointEstimate) -> go.Figure:
 
 
 def unit_label(one: JointEstimate, unit: UnitValue) -> str:
-    """A unit, or what became of it after a change."""
+    """Format the label of a unit, before or after a change."""
     if unit.since is None:
         return unit.unit
     return f"{unit.unit} from {reading_text(one.drifts[0].field, unit.since)}"
@@ -151,7 +151,7 @@ def unit_label(one: JointEstimate, unit: UnitValue) -> str:
 def _shown(
     field: str, readings: FloatArray
 ) -> FloatArray | np.ndarray[tuple[int], np.dtype[np.object_]]:
-    """Readings as they are drawn: dates as such."""
+    """Convert readings for plotting; date fields become dates."""
     if not is_date(field):
         return readings
     return np.array([moment(each) for each in readings], dtype=object)

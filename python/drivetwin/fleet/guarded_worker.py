@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One worker process under guard: it is given a log, watched, and ended where it goes astray."""
+"""Guarded worker process: it receives a log and is stopped when it exceeds its limits."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class _GoneError(Exception):
 
 
 class Cell:
-    """A worker process that is made when needed and made anew when it is gone.
+    """Worker process, started on demand and restarted after its end.
 
     For use by one thread; only `kill` may be called by others.
     """
@@ -68,7 +68,7 @@ class Cell:
         self._closed = False
 
     def run(self, task: Task) -> Reply:
-        """Do a task within the limits. Never raises for what the log or the worker does."""
+        """Run a task within the limits. Errors of log or worker are returned, not raised."""
         limits = self._spec.limits
         if fault := self._start():
             return fault
@@ -99,7 +99,7 @@ class Cell:
             self._end()
 
     def _start(self) -> Lost | Stopped | None:
-        """Have a worker that is ready; where none will start, it is no fault of the log.
+        """Start a worker and wait until it is ready; a failed start is not counted against the log.
 
         One that ends by itself will do so again; one that was killed may have been unlucky.
         """
@@ -192,7 +192,7 @@ class Cell:
 
 
 def time_exceeded(limits: Limits) -> Outcome:
-    """The outcome of a log that hung."""
+    """Return the outcome of a log that exceeded the time limit."""
     return Outcome(
         State.QUARANTINED,
         error="TimeLimit",
@@ -203,7 +203,7 @@ def time_exceeded(limits: Limits) -> Outcome:
 
 
 def _resident(pid: int) -> int:
-    """Memory [bytes] that a process holds; 0 where the system does not tell."""
+    """Read the resident memory [bytes] of a process; 0 if the system does not report it."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except (OSError, IndexError, ValueError):

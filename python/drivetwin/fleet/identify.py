@@ -15,7 +15,6 @@ from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, InputError, MissingChannelError, StoreError, Where
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.verdict import judge
 from drivetwin.fleet.mixed_model.remove_priors import free_friction
@@ -26,6 +25,7 @@ from drivetwin.fleet.task import Recipe, ShiftRow, Task
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.read import read_log
 from drivetwin.parameters import spec_of
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import FoundShifts, usable_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import validated
@@ -73,7 +73,7 @@ def _card(recipe: Recipe) -> VehicleCard:
 
 
 def _check_inputs(recipe: Recipe) -> None:
-    """Raise StoreError where card or mapping are no longer those that the log's key stands for."""
+    """Raise StoreError if card or mapping changed after the log's key was computed."""
     try:
         same = inputs_of(recipe.vehicle, recipe.channels) == recipe.inputs
     except (OSError, InputError):
@@ -103,7 +103,7 @@ def _artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
 def _means(task: Task, mapping: Path | None) -> Iterator[Row]:
     """Mean of each channel that is a field of the log, in the file's unit.
 
-    Of a channel without any value there is none: a warning says so. Raises MissingChannelError.
+    A channel without any value has no mean and gets a warning. Raises MissingChannelError.
     """
     if not task.recipe.means:
         return

@@ -62,12 +62,12 @@ its old path in the index; a log that stands at two places counts once.
 """
 
 RUN_COLUMNS = frozenset({"attempts", "seconds", "modified", "run"})
-"""What tells of the runs rather than of the logs: it differs where all else is equal."""
+"""Columns that describe the runs, not the logs; they differ between equal results."""
 
 
 @dataclass(frozen=True)
 class FileRow:
-    """A log file as it was last seen: size [bytes], time of change [ns], where it belongs."""
+    """Log file at its last scan: size [bytes], modification time [ns], unit and log key."""
 
     path: str
     log: str
@@ -117,7 +117,7 @@ class Index:
                 self._db.close()
 
     def commit(self) -> None:
-        """Make all that was written last."""
+        """Commit all writes."""
         with self._told():
             if self._db.in_transaction:
                 self._db.execute("COMMIT")
@@ -146,13 +146,13 @@ class Index:
         return None
 
     def seen_in_this_run(self, path: str) -> bool:
-        """Whether `put_file` was called for the path since this index was opened."""
+        """Return True if `put_file` was called for the path since this index was opened."""
         return bool(
             self._one("SELECT count(*) FROM files WHERE path = ? AND run = ?", path, self.run)
         )
 
     def put_file(self, file: FileRow) -> None:
-        """Remember a file; replaces what was known of its path."""
+        """Store a file; replace the earlier entry of its path."""
         fields = json.dumps(dict(file.fields))
         values = (file.path, file.log, file.content, file.size, file.modified, file.rule, file.unit)
         self._write(
@@ -161,33 +161,33 @@ class Index:
         )
 
     def state(self, log: str) -> State | None:
-        """Where a log stands; None where it is not known yet."""
+        """Return the state of a log; None if the log is not in the index."""
         for (state,) in self.select("SELECT state FROM logs WHERE log = ?", log):
             return State(state)
         return None
 
     def outcome(self, log: str) -> Outcome:
-        """What became of a log, without its shifts."""
+        """Return the outcome of a log, without its shifts."""
         (row,) = self.select("SELECT state, error, what, remedy FROM logs WHERE log = ?", log)
         return Outcome(State(row[0]), (), *row[1:])
 
     def put_settings(self, settings: str, version: str, document: str) -> None:
-        """Remember what a settings hash stands for."""
+        """Store the settings of a hash."""
         row = (settings, version, document)
         self._write("INSERT OR IGNORE INTO settings VALUES (?, ?, ?)", [row])
 
     def put_waiting(self, log: str, content: str, settings: str, version: str) -> None:
-        """Add a log that is to be done; one that is there already stays as it is."""
+        """Add a log in the waiting state; an existing log is unchanged."""
         sql = "INSERT OR IGNORE INTO logs (log, content, settings, version, state)"
         values = (log, content, settings, version, State.WAITING.value)
         self._write(f"{sql} VALUES (?, ?, ?, ?, ?)", [values])
 
     def put_attempts(self, log: str, attempts: int) -> None:
-        """Remember how often a log was tried."""
+        """Store the number of attempts of a log."""
         self._write("UPDATE logs SET attempts = ? WHERE log = ?", [(attempts, log)])
 
     def put_outcome(self, log: str, outcome: Outcome, seconds: float) -> None:
-        """Write what became of a log, and its shifts."""
+        """Store the outcome of a log, and its shifts."""
         self._write(
             "UPDATE logs SET state = ?, error = ?, what = ?, remedy = ?, seconds = ? WHERE log = ?",
             [(outcome.state, outcome.error, outcome.what, outcome.remedy, seconds, log)],
@@ -200,18 +200,18 @@ class Index:
         )
 
     def reset(self, logs: Iterable[str]) -> None:
-        """Let logs wait again."""
+        """Reset logs to the waiting state."""
         sql = "UPDATE logs SET state = ?, error = '', what = '', remedy = '', part = ''"
         values = [(State.WAITING.value, log) for log in logs]
         self._write(f"{sql} WHERE log = ?", values)
 
     def done(self, prefix: str = "") -> Iterator[tuple[str, str]]:
-        """Key and large part of the logs that are done and whose keys begin so, by key."""
+        """Iterate over key and large part of the done logs whose keys have the prefix, by key."""
         sql = "SELECT log, part FROM logs WHERE state = ? AND log >= ? AND log < ? ORDER BY log"
         yield from self.select(sql, State.DONE.value, prefix, prefix + _AFTER_HEX)
 
     def put_part(self, prefix: str, part: str) -> None:
-        """Let `part` hold the rows of all logs that are done and whose keys begin so."""
+        """Assign `part` to all done logs whose keys have the prefix."""
         sql = "UPDATE logs SET part = ? WHERE state = ? AND log >= ? AND log < ?"
         self._write(sql, [(part, State.DONE.value, prefix, prefix + _AFTER_HEX)])
 
@@ -220,7 +220,7 @@ class Index:
         return {part for (part,) in self.select("SELECT DISTINCT part FROM logs WHERE part != ''")}
 
     def count(self, state: State) -> int:
-        """How many logs stand so."""
+        """Count the logs in a state."""
         return int(self._one("SELECT count(*) FROM logs WHERE state = ?", state.value))
 
     def _write(self, sql: str, values: list[tuple[Any, ...]]) -> None:
@@ -235,7 +235,7 @@ class Index:
 
     @contextmanager
     def _told(self) -> Iterator[None]:
-        """SQLite's errors as ours."""
+        """Convert SQLite errors to StoreError."""
         try:
             yield
         except sqlite3.Error as fault:

@@ -17,7 +17,7 @@ LIBRARY = "plotly.js"
 
 
 def save_single(path: Path, found: Identification, log: ShiftLog) -> None:
-    """Write the report of one log beside the library that all reports of a fleet share."""
+    """Write the report of one log; all reports of a fleet use one library file."""
     library = path.with_name(LIBRARY)
     if not library.is_file():
         save_library(library)

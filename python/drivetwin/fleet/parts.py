@@ -45,7 +45,7 @@ def write_part(path: Path, log: str, outcome: Outcome, rows: Sequence[Row]) -> N
 
 @contextmanager
 def writing() -> Iterator[None]:
-    """What a worker cannot write, as a StoreError: no log is to blame, and the run stops."""
+    """Convert a worker's write error to a StoreError: no log caused it, and the run stops."""
     try:
         yield
     except OSError as fault:
@@ -54,7 +54,7 @@ def writing() -> Iterator[None]:
 
 
 def read_outcome(path: Path) -> Outcome | None:
-    """What a part says of its log; None where it does not exist or is no whole part."""
+    """Read the outcome of a log from its part; None if the part is missing or incomplete."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -89,9 +89,10 @@ def read_rows(path: Path, kinds: Sequence[RowKind] = ()) -> Any:
 
 
 def prefixes(count: int) -> list[str]:
-    """How the keys of `count` logs are divided into large parts: by their first digits.
+    """Return the prefixes by which the keys of `count` logs are divided into large parts.
 
-    Depends on the number alone, so that the same logs end in the same parts, however they came.
+    The prefixes depend on the number alone, so that the same logs end in the same parts in any
+    order.
     """
     found = [""]
     while count > _LOGS_PER_PART * len(found):
@@ -102,7 +103,7 @@ def prefixes(count: int) -> list[str]:
 def merge(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path]) -> str:
     """Write the large part of `logs` (sorted keys) from the parts that hold them; its name.
 
-    The name tells its logs, so that a part of the same logs is never written twice.
+    The name is a hash of its logs, so that a part of the same logs is never written twice.
     Raises OSError and StoreError.
     """
     import pyarrow as pa
@@ -118,7 +119,7 @@ def merge(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path
 
 
 def _by_log(rows: Any) -> Iterator[tuple[str, Any]]:
-    """The rows of each log of a part, as a record batch without a copy; they stand together."""
+    """Iterate over the adjacent rows of each log of a part, as record batches without a copy."""
     import pyarrow.compute as pc
 
     for batch in rows.combine_chunks().to_batches():
@@ -139,7 +140,7 @@ def _bytes(whole: Any) -> bytes:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in a folder last through a power cut, where the system can."""
+    """Synchronise a folder to disk, if the system supports it, to survive a power failure."""
     if os.name != "posix":
         return
     handle = os.open(folder, os.O_RDONLY)

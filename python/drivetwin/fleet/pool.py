@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where tasks are done: what the coordinator asks of it, and the processes of this machine."""
+"""Worker pools: the interface used by the coordinator, and the processes of this machine."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class Pool(Protocol):
 
     @property
     def capacity(self) -> int:
-        """How many tasks may be given out and unanswered."""
+        """Maximum number of tasks in flight."""
 
     @property
     def address(self) -> str | None:
-        """Where people can watch it, if anywhere."""
+        """Address of the pool's dashboard, if any."""
 
     def submit(self, task: Task) -> None:
         """Give out a task."""
 
     def next(self, timeout: float) -> tuple[Task, Reply] | None:
-        """The next answer, None where none comes within `timeout` [s]."""
+        """Return the next reply, or None after `timeout` [s]."""
 
     def close(self) -> None:
         """End all work at once."""
@@ -44,7 +44,7 @@ def usable_cores() -> int:
 
 
 class LocalPool:
-    """Worker processes of this machine, each watched by a thread of its own."""
+    """Worker processes of this machine, each with a supervising thread."""
 
     address = None
 

@@ -109,7 +109,7 @@ def _readings(fields: str) -> dict[str, float | datetime]:
 
 
 def save_answer(answer: Answer, path: Path) -> None:
-    """Write an answer as CSV, or as Parquet where the name ends so."""
+    """Write an answer as CSV, or as Parquet for a name that ends in `.parquet`."""
     from io import BytesIO, StringIO
 
     from drivetwin._util.atomic import write_bytes, write_text

@@ -31,5 +31,5 @@ def span_text(field: str, low: float, high: float) -> str:
 
 
 def drift_unit(field: str) -> tuple[float, str]:
-    """What a change with one unit of the field is multiplied by to be shown, and per what it is."""
+    """Return the factor and the unit by which a change per unit of the field is displayed."""
     return (_YEAR, "year") if is_date(field) else (1.0, field)

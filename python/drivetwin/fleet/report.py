@@ -58,7 +58,7 @@ def save_fleet_report(store: Store, path: Path) -> list[JointEstimate]:
 def render_fleet(
     store: Store, found: Sequence[JointEstimate], folder: Path, library: str | None = None
 ) -> str:
-    """HTML text of the page, which will stand in `folder`: links count from there."""
+    """Return the HTML text of the page; links are relative to `folder`."""
     sections = [
         _overview(store),
         _parameters(found, untold(store, found)),
@@ -187,7 +187,7 @@ def _between(ci95: Interval, factor: float) -> str:
 
 
 def remark(one: JointEstimate, shared: Sequence[str] = ()) -> str:
-    """What there is to say of an estimate, in words; `shared` is said of all elsewhere."""
+    """Return the remark on an estimate; `shared` is the remark made of all elsewhere."""
     parts = [note for note in one.notes if note not in shared]
     if drift := _whole_drift(one):
         parts.append(_drift_text(one, drift) + _small(drift, one))
@@ -221,12 +221,12 @@ def _drift_text(one: JointEstimate, whole: float) -> str:
 
 
 def _own(one: JointEstimate) -> float:
-    """The error that a log states of its own, in the middle."""
+    """Return the median standard error of the logs."""
     return float(np.median(one.points.std))
 
 
 def _small(size: float, one: JointEstimate) -> str:
-    """What to say of an effect that is real but less than one log's own error."""
+    """Describe an effect that is significant but smaller than the error of one log."""
     if abs(size) >= _own(one):
         return ""
     return ", by less than one log's own error: an error of the method may look like that"
@@ -255,7 +255,7 @@ def ageing(found: Sequence[JointEstimate]) -> Section:
 
 
 def _effect(one: JointEstimate) -> float:
-    """How large drift and spread are, where they are certain, against one log's own error."""
+    """Return the size of the significant drift and spread, relative to the error of one log."""
     return max(abs(_whole_drift(one)), _sure_spread(one)) / _own(one)
 
 
@@ -304,7 +304,7 @@ def _odd(store: Store, found: Sequence[JointEstimate], folder: Path) -> Section:
 
 
 def _values(one: JointEstimate, outlier: Outlier) -> tuple[str, str]:
-    """What a log says and what its unit and fields let expect."""
+    """Return the value of a log and the value expected from its unit and fields."""
     display = display_of(one.si_unit)
     value = f"{significant(outlier.value * display.factor)} {display.label}".removesuffix(" –")
     return value, significant(outlier.expected * display.factor)
@@ -352,7 +352,7 @@ def _failed(store: Store) -> Section:
 
 
 def _settings(store: Store) -> Section:
-    """What the rows were made with; one note for each settings hash in use."""
+    """List the settings of the rows, with one note for each settings hash."""
     sql = (
         "SELECT settings, document, count(*) FROM files JOIN logs USING (log) "
         "JOIN settings USING (settings) GROUP BY settings ORDER BY settings"

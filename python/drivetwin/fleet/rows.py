@@ -16,7 +16,7 @@ MU = "mu."
 
 
 class RowKind(StrEnum):
-    """What a row tells, and what its `name` is."""
+    """Kind of a row, which also determines the meaning of its `name`."""
 
     PARAMETER = "parameter"
     """Parameter id; `mu.<element>` is μ at slip `at`."""
@@ -63,7 +63,7 @@ ROW_COLUMNS = ("log", *(field.name for field in fields(Row)))
 
 @dataclass(frozen=True)
 class Found:
-    """What identifying a log gave: its rows and its shifts."""
+    """Result of identifying a log: its rows and its shifts."""
 
     rows: Sequence[Row]
     shifts: Sequence[ShiftRow]

@@ -59,7 +59,7 @@ class RuleTable(StrictModel):
         return self
 
     def fits(self, path: str, unit: str, channels: frozenset[str]) -> bool:
-        """Whether a log with this path, unit and names of channels is of this rule."""
+        """Return True if the rule applies to a log with this path, unit and channel names."""
         if self.path is not None and not fnmatchcase(path, self.path):
             return False
         if self.units is not None and unit not in self.units:
@@ -96,7 +96,7 @@ class RulesFile(StrictModel):
     @field_validator("fields")
     @classmethod
     def _names_of_their_own(cls, fields: dict[str, FieldTable]) -> dict[str, FieldTable]:
-        """Fields become columns beside those of files and rows; SQL knows no case."""
+        """Check that field names differ from other columns; SQL ignores case."""
         taken = {*FILE_COLUMNS, *ROW_COLUMNS}
         for name in fields:
             if name.casefold() in taken:
@@ -119,7 +119,7 @@ class RulesFile(StrictModel):
         return str(found[1])
 
     def fields_of(self, source: Source) -> dict[str, float]:
-        """The fields that path and list tell, in the order of the rules."""
+        """Return the fields found in path and list, in the order of the rules."""
         found = {}
         for name, table in self.fields.items():
             text = None
@@ -139,7 +139,7 @@ class RulesFile(StrictModel):
 
 
 def is_date(field: str) -> bool:
-    """Whether a field holds dates."""
+    """Return True if a field holds dates."""
     return field == "date" or field.endswith("_date")
 
 

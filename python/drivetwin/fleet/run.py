@@ -20,9 +20,9 @@ from drivetwin.fleet.task import WorkerSpec
 
 @dataclass(frozen=True)
 class FleetRun:
-    """What `drivetwin fleet` is asked: files, rules, where to, by which workers.
+    """Request of `drivetwin fleet`: files, rules, output folder and workers.
 
-    `workers` processes run on this machine, one for each core where None; with `scheduler`, the
+    `workers` processes run on this machine, one for each core if None. With `scheduler`, the
     address of a Dask scheduler, the work is done there instead.
     """
 

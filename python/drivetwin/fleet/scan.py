@@ -34,7 +34,7 @@ _KEY = 40
 
 @dataclass(frozen=True)
 class Scanned:
-    """A file that was looked at. `recipe` is None where `fault` says why it cannot be used."""
+    """A scanned file. `recipe` is None if it cannot be used; `fault` then holds the reason."""
 
     file: FileRow
     settings: str
@@ -50,7 +50,7 @@ class Skipped:
 
 
 Known = Callable[[str], FileRow | None]
-"""Finds what the index knows of a path."""
+"""Looks up the index entry of a path."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Scan:
 
 
 def inputs_of(vehicle: str, channels: str | None) -> tuple[tuple[str, str], ...]:
-    """SHA-256 of a card, a channel mapping and the DBC files behind it, as they are now."""
+    """Compute the SHA-256 of a card, a channel mapping and the DBC files of the mapping."""
     inputs = [("vehicle", _digest(Path(vehicle)))]
     if channels is not None:
         inputs.append(("channels", _digest(Path(channels))))
@@ -132,7 +132,7 @@ def inputs_of(vehicle: str, channels: str | None) -> tuple[tuple[str, str], ...]
 
 
 def settings_document(recipe: Recipe) -> str:
-    """What decides the rows of a log besides its content, as JSON; paths do not count."""
+    """Return as JSON the settings that determine a log's rows; paths are not included."""
     tree = {k: v for k, v in asdict(recipe).items() if k not in ("vehicle", "channels")}
     return json.dumps({**tree, "rows": ROWS_FORMAT}, sort_keys=True)
 
@@ -171,7 +171,7 @@ def _unreadable(fault: OSError, path: str) -> DrivetwinError:
 
 
 def _refused(path: str, unit: str, content: _Content, error: DrivetwinError) -> Scanned:
-    """A file that no task can be made of; it is looked at anew in the next run."""
+    """Return a file that cannot become a task; the next run scans it again."""
     outcome = Outcome(State.BAD, (), type(error).__name__, error.what, error.remedy)
     log = _key("refused", content.digest or path, unit, error.what)
     file = FileRow(path, log, content.digest, content.size, content.modified, "", unit, {})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which files belong to a fleet: files, folders, globs and lists, one after the other."""
+"""Files of a fleet: files, folders, globs and lists, one after the other."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PATH = "path"
 
 @dataclass(frozen=True)
 class Source:
-    """A file, and what the list says of it by column."""
+    """A file, and its list entries by column."""
 
     path: Path
     told: Mapping[str, str] = field(default_factory=dict)
@@ -27,11 +27,11 @@ class Source:
 
 @dataclass(frozen=True)
 class Sources:
-    """What the user named: `given` are files, folders and globs, `listed` is a list of files.
+    """Sources named by the user: `given` are files, folders and globs, `listed` is a list of files.
 
     The list is a CSV table with a column `path` (from the list's folder) and any others, or one
-    path a line. Iterating yields absolute paths in an order that depends on the files alone; it
-    may be done again. A file that is named twice is yielded twice.
+    path a line. Iterating yields absolute paths in an order that depends on the files alone; it may
+    be repeated. A file that is named twice is yielded twice.
     """
 
     given: Sequence[str]
@@ -44,7 +44,7 @@ class Sources:
             yield from map(Source, _below(name))
 
     def count(self) -> int:
-        """How many files there are. Raises InputError where a name stands for none."""
+        """Count the files. Raises InputError if a name matches no file."""
         return sum(1 for _ in self)
 
 

@@ -90,7 +90,7 @@ class Store:
             raise StoreError(what, "check its permissions and the free space", place) from None
 
     def _repair(self) -> None:
-        """Let the logs wait again whose rows are gone, and drop what no run finished."""
+        """Reset the logs whose rows are missing to waiting, and delete unfinished files."""
         for part in self.index.large_parts():
             if not (self.folder / part).is_file():
                 logs = self.index.select("SELECT log FROM logs WHERE part = ?", part)
@@ -110,25 +110,25 @@ class Store:
                 file.unlink()
 
     def part(self, log: str) -> Path:
-        """Where a log's own part stands."""
+        """Return the path of a log's own part."""
         return self.folder / parts.part_of(log)
 
     def report(self, log: str) -> Path:
-        """Where the report of a single log stands."""
+        """Return the path of a single log's report."""
         return self.folder / REPORTS / f"{log}.html"
 
     def traces(self, log: str) -> Path:
-        """Where the traces of a single log stand."""
+        """Return the path of a single log's traces."""
         return self.folder / TRACES / f"{log}.parquet"
 
     def misses(self, task: Task) -> bool:
-        """Whether a report or traces that are wanted are not there."""
+        """Return True if a requested report or trace file is missing."""
         return any(
             one is not None and not Path(one).is_file() for one in (task.report, task.traces)
         )
 
     def written(self, log: str) -> Outcome | None:
-        """The outcome that a worker wrote, though the index may not know of it yet."""
+        """Read the outcome written by a worker, which may not be in the index yet."""
         return parts.read_outcome(self.part(log))
 
     def compact(self) -> None:
@@ -170,7 +170,7 @@ class Store:
         return whole.take(pc.sort_indices(whole.column("log")))
 
     def table(self, name: str) -> list[dict[str, Any]]:
-        """Rows of a table of the index by its key, without what tells of the runs only."""
+        """Read the rows of an index table by its key, without the columns on runs."""
         columns = [column for column in self.index.columns(name) if column not in RUN_COLUMNS]
         listed = ", ".join(f'"{column}"' for column in columns)
         rows = self.index.select(f"SELECT {listed} FROM {name} ORDER BY 1, 2")
@@ -178,7 +178,7 @@ class Store:
 
     @contextmanager
     def _space(self) -> Iterator[None]:
-        """A full or read-only disk as a StoreError."""
+        """Convert errors of a full or read-only disk to StoreError."""
         try:
             yield
         except OSError as fault:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a worker is asked and what comes back, as plain data that crosses a pipe or a network."""
+"""Requests and replies of a worker, as plain data that crosses a pipe or a network."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GO_ON = (
 
 
 class State(StrEnum):
-    """Where a log stands. The last three are final for its content and settings."""
+    """State of a log. The last three are final for its content and settings."""
 
     WAITING = "waiting"
     DONE = "done"
@@ -92,7 +92,7 @@ class ShiftRow:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a log: final, and the same whenever it is done with the same recipe.
+    """Final result of a log; it is reproducible with the same recipe.
 
     `error`, `what` and `remedy` are those of the typed error of a log that is not done.
     """
@@ -116,7 +116,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Finished:
-    """A worker's answer: the outcome and the time [s] that it took."""
+    """Reply of a worker: the outcome and the computing time [s]."""
 
     outcome: Outcome
     seconds: float
@@ -147,7 +147,7 @@ Reply = Finished | Lost | Stopped
 
 @dataclass(frozen=True)
 class Limits:
-    """What one log may take: time [s] and memory [bytes] of its worker."""
+    """Time [s] and memory [bytes] that the worker of one log may use."""
 
     seconds: float = 600.0
     memory: int = 4 * 2**30
@@ -155,7 +155,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class WorkerSpec:
-    """How a worker is made: its function as `module:name`, and the limits of one log."""
+    """Specification of a worker: its function as `module:name`, and the limits of one log."""
 
     function: str = "drivetwin.fleet.identify:identify_log"
     limits: Limits = field(default_factory=Limits)

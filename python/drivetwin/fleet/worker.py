@@ -33,7 +33,7 @@ for what grows too fast to be seen there."""
 
 
 def answer(work: Work, task: Task, memory: int) -> dict[str, Any]:
-    """Do a task, write its part, and say what became of it; see `Cell` for the keys."""
+    """Run a task, write its part, and return its outcome; see `GuardedWorker` for the keys."""
     started = perf_counter()
     if task.recipe.version != program_version():
         versions = f"{program_version()} where the worker is, {task.recipe.version} here"
@@ -61,7 +61,7 @@ def answer(work: Work, task: Task, memory: int) -> dict[str, Any]:
 
 
 def _unread(fault: OSError) -> Outcome:
-    """What a drive did to a log: no part says so, for its content may be read another time."""
+    """I/O error while reading a log. Not recorded as its outcome, because a retry may succeed."""
     return Outcome(
         State.QUARANTINED,
         error=type(fault).__name__,
@@ -71,7 +71,7 @@ def _unread(fault: OSError) -> Outcome:
 
 
 def _bad(error: DrivetwinError) -> Outcome:
-    """What a typed error says, without the path: the same content may stand at several."""
+    """Convert a typed error to an outcome without the path, which is not unique."""
     place = str(replace(error.where, file=None))
     what = f"{place}: {error.what}" if place else error.what
     return Outcome(State.BAD, error=type(error).__name__, what=what, remedy=error.remedy)
@@ -83,7 +83,7 @@ def _unexpected(fault: Exception) -> Outcome:
 
 
 def limit_memory(memory: int) -> None:
-    """Let allocations beyond the limit fail [bytes]; where the system cannot, do nothing."""
+    """Make allocations beyond the limit [bytes] fail, if the system supports it."""
     try:
         import resource
     except ImportError:

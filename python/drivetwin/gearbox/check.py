@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faults of a gearbox card that lie between its tables: names that nothing else knows."""
+"""Cross-table checks of a gearbox card: undefined names, unconnected members."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The error seen: whole gearbox and dual-clutch form simulated over the same reference shift."""
+"""Simulate whole gearbox and dual-clutch form over one reference shift and compare them."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What surrounds a gearbox in a shift: engine, output shaft, vehicle, and the shift's pace."""
+"""Surroundings of a gearbox in a shift: engine, output shaft, vehicle, and shift durations."""
 
 from __future__ import annotations
 

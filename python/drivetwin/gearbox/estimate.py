@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""How far the dual-clutch form without M12 goes astray, before any simulation.
+"""Closed-form estimate of the error of the dual-clutch form without M12.
 
-Closed forms of a reference shift with constant torques in each phase; the derivation stands in
+The reference shift has constant torques in each phase. The derivation is in
 docs/explanation/coupling-error.md.
 """
 
@@ -44,7 +44,7 @@ def estimate(reduction: Reduction, drive: Drive | None = None) -> CouplingError:
 
 @dataclass(frozen=True)
 class _InertiaPhase:
-    """What a coupling does before lock-up, in first order.
+    """First-order effect of the coupling M12 on the motion before lock-up.
 
     `M12` [kg m^2]; `ahead` the output speed gained before the release, `shift_in` and `shift_out`
     what the coupling adds to the swings, `in_at_lock` and `out_at_lock` the whole differences when

@@ -96,7 +96,7 @@ class Reduction:
 
     @property
     def exact(self) -> bool:
-        """Whether the dual-clutch form is exact: M12 vanishes."""
+        """True if the dual-clutch form is exact, i.e. M12 is zero."""
         return self.coupling_ratio <= _NO_COUPLING
 
     def condition(self) -> str:

@@ -19,7 +19,7 @@ GROUND = "ground"
 
 
 class ElementKind(StrEnum):
-    """What a shift element is.
+    """Type of a shift element.
 
     `DOG` stands for dog clutches and synchronisers: engaged without slip, never under load.
     """
@@ -56,7 +56,7 @@ class GearPair:
 
 @dataclass(frozen=True)
 class Capacity:
-    """What an element transmits: μ·gain·(P - P0), static `peak` times that (THEORY section 1).
+    """Torque capacity of an element: μ·gain·(P - P0), static `peak` times that (THEORY section 1).
 
     `gain` = N·D·A·r [m^3], `P0` [Pa].
     """
@@ -98,7 +98,7 @@ class GearEntry:
     tolerance: float
 
     def agrees(self, ratio: float) -> bool:
-        """Whether a computed ratio is the published one within its rounding."""
+        """Return True if a computed ratio equals the published one within its rounding."""
         return abs(ratio - self.published) <= self.tolerance * (1.0 + 1e-9)
 
 
@@ -142,8 +142,9 @@ class Gearbox:
         )
 
     def capacity(self, element: str) -> Capacity:
-        """Return what an element transmits; raises ReductionError where the card does not say, and
-        for a dog.
+        """Return the torque capacity of an element.
+
+        Raises ReductionError for a dog and where the card states no capacity.
         """
         capacity = self.elements[element].capacity
         if element in self.dogs:

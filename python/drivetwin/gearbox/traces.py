@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What two models of one shift are compared by."""
+"""Signals and errors by which two models of one shift are compared."""
 
 from __future__ import annotations
 

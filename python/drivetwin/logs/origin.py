@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Time stamps that count from far back, as from 1970, are made to count from the first of the log.
+"""Shift of time stamps with a distant epoch, such as 1970, to the first stamp of the log.
 
-So far from zero a stamp has no digits left for the fractions of a sample that a simulation tells
-apart. Channels of one log share one origin: how they lie to each other stays.
+Far from zero a float has too few digits for the fractions of a sample that a simulation needs.
+All channels of a log have the same origin, so their relative timing does not change.
 """
 
 from __future__ import annotations

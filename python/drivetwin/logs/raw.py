@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What every reader delivers: named columns in the file's own units, each on its own time base.
+"""Interface of all readers: named columns in the units of the file, each on its own time base.
 
 A reader opens a file as a `Recording`: it lists columns at once and loads one when asked, so that
 memory is bounded by what is selected. Text files are in memory anyway: `RawLog`.
@@ -26,7 +26,7 @@ class RawChannel:
     """One column as recorded: `time` (n,) [s], `values` (n,) in `unit`; None: file names no unit.
 
     Values may hold NaN where the file says so; a sample that the file does not have is absent.
-    `notes` tell what the reader left out and why.
+    `notes` list the samples that the reader dropped, with the reason.
     """
 
     name: str
@@ -49,7 +49,7 @@ class RawChannel:
 
     @property
     def rate(self) -> float | None:
-        """Samples per second; None where it cannot be told."""
+        """Samples per second; None below two samples."""
         step = self.step
         return 1.0 / step if step is not None and step > 0.0 else None
 
@@ -68,7 +68,7 @@ class RawChannel:
 
     @property
     def pauses(self) -> int:
-        """Number of interruptions in time, whether or not numbers stand beside them."""
+        """Number of interruptions of the stamps, with or without numbers next to them."""
         stamps = self.stamps
         return int(np.count_nonzero(np.diff(stamps) > gap_limit(stamps)))
 
@@ -124,7 +124,7 @@ class Joined:
 
 @dataclass(frozen=True, eq=False)
 class RawLog:
-    """All columns of one file in memory. `unreadable` tells by name why one holds no numbers."""
+    """All columns of one file in memory. `unreadable`: reason for each column without numbers."""
 
     channels: tuple[RawChannel, ...]
     unreadable: Mapping[str, str] = field(default_factory=dict)

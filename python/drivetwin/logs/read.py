@@ -115,7 +115,7 @@ def _refuse_unitless(
 ) -> None:
     """Name all channels without a unit at once, but those that may be left out.
 
-    Of a column without numbers that is not the fault to tell.
+    Columns without numbers are reported elsewhere.
     """
     without = {
         role: spec.source
@@ -180,7 +180,7 @@ def _channel(role: str, spec: ChannelSpec, source: RawChannel, file: str) -> Cha
 
 
 def _checked(role: str, spec: ChannelSpec, raw: RawChannel, file: str) -> Checked:
-    """The channel of a role, fit for use, and what is to be said of it."""
+    """Return the checked channel of a role, and its warnings."""
     notes = [f"channel {raw.name!r}: {note}" for note in raw.notes]
     found = check_channel(_channel(role, spec, raw, file), file)
     held = find_raster(found.channel) is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What each column of a file holds, one column in memory at a time."""
+"""Summary of each column of a file, with one column in memory at a time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ColumnSummary:
     """A column as recorded: `rate` [Hz] of its updates, `range` in the file's unit.
 
     `span` is first and last time [s]; `gaps` counts samples without a number and interruptions.
-    `fault` tells why a column holds no numbers.
+    `fault` is the reason why a column has no numbers.
     """
 
     column: Column
@@ -33,7 +33,7 @@ class ColumnSummary:
 
 @dataclass(frozen=True)
 class Summary:
-    """All columns of a file in file order, and what its reader has to say."""
+    """All columns of a file in file order, and the warnings of its reader."""
 
     columns: tuple[ColumnSummary, ...]
     warnings: tuple[str, ...]
@@ -63,7 +63,7 @@ def _summary(column: Column, channel: RawChannel) -> ColumnSummary:
 
 
 def _update_rate(channel: RawChannel) -> float | None:
-    """Updates per second; of a held signal those of its sender, not the logger's."""
+    """Return the updates per second; for a held signal the rate of the sender."""
     step = channel.step
     if step is None or step <= 0.0:
         return None

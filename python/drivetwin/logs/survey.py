@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a log file holds, column by column, before anything is computed from it."""
+"""Survey of the contents of a log file, column by column."""
 
 from __future__ import annotations
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Torques that no sensor shows, from speeds and engine torque with an identified twin."""
+"""Estimation of unmeasured torques from speeds and engine torque with an identified twin."""

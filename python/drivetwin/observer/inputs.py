@@ -15,7 +15,7 @@ from drivetwin.estimation.data.shift_data import Sampled
 from drivetwin.estimation.likelihood.data.input_smoothing import local_mean
 from drivetwin.observer.linear_model import BoolArray, Course
 from drivetwin.observer.result import FloatArray
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement
 
 GRID = 1e-3
@@ -33,15 +33,13 @@ HAND_OVER = 10.0
 """Drift [1/sqrt(s)] of an unknown torque while the elements hand over: a level in 10 ms."""
 RATE = 0.01
 """Time on either side of an instant over which the rate of the engine speed is taken [s]."""
-_HANDED_UP = (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_DOWN)
-"""Kinds of shift in which the on-coming element carries the torque while both slip."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What an observer sees of one shift: fresh samples, SI; `pressures` only where there are any.
+    """Measured input of an observer for one shift: fresh samples, SI; `pressures` may be empty.
 
-    `time` (N,) holds every stamp of `speeds`, which goes by `engine_speed`, `output_speed` and
+    `time` (N,) contains every stamp of `speeds`. Its keys are `engine_speed`, `output_speed` and
     `wheel_speed`; the last may be missing.
     """
 
@@ -107,10 +105,10 @@ def _floored(signal: Sampled) -> Sampled:
 
 
 def is_driving(model: DualClutch, seen: Recorded, delay: float) -> BoolArray:
-    """Whether power flows from the engine over each step (N-1,): T_g = T_e - J1·ω_e' ≥ 0.
+    """Determine if power flows from the engine over each step (N-1,): T_g = T_e - J1·ω_e' ≥ 0.
 
-    The sign of T_e does not tell it: with a closed pedal the engine still drives while it is slowed
-    down. `delay` [s] is the age of the engine torque.
+    The sign of T_e alone is not sufficient: with a released pedal a decelerating engine still
+    drives. `delay` [s] is the delay of the engine torque.
     """
     middle = 0.5 * (seen.time[1:] + seen.time[:-1])
     before = np.maximum(middle - RATE, seen.time[0])
@@ -156,7 +154,7 @@ def course_of(model: DualClutch, seen: Recorded, delay: float, driving: BoolArra
 def _unknown(shift: Shift, name: str, middle: FloatArray) -> tuple[BoolArray, BoolArray]:
     """When (n,) an element of unknown pressure may carry torque, and when that changes in haste."""
     start, end = shift.inertia_phase
-    by_oncoming = shift.kind in _HANDED_UP
+    by_oncoming = shift.kind.has_torque_phase_first
     if name == shift.oncoming:
         first = start - ONSET if by_oncoming else end - VENT
         window = (middle >= first) & (middle < end)

@@ -33,12 +33,12 @@ SPEEDS = 3
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What is known over the grid `time` (N,), each over the N-1 steps between.
+    """Inputs over the grid `time` (N,), each over the N-1 steps between.
 
-    `engine_torque` [N m] as it acts; `driving`, whether power flows from the engine, T_g ≥ 0; by
-    element `locked`, `base` [N m], the torque while it slips, with the sign of the slip and 0 while
-    it is open, and least `drift` [1/sqrt(s)] of the relative error of that; `error_rate` [1/s] at
-    which the engine torque's error is forgotten.
+    `engine_torque` [N m] is corrected for its delay. `driving` is True if power flows from the
+    engine, T_g ≥ 0. By element: `locked`; `base` [N m], the torque while it slips, with the sign of
+    the slip and 0 while it is open; and `drift` [1/sqrt(s)], the lower bound of the drift of its
+    relative error. `error_rate` [1/s] is the decay rate of the engine torque's error.
     """
 
     time: FloatArray
@@ -66,7 +66,7 @@ class Linear:
 
 
 def answer(model: DualClutch, one: ShiftElement) -> tuple[FloatArray, FloatArray]:
-    """What a unit impulse of an element does to the three speeds (3,), and its slip's row (3,)."""
+    """Response of the three speeds (3,) to a unit impulse of an element, and its slip row (3,)."""
     g = _direction(model, one)
     mass = np.diag([model.J1 * model.eta + model.J2e, model.J_out, model.J_v])
     for each in model.elements:

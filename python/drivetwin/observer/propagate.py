@@ -38,7 +38,7 @@ class Uncertain:
         return self.twin.dual_clutch(self.shift, overrides=own)
 
     def named(self, values: FloatArray) -> Mapping[str, float]:
-        """The same values by id."""
+        """Return the `values` (p,) by parameter id."""
         return dict(zip(self.ids, values.tolist(), strict=True))
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What an observer returns: torques over time with their standard deviations."""
+"""Result of an observer: torques over time with their standard deviations."""
 
 from __future__ import annotations
 

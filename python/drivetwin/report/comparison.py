@@ -54,7 +54,7 @@ def trials_of(
 ) -> list[Trial]:
     """Simulate every shift of a log, called `name`, with every twin.
 
-    A twin that lacks a parameter, gear or channel is named in `refused`; progress is told.
+    A twin that lacks a parameter, gear or channel is named in `refused`. Progress is reported.
     """
     trials = []
     for count, shift in enumerate(shifts):

@@ -32,7 +32,7 @@ def envelope(
 def focused(
     time: FloatArray, values: FloatArray, focus: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Envelope of a trace (n,) that keeps its points where they are looked at: inside `focus` [s].
+    """Decimate a trace (n,) to its envelope outside `focus` [s]; keep all points inside.
 
     Traces of up to MAX_POINTS come back unchanged.
     """

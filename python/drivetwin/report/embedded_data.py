@@ -27,7 +27,7 @@ EVEN = 0.01
 
 @dataclass
 class Store:
-    """Arrays by number, equal ones once; `index` says how to read each from the bytes."""
+    """Numbered arrays without duplicates; `index` describes the encoding of each in the bytes."""
 
     index: list[dict[str, Any]] = field(default_factory=list)
     _bytes: list[bytes] = field(default_factory=list)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a comparison compares: several identifications, and their simulations of common logs."""
+"""Inputs of a comparison: several identifications, and their simulations of common logs."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class Candidate:
 
     @classmethod
     def of_twin(cls, name: str, twin: Twin) -> Candidate:
-        """What a twin file tells."""
+        """Create a candidate from a twin file."""
         return cls(name, twin.method, twin.parameters, twin.friction, {}, twin.inputs, twin.version)
 
     @classmethod
     def of_result(cls, name: str, content: ResultFile) -> Candidate:
-        """What a result file tells."""
+        """Create a candidate from a result file."""
         nan = float("nan")
         fit = {
             signal: {
@@ -64,7 +64,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One shift of a log, simulated by each candidate that can; `refused` says why others cannot.
+    """One shift of a log, simulated by each candidate; `refused` holds the reasons of failures.
 
     `label` names log and shift.
     """
@@ -76,7 +76,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Agreement:
-    """One parameter over the candidates, in their order; None where one does not tell it.
+    """One parameter over the candidates, in their order; None if a candidate has no estimate.
 
     `mean` is weighted by the inverse variances; `apart` is the largest difference of two
     candidates in its standard deviations (sensor tolerances included). A value without an interval
@@ -91,18 +91,18 @@ class Agreement:
 
     @property
     def bare(self) -> tuple[int, ...]:
-        """Places of the candidates that tell a value without an interval."""
+        """Indices of the candidates with a value but without an interval."""
         told = [(k, one) for k, one in enumerate(self.estimates) if one and one.value is not None]
         return tuple(k for k, one in told if not _has_interval(one.std_total))
 
     @property
     def agrees(self) -> bool | None:
-        """Whether the values agree within their uncertainty; None where that cannot be said."""
+        """True if the values agree within their uncertainty; None if the uncertainty is unknown."""
         return None if self.apart is None else self.apart <= DIFFER
 
 
 def agreements(candidates: Sequence[Candidate]) -> list[Agreement]:
-    """Every parameter that some candidate tells, in the order of the first that does."""
+    """Compare every parameter that some candidate estimates, in the order of the first such one."""
     ids = dict.fromkeys(name for one in candidates for name in one.estimates)
     found = (_agreement(name, [one.estimates.get(name) for one in candidates]) for name in ids)
     return [one for one in found if one is not None]

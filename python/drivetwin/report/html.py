@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The report: one HTML file that opens offline; plotly.js stands in it exactly once, compressed."""
+"""The report: one HTML file that opens offline and contains plotly.js once, compressed."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How parameters and channels are called in tables and figures."""
+"""Labels of parameters and channels in tables and figures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _SYMBOLS = {
 
 
 def channel_symbol(role: str) -> str:
-    """Role of a channel as a symbol, e.g. `T_o` or `P B2`; the role itself where it has none."""
+    """Return the symbol of a channel, e.g. `T_o` or `P B2`; the role itself without a symbol."""
     element = pressed_element(role)
     return _SYMBOLS.get(role, role) if element is None else f"P {element}"
 

@@ -182,7 +182,7 @@ def _parameters(estimates: Iterable[Estimate]) -> Table:
 
 
 def _reasons(estimates: Iterable[Estimate]) -> list[str]:
-    """What stands behind verdicts, each reason once with all parameters that share it."""
+    """Collect the reasons of the verdicts, each once with all parameters that share it."""
     shared: dict[str, list[str]] = {}
     for one in estimates:
         if one.reason:

@@ -29,7 +29,7 @@ VERDICT_COLOURS = {
 }
 
 DIVERGING = [[0.0, "#D55E00"], [0.5, "#f4f4f4"], [1.0, "#0072B2"]]
-"""From vermilion over white to blue, told apart in every kind of colour vision."""
+"""From vermilion over white to blue, distinguishable in every kind of colour vision."""
 
 PHASE_FILL = {
     "before": "rgba(0,0,0,0)",
@@ -42,7 +42,7 @@ PHASE_NUMBER = {"before": "1", "torque": "2", "inertia": "3", "after": "4"}
 
 @dataclass(frozen=True)
 class CandidateStyle:
-    """How one of several compared things is drawn: colour, its pale form, dash and marker."""
+    """Drawing style of one compared item: colour, pale colour, dash and marker."""
 
     colour: str
     fill: str
@@ -88,7 +88,7 @@ def axis(title: str, **extra: Any) -> dict[str, Any]:
 
 
 def layout(height: int, **extra: Any) -> dict[str, Any]:
-    """Layout common to all figures; transparent, so that the page's theme shows through."""
+    """Return the common layout of all figures; the background is transparent."""
     return {
         "template": go.layout.Template(),
         "height": height,

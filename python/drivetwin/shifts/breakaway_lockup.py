@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.shifts.changepoint import Hinge, Moving, fit_hinge
 from drivetwin.shifts.kinematics import GearboxSpeeds
 from drivetwin.shifts.settings import ShiftSettings
@@ -47,9 +48,9 @@ class Boundary:
 def break_away(
     speeds: GearboxSpeeds, ratio: float, held: tuple[int, int], stop: int, settings: ShiftSettings
 ) -> Boundary | None:
-    """Where the gear of `ratio`, held in samples `held`, lets go; None if it cannot be told.
+    """Locate break-away from the gear of `ratio`, engaged in samples `held`; None if not found.
 
-    `stop` is the first sample at which the next gear is held.
+    `stop` is the first sample at which the next gear is engaged.
     """
     first, last = held
     rest = slice(max(first, last + 1 - speeds.samples(_REST, 8)), last + 1)
@@ -75,9 +76,9 @@ def break_away(
 def lock_up(
     speeds: GearboxSpeeds, ratio: float, held: tuple[int, int], start: int, settings: ShiftSettings
 ) -> Boundary | None:
-    """Where the gear of `ratio`, held in samples `held`, is reached; None if it cannot be told.
+    """Locate lock-up of the gear of `ratio`, engaged in samples `held`; None if not found.
 
-    `start` is the last sample at which the gear before is held.
+    `start` is the last sample at which the previous gear is engaged.
     """
     first, last = held
     rest = slice(first, min(last + 1, first + speeds.samples(_REST, 8)))
@@ -95,7 +96,7 @@ def lock_up(
 
 
 def _is_sparse(speeds: GearboxSpeeds, settings: ShiftSettings) -> bool:
-    """Whether the fewest samples of a fit would take longer than any curve can follow."""
+    """Return True if the minimum number of samples of a fit exceeds the longest fit window."""
     return _LEAST * speeds.step > 2.0 * settings.hinge_window
 
 
@@ -133,8 +134,7 @@ def _slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
     rounding = speeds.rounding(ratio)
     noise = max(noise, floor, rounding)
     root = float(np.sqrt(width))
-    mean = np.convolve(np.pad(error - level, width // 2, mode="edge"), np.ones(width), "same")
-    mean = np.abs(mean[width // 2 : width // 2 + len(error)]) / width
+    mean = np.abs(compute_moving_mean(error - level, width))
     stairs = rounding > _white(error[rest])
     return _Slip(speeds.time, error, level, floor, noise, mean * root / noise, root, stairs)
 

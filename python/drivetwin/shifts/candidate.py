@@ -15,9 +15,10 @@ from drivetwin.shifts.gear_runs import Run
 from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds
 from drivetwin.shifts.pressures import one_clutch
 from drivetwin.shifts.settings import ShiftSettings
-from drivetwin.shifts.shift import Shift, ShiftKind, shift_kind
+from drivetwin.shifts.shift import Shift, shift_kind
 from drivetwin.shifts.tcu_flags import flag_before
 from drivetwin.shifts.torque_onset import SMOOTH, pressure_onset, smoothed, torque_dip_onset
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _RATIO_DRIFT = 0.002
@@ -34,7 +35,7 @@ class CandidateRefusedError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What every step of the search needs."""
+    """Inputs shared by all steps of the shift detection."""
 
     log: ShiftLog
     card: VehicleCard
@@ -50,7 +51,7 @@ def ratio_in(speeds: GearboxSpeeds, first: int, last: int) -> FloatArray:
 
 
 def build_shift(search: Search, before: Run, after: Run) -> Shift:
-    """Build the shift between two gears held; CandidateRefusedError says why there is none."""
+    """Build the shift between two gears held; raises CandidateRefusedError with the reason."""
     speeds, settings = search.speeds, search.settings
     start_gear, end_gear = before.gear or "", after.gear or ""
     if start_gear == end_gear:
@@ -157,7 +158,7 @@ def _torque_start(
 ) -> tuple[Boundary, tuple[str, ...]]:
     """Onset of the on-coming element's torque in a `passage` (kind, elements, ratios' step).
 
-    The warnings say where it is not what it should be, and where it was not told by the pressure.
+    The warnings report an implausible onset, and an onset not derived from the pressure.
 
     Where the on-coming element takes hold only after break-away (power-off upshift, power-on
     downshift) the torque phase before it is empty and starts at break-away.
@@ -194,7 +195,7 @@ def _pressure_start(
     earliest: float,
     phase: tuple[Boundary, Boundary],
 ) -> tuple[Boundary, tuple[str, ...]]:
-    """The same by the on-coming pressure, refused where it is missing or contradicts the speeds."""
+    """Locate the torque start by the on-coming pressure; refuse a missing or contradictory one."""
     offgoing, oncoming = elements
     begin, lock = phase
     channel, P0 = search.log.pressure(oncoming), search.card.elements[oncoming].P0
@@ -227,7 +228,7 @@ def _pressure_start(
 def _check_seen(pressure: Channel, oncoming: str, span: tuple[float, float]) -> None:
     """Refuse where the rise above P0, which ends `span` [s], lies before or between samples.
 
-    Averaging moves it beside a gap.
+    Averaging displaces the rise next to a gap.
     """
     onset = span[1]
     for low, high in (*pressure.gaps, *open_ends(pressure.time, span)):
@@ -239,7 +240,7 @@ def _check_seen(pressure: Channel, oncoming: str, span: tuple[float, float]) -> 
 
 
 def _ratio_warnings(search: Search, *runs: Run) -> tuple[str, ...]:
-    """Say where the ratio held differs from the card's: rounded ratios, scaled speeds."""
+    """Return a warning if a measured ratio differs from the card (rounded ratio, scaled speed)."""
     texts = []
     for run in runs:
         gear = run.gear or ""

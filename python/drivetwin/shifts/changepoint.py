@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where a signal leaves, or comes to, rest: broken-curve fits with an uncertainty."""
+"""Change-point estimation: hinge fits of departure from, or return to, rest, with sigma."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Hinge:
     """A hinge in time: `time` ± `sigma` [s].
 
     `noise_moving` is the RMS residual of the best fit on the moving side, in the signal's unit;
-    more than the signal's noise says that the curve cannot follow it.
+    more than the noise of the signal indicates lack of fit.
     """
 
     time: float
@@ -67,9 +67,9 @@ def fit_hinge(
 
     `time`, `values` (n,) hold both sides; the hinge is sought within `search` [s]. Fits of several
     orders are averaged with weights exp(-BIC/4) (Schwarz 1978; Hoeting et al. 1999; half the usual
-    exponent, because the caller chooses the window from the same data), so that `sigma` has a part
-    from noise and a part from not knowing the form of the onset. `noise_floor`
-    (signal unit) keeps noise-free data from claiming certainty. None where nothing moves.
+    exponent, because the caller chooses the window from the same data), so that `sigma` includes
+    noise and the unknown form of the onset. `noise_floor` (signal unit) is a lower bound of the
+    noise. Returns None if nothing moves.
     """
     direction = _direction(time, values, moving, search)
     fits = [

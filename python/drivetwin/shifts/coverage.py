@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The part of a shift over which all that drives it was recorded, and that one load holds for.
+"""Trimming of a shift to the span in which all its inputs were recorded.
 
-A gap in the engine torque or in a pressure is no input that a model could be driven by, so the
-gears held before and after the shift are cut at it, and a shift with a gap inside is refused. A
-pressure counts only while an element may slip: one that stays above or below P0 on both sides of
-its gap, while the speeds show a held gear, decides nothing. An input that starts after the gear
-before the shift, or ends before the gear after it, has a gap there. So has the torque that drives
-the gearbox where the converter is open: the engine torque is not it.
+A gap in the engine torque or in a pressure cannot drive a model, so the gears before and after the
+shift are cut at it, and a shift with a gap inside is rejected. A pressure gap matters only while an
+element may slip. It is ignored if the pressure stays above or below P0 on both sides and the speeds
+are those of an engaged gear. An input that starts after the gear before the shift, or ends before
+the gear after it, has a gap there. So does the engine torque while the converter is open, because
+it does not drive the gearbox then.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy as np
 from drivetwin.channels.pressure_roles import pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, open_ends
 from drivetwin.errors import DamagedChannelError, Where
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE, open_spans
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
@@ -86,9 +85,9 @@ def recorded(
 ) -> Shift:
     """Return `shift` with `before` and `after` cut to what its inputs were recorded for.
 
-    `fills` is P0 [Pa] of both elements by name, `i_in` the ratio of the input gear. A cut is told
-    in the warnings of the shift. Raises DamagedChannelError where a gap lies in the shift itself or
-    leaves less than LEAST of a gear.
+    `fills` is P0 [Pa] of both elements by name, `i_in` the ratio of the input gear. A cut is
+    reported in the warnings of the shift. Raises DamagedChannelError where a gap lies in the shift
+    itself or leaves less than LEAST of a gear.
     """
     gaps = _gaps(log, shift, fills)
     gaps += [
@@ -122,7 +121,7 @@ def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[
     found = []
     whole = (shift.before[0], shift.after[1])
     if "engine_torque" in log:
-        torque = fresh_samples(log["engine_torque"])
+        torque = log["engine_torque"].updates
         gaps = (*torque.gaps, *open_ends(torque.time, whole))
         found += [_Gap(torque, gap, (gap[0] - OLDEST, gap[1] + YOUNGEST)) for gap in gaps]
     for name, fill in fills.items():
@@ -135,7 +134,7 @@ def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[
 
 
 def _decides(pressure: Channel, gap: Span, shift: Shift, fill: PriorValue) -> bool:
-    """Whether an element might have begun to carry torque, or to slip, within a gap."""
+    """Return True if an element may have started to transmit torque, or to slip, in a gap."""
     if gap[1] > shift.before[1] and gap[0] < shift.lockup_time:
         return True
     beside = np.interp(gap, pressure.time, pressure.values) - fill.value

@@ -27,7 +27,7 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 class FoundShifts(NamedTuple):
-    """What a log holds: usable shifts and refused candidates, both in order of time."""
+    """Usable shifts and rejected candidates of a log, both in order of time."""
 
     shifts: tuple[Shift, ...]
     rejected: tuple[RejectedShift, ...]
@@ -95,7 +95,7 @@ def _span(speeds: GearboxSpeeds, run: Run) -> tuple[float, float]:
 
 
 def _interrupted(runs: list[Run], before: Run, after: Run) -> bool:
-    """Whether the vehicle stood still between two gears held."""
+    """Return True if the vehicle stood still between two engaged gears."""
     between = [run for run in runs if before.last < run.first and run.last < after.first]
     missing = (after.first - before.last - 1) - sum(run.last - run.first + 1 for run in between)
     return missing > 0
@@ -158,7 +158,7 @@ def _chain(shifts: list[Shift], settings: ShiftSettings) -> list[Shift]:
 
 
 def usable_shifts(log: ShiftLog, card: VehicleCard) -> FoundShifts:
-    """What `find_shifts` finds; NoShiftError lists what was refused where nothing can be used."""
+    """Detect shifts like `find_shifts`; raise NoShiftError with the rejections if all are."""
     found = find_shifts(log, card)
     if found.shifts:
         return found

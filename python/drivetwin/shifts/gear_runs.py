@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which gear is held when: runs of samples whose speed ratio is that of a gear."""
+"""Detection of engaged gears: runs of samples with the speed ratio of a gear."""
 
 from __future__ import annotations
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.logs.quality.outliers import staircase
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 FloatArray = NDArray[np.float64]
@@ -110,7 +109,7 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
 
 def _finite(channel: Channel) -> Channel:
     """The numbers of a channel, of a held one its fresh values only."""
-    channel = fresh_samples(channel)
+    channel = channel.updates
     keep = np.isfinite(channel.values)
     if np.count_nonzero(keep) < 2:
         raise MissingChannelError(

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The converter's lock-up clutch: when it closes and opens, and whether a shift has it closed.
+"""The converter's lock-up clutch: closings, open spans, and its state during a shift.
 
-With the clutch open the gearbox is driven by the turbine; a map tells its torque from both speeds.
-Closed means ω_e = i_in·ω_in. The flag on the bus tells when; the speeds decide whether it is true.
+With the clutch open the gearbox is driven by the turbine; a map gives its torque from both speeds.
+Closed means ω_e = i_in·ω_in. The flag on the bus gives the time; the speeds must confirm it.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.logs.quality.outliers import runs
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.shifts.kinematics import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.tcu_flags import set_spans
@@ -51,7 +51,7 @@ _STEP = 0.01
 class LockUp:
     """The lock-up clutch closes at `time` ± `sigma` [s] and stays so until `end` [s].
 
-    `warning` says where flag and speeds contradict each other; empty where they agree.
+    `warning` describes a contradiction between flag and speeds; empty without one.
     """
 
     time: float
@@ -61,7 +61,7 @@ class LockUp:
 
 
 def converter_slip(log: ShiftLog, card: VehicleCard, span: Span) -> float | None:
-    """Mean of ω_e/(i_in·ω_in) - 1 over `span` [s]; None where no channel tells it."""
+    """Mean of ω_e/(i_in·ω_in) - 1 over `span` [s]; None without the channels."""
     if "engine_speed" not in log or "input_speed" not in log:
         return None
     engine = log["engine_speed"]
@@ -74,13 +74,13 @@ def converter_slip(log: ShiftLog, card: VehicleCard, span: Span) -> float | None
 
 
 def open_slip(log: ShiftLog, card: VehicleCard, shift: Shift) -> float | None:
-    """Slip of the converter before `shift`; None where it is closed or no channel tells it."""
+    """Slip of the converter before `shift`; None if closed or without the channels."""
     slip = converter_slip(log, card, (shift.before[1] - _BESIDE, shift.before[1]))
     return slip if slip is not None and abs(slip) > CLOSED else None
 
 
 def unseen(log: ShiftLog, card: VehicleCard) -> tuple[str, ...]:
-    """What is said where the card has a converter and no channel tells whether it is open."""
+    """Return a warning if the card has a converter and no channel indicates whether it is open."""
     lacks = [role for role in ("engine_speed", "input_speed") if role not in log]
     if card.converter is None or not lacks or "lockup_engaged" in log:
         return ()
@@ -92,7 +92,7 @@ def unseen(log: ShiftLog, card: VehicleCard) -> tuple[str, ...]:
 
 
 def behind_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog:
-    """The log as the gearbox sees it: where the converter is open, the turbine is its engine.
+    """Replace the engine by the turbine as the input of the gearbox if the converter is open.
 
     Its torque, by the card's map from the speeds of engine and input, takes the place of
     `engine_torque`, and its speed that of the engine. It has no samples where the lock-up clutch
@@ -102,8 +102,8 @@ def behind_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog
     """
     if card.converter is None or open_slip(log, card, shift) is None:
         return log
-    engine = fresh_samples(log["engine_speed"])
-    turbine = card.i_in * fresh_samples(log["input_speed"]).at(engine.time)
+    engine = log["engine_speed"].updates
+    turbine = card.i_in * log["input_speed"].updates.at(engine.time)
     known = np.isfinite(turbine) & (engine.values > 0.0)
     ratio = np.divide(turbine, engine.values, out=np.zeros_like(turbine), where=known)
     first, last = card.converter.speed_ratio[0], card.converter.speed_ratio[-1]
@@ -181,7 +181,7 @@ def lock_ups(log: ShiftLog, card: VehicleCard) -> tuple[LockUp, ...]:
 
 
 def _flagged(log: ShiftLog, card: VehicleCard, flag: Channel, span: Span) -> LockUp:
-    """A closing that the flag tells, with the slip's word on it."""
+    """Closing according to the flag, checked against the slip."""
     slip = converter_slip(log, card, (span[0] + _HOLD, max(span[1], span[0] + 2.0 * _HOLD)))
     warning = ""
     if slip is None:
@@ -192,15 +192,15 @@ def _flagged(log: ShiftLog, card: VehicleCard, flag: Channel, span: Span) -> Loc
 
 
 def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
-    """Closings that the speeds show: the slip, averaged over _HOLD/3, comes to rest for _HOLD.
+    """Find closings from the speeds: the slip, averaged over _HOLD/3, rests at zero for _HOLD.
 
-    It has to be there for as long before.
+    Slip has to be present for as long before.
     """
     time, slip = _slip(engine, inlet, i_in)
     width = round(_HOLD / _STEP / 3.0)
     if time.size < 4 * width:
         return ()
-    mean = np.convolve(np.where(np.isfinite(slip), slip, 1.0), np.ones(width) / width, "same")
+    mean = compute_moving_mean(np.where(np.isfinite(slip), slip, 1.0), width)
     closed = np.abs(mean) < CLOSED
     for first, stop in runs(~closed):
         # A late engine speed looks like slip while a shift changes the speeds.
@@ -232,7 +232,7 @@ def _spans(
     width = round(_HOLD / _STEP / 3.0)
     if time.size < 4 * width:
         return ()
-    mean = np.convolve(np.where(np.isfinite(slip), slip, 0.0), np.ones(width) / width, "same")
+    mean = compute_moving_mean(np.where(np.isfinite(slip), slip, 0.0), width)
     return tuple(
         (float(time[first]), float(time[stop - 1]))
         for first, stop in runs(shows(mean))

@@ -18,7 +18,7 @@ from drivetwin.shifts.shift import Shift
 
 
 def one_clutch(log: ShiftLog, offgoing: str, oncoming: str) -> bool:
-    """Whether both elements have their pressure from one column."""
+    """Return True if the pressures of both elements come from the same column."""
     roles = (pressure_role(offgoing), pressure_role(oncoming))
     if any(role not in log for role in roles):
         return False

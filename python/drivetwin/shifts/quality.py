@@ -11,7 +11,8 @@ from scipy.signal import butter, sosfiltfilt
 
 from drivetwin.channels.shiftlog import Channel, ShiftLog, gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, gear_ratios, gearbox_speeds
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import middle_of
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -158,7 +159,7 @@ def _speed_excess(
 def _slip_left(
     speeds: GearboxSpeeds, ratios: tuple[float, float], shift: Shift
 ) -> dict[str, float]:
-    """What is left of the slip once the on-coming element is locked."""
+    """Residual slip after lock-up of the on-coming element."""
     i_c, i_out = ratios
     held = (speeds.time >= shift.lockup_time) & (speeds.time <= shift.lockup_time + _REFERENCE)
     if not held.any():

@@ -1,24 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""What a gear shift is: gears, elements, phase boundaries."""
+"""Gear shifts: gears, elements, phase boundaries."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 import numpy as np
 
 from drivetwin.channels.shiftlog import ShiftLog
-
-
-class ShiftKind(StrEnum):
-    """Direction and power state of a shift."""
-
-    POWER_ON_UP = "power-on upshift"
-    POWER_OFF_UP = "power-off upshift"
-    POWER_ON_DOWN = "power-on downshift"
-    POWER_OFF_DOWN = "power-off downshift"
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 
 @dataclass(frozen=True)
@@ -62,7 +53,7 @@ _PEDAL = 0.05
 
 
 def shift_kind(log: ShiftLog, up: bool, break_away: float) -> tuple[ShiftKind, tuple[str, ...]]:
-    """Kind of the shift, and a warning where no channel tells the power state.
+    """Kind of the shift, and a warning if no channel indicates the power state.
 
     Power is on where the mean engine torque in the last 0.3 s before break-away [s] is positive;
     in its absence the output torque's sign or the accelerator (above 5 %) decides.
@@ -78,9 +69,7 @@ def shift_kind(log: ShiftLog, up: bool, break_away: float) -> tuple[ShiftKind, t
     else:
         power_on = True
         warnings = ("no torque or pedal channel tells the power state: taken as power on",)
-    if up:
-        return (ShiftKind.POWER_ON_UP if power_on else ShiftKind.POWER_OFF_UP), warnings
-    return (ShiftKind.POWER_ON_DOWN if power_on else ShiftKind.POWER_OFF_DOWN), warnings
+    return ShiftKind.from_direction(up=up, power_on=power_on), warnings
 
 
 def _mean(log: ShiftLog, role: str, end: float) -> float:
@@ -92,8 +81,8 @@ def _mean(log: ShiftLog, role: str, end: float) -> float:
 
 
 def shift_labels(shifts: Sequence[Shift], to: str = "→") -> list[str]:
-    """The shifts of a log by their gears, `2→3`; of those between the same gears each with the
-    time of its lock-up, `2→3 at 3.34 s`.
+    """Labels of the shifts of a log by their gears, `2→3`; repeated ones with the time of lock-up,
+    `2→3 at 3.34 s`.
     """
     names = [f"{one.start_gear}{to}{one.end_gear}" for one in shifts]
     return [

@@ -29,14 +29,14 @@ _CALM = 2.0
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a slip leaves or reaches rest: `time` ± `sigma` [s]."""
+    """Time at which a slip leaves or reaches zero: `time` ± `sigma` [s]."""
 
     time: float
     sigma: float
 
 
 def begun(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
-    """Where a slip (n,) that ends away from rest has begun; None where it never does.
+    """Locate the start of a slip (n,) that ends away from rest; None without one.
 
     `slip` [rad/s] is that of the off-going element, 0 at rest, up to the lock-up of the other.
     """
@@ -59,7 +59,7 @@ def begun(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
 
 
 def _last_at_rest(moved: FloatArray, limit: float, noise: float) -> int | None:
-    """The last sample of those that lastingly are at rest; None without one, or if it is the last.
+    """Return the last sample of the lasting rest; None without one, or if it ends the signal.
 
     A slip that turns after a flare passes through zero and does not rest there.
     """
@@ -74,13 +74,13 @@ def _last_at_rest(moved: FloatArray, limit: float, noise: float) -> int | None:
 
 
 def _passes(time: FloatArray, moved: FloatArray, limit: float, last: int) -> float:
-    """When `moved` (n,) passes `limit` first after the sample `last`, at which it is below [s]."""
+    """Interpolate the time [s] at which `moved` (n,) first exceeds `limit` after sample `last`."""
     above = last + int(np.argmax(moved[last:] >= limit))
     return float(np.interp(limit, moved[above - 1 : above + 1], time[above - 1 : above + 1]))
 
 
 def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
-    """Where a slip (n,) that begins away from rest comes to it for good; None where it never does.
+    """Locate the end of a slip (n,) that starts away from rest; None if it never ends.
 
     `slip` [rad/s] is that of the on-coming element, 0 where it is locked.
     """
@@ -109,7 +109,7 @@ def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
 def _to_rest(time: FloatArray, moved: FloatArray, limit: float) -> float:
     """Time [s] that a slip takes from its last number to zero, at its pace down to the limit.
 
-    Zero where it comes down in a few samples, which tell no pace.
+    Returns zero if the decrease has too few samples for a rate.
     """
     high = int(np.flatnonzero(moved >= min(_STEEP * limit, 0.5 * float(moved.max())))[-1])
     fall = float(moved[high] - moved[-1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the transmission says of its shifts, checked against what the speeds show."""
+"""Check of the detected shifts against the shift flag and gear of the transmission."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def set_spans(flag: Channel) -> tuple[Span, ...]:
 
 
 def flag_before(log: ShiftLog, time: float, reach: float) -> float | None:
-    """When the shift flag was set that is on at `time` [s], at most `reach` earlier."""
+    """Return the time [s] of setting of the shift flag at `time`, at most `reach` earlier."""
     if "shift_in_process" not in log:
         return None
     found = [low for low, high in set_spans(log["shift_in_process"]) if low <= time <= high]
@@ -61,7 +61,7 @@ def checked(
 
 
 def _unseen(log: ShiftLog, flag: Channel, span: Span) -> str:
-    """Why a flag that is set over `span` [s] has no shift."""
+    """Explain why a flag set over `span` [s] has no shift."""
     if span[0] <= flag.time[0]:
         return "the shift flag is set where the recording begins: the shift is not all in it"
     if span[1] >= flag.time[-1]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.shifts.breakaway_lockup import Boundary
 from drivetwin.shifts.changepoint import Moving, fit_hinge
@@ -39,13 +40,11 @@ def smoothed(channel: Channel, span: tuple[float, float]) -> Smoothed:
     """Moving average of the finite samples within `span` [s], centred, so a ramp is kept."""
     keep = np.isfinite(channel.values) & (channel.time >= span[0]) & (channel.time <= span[1])
     time, values = channel.time[keep], channel.values[keep]
-    half = round(0.5 * SMOOTH / channel.step)
-    width = 2 * half + 1
+    width = 2 * round(0.5 * SMOOTH / channel.step) + 1
     if len(values) < width + 2:
         return Smoothed(time, values, 0.0)
     noise = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0 * width)
-    padded = np.pad(values, half, mode="edge")
-    return Smoothed(time, np.convolve(padded, np.ones(width) / width, "valid"), noise)
+    return Smoothed(time, compute_moving_mean(values, width), noise)
 
 
 def pressure_onset(
@@ -92,12 +91,12 @@ def _crossing(pressure: Smoothed, level: float, break_away: float) -> float | No
 
 
 def torque_dip_onset(torque: Smoothed, break_away: float, step: float) -> Boundary | None:
-    """Where the output torque begins to fall towards break-away; None if it does not clearly.
+    """Locate the onset of the torque dip towards break-away; None if there is no clear onset.
 
     Only for power-on upshifts, whose torque phase lowers the output torque by the ratios' `step`
-    (new over old) at a steady engine torque. The onset lies where the last such fall begins, since
-    an earlier fall is the driver's, and before the hinge by what the shaft delays it. Sigma is that
-    of the hinge fit, doubled because the fall need not be smooth, and that delay again.
+    (new over old) at a steady engine torque. The onset is the start of the last such fall,
+    since an earlier fall is caused by the driver; the delay of the shaft is subtracted. Sigma is
+    that of the hinge fit, doubled because the fall need not be smooth, and that delay again.
     """
     keep = torque.time <= break_away
     time, values = torque.time[keep], torque.values[keep]

@@ -33,7 +33,7 @@ from drivetwin.simulation.serialize import as_array, as_json, as_names
 
 
 class Keep(StrEnum):
-    """What is kept of every run, so that memory fits the question."""
+    """Outputs kept of every run; fewer outputs need less memory."""
 
     COLUMNS = "columns"  # every output on the grid
     LAST = "last"  # every output at the end
@@ -175,7 +175,7 @@ _Plain = tuple[list[tuple[str, FloatArray, FloatArray, float]], _Start]
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What the core is asked for, as it takes it; `shape` is that of the values kept."""
+    """Arguments of a batch call to the core; `shape` is that of the values kept."""
 
     scenarios: Sequence[_Plain]
     sets: tuple[list[str], FloatArray]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The dual-clutch driveline of THEORY section 3 and its simulation, as seen from Python.
 
-The physics itself stands in the Rust core; these classes only describe and carry.
+The physics is computed by the Rust core; these classes only hold data.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ FloatArray = NDArray[np.float64]
 LossLaw = Literal["paper", "dissipative"]
 
 LATEST = 1e6
-"""Times farther from zero [s], 12 days, are too coarse for a run: what the core tells apart in time
-it takes relative to them, and stamps that count from 1970 give wrong results."""
+"""Largest magnitude of a time in a run [s], 12 days. The time resolution of the core is relative to
+the magnitude of the times, so Unix time stamps would give wrong results."""
 
 ENGINE_TORQUE = "engine torque"
 """Name of that input of a dual clutch; the pressures have those of their elements."""
@@ -135,7 +135,7 @@ class DualClutch:
     def sides(self, ratio: float, *, driving: bool = True) -> tuple[float, float]:
         """Inertias before and behind the output shaft, at the shaft [kg m^2], in a gear.
 
-        `ratio` is the overall one of the gear; `driving` says whether power flows from the engine.
+        `ratio` is the overall one of the gear; `driving` is True if power flows from the engine.
         The drums of open elements are left out.
         """
         engine = self.J1 * self.efficiency(driving=driving) + self.J2e
@@ -227,7 +227,7 @@ class Accuracy:
 
     @property
     def sprint(self) -> bool:
-        """Whether samples without events may be passed at once."""
+        """True if several samples without events may be passed at once."""
         return not self.exact and self.order is None
 
 
@@ -264,7 +264,7 @@ class EnergyAudit:
 class Trajectory:
     """Result of one run. Arrays (n,) on `time`; `clutch_torque` and `slip` by element name.
 
-    A run that fails keeps its length: NaN after the failure, and `status` says what happened
+    A run that fails keeps its length: NaN after the failure, and `status` is the cause
     (`completed` otherwise).
     """
 
@@ -386,7 +386,7 @@ class _Derivatives(Mapping[str, Trajectory]):
 
 
 def inputs_of(engine_torque: Signal, pressures: Mapping[str, Signal]) -> dict[str, Signal]:
-    """The inputs of a dual clutch by the names that the core knows them by.
+    """Collect the inputs of a dual clutch by their names in the core.
 
     Raises InputError where an element has the name of the engine's torque.
     """

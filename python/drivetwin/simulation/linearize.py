@@ -107,7 +107,7 @@ def _forced(moved: NDArray[np.complex128], by: FloatArray) -> NDArray[np.complex
 
     Such a combination w has w·`moved` = 0 and w·`by` = 0: the slip of a locked element, or the
     difference of the twists of two shafts side by side. Rows and columns are brought to one size,
-    so that units do not tell what is zero. Raises InputError where X is not unique even so.
+    so that the zero test does not depend on units. Raises InputError where X is not unique even so.
     """
     rows = 1.0 / _sizes(np.hstack([moved, by]), 1)
     forces = rows * by
@@ -176,7 +176,7 @@ def linearise(
 
 
 def _check(locked: Sequence[str], points: Mapping[str, Slip], outputs: Sequence[Output]) -> None:
-    """Raise InputError for what no linear system can tell."""
+    """Raise InputError for elements or outputs that a linear system cannot represent."""
     both = [name for name in points if name in locked]
     if both:
         raise InputError(f"{', '.join(both)}: locked and slipping", "name it in one of them")
@@ -189,6 +189,6 @@ def _check(locked: Sequence[str], points: Mapping[str, Slip], outputs: Sequence[
 
 
 def _held(elements: Sequence[Element]) -> set[object]:
-    """Names of the inputs that act through elements which take no part."""
+    """Names of the inputs of elements that are not part of the linear system."""
     fields = [(one, _HELD.get(str(one.get("type")))) for one in elements]
     return {one.get(field) for one, field in fields if field}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What crosses the border to the core: descriptions as JSON, arrays."""
+"""Serialise data for the core: descriptions as JSON, arrays."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def as_json(description: object) -> str:
 
 
 def _plain(value: object) -> object:
-    """A value that JSON does not know, in others that it does."""
+    """Convert a value to JSON-serialisable types."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if is_dataclass(value):

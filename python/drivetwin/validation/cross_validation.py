@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError, IdentificationError, Where
-from drivetwin.estimation.data.prepare import signals_of
+from drivetwin.estimation.data.prepare import prepare_shift
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.multi_log.fit import of_one_log
@@ -67,11 +67,11 @@ def _one(
 def _expected(
     fit: LikelihoodFit | None, card: VehicleCard, log: ShiftLog, shift: Shift, number: int
 ) -> Expected | None:
-    """What the likelihood leads one to expect; None for another method."""
+    """Predict the misfit expected by the likelihood; None for another method."""
     if fit is None:
         return None
-    signals = replace(signals_of(log, card, shift), log=number)
-    return expected(fit, [signals], card)[0]
+    data = prepare_shift(log, card, shift)
+    return expected(fit, [replace(data, signals=replace(data.signals, log=number))])[0]
 
 
 def _of_log(

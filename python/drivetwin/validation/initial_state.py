@@ -99,7 +99,7 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
 
 
 def _runs(log: ShiftLog, role: str, time: float) -> bool:
-    """Whether a channel is recorded at `time` [s]."""
+    """Return True if a channel is recorded at `time` [s]."""
     return role in log and bool(log[role].time[0] - _SPAN <= time <= log[role].time[-1])
 
 

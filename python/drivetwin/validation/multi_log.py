@@ -10,10 +10,10 @@ from drivetwin._util.progress import part
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, Where
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
-from drivetwin.estimation.multi_log.fit import identify_several, of_one_log
+from drivetwin.estimation.multi_log.fit import of_one_log
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.validation import HeldOut
+from drivetwin.pipeline import identify, identify_jointly
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.split_gears import apart
@@ -57,7 +57,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """What came of it: the identification, the logs fitted, and a twin of each by its source."""
+    """Result of a joint identification: the identification, the fitted logs, a twin by source."""
 
     found: Identification
     fitted: tuple[ShiftLog, ...]
@@ -72,7 +72,7 @@ def identify_together(
     The identification is simulated over the logs (`fit`); `evidence.held_out` has every shift
     that was predicted. Only the likelihood method joins several logs (`evidence.several`).
     Raises InputError where nothing is left to fit or several logs are asked of another method,
-    and what `identify` and `identify_several` raise.
+    and what `identify` and `identify_jointly` raise.
     """
     splits = [source.split() for source in sources]
     fitted = [k for k, (kept, _) in enumerate(splits) if kept.shifts]
@@ -88,7 +88,7 @@ def identify_together(
             numbers = {fitted[0]: 0}
         else:
             _require_likelihood(method)
-            found = identify_several(logs, card, shifts)
+            found = identify_jointly(logs, card, shifts)
             numbers = {k: number for number, k in enumerate(fitted, 1)}
     with part(0.85, 0.92, "simulating the shifts"):
         found, twins = _simulated(found, card, logs)

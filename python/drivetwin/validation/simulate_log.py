@@ -15,7 +15,6 @@ from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, SignalFit
 from drivetwin.estimation.result.validation import SignalTrace, Validation
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.shifts.coverage import near, recorded
 from drivetwin.shifts.lockup_clutch import behind_converter
 from drivetwin.shifts.pressures import shift_pressures
@@ -205,7 +204,7 @@ def _signal(channel: Channel) -> Signal:
 
 def _moved(channel: Channel, shift: float) -> Signal:
     """Fresh samples moved by `shift` [s]; the last value is held to the end of the channel."""
-    fresh = fresh_samples(channel)
+    fresh = channel.updates
     time, values = fresh.time + shift, fresh.values
     if time[0] > channel.time[0]:
         time, values = np.append(channel.time[0], time), np.append(values[0], values)
@@ -215,7 +214,7 @@ def _moved(channel: Channel, shift: float) -> Signal:
 
 
 def simulated_signals(model: DualClutch, run: Trajectory) -> dict[str, FloatArray]:
-    """What a run says of each of SIGNALS (n,) on its own time; SI."""
+    """Compute each of SIGNALS (n,) from a run, on its own time; SI."""
     return {
         "output_torque": run.shaft_torque,
         "input_speed": run.engine_speed / model.i_in,

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Vehicle cards: what is known from design. `card` loads one; `spec` is what it becomes, in SI."""
+"""Vehicle cards: design data of a vehicle. `card` loads a file; `spec` has the data in SI."""

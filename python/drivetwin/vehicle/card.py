@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Vehicle cards: from the TOML file to a VehicleCard in SI, with every fault told at once."""
+"""Vehicle cards: from the TOML file to a VehicleCard in SI, with all faults reported at once."""
 
 from __future__ import annotations
 

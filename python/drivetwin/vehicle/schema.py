@@ -16,7 +16,7 @@ from drivetwin.vehicle.spec import ElementSpec, PriorValue, SensorTolerance
 
 
 class PriorTable(StrictModel):
-    """A design value with its standard deviation in the same unit; 0 means known."""
+    """A design value with its standard deviation in the same unit; 0 means exact."""
 
     value: float = Field(ge=0)
     std: float = Field(default=0.0, ge=0)
@@ -27,7 +27,7 @@ class PriorTable(StrictModel):
 
 
 def _known(value: object) -> object:
-    """A bare number is a known value."""
+    """Read a bare number as an exact value."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return {"value": value} if is_number else value
 

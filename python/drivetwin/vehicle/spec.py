@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is known of a vehicle from design, in SI: ratios, shift elements, plausible ranges."""
+"""Design data of a vehicle in SI: ratios, shift elements, plausible ranges."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The workbench: one log from channels to a checked model, in the browser.
 
-What it does is in plain functions of this folder; `views` shows it and hands over what is typed.
+The modules of this folder do the work in plain functions. The package `views` contains the layouts
+and passes the user's input to these functions.
 """

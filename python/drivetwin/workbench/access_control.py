@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What the server answers to: its own pages only, by address and not by a foreign name.
+"""Access control: the server answers only requests that name its own address.
 
-A page of another site can make a browser send requests here, under a name that it has made point
-to this machine (DNS rebinding). Such a request carries that name as its host: it is refused.
+A page of another site can make a browser send requests here, under a name that it has made point to
+this machine (DNS rebinding). Such a request carries that name as its host and is refused.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ def protect(server: Flask, host: str, script_hashes: list[str]) -> None:
 
 
 def is_own(named: str, host: str) -> bool:
-    """Whether the host that a request names is this server and no name given to it by others.
+    """Return True if the host named by a request is this server.
 
-    Addresses cannot be rebound; of names only `localhost` and the one listened on count. Where the
-    server listens on this machine alone, the address is one of this machine.
+    Addresses cannot be rebound. Of the names, only `localhost` and the listening name are accepted.
+    If the server listens on this machine alone, the address must be one of this machine.
     """
     try:
         name = urlsplit(f"//{named}").hostname or ""
@@ -68,7 +68,7 @@ def is_own(named: str, host: str) -> bool:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an address to listen on is reachable from this machine alone."""
+    """Return True if a listening address can be reached from this machine alone."""
     if host == LOCAL:
         return True
     try:
@@ -78,7 +78,7 @@ def is_loopback(host: str) -> bool:
 
 
 def refusal(status: int, text: str) -> Response:
-    """An answer that says why there is none."""
+    """Return a response with the reason of the refusal."""
     return Response(json.dumps({"error": text}), status, mimetype="application/json")
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""How large a compressed MATLAB file says it becomes, told before anything of it is expanded.
+"""Limit on the decompressed size of MATLAB files, checked before decompression.
 
-The reader would expand a file of a few megabytes for half a minute before it fails.
+The reader would otherwise expand a file of a few megabytes for half a minute before it fails.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _MAGIC = b"MATLAB 5.0"
 
 
 def refuse_expansion(path: Path, label: str, limit: int) -> None:
-    """Raise RefusedError where the variables of a MATLAB 5 file claim more than `limit` bytes."""
+    """Raise RefusedError if the variables of a MATLAB 5 file declare more than `limit` bytes."""
     total = 0
     with path.open("rb") as file:
         head = file.read(_HEADER)
@@ -41,7 +41,7 @@ def refuse_expansion(path: Path, label: str, limit: int) -> None:
 
 
 def _claim(packed: bytes, order: str) -> int:
-    """Bytes that a compressed variable says it has; 0 where its beginning cannot be read."""
+    """Read the declared size [bytes] of a compressed variable; 0 if its header cannot be read."""
     try:
         tag = zlib.decompressobj().decompress(packed, _TAG)
     except zlib.error:

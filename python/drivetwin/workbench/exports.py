@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a session hands over as a file: the twin for other programs, result, report, mapping."""
+"""Files exported by a session: twin for other programs, result, report, channel mapping."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Record(StrEnum):
 
 @dataclass(frozen=True)
 class Product:
-    """A file to be handed over."""
+    """Exported file."""
 
     name: str
     content: bytes

@@ -44,7 +44,7 @@ class MemberLine:
 
 @dataclass(frozen=True)
 class ReducedShift:
-    """A shift as a dual clutch, and the error of leaving the coupling out where it can be told."""
+    """A shift as a dual clutch, and the error of neglecting the coupling, if it can be computed."""
 
     reduction: Reduction
     estimated: CouplingError | None = None

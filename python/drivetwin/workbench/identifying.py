@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The identification as a job: one method after the other, each result told when it is there."""
+"""The identification as a job: one method after the other, each result reported when complete."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from drivetwin._util.progress import part
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.analysis.experiment_design import examined
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.method import Method
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.build import build_twin
@@ -26,7 +26,7 @@ _WEIGHTS = {Method.PAPER: 1.0, Method.INTEGRAL: 30.0, Method.LIKELIHOOD: 70.0}
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What to identify from; `card` is as the locks have it, `shifts` as moved by hand."""
+    """Input of an identification; `card` includes the fixed values, `shifts` the manual edits."""
 
     log: ShiftLog
     card: VehicleCard
@@ -36,9 +36,9 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one method found, with its twin; `found` holds the validation.
+    """Result of one method, with its twin; `found` holds the validation.
 
-    `found` is None where the twin comes from a saved workspace: the evidence is not saved.
+    `found` is None if the twin comes from a saved workspace, because the evidence is not saved.
     """
 
     method: Method
@@ -48,7 +48,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why one method found nothing, and what to do."""
+    """Reason why one method failed, and the remedy."""
 
     method: Method
     text: str
@@ -69,7 +69,7 @@ def identify_all(emit: Emit, task: Task) -> None:
 
 
 def _tried(task: Task, shifts: FoundShifts, method: Method) -> Outcome | Refusal:
-    """What a method finds, or why it does not."""
+    """Run one method; return its outcome, or the reason of its failure."""
     try:
         return _outcome(task, shifts, method)
     except Exception as error:

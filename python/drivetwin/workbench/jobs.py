@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Work in a process of its own: it tells how far it is, may be cancelled, and may die alone.
+"""Jobs in separate processes: they report progress, can be cancelled, and crash separately.
 
 What is handed in and comes back are dataclasses of the program itself, through a pipe between
 parent and child; bytes of a user's file never take that way.
@@ -28,26 +28,26 @@ Work = Callable[..., None]
 
 _PRELOADED = ["drivetwin.workbench.sandboxed_parse", "drivetwin.workbench.identifying"]
 _PATIENCE = 2.0
-"""Time [s] that a process gets to end after it was told to."""
+"""Time [s] that a process may take to end after the request."""
 _PAUSE = 0.1
 """Shortest time [s] between two messages about progress."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a job failed, as it passes through the pipe."""
+    """Error of a job in a form that can be sent through the pipe."""
 
     what: str
     remedy: str
     where: Where = field(default_factory=Where)
 
     def error(self) -> InputError:
-        """The same as an exception."""
+        """Convert the fault to an exception."""
         return InputError(self.what, self.remedy, self.where)
 
 
 def fault_of(error: Exception) -> Fault:
-    """What is told of an error; of one that nobody raised on purpose the terminal has more."""
+    """Convert an exception to a fault; print the traceback of an unexpected error."""
     match error:
         case DrivetwinError():
             return Fault(error.what, error.remedy, error.where)
@@ -75,7 +75,7 @@ class _Done:
 
 @dataclass
 class Job:
-    """A running process. `share` and `text` say how far it is, `fault` why it ended early."""
+    """A running process. `share` and `text` are its progress, `fault` the cause of an early end."""
 
     process: Any
     pipe: Connection
@@ -91,7 +91,7 @@ class Job:
         return time.monotonic() - self.started
 
     def results(self) -> list[Any]:
-        """What has come in since the last call; never waits."""
+        """Return the results received since the last call, without waiting."""
         found: list[Any] = []
         while not self.finished and self.pipe.poll():
             try:
@@ -112,7 +112,7 @@ class Job:
         return found
 
     def wait(self, limit: float) -> list[Any]:
-        """All results; raises InputError where the job fails or takes longer than `limit` [s]."""
+        """Wait for all results; raise InputError on failure or after `limit` [s]."""
         found: list[Any] = []
         while not self.finished:
             left = limit - self.elapsed
@@ -151,7 +151,7 @@ class Job:
 
 
 def start(work: Work, *arguments: object) -> Job:
-    """Run `work(emit, *arguments)` in a process of its own."""
+    """Run `work(emit, *arguments)` in a separate process."""
     context = _context()
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(  # type: ignore[attr-defined]
@@ -163,7 +163,7 @@ def start(work: Work, *arguments: object) -> Job:
 
 
 def call(work: Work, *arguments: object, limit: float) -> Any:
-    """The one result of `work` in a process of its own; raises as `Job.wait` does."""
+    """Run `work` in a separate process; return its only result. Raises InputError on failure."""
     return start(work, *arguments).wait(limit)[-1]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Locks: what the identification is to take as known of a parameter."""
+"""Prior knowledge of parameters set by the user: free, uncertain or fixed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 class LockKind(StrEnum):
-    """How much is known of a parameter before the log is looked at."""
+    """Kind of prior knowledge of a parameter: unknown, uncertain or exact."""
 
     FREE = "free"
     PRIOR = "prior"
@@ -33,7 +33,7 @@ bar. Where the card's P0 is larger, so is the deviation."""
 
 @dataclass(frozen=True)
 class Lock:
-    """What is known: nothing, `value` ± `std` (1 sigma), or exactly `value`; SI."""
+    """Prior of a parameter: none, `value` ± `std` (1 sigma), or exactly `value`; SI."""
 
     kind: LockKind
     value: float = 0.0
@@ -45,7 +45,7 @@ class Lock:
 
 
 def lockable(parameter_id: str) -> bool:
-    """Whether a parameter can be locked."""
+    """Return True if the parameter can be fixed."""
     try:
         return spec_of(parameter_id).stem in LOCKABLE
     except InputError:
@@ -53,7 +53,7 @@ def lockable(parameter_id: str) -> bool:
 
 
 def checked(parameter_id: str, lock: Lock) -> Lock:
-    """The lock itself; raises InputError where the parameter cannot have it."""
+    """Return the lock; raise InputError if the parameter does not support it."""
     spec = spec_of(parameter_id)
     where = Where(key=parameter_id)
     if spec.stem not in LOCKABLE:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mapping as it is shown and corrected: one row for each column of the file."""
+"""Editable channel mapping: one row for each column of the file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Entry:
-    """What the user states of one column, in the order of the rows."""
+    """User input for one column, in the order of the rows."""
 
     role: str
     unit: str
@@ -95,7 +95,7 @@ def _spec_for(column: Column, mapping: Mapping[str, ChannelSpec]) -> tuple[str, 
 
 
 def _asserted(entry: Entry, column: Column) -> str | None:
-    """The unit where it is not the file's own; checked against the role."""
+    """Return the unit if it differs from the file's unit; check it against the role."""
     unit = entry.unit.strip()
     if unit == (column.unit or ""):
         return None
@@ -109,7 +109,7 @@ def _asserted(entry: Entry, column: Column) -> str | None:
 
 
 def _refuse_set_aside(survey: Survey, found: Mapping[str, ChannelSpec]) -> None:
-    """A column whose name tells its role would be recognised again by the reader."""
+    """Raise if a column is set aside although the reader would recognise its role by its name."""
     for role, spec in survey.mapping.items():
         used = any(one.source == spec.source for one in found.values())
         if role not in found and not used:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Phase boundaries moved by hand: which there are, where they may stand, what follows."""
+"""Manual phase boundaries: the boundaries, their valid ranges, and the edited shift."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ LEAST_PHASE = 5e-3
 """Shortest phase [s] that can be set by hand; only the torque phase may be empty."""
 BY_HAND = "set by hand"
 _DECIMALS = 4
-"""Decimals of a time [s] in its field: finer than a boundary is known."""
+"""Decimals of a time [s] in its field: finer than the uncertainty of a boundary."""
 
 
 class Boundary(StrEnum):
-    """What can be moved, in order of time."""
+    """Movable phase boundary, in order of time."""
 
     START = "before_start"
     TORQUE = "torque_start"

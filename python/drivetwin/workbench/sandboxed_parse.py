@@ -39,9 +39,9 @@ AT_ALL = 600.0
 
 @dataclass(frozen=True, eq=False)
 class Opened:
-    """What a log holds and how it is read.
+    """Contents of a log, and the mapping it was read with.
 
-    `log` and `found` are None where it cannot be read as mapped, `fault` then says why.
+    `log` and `found` are None if the log cannot be read as mapped; `fault` then holds the reason.
     """
 
     survey: Survey
@@ -53,9 +53,9 @@ class Opened:
 
 @dataclass(frozen=True)
 class Request:
-    """What to open: files, and the channels as the user has corrected them.
+    """Files to open, and the channels as corrected by the user.
 
-    The labels are what the files are called in messages and results.
+    The labels name the files in messages and results.
     """
 
     log: Path
@@ -107,7 +107,7 @@ def open_gearbox(emit: Emit, path: Path, label: str) -> None:
 
 
 def bound_memory() -> None:
-    """Let this process take `MEMORY` more than it has; where the system cannot, nothing happens."""
+    """Limit the memory of this process to `MEMORY` more than its present use, if supported."""
     status = Path("/proc/self/statm")
     if sys.platform == "win32" or not status.exists():
         return
@@ -119,7 +119,7 @@ def bound_memory() -> None:
 
 @contextmanager
 def _labelled(labels: Mapping[Path, str]) -> Iterator[None]:
-    """Errors call files by their labels: uploads stand under names of ours."""
+    """Replace paths in errors by the files' labels, because uploads have internal names."""
     try:
         yield
     except DrivetwinError as error:

@@ -29,14 +29,14 @@ from drivetwin.workbench.session_state import Source, Work
 from drivetwin.workbench.workspace_folder import Folder
 
 MOST_SESSIONS = 16
-"""Sessions held; the one that was idle longest goes when another is opened."""
+"""Maximum number of sessions; opening another closes the one that was idle longest."""
 MOST_UPLOADS = 8
-"""Uploads kept for one session; the oldest goes that is not open."""
+"""Maximum number of uploads of a session; the oldest one that is not open is deleted."""
 
 
 @dataclass(frozen=True, eq=False)
 class Live:
-    """What the sliders move: the run as identified, the present run and the figure of both."""
+    """State of the sliders' simulation: identified run, present run and the figure of both."""
 
     identified: Validation
     present: Validation
@@ -70,7 +70,7 @@ class Session:
         return key
 
     def uploaded(self, key: str) -> Source:
-        """An upload by its key. Raises RefusedError where it is no longer there."""
+        """Return an upload by its key. Raises RefusedError if it was deleted."""
         upload = self.uploads.get(key)
         if upload is None:
             raise RefusedError("this upload is no longer there", "upload the file again")
@@ -82,7 +82,7 @@ class Session:
         return Source(self.folder.name_of(path), path)
 
     def open(self, log: Source, card: Source, mapping: Path | None = None) -> None:
-        """Open a log with its card; what was done with the one before goes.
+        """Open a log with its card; discard the work on the previous log.
 
         Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
@@ -93,7 +93,7 @@ class Session:
             self._set(work)
 
     def correct(self, entries: Sequence[Entry]) -> None:
-        """Read the log again with the mapping as corrected; what was found before goes.
+        """Read the log again with the corrected mapping; discard the previous results.
 
         Raises MappingError, UnitError; the work stays as it was then, and goes on.
         """
@@ -114,7 +114,7 @@ class Session:
             self.work = self.work.with_lock(parameter_id, lock)
 
     def identify(self, methods: Sequence[Method]) -> None:
-        """Start the identification in a process of its own. Raises InputError where it cannot."""
+        """Start the identification in a separate process. Raises InputError on failure."""
         with self.lock:
             if self.job is not None:
                 raise InputError("an identification is running", "wait for it or cancel it")
@@ -149,14 +149,14 @@ class Session:
                 self.job = None
 
     def choose_shift(self, index: int) -> None:
-        """Show another shift of the log. Raises InputError where there is none such."""
+        """Select another shift of the log. Raises InputError if it does not exist."""
         with self.lock:
             if not 0 <= index < len(self.work.shifts):
                 raise InputError("there is no such shift", "choose one that is listed")
             self._set(replace(self.work, shift=index, changes={}))
 
     def choose_method(self, method: Method) -> None:
-        """Show the result of another method. Raises InputError where it found none."""
+        """Select the result of another method. Raises InputError if it has no result."""
         with self.lock:
             if method not in self.work.results:
                 raise InputError("there is no such result", "choose one that is listed")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What one session is at: files, mapping, phases, locks, results, sliders; immutable."""
+"""Immutable state of one session: files, mapping, phases, fixed parameters, results, sliders."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from drivetwin.workbench.sandboxed_parse import Opened
 
 @dataclass(frozen=True)
 class Source:
-    """A file in use: the name it is shown under, where it is, and whether it was uploaded."""
+    """File in use: display name, path, and upload flag."""
 
     name: str
     path: Path
@@ -102,7 +102,7 @@ class Work:
         return locked(self.require_card(), self.locks)
 
     def require_opened(self) -> Opened:
-        """What was opened; raises InputError before that."""
+        """Return the opened log; raise InputError if none is open."""
         if self.opened is None:
             raise InputError("no log is open", "open a log and its vehicle card first")
         return self.opened
@@ -112,14 +112,14 @@ class Work:
         return self.require_opened().card
 
     def require_log(self) -> ShiftLog:
-        """The log as read; raises InputError where there is none or it cannot be read."""
+        """Return the log; raise InputError if none is open or it cannot be read."""
         opened = self.require_opened()
         if opened.log is None:
             raise InputError("the log cannot be read as mapped", "correct the mapping first")
         return opened.log
 
     def require_shift(self) -> Shift:
-        """The shift that is shown; raises InputError where the log has none."""
+        """Return the selected shift; raise InputError if the log has none."""
         self.require_log()
         if not self.shifts:
             raise InputError(

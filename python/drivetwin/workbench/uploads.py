@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files handed over by the browser: streamed to disk, counted, and looked at, never executed.
+"""Uploads from the browser: streamed to disk, limited in size, checked, never executed.
 
 An upload is bytes under a name of our own; the name that the browser gives is a label. Its
 content is parsed in a process of its own (see `reading.py`).
@@ -33,7 +33,7 @@ _HEAD = 4096
 
 @dataclass(frozen=True)
 class Upload:
-    """A file that was received: the label it came under, and where it stands."""
+    """A received file: its label and its path."""
 
     name: str
     path: Path
@@ -55,7 +55,7 @@ def label_of(name: str) -> str:
 
 
 def receive(stream: IO[bytes], name: str, claimed: int | None, target: Path, limit: int) -> Upload:
-    """Write `stream` to `target`, at most `limit` bytes of it; nothing stays where it is refused.
+    """Write at most `limit` bytes of `stream` to `target`; delete the file if it is refused.
 
     `claimed` is the length that the browser states, None where it states none.
     Raises RefusedError for a bad name, too many bytes, claimed or sent, and none at all.

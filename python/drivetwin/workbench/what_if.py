@@ -46,7 +46,7 @@ _HEIGHT = 980
 
 @dataclass(frozen=True)
 class Slider:
-    """One parameter to be moved: where it stands as identified, its range and its unit.
+    """One adjustable parameter: its identified value, range and unit.
 
     Numbers are in the display unit and multiples of `step`, so that they read well.
     """
@@ -68,7 +68,7 @@ class Slider:
 
 
 def sliders_of(twin: Twin, shift: Shift) -> list[Slider]:
-    """What the simulation of a shift can be told, as far as the log could tell it."""
+    """List the sliders of a shift's simulation: its identifiable parameters."""
     inertia = f"J_prime_{twin.inertia_gear(shift)}"
     names = ("eta", inertia, "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
     elements = (shift.offgoing, shift.oncoming)
@@ -82,16 +82,16 @@ def sliders_of(twin: Twin, shift: Shift) -> list[Slider]:
 
 
 def display_for(slider_id: str) -> Display:
-    """How the number of a slider is shown; friction factors as they are."""
+    """Return the display format of a slider's number; friction factors stay unscaled."""
     if slider_id.startswith(FRICTION):
         return Display("× identified")
     return display_of(spec_of(slider_id).unit)
 
 
 def model_of(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClutch:
-    """The model of a shift with some parameters changed (SI, by slider id).
+    """Build the model of a shift with some parameters changed (SI, by slider id).
 
-    Raises MissingParameterError where the log could not tell a parameter and nothing replaces it.
+    Raises MissingParameterError if a parameter was not identified and has no replacement.
     """
     overrides = {
         name: value
@@ -106,7 +106,7 @@ def model_of(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClut
 
 
 def changes_of(sliders: Sequence[Slider], positions: Mapping[str, float]) -> dict[str, float]:
-    """Parameters (SI) by slider id that were moved away from where they were identified."""
+    """Return the parameters (SI) by slider id that differ from their identified values."""
     return {
         one.id: positions[one.id] / display_for(one.id).factor
         for one in sliders
@@ -183,7 +183,7 @@ def _scaled(element: ShiftElement, factor: float) -> ShiftElement:
 
 
 def _delayed(twin: Twin, changes: Mapping[str, float]) -> Twin:
-    """The twin with the age of the engine torque that the sliders say."""
+    """Return the twin with the engine-torque signal delay of the sliders."""
     if "te_delay" not in changes or "te_delay" not in twin.parameters:
         return twin
     estimate = replace(twin.parameters["te_delay"], value=changes["te_delay"])

@@ -132,12 +132,12 @@ def load(path: Path, label: str) -> WorkspaceFile:
 
 
 def sources_of(content: WorkspaceFile, folder: Folder, label: str) -> tuple[Source, Source]:
-    """Log and card of a workspace in the folder. Raises RefusedError where one is not the same."""
+    """Locate log and card of a workspace in the folder. Raises RefusedError if one has changed."""
     return _found(content.log, folder, label), _found(content.card, folder, label)
 
 
 def restored(content: WorkspaceFile, work: Work) -> Work:
-    """`work` with the log read anew, brought to where the workspace was saved.
+    """Return `work`, whose log was read again, with the saved state of the workspace.
 
     Raises InputError where phases, locks or sliders do not belong to the log.
     """

@@ -24,7 +24,7 @@ class Folder:
 
     @classmethod
     def at(cls, path: Path) -> Folder:
-        """The folder at `path`; raises RefusedError where there is none."""
+        """Open the folder at `path`; raise RefusedError if it does not exist."""
         root = path.resolve()
         if not root.is_dir():
             raise RefusedError("this is no folder", "start in a folder", Where(file=str(path)))
@@ -45,7 +45,7 @@ class Folder:
         return path
 
     def new_file(self, name: str, suffix: str) -> Path:
-        """Where a file called `name` is to be written; the ending `suffix` is added if missing.
+        """Return the path of a new file called `name`; append `suffix` if it is missing.
 
         Raises RefusedError for a path that leads outside or into a folder that does not exist.
         """
@@ -59,7 +59,7 @@ class Folder:
         return path
 
     def name_of(self, path: Path) -> str:
-        """Path of a file of the folder as it is typed and stored, with forward slashes."""
+        """Return the path of a file relative to the folder, with forward slashes."""
         return path.relative_to(self.root).as_posix()
 
     def names(self, endings: Collection[str]) -> list[str]:

@@ -14,7 +14,7 @@ import drivetwin
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.actuators import Actuator, Program
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis import friction_dependence as module
 from drivetwin.estimation.analysis.friction_dependence import Departure, Kind, departures
 from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
@@ -29,7 +29,7 @@ DRAG = {"B2": 0.6, "B3": 0.3}
 
 def _dragging() -> Identification:
     """A log whose clutches drag: one element more beside each, at a constant pressure of 1 Pa."""
-    base = replace(paper_steps(), duration=DURATION)
+    base = replace(load_scenario("paper_steps"), duration=DURATION)
     base = replace(base, sensors=tuple(replace(s, rate=min(s.rate, RATE)) for s in base.sensors))
     beside = tuple(
         ShiftElement(

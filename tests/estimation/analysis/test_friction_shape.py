@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.dyno.scenarios import paper
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.analysis.friction_shape import BENDS, shaped, shaped_friction
 from drivetwin.estimation.analysis.friction_shape_prior import Shape
@@ -22,7 +22,7 @@ def test_free_shape_holds_the_truth() -> None:
     found = stepped()
     one = shaped_friction(found, Shape.FREE, {})
     curve = one.curves["B3"]
-    truth = paper().model.elements[1].friction.at(curve.slip)
+    truth = load_scenario("paper").model.elements[1].friction.at(curve.slip)
     inside = (truth >= curve.mu_lo) & (truth <= curve.mu_hi)
     assert inside.mean() > 0.8
     assert np.abs(curve.mu - truth).max() < 0.004

@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
-from drivetwin.estimation import identify
-from drivetwin.estimation.data.prepare import BESIDE, sampled, signals_of, tolerances_of
-from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.data import prepare as preparation
+from drivetwin.estimation.data.prepare import prepare, prepare_shift, sampled, tolerances_of
+from drivetwin.estimation.data.select_shifts import BESIDE, balanced
+from drivetwin.estimation.data.shift_data import PreparedLog, ShiftSignals
 from drivetwin.estimation.linear.multi_shift import disturbed
 from drivetwin.shifts.coverage import AFTER, BEFORE
 from drivetwin.shifts.detect import FoundShifts
-from drivetwin.shifts.shift import RejectedShift, Shift, ShiftKind
+from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import SensorTolerance
+from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import make_card
 
 CARD = make_card({"2": 1.91, "3": 1.43})
@@ -53,9 +56,13 @@ def drive() -> ShiftLog:
     return ShiftLog(channels, "made", "")
 
 
+def signals_of(log: ShiftLog, one: Shift) -> ShiftSignals:
+    return prepare_shift(log, CARD, one).signals
+
+
 def test_of_a_long_log_the_estimators_see_what_is_near_the_shift() -> None:
     log, one = drive(), replace(shift(100.0), before=(95.0, 100.0), after=(100.6, 104.0))
-    signals = signals_of(log, CARD, one)
+    signals = signals_of(log, one)
     seen = [
         signals.engine_torque,
         signals.output_torque,
@@ -67,7 +74,7 @@ def test_of_a_long_log_the_estimators_see_what_is_near_the_shift() -> None:
         assert signal.time[0] == pytest.approx(95.0 - BESIDE, abs=0.011)
         assert signal.time[-1] == pytest.approx(104.0 + BESIDE, abs=0.011)
     assert signals.engine_torque.sigma == sampled(log["engine_torque"]).sigma
-    whole = signals_of(log, CARD, replace(one, before=(0.0, 100.0), after=(100.6, 200.0)))
+    whole = signals_of(log, replace(one, before=(0.0, 100.0), after=(100.6, 200.0)))
     assert whole.engine_torque.time.size == log["engine_torque"].time.size
 
 
@@ -83,12 +90,10 @@ def test_the_tolerance_of_the_speed_sensor_that_is_read_is_one_of_the_engine_spe
     assert found == {**other, "engine_speed": SensorTolerance(1e-3, 0.6)}
     # What such an error does to the log is what it does to the signals.
     wrong = replace(log["input_speed"], values=1.001 * log["input_speed"].values + 0.5)
-    there = signals_of(
-        replace(log, channels={**log.channels, "input_speed": wrong}), card, shift(100.0)
-    )
-    here = disturbed(
-        signals_of(log, card, shift(100.0)), "engine_speed", SensorTolerance(1e-3, 0.6)
-    )
+    changed = replace(log, channels={**log.channels, "input_speed": wrong})
+    there = prepare_shift(changed, card, shift(100.0)).signals
+    right = prepare_shift(log, card, shift(100.0)).signals
+    here = disturbed(right, "engine_speed", SensorTolerance(1e-3, 0.6))
     assert here.engine_speed.values == pytest.approx(there.engine_speed.values)
     engine = replace(
         log["input_speed"], role="engine_speed", values=1.2 * log["input_speed"].values
@@ -113,54 +118,34 @@ def test_rows_that_show_values_late_make_ages_uncertain() -> None:
 
 
 def test_what_is_older_has_the_values_of_before() -> None:
-    signals = signals_of(drive(), CARD, shift(100.0))
+    signals = signals_of(drive(), shift(100.0))
     older = disturbed(signals, "output_torque", SensorTolerance(age=2e-3)).output_torque
     assert older.time == pytest.approx(signals.output_torque.time + 2e-3)
     assert older.values == pytest.approx(signals.output_torque.values)
 
 
-class Fitted(Exception):
-    """Stands in place of a fit."""
+def _prepare(log: ShiftLog, card: VehicleCard) -> PreparedLog:
+    return prepare(log, card, FoundShifts((shift(80.0), shift(150.0)), ()))
 
 
 def test_what_is_fitted_is_near_the_shifts_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[Sequence[ShiftSignals]] = []
-
     def chosen(
-        _log: ShiftLog, _card: object, shifts: Sequence[Shift]
+        _channels: object, _i_f: float, shifts: Sequence[Shift]
     ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
         return tuple(shifts[1:]), (RejectedShift(shifts[0].inertia_phase, "left out"),)
 
-    def fitted(signals: Sequence[ShiftSignals], *_: object) -> None:
-        told.append(signals)
-        raise Fitted
-
-    monkeypatch.setattr(identify, "chosen", chosen)
-    monkeypatch.setattr(identify, "_with_torque", fitted)
-    with pytest.raises(Fitted):
-        identify.identify(drive(), CARD, FoundShifts((shift(80.0), shift(150.0)), ()))
-    ((one,),) = told
+    monkeypatch.setattr(preparation, "chosen", chosen)
+    (one,) = _prepare(drive(), CARD).signals
     assert one.shift.before == (150.0 - BEFORE, 150.0)
     assert one.shift.after == (150.6, 150.6 + AFTER)
 
 
 def test_a_shift_in_overrun_does_not_stop_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[Sequence[ShiftSignals]] = []
-
-    def fitted(signals: Sequence[ShiftSignals], *_: object) -> None:
-        told.append(signals)
-        raise Fitted
-
     log = drive()
     torque = log["output_torque"]
     coasting = np.where(torque.time < 115.0, -100.0, 100.0) + (torque.values - 100.0)
     changed = {**log.channels, "output_torque": replace(torque, values=coasting)}
-    monkeypatch.setattr(identify, "_with_torque", fitted)
-    monkeypatch.setattr(identify, "chosen", lambda _log, _card, shifts: (tuple(shifts), ()))
-    shifts = FoundShifts((shift(80.0), shift(150.0)), ())
-    with pytest.raises(Fitted):
-        identify.identify(
-            replace(log, channels=changed), replace(CARD, loss_law="dissipative"), shifts
-        )
-    ((one,),) = told
+    monkeypatch.setattr(preparation, "chosen", lambda _all, _i_f, shifts: (tuple(shifts), ()))
+    card = replace(CARD, loss_law="dissipative")
+    (one,) = balanced(_prepare(replace(log, channels=changed), card)).signals
     assert one.shift.before[1] == 150.0

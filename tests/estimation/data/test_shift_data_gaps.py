@@ -15,13 +15,13 @@ import pytest
 from drivetwin.channels.shiftlog import FloatArray, ShiftLog
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import card_text, log_text
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import DamagedChannelError
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -35,7 +35,7 @@ STEP = (1.0, 1.3)
 def whole() -> tuple[ShiftLog, VehicleCard]:
     with TemporaryDirectory() as text:
         folder = Path(text)
-        bench = run(paper_steps(), seed=3)
+        bench = run(load_scenario("paper_steps"), seed=3)
         (folder / "log.csv").write_text(log_text(bench))
         (folder / "card.toml").write_text(card_text(bench.scenario))
         card = load_card(folder / "card.toml")

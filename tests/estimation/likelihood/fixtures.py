@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import SCENARIOS
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.objective import Problem
 from drivetwin.estimation.likelihood.optimize.multistart import fit
@@ -20,7 +20,7 @@ ROUGH = Knowledge(J_out=0.1, P0=5e3)
 
 @shared
 def bench(seed: int = 0, noise: float = 1.0, know: Knowledge = ROUGH) -> Bench:
-    return record_bench(SCENARIOS[ScenarioName.THROTTLE_STEPS](), seed, know, noise)
+    return record_bench(load_scenario(ScenarioName.THROTTLE_STEPS), seed, know, noise)
 
 
 def truth_of(made: Bench) -> dict[str, float]:

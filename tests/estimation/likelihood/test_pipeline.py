@@ -7,28 +7,28 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.dyno.scenarios import throttle_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
+from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.likelihood.pipeline import DISAGREE, likelihood
 from drivetwin.estimation.linear.estimates import conclude
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
 from drivetwin.simulation.dual_clutch import RoadLoad
-from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.bench import Bench, Knowledge, record_bench
 
-CARD = VehicleCard("truck", "paper", 1.0, 5.0, (), {}, (3.0, 9.0), (1000.0, 9000.0))
+DESIGN = DesignData("paper", 5.0, (3.0, 9.0), (1000.0, 9000.0))
 GROWTH = 40.0
 """Enough, N·m·s²/rad², for the linear method to err beyond its noise."""
 
 
 def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> None:
-    base = throttle_steps()
+    base = load_scenario("throttle_steps")
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
     made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     signals, drivelines = [made.signals], [made.driveline]
     shifts = [identify_shift(made.signals, made.driveline, 5.0)]
     linear = conclude(shifts, signals, drivelines, {})
-    told, _ = likelihood(signals, drivelines, (linear, shifts), CARD)
+    told, _ = likelihood(signals, drivelines, (linear, shifts), DESIGN)
     assert told.load is not None
     assert sum("grows with the square of the speed" in text for text in told.warnings) == 1
     linear_J, J = linear.estimates["J_vehicle"], told.estimates["J_vehicle"]
@@ -43,13 +43,13 @@ def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> N
 def test_a_vehicle_that_cannot_be_is_no_start(
     factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = record_bench(throttle_steps(), 0, Knowledge())
+    made = record_bench(load_scenario("throttle_steps"), 0, Knowledge())
     found = identify_shift(made.signals, made.driveline, 5.0)
     values = found.values.copy()
     values[found.ids.index("J_vehicle")] *= factor
     guess = _started_from(made, replace(found, values=values), monkeypatch)
     told = dict(zip(found.ids, found.values, strict=True))
-    low, high = CARD.J_vehicle_range
+    low, high = DESIGN.J_vehicle_range
     assert guess["eta"] == told["eta"]
     assert (guess["J_vehicle"] == told["J_vehicle"]) == (factor == 1.0)
     assert low <= guess["J_vehicle"] <= high
@@ -71,5 +71,5 @@ def _started_from(
     signals, drivelines = [made.signals], [made.driveline]
     linear = conclude([shift], signals, drivelines, {})
     with pytest.raises(IdentificationError, match="seen"):
-        likelihood(signals, drivelines, (linear, [shift]), CARD)
+        likelihood(signals, drivelines, (linear, [shift]), DESIGN)
     return seen[0]

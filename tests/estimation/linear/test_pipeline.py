@@ -17,12 +17,13 @@ from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals
 from drivetwin.estimation.linear.friction_points import stribeck_at
 from drivetwin.estimation.linear.momentum_balance import rounding_error
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
-from drivetwin.shifts.shift import Shift, ShiftKind
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.synthetic import Run, Truth, run, smooth_steps, upshift
 from tests.support.coverage import assert_covers, vary_draws
 
-REFERENCE = Path(__file__).parents[3] / "shared" / "reference"
+REFERENCE = Path(__file__).parents[4] / "shared" / "reference"
 SLIPS = np.array([15.0, 30.0, 40.0, 50.0])
 
 

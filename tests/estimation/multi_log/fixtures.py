@@ -13,7 +13,7 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.shifts.detect import usable_shifts
 from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.validation.multi_log import Source, Together, identify_together
@@ -29,7 +29,7 @@ LOADS = (2300.0, 2000.0)
 
 def scenario(level: float = 1.0, load: float = LOADS[0], payload: float = 1.0) -> Scenario:
     """The paper's vehicle with throttle steps; `payload` multiplies the vehicle's inertia."""
-    base = paper_steps()
+    base = load_scenario("paper_steps")
     torque = Program(tuple((time, level * value) for time, value in base.engine_torque.knots))
     model = replace(
         base.model, load=RoadLoad(constant=load * base.model.i_f), J_v=payload * base.model.J_v

@@ -11,19 +11,19 @@ import pytest
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.identify import identify
+from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.likelihood.fit import covariance_of
 from drivetwin.estimation.likelihood.parametrization import OWN
 from drivetwin.estimation.multi_log.consistency import shared_of
 from drivetwin.estimation.multi_log.fit import (
     common_tolerances,
     farthest,
-    identify_several,
     of_one_log,
     start_of,
 )
 from drivetwin.estimation.result.multi_log import Several
 from drivetwin.parameters import log_of
+from drivetwin.pipeline import identify, identify_jointly
 from tests.estimation.asked import still
 from tests.estimation.multi_log.fixtures import (
     LOADS,
@@ -84,12 +84,11 @@ def test_the_truth_of_shared_and_of_own_values_is_within_the_intervals() -> None
 
 @pytest.mark.parametrize("first", [0.0, 0.01])
 def test_the_log_that_shows_values_latest_tells_how_old_they_may_be(first: float) -> None:
-    found = together().found
-    logs = [
-        replace(one.log, channels={r: replace(c, late=late) for r, c in one.log.channels.items()})
-        for one, late in zip(pair(), (first, 0.01 - first), strict=True)
-    ]
-    tolerances = common_tolerances(logs, [found, found], card())
+    prepared = []
+    for one, late in zip(pair(), (first, 0.01 - first), strict=True):
+        channels = {r: replace(c, late=late) for r, c in one.log.channels.items()}
+        prepared.append(prepare(replace(one.log, channels=channels), card(), one.shifts))
+    tolerances = common_tolerances(prepared)
     assert tolerances["output_torque"].age == pytest.approx(0.01 / np.sqrt(12.0))
 
 
@@ -131,7 +130,7 @@ def test_the_same_recording_twice_is_refused() -> None:
     one = pair()[0]
     again = replace(one.log, source="copy.mf4", sha256="another")
     with pytest.raises(InputError, match="same recording"):
-        identify_several([one.log, again], card(), [one.shifts, one.shifts])
+        identify_jointly([one.log, again], card(), [one.shifts, one.shifts])
 
 
 def test_logs_with_and_without_output_torque_are_refused() -> None:
@@ -139,13 +138,13 @@ def test_logs_with_and_without_output_torque_are_refused() -> None:
     channels = {k: v for k, v in other.log.channels.items() if k != "output_torque"}
     without = ShiftLog(channels, "blind.csv", "x")
     with pytest.raises(InputError, match=r"blind\.csv without an output torque"):
-        identify_several([one.log, without], card(), [one.shifts, other.shifts])
+        identify_jointly([one.log, without], card(), [one.shifts, other.shifts])
 
 
 def test_logs_of_different_vehicles_are_refused_with_what_differs() -> None:
     heavy = source(scenario(payload=1.25), 25)
     with pytest.raises(IdentificationError, match="J_vehicle"):
-        identify_several([pair()[0].log, heavy.log], card(), [pair()[0].shifts, heavy.shifts])
+        identify_jointly([pair()[0].log, heavy.log], card(), [pair()[0].shifts, heavy.shifts])
 
 
 def test_logs_that_agree_have_nothing_that_differs() -> None:

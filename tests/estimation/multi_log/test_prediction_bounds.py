@@ -8,18 +8,25 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.data.prepare import signals_of
+from drivetwin.estimation.data.prepare import prepare_shift
+from drivetwin.estimation.data.shift_data import ShiftData
 from drivetwin.estimation.multi_log.prediction_bounds import Expected, expected
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, together
 from tests.support.shared_results import shared
 
 
+def _prepared(number: int) -> ShiftData:
+    """The shift of the second log of the pair, as one of the log `number`."""
+    second = pair()[1]
+    data = prepare_shift(second.log, card(), second.shifts.shifts[0])
+    return replace(data, signals=replace(data.signals, log=number))
+
+
 @shared
 def _of_second() -> Expected:
     """The second log of the pair as if it were unknown to a fit that it took part in."""
-    second = pair()[1]
-    signals = replace(signals_of(second.log, card(), second.shifts.shifts[0]), log=9)
-    return expected(likelihood_of(together().found)[0], [signals], card())[0]
+    data = _prepared(9)
+    return expected(likelihood_of(together().found)[0], [data])[0]
 
 
 def test_load_and_age_come_from_the_gear_before_the_shift() -> None:
@@ -32,8 +39,7 @@ def test_load_and_age_come_from_the_gear_before_the_shift() -> None:
 
 
 def test_no_error_is_allowed_below_the_sensor_noise() -> None:
-    second = pair()[1]
-    signals = signals_of(second.log, card(), second.shifts.shifts[0])
+    signals = _prepared(9).signals
     sigma = {
         "output_torque": signals.output_torque.sigma,
         "engine_speed": signals.engine_speed.sigma,
@@ -45,15 +51,13 @@ def test_no_error_is_allowed_below_the_sensor_noise() -> None:
 
 
 def test_a_log_of_the_fit_keeps_its_own() -> None:
-    second = pair()[1]
-    signals = replace(signals_of(second.log, card(), second.shifts.shifts[0]), log=2)
+    data = _prepared(2)
     fit = likelihood_of(together().found)[0]
-    assert expected(fit, [signals], card())[0].own == {}
+    assert expected(fit, [data])[0].own == {}
 
 
 def test_equal_seeds_give_equal_bounds() -> None:
-    second = pair()[1]
-    signals = replace(signals_of(second.log, card(), second.shifts.shifts[0]), log=9)
-    again = expected(likelihood_of(together().found)[0], [signals], card())[0]
+    data = _prepared(9)
+    again = expected(likelihood_of(together().found)[0], [data])[0]
     assert again.bounds == _of_second().bounds
     assert np.isclose(again.mean_speed, _of_second().mean_speed)

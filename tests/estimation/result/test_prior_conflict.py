@@ -10,6 +10,7 @@ import pytest
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import in_units
+from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.prior_conflict import (
     Contradiction,
@@ -21,7 +22,6 @@ from drivetwin.estimation.result.prior_conflict import (
 from drivetwin.estimation.result.prior_update import CONTRADICTS, without_prior
 from drivetwin.estimation.result.verdict import ADDS_LITTLE, designed, judge
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 IDS = ("J_out", "J_prime_2", "Tv_over_if")
 LOG = np.array([1.2, 14.3, 1800.0])
@@ -110,17 +110,17 @@ def test_an_exact_value_and_one_that_physics_excludes_are_judged_elsewhere() -> 
 def test_an_inertia_whose_interval_lies_outside_the_design_range_is_told(
     value: float, std: float | None, told: bool
 ) -> None:
-    card = VehicleCard("truck", "paper", 1.0, 5.0, (), {}, (3.0, 9.0), (1000.0, 2000.0))
+    design = DesignData("paper", 5.0, (3.0, 9.0), (1000.0, 2000.0))
     estimate = Estimate("J_prime_2", value, std, Verdict.IDENTIFIED, "likelihood")
     ratio = replace(estimate, id="J_prime_2_over_eta")
-    texts = outside_ranges({"J_prime_2": estimate, "J_prime_2_over_eta": ratio}, card)
+    texts = outside_ranges({"J_prime_2": estimate, "J_prime_2_over_eta": ratio}, design)
     assert len(texts) == int(told)
     for text in texts:
         assert f"J_prime_2 = {value:#.4g} kg·m²" in text
         assert "3 to 9 kg·m²" in text
-    design = replace(estimate, verdict=Verdict.DESIGN)
+    fixed = replace(estimate, verdict=Verdict.DESIGN)
     refused = Estimate("J_vehicle", None, None, Verdict.NOT_IDENTIFIABLE, "likelihood")
-    assert outside_ranges({"J_prime_2": design, "J_vehicle": refused}, card) == ()
+    assert outside_ranges({"J_prime_2": fixed, "J_vehicle": refused}, design) == ()
 
 
 @pytest.mark.parametrize(("eta", "std", "told"), [(1.06, 2e-4, True), (1.01, 0.01, False)])

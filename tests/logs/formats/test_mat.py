@@ -23,7 +23,7 @@ from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
 from tests.fuzz.seeds import SEEDS
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 TRUCK_C = ROOT.parent / "shared" / "logs" / "truck_c.mat"
 T = np.arange(0.0, 2.0, 0.01)
 

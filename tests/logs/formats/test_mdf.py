@@ -25,7 +25,7 @@ from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 TRUCK_B = ROOT.parent / "shared" / "logs" / "truck_b.mf4"
 
 

@@ -11,8 +11,8 @@ import pytest
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.artifacts import Evidence
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import identify
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.report.html import render_report
 from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, TableBlock, Tone
 from drivetwin.report.sections.stage_results import evidence_sections

@@ -9,7 +9,7 @@ import pytest
 
 from drivetwin.report.sections.blocks import FigureBlock
 from drivetwin.report.sections.summary import friction_section, phase_key
-from drivetwin.shifts.shift import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.report.sample import identification
 
 

@@ -31,7 +31,7 @@ def test_faults_of_a_callback_become_a_message(
         raise fault
 
     assert widgets.told(failing)() is no_update
-    widgets.acted(failing)()
+    widgets.told(failing, None)()
     assert len(messages) == 2
     assert all(says in text for text in messages)
 

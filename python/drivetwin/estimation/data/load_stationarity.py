@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whether the load is constant over a shift: eq. 11 over it, with the vehicle of all shifts."""
+"""Stationarity of the load over a shift: residual of eq. 11 with a common vehicle inertia."""
 
 from __future__ import annotations
 
@@ -28,9 +28,12 @@ AGREEING = 3
 
 @dataclass(frozen=True)
 class OwnLoad:
-    """What eq. 11 says over one span: `left`, the noise power (1: noise alone) that the best load
-    leaves; J3 [kg m^2] and the part of the load that grows with the square of the speed, at the
-    output shaft [N m s^2/rad^2], with their standard deviations."""
+    """Constant-load fit of eq. 11 over one span.
+
+    `left` is the residual noise power of the best load (1: noise alone). J3 [kg m^2] and the part
+    of the load that grows with the square of the speed, at the output shaft [N m s^2/rad^2], have
+    their standard deviations.
+    """
 
     left: float
     J_vehicle: tuple[float, float]

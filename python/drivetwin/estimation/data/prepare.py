@@ -1,31 +1,282 @@
 # SPDX-License-Identifier: MIT
-"""From log and vehicle card to what the estimators see."""
+"""Preparation of a log for the estimators: the only place where they meet log and vehicle card.
+
+Each channel is reduced to its updates and its noise estimated once; each shift is referred to the
+turbine, trimmed to its recorded inputs and cut out once. The estimators see a `PreparedLog`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
+from drivetwin._util.progress import part
 from drivetwin.channels.shiftlog import Channel, ShiftLog
+from drivetwin.errors import DamagedChannelError, IdentificationError, NoShiftError, Where
 from drivetwin.estimation.data.noise import resolution, white_noise
+from drivetwin.estimation.data.select_shifts import BESIDE, chosen
 from drivetwin.estimation.data.shift_data import (
     Coupling,
+    DesignData,
     Driveline,
+    PreparedLog,
     Sampled,
+    ShiftData,
     ShiftSignals,
     TorqueOfSpeeds,
 )
-from drivetwin.logs.quality.update_raster import fresh_samples
-from drivetwin.shifts.lockup_clutch import behind_converter
+from drivetwin.shifts.coverage import near, recorded
+from drivetwin.shifts.lockup_clutch import behind_converter, require_closed, unseen
 from drivetwin.shifts.pressures import shift_pressures
-from drivetwin.shifts.shift import Shift
+from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
+NO_AGE = PriorValue(0.0)
+"""Age of a torque [s] that is computed from speeds."""
+
+
+ENGINE_SPEEDS = ("engine_speed", "input_speed")
+"""Roles of the sensors that ω_e may be from."""
+SECANT = 1e-3
+"""Least change of a speed [rad/s] over which the slope of a converter's torque is taken."""
+
+
+class DetectedShifts(Protocol):
+    """Result of the shift detection."""
+
+    @property
+    def shifts(self) -> tuple[Shift, ...]:
+        """Usable shifts."""
+
+    @property
+    def rejected(self) -> tuple[RejectedShift, ...]:
+        """Rejected candidates with the reason."""
+
+
+def prepare(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> PreparedLog:
+    """Prepare the shifts of a log for the estimators.
+
+    Raises NoShiftError without a shift, MissingChannelError for a missing channel, and if no shift
+    can be used DamagedChannelError or IdentificationError.
+    """
+    if not shifts.shifts:
+        raise NoShiftError(
+            "the log holds no usable gear shift",
+            "record from a second before the torque phase to a second after lock-up",
+            Where(file=log.source),
+        )
+    sampler = _Sampler()
+    usable, refused = _split_usable(log, card, shifts.shifts)
+    with part(0.0, 0.05, "loads of the shifts"):
+        kept, left_out = _select(log, card, [one.shift for one in usable], sampler)
+    fitted = [one for one in usable if one.shift in kept]
+    first = fitted[0].log
+    design = DesignData(
+        loss_law=card.loss_law,
+        final_drive=card.final_drive,
+        J_prime_range=card.J_prime_range,
+        J_vehicle_range=card.J_vehicle_range,
+        J_out=card.J_out,
+        sensors=_collect_tolerances(log, first, card),
+        known=card.known if first is log else {**card.known, "te_delay": NO_AGE},
+    )
+    return PreparedLog(
+        shifts=tuple(_prepare_shift(log, card, one, sampler) for one in fitted),
+        candidates=shifts.shifts,
+        rejected=(*shifts.rejected, *refused, *left_out),
+        design=design,
+        source=log.source,
+        sha256=log.sha256,
+        inputs={**log.inputs, **card.inputs},
+        warnings=log.warnings,
+        notes=unseen(log, card),
+    )
+
+
+def prepare_shift(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftData:
+    """Prepare one shift as it is, neither trimmed nor compared with others.
+
+    Raises MissingChannelError for a missing channel.
+    """
+    usable = _UsableShift(shift, behind_converter(log, card, shift))
+    return _prepare_shift(log, card, usable, _Sampler())
+
+
+@dataclass(frozen=True, eq=False)
+class _UsableShift:
+    """A trimmed shift and the log that it is taken from: behind an open converter, or as it is."""
+
+    shift: Shift
+    log: ShiftLog
+
+
+def _split_usable(
+    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
+) -> tuple[list[_UsableShift], list[RejectedShift]]:
+    """Trim the shifts to their recorded inputs; return the usable ones and the rejected ones.
+
+    Rejected are shifts with a gap, with an open converter and no map, and with a map if the
+    converter is closed in other shifts of the log: the inertia on the engine's side is another.
+    Raises the last refusal (DamagedChannelError, IdentificationError) if none is left.
+    """
+    usable: list[_UsableShift] = []
+    rejected: list[RejectedShift] = []
+    for shift in shifts:
+        fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
+        try:
+            require_closed(log, card, shift)
+            referred = behind_converter(log, card, shift)
+            trimmed = near(recorded(referred, shift, fills, card.i_in))
+        except (DamagedChannelError, IdentificationError) as refusal:
+            if len(shifts) == len(rejected) + 1:
+                raise
+            rejected.append(RejectedShift((shift.before[1], shift.lockup_time), refusal.what))
+        else:
+            usable.append(_UsableShift(trimmed, referred))
+    closed = [one for one in usable if one.log is log]
+    if not closed:
+        return usable, rejected
+    rejected += [
+        RejectedShift(
+            (one.shift.before[1], one.shift.lockup_time), "the converter is open in this shift"
+        )
+        for one in usable
+        if one.log is not log
+    ]
+    return closed, rejected
+
+
+def _select(
+    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift], sampler: _Sampler
+) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
+    """Select the shifts with a constant load; without an output torque the load is unknown."""
+    if len(shifts) < 2:
+        return tuple(shifts), ()
+    if "output_torque" not in log:
+        return chosen(None, card.final_drive, shifts)
+    torque = sampler.sample(log["output_torque"])
+    if "wheel_speed" in log:
+        wheel = sampler.sample(log["wheel_speed"])
+    else:
+        wheel = sampler.sample(log["output_speed"], 1.0 / card.final_drive)
+    return chosen((torque, wheel), card.final_drive, shifts)
+
+
+@dataclass(eq=False)
+class _Sampler:
+    """Samples of the channels of one log, each computed once."""
+
+    known: dict[tuple[Channel, float], Sampled] = field(default_factory=dict)
+
+    def sample(self, channel: Channel, factor: float = 1.0) -> Sampled:
+        """Return the samples of a channel times `factor`."""
+        key = channel, factor
+        if key not in self.known:
+            self.known[key] = sampled(channel, factor)
+        return self.known[key]
+
+
+def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
+    """Return the finite updates of a channel times `factor`, with their noise."""
+    updates = channel.updates
+    finite = np.isfinite(updates.values)
+    values = factor * updates.values[finite]
+    floor = resolution(values) / np.sqrt(12.0)
+    return Sampled(updates.time[finite], values, max(white_noise(values), float(floor)))
+
+
+def pressures_of(log: ShiftLog, shift: Shift) -> dict[str, Sampled]:
+    """Return the pressures of both elements by name, with the noise of their whole channels.
+
+    Raises MissingChannelError where one is missing.
+    """
+    return _sample_pressures(log, shift, _Sampler())
+
+
+def _sample_pressures(log: ShiftLog, shift: Shift, sampler: _Sampler) -> dict[str, Sampled]:
+    parts = shift_pressures(log, shift)
+    return {
+        name: replace(sampler.sample(parts[name]), sigma=sampler.sample(log.pressure(name)).sigma)
+        for name in sorted(parts)
+    }
+
+
+def _prepare_shift(
+    log: ShiftLog, card: VehicleCard, usable: _UsableShift, sampler: _Sampler
+) -> ShiftData:
+    """Cut out one shift. The noise is that of whole channels; the output torque may be missing."""
+    shift, referred = usable.shift, usable.log
+    whole = _sample_shift(referred, card, shift, sampler)
+    driveline = driveline_of(card, shift)
+    if referred is not log:
+        whole = replace(whole, torque_of_speeds=_torque_of_speeds(log, card, whole, sampler))
+        driveline = replace(driveline, known={**driveline.known, "te_delay": NO_AGE})
+    return ShiftData(_cut(whole, (shift.before[0] - BESIDE, shift.after[1] + BESIDE)), driveline)
+
+
+def _cut(whole: ShiftSignals, span: tuple[float, float]) -> ShiftSignals:
+    """Cut all signals to `span` [s]."""
+
+    def cut(signal: Sampled) -> Sampled:
+        within = signal.time.size == 0 or (span[0] <= signal.time[0] and signal.time[-1] <= span[1])
+        return signal if within else signal.within(span)
+
+    return replace(
+        whole,
+        engine_torque=cut(whole.engine_torque),
+        output_torque=cut(whole.output_torque),
+        engine_speed=cut(whole.engine_speed),
+        output_speed=cut(whole.output_speed),
+        wheel_speed=None if whole.wheel_speed is None else cut(whole.wheel_speed),
+        pressures={name: cut(pressure) for name, pressure in whole.pressures.items()},
+    )
+
+
+def _sample_shift(
+    log: ShiftLog, card: VehicleCard, shift: Shift, sampler: _Sampler
+) -> ShiftSignals:
+    """Collect the signals of the whole log for a shift, engine side referred to ω_e."""
+    sample = sampler.sample
+    if "engine_speed" in log:
+        engine_speed = sample(log["engine_speed"])
+    else:
+        engine_speed = sample(log["input_speed"], card.i_in)
+    engine_torque = sample(log["engine_torque"])
+    return ShiftSignals(
+        engine_torque=engine_torque,
+        output_torque=sample(log["output_torque"]) if "output_torque" in log else _NOTHING,
+        engine_speed=engine_speed,
+        output_speed=sample(log["output_speed"]),
+        wheel_speed=sample(log["wheel_speed"]) if "wheel_speed" in log else None,
+        pressures=_sample_pressures(log, shift, sampler),
+        shift=shift,
+        torque_resolution=resolution(engine_torque.values),
+    )
+
+
+_NOTHING = Sampled(np.empty(0), np.empty(0))
+"""Samples of a sensor that the log does not have."""
+
+
+def _torque_of_speeds(
+    log: ShiftLog, card: VehicleCard, behind: ShiftSignals, sampler: _Sampler
+) -> TorqueOfSpeeds:
+    """Differentiate the turbine's torque by its speed, which the fit compares."""
+    assert card.converter is not None
+    engine, turbine = sampler.sample(log["engine_speed"]), behind.engine_speed
+    time = behind.engine_torque.time
+    pump, speed = (np.interp(time, one.time, one.values) for one in (engine, turbine))
+    steps = max(engine.sigma, SECANT), max(turbine.sigma, SECANT)
+    by_pump, by_turbine = card.converter.turbine_slopes(pump, speed, steps)
+    return TorqueOfSpeeds(time, by_turbine, engine.sigma * np.abs(by_pump))
+
 
 def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
-    """Known structure of the driveline during `shift`, ratios referred to the engine speed."""
+    """Return the known structure in `shift`, ratios referred to the engine speed."""
     couplings = {}
     for name, spec in card.elements.items():
         i_c, i_out = card.clutch_ratios(name)
@@ -49,118 +300,20 @@ def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
     )
 
 
-NO_AGE = PriorValue(0.0)
-"""Age of a torque [s] that is computed from speeds."""
-
-
-def driveline_behind(card: VehicleCard, signals: ShiftSignals) -> Driveline:
-    """Known structure during the shift of `signals`; a torque computed from speeds has no age."""
-    found = driveline_of(card, signals.shift)
-    if signals.torque_of_speeds is None:
-        return found
-    return replace(found, known={**found.known, "te_delay": NO_AGE})
-
-
-BESIDE = 10.0
-"""What the estimators see of a long log before and after a shift's held gears [s]: smoothing and
-ages of channels reach no further."""
-
-
-ENGINE_SPEEDS = ("engine_speed", "input_speed")
-"""Roles of the sensors of which one tells ω_e."""
-SECANT = 1e-3
-"""Least change of a speed [rad/s] over which the slope of a converter's torque is taken."""
-
-
-def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
-    """A channel's finite samples times `factor`, with their noise estimated from themselves."""
-    fresh = fresh_samples(channel)
-    good = np.isfinite(fresh.values)
-    values = factor * fresh.values[good]
-    floor = resolution(values) / np.sqrt(12.0)
-    return Sampled(fresh.time[good], values, max(white_noise(values), float(floor)))
-
-
-def pressures_of(log: ShiftLog, shift: Shift) -> dict[str, Sampled]:
-    """Pressures of both elements by name, with the noise of their whole channels.
-
-    Raises MissingChannelError where one is missing.
-    """
-    parts = shift_pressures(log, shift)
-    return {
-        name: replace(sampled(parts[name]), sigma=sampled(log.pressure(name)).sigma)
-        for name in sorted(parts)
-    }
-
-
-def signals_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
-    """The signals of a log that the estimators need, around `shift`.
-
-    Where the converter is open the turbine stands for the engine (`behind_converter`). The noise
-    is that of whole channels. Raises MissingChannelError for a missing channel. The output torque
-    may be missing.
-    """
-    span = shift.before[0] - BESIDE, shift.after[1] + BESIDE
-    seen = behind_converter(log, card, shift)
-    whole = _whole_signals(seen, card, shift)
-    if seen is not log:
-        whole = replace(whole, torque_of_speeds=_torque_of_speeds(log, card, whole))
-
-    def near(signal: Sampled) -> Sampled:
-        within = signal.time.size == 0 or (span[0] <= signal.time[0] and signal.time[-1] <= span[1])
-        return signal if within else signal.within(span)
-
-    return replace(
-        whole,
-        engine_torque=near(whole.engine_torque),
-        output_torque=near(whole.output_torque),
-        engine_speed=near(whole.engine_speed),
-        output_speed=near(whole.output_speed),
-        wheel_speed=None if whole.wheel_speed is None else near(whole.wheel_speed),
-        pressures={name: near(one) for name, one in whole.pressures.items()},
-    )
-
-
-def _whole_signals(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftSignals:
-    if "engine_speed" in log:
-        engine_speed = sampled(log["engine_speed"])
-    else:
-        engine_speed = sampled(log["input_speed"], card.i_in)
-    engine_torque = sampled(log["engine_torque"])
-    return ShiftSignals(
-        engine_torque=engine_torque,
-        output_torque=sampled(log["output_torque"]) if "output_torque" in log else _NOTHING,
-        engine_speed=engine_speed,
-        output_speed=sampled(log["output_speed"]),
-        wheel_speed=sampled(log["wheel_speed"]) if "wheel_speed" in log else None,
-        pressures=pressures_of(log, shift),
-        shift=shift,
-        torque_resolution=resolution(engine_torque.values),
-    )
-
-
-_NOTHING = Sampled(np.empty(0), np.empty(0))
-"""What stands for a sensor that the log does not have."""
-
-
-def _torque_of_speeds(log: ShiftLog, card: VehicleCard, behind: ShiftSignals) -> TorqueOfSpeeds:
-    """How the turbine's torque hangs on its speed, with which the fit compares."""
-    assert card.converter is not None
-    engine, turbine = sampled(log["engine_speed"]), behind.engine_speed
-    time = behind.engine_torque.time
-    pump, speed = (np.interp(time, one.time, one.values) for one in (engine, turbine))
-    steps = max(engine.sigma, SECANT), max(turbine.sigma, SECANT)
-    by_pump, by_turbine = card.converter.turbine_slopes(pump, speed, steps)
-    return TorqueOfSpeeds(time, by_turbine, engine.sigma * np.abs(by_pump))
-
-
 def tolerances_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> dict[str, SensorTolerance]:
-    """The card's sensor tolerances by role, of the speed sensors that ω_e is from as one of ω_e.
+    """Return the card's sensor tolerances by role, with ω_e from the speed sensor that is used.
 
-    An engine speed beside which the gearbox input's is not looked at, or the reverse, has none.
-    Where the log's table shows values up to a row late, each channel's age is uncertain by that.
+    A speed sensor that is not used has none. If the log's table shows values up to a row late, the
+    age of each channel is uncertain by that.
     """
-    read = "engine_speed" if "engine_speed" in behind_converter(log, card, shift) else "input_speed"
+    return _collect_tolerances(log, behind_converter(log, card, shift), card)
+
+
+def _collect_tolerances(
+    log: ShiftLog, referred: ShiftLog, card: VehicleCard
+) -> dict[str, SensorTolerance]:
+    """Return the tolerances of a log; `referred` is the log behind an open converter."""
+    read = "engine_speed" if "engine_speed" in referred else "input_speed"
     found = {role: one for role, one in card.sensors.items() if role not in ENGINE_SPEEDS}
     if read in card.sensors:
         one, factor = card.sensors[read], card.i_in if read == "input_speed" else 1.0

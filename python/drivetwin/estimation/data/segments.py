@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivetwin._util.arrays import Span
+from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
 from drivetwin.estimation.regression.modulating_functions import Windows, windows_in
@@ -84,15 +85,17 @@ def off_going_free(
     rest, margin = _vented(pressure, shift)
     if limit < rest + margin and rest < max(VENTED * element.P0.value, margin):
         limit = rest + margin
-    smooth = np.convolve(pressure.values, np.ones(SMOOTH) / SMOOTH, mode="same")
+    smooth = compute_moving_mean(pressure.values, SMOOTH)
     inside = (pressure.time >= start) & (pressure.time < shift.lockup_time)
     held = pressure.time[inside & (smooth >= limit)]
     return float(held[-1]) if held.size else start
 
 
 def _vented(pressure: Sampled, shift: Shift) -> tuple[float, float]:
-    """What is left of an off-going pressure after lock-up [Pa], and how near is as good as there:
-    what noise makes of a mean of so many samples, and a hundredth of the whole fall."""
+    """Residual off-going pressure after lock-up [Pa] and the tolerance for reaching it.
+
+    The tolerance is the standard error of the mean plus a hundredth of the whole pressure drop.
+    """
     spans = (np.linspace(*span, 100) for span in (shift.before, shift.after))
     before, rest = (float(np.median(pressure.at(time))) for time in spans)
     return rest, 5.0 * pressure.sigma / float(np.sqrt(SMOOTH)) + 0.01 * abs(before - rest)
@@ -104,7 +107,7 @@ def _driving(torque: Sampled, windows: Windows) -> Windows:
     Elsewhere the dissipative loss law has another efficiency (THEORY section 3). The output
     torque, averaged over 21 samples, must stay four standard errors above zero.
     """
-    mean = np.convolve(torque.values, np.ones(21) / 21.0, mode="same")
+    mean = compute_moving_mean(torque.values, 21)
     reversed_at = torque.time[mean < 4.0 * torque.sigma / np.sqrt(21.0)]
     first = np.searchsorted(reversed_at, windows.start)
     last = np.searchsorted(reversed_at, windows.start + windows.width)

@@ -1,30 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""Which shifts of a whole drive are fitted: those that can be, as many as tell something new.
+"""Selection of the shifts of a whole drive that are fitted.
 
-On a road the vehicle is braked and hills come and go, which no channel tells. A shift over which
-the load is not constant spoils the fit of all others, so it is left out where others do without.
-Beyond MOST shifts the sensors' tolerances decide, and time and memory of a fit grow with them:
-every change of gears then counts first with the shift that leaves least of the load unexplained.
+On a road the driver brakes and the slope changes, and no channel records either. A shift with a
+varying load biases the fit of all others, so it is dropped if enough other shifts remain. Beyond
+MOST shifts the sensor tolerances dominate the intervals, while time and memory of a fit still
+grow. For each gear change, the shifts with the smallest load residual are therefore used first.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from drivetwin._util.progress import tell
-from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.errors import DamagedChannelError, IdentificationError
+from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.load_stationarity import own_load, vehicle_of
-from drivetwin.estimation.data.prepare import BESIDE, sampled
 from drivetwin.estimation.data.segments import MomentumSettings, stretches
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
-from drivetwin.shifts.coverage import near, recorded
-from drivetwin.shifts.lockup_clutch import behind_converter, open_slip, require_closed
+from drivetwin.estimation.data.shift_data import PreparedLog, Sampled
 from drivetwin.shifts.shift import RejectedShift, Shift
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
+BESIDE = 10.0
+"""Time of a log that is kept before and after the engaged gears of a shift [s]: smoothing and ages
+of channels reach no further."""
 MOST = 12
 """Most shifts of one log in one fit."""
 CONSTANT = 5.0
@@ -34,70 +33,37 @@ times. That of the best is 1, or what a delay of the sensors makes of it, which 
 """
 
 
-def usable_of(
-    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
-) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
-    """The shifts that can be used, cut to what a model may be driven over, and those refused.
+def balanced(log: PreparedLog) -> PreparedLog:
+    """Reject the shifts that a fit cannot start from, unless there would be none left.
 
-    Refused for a gap, for an open converter without a map, and for one with a map where other
-    shifts of the log have it closed: the inertia on the engine's side is another. Where none is
-    left, the last refusal is raised (DamagedChannelError, IdentificationError).
+    In overrun the dissipative law leaves no momentum balance.
     """
-    usable: list[Shift] = []
-    refused: list[RejectedShift] = []
-    for shift in shifts:
-        fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
+    kept, rejected = [], []
+    for one in log.shifts:
         try:
-            require_closed(log, card, shift)
-            seen = behind_converter(log, card, shift)
-            usable.append(near(recorded(seen, shift, fills, card.i_in)))
-        except (DamagedChannelError, IdentificationError) as refusal:
-            if len(shifts) == len(refused) + 1:
-                raise
-            span = (shift.before[1], shift.lockup_time)
-            refused.append(RejectedShift(span, refusal.what))
-    closed = tuple(shift for shift in usable if open_slip(log, card, shift) is None)
-    if not closed:
-        return tuple(usable), tuple(refused)
-    refused += [
-        RejectedShift((shift.before[1], shift.lockup_time), "the converter is open in this shift")
-        for shift in usable
-        if shift not in closed
-    ]
-    return closed, tuple(refused)
-
-
-def balanced(
-    signals: list[ShiftSignals], drivelines: list[Driveline]
-) -> tuple[list[ShiftSignals], list[Driveline], tuple[RejectedShift, ...]]:
-    """The shifts from which a fit can start, and those left out with the reason.
-
-    All where there would be none: in overrun the dissipative law leaves no momentum balance.
-    """
-    kept, refused = [], []
-    for k, (one, driveline) in enumerate(zip(signals, drivelines, strict=True)):
-        try:
-            stretches(one, driveline, MomentumSettings())
+            stretches(one.signals, one.driveline, MomentumSettings())
         except IdentificationError as fault:
-            span = (one.shift.before[1], one.shift.lockup_time)
-            refused.append(RejectedShift(span, f"{fault.what}; other shifts of the log have one"))
+            shift = one.signals.shift
+            span = (shift.before[1], shift.lockup_time)
+            rejected.append(RejectedShift(span, f"{fault.what}; other shifts of the log have one"))
         else:
-            kept.append(k)
+            kept.append(one)
     if not kept:
-        return signals, drivelines, ()
-    return [signals[k] for k in kept], [drivelines[k] for k in kept], tuple(refused)
+        return log
+    return replace(log, shifts=tuple(kept), rejected=(*log.rejected, *rejected))
 
 
 def chosen(
-    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
+    channels: tuple[Sampled, Sampled] | None, i_f: float, shifts: Sequence[Shift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
-    """The shifts to be fitted, in order of time, and those left out with the reason.
+    """Return the shifts to be fitted, in order of time, and those left out with the reason.
 
-    All where there is one only. Without an output torque nothing tells of the load.
+    `channels` are output torque [N m] and wheel speed [rad/s]; None if the load is unknown. All
+    shifts are kept if there is one only.
     """
     if len(shifts) < 2:
         return tuple(shifts), ()
-    left = _left(log, card, shifts)
+    left = [0.0] * len(shifts) if channels is None else _left(*channels, i_f, shifts)
     most = CONSTANT * max(1.0, min(left))
     steady = [k for k, power in enumerate(left) if power <= most]
     taken = sorted(_first(shifts, left, steady))
@@ -123,20 +89,15 @@ def _reason(left: float, steady: bool) -> str:
     )
 
 
-def _left(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> list[float]:
-    """Noise power that the best constant load leaves of each shift, the vehicle being the same in
-    all; infinite where a shift tells nothing of it, and 0 for all without an output torque."""
-    if "output_torque" not in log:
-        return [0.0] * len(shifts)
-    torque = sampled(log["output_torque"])
-    if "wheel_speed" in log:
-        wheel = sampled(log["wheel_speed"])
-    else:
-        wheel = sampled(log["output_speed"], 1.0 / card.final_drive)
+def _left(torque: Sampled, wheel: Sampled, i_f: float, shifts: Sequence[Shift]) -> list[float]:
+    """Compute the noise power that the best constant load leaves of each shift.
+
+    The vehicle is the same in all. Infinite if a shift has no information on its load.
+    """
     spans = [(one.before[0], one.after[1]) for one in shifts]
     near = [(start - BESIDE, end + BESIDE) for start, end in spans]
     seen = [(torque.within(span), wheel.within(span)) for span in near]
-    i_f, alone = card.final_drive, []
+    alone = []
     for k, (span, (T_o, w)) in enumerate(zip(spans, seen, strict=True)):
         tell(0.5 * k / len(spans))
         alone.append(own_load(T_o, w, i_f, span))

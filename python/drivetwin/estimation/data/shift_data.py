@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the estimators see: sampled signals with their noise, and the ratios of one shift."""
+"""Prepared data of the estimators: sampled signals with their noise, driveline, design data."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.channels.shiftlog import pauses
-from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
 NO_DRUM = PriorValue(0.0)
 """Inertia of the drum of an element that has none."""
@@ -101,7 +102,7 @@ class Driveline:
     oncoming: Coupling
     couplings: Mapping[str, Coupling]
     J_out: PriorValue | None
-    loss_law: str = "paper"
+    loss_law: LossLaw = "paper"
     known: Mapping[str, PriorValue] = field(default_factory=dict)
 
     @property
@@ -154,3 +155,81 @@ class ShiftSignals:
     def scale_known(self) -> bool:
         """Whether an output torque gives all torque-like quantities their common scale."""
         return self.output_torque.time.size > 0
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftData:
+    """Measured signals of one shift and the known structure of its driveline."""
+
+    signals: ShiftSignals
+    driveline: Driveline
+
+
+@dataclass(frozen=True)
+class DesignData:
+    """Design data of the vehicle that hold for all shifts of a log; SI.
+
+    `J_prime_range` [kg m^2] is the design range of J' at the engine, `J_vehicle_range` [kg m^2]
+    that of J3 at the wheel. `sensors` are the tolerances by role, those of the speed sensor that
+    ω_e is from under `engine_speed`; `known` are the priors by parameter id.
+    """
+
+    loss_law: LossLaw
+    final_drive: float
+    J_prime_range: tuple[float, float]
+    J_vehicle_range: tuple[float, float]
+    J_out: PriorValue | None = None
+    sensors: Mapping[str, SensorTolerance] = field(default_factory=dict)
+    known: Mapping[str, PriorValue] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedLog:
+    """Data of one log and one vehicle for the estimators.
+
+    `candidates` are the shifts that were detected, `shifts` the data of those to be fitted and
+    `rejected` all others with the reason. `inputs` is the SHA-256 by name of every file, `notes`
+    are warnings that belong behind those of the estimation.
+    """
+
+    shifts: tuple[ShiftData, ...]
+    candidates: tuple[Shift, ...]
+    rejected: tuple[RejectedShift, ...]
+    design: DesignData
+    source: str
+    sha256: str
+    inputs: Mapping[str, str]
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def signals(self) -> tuple[ShiftSignals, ...]:
+        """Signals of the shifts to be fitted."""
+        return tuple(shift.signals for shift in self.shifts)
+
+    @property
+    def drivelines(self) -> tuple[Driveline, ...]:
+        """Structure of the driveline in the shifts to be fitted."""
+        return tuple(shift.driveline for shift in self.shifts)
+
+    @property
+    def turbine_driven(self) -> bool:
+        """True if the converter is open: its turbine takes the place of the engine."""
+        return any(s.torque_of_speeds is not None for s in self.signals)
+
+    @property
+    def scale_known(self) -> bool:
+        """True if all shifts have an output torque."""
+        return all(s.scale_known for s in self.signals)
+
+
+@dataclass(frozen=True, eq=False)
+class GearData:
+    """Engine torque [N m] and output speed [rad/s] while a gear of overall `ratio` is engaged
+    over `span` [s], with the converter closed; the span may be empty."""
+
+    gear: str
+    ratio: float
+    span: Span
+    engine_torque: Sampled
+    output_speed: Sampled

@@ -45,7 +45,7 @@ def recorded_windows(
 
 @dataclass(frozen=True, eq=False)
 class VehicleBalance:
-    """What eq. 11 needs: `windows` (m,), output torque, a speed and the `ratio` of ω_w to it.
+    """Terms of eq. 11 in the `windows` (m,): output torque, a speed and the `ratio` of ω_w to it.
 
     `psi` integrates the torque, `kernels` the speed.
     """

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.display_units import in_units
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
+from drivetwin.estimation.data.shift_data import DesignData, Driveline, ShiftSignals
 from drivetwin.estimation.likelihood.estimates import conclude
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.initial_guess import guess_of
@@ -21,7 +21,6 @@ from drivetwin.estimation.likelihood.selection.select_model import choose
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.result.estimate_set import Conclusions
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 DISAGREE = 5.0
 """Difference of the two methods in its standard deviations from which a warning is due."""
@@ -35,7 +34,7 @@ OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
 
 
 def likelihood_alone(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], design: DesignData
 ) -> tuple[Conclusions, LikelihoodFit]:
     """Fit without the linear method.
 
@@ -43,20 +42,20 @@ def likelihood_alone(
     log without an equation for the linear method. Raises IdentificationError if the fit does not
     reach a plausible minimum.
     """
-    guess = _own_guess(signals, drivelines, card)
-    best, notes = choose(signals, drivelines, card.loss_law, guess)
-    told = conclude(best, signals, drivelines, {}, card.sensors)
+    guess = _own_guess(signals, drivelines, design)
+    best, notes = choose(signals, drivelines, design.loss_law, guess)
+    told = conclude(best, signals, drivelines, {}, design.sensors)
     return replace(told, warnings=(*told.warnings, *notes)), best
 
 
 def _own_guess(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], design: DesignData
 ) -> dict[str, float]:
     """Compute an initial value of every unknown without the linear method."""
     guess: dict[str, float] = {}
     loads = []
     for s, d in zip(signals, drivelines, strict=True):
-        found = guess_without_torque(s, d, card)
+        found = guess_without_torque(s, d, design)
         loads.append(found["Tv_over_if"])
         guess = found | guess
     return guess | departures_of(loads)
@@ -66,7 +65,7 @@ def _guess(
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[Driveline],
     shifts: Sequence[IntegralShift],
-    card: VehicleCard,
+    design: DesignData,
 ) -> dict[str, float]:
     """Compute an initial value of every unknown from the linear method, unless its J3 is
     impossible.
@@ -75,10 +74,10 @@ def _guess(
     its swing hides how little the vehicle's speed changes.
     """
     found = guess_of(shifts, drivelines)
-    low, high = card.J_vehicle_range
+    low, high = design.J_vehicle_range
     if low / OUTSIDE < found["J_vehicle"] < high * OUTSIDE:
         return found
-    own = _own_guess(signals, drivelines, card)
+    own = _own_guess(signals, drivelines, design)
     behind = {n: own[n] for n in own if n in BEHIND_GEARBOX or n.endswith(f".{DEPARTURE}")}
     return {name: value for name, value in found.items() if name != AERO} | behind
 
@@ -87,16 +86,16 @@ def likelihood(
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[Driveline],
     linear: tuple[Conclusions, Sequence[IntegralShift]],
-    card: VehicleCard,
+    design: DesignData,
 ) -> tuple[Conclusions, LikelihoodFit]:
     """Fit all shifts together and assess the result; `linear` is the result of the linear method.
 
     Raises IdentificationError where the fit does not reach a plausible minimum.
     """
     found, shifts = linear
-    guess = _guess(signals, drivelines, shifts, card)
-    best, notes = choose(signals, drivelines, card.loss_law, guess)
-    told = conclude(best, signals, drivelines, found.friction, card.sensors)
+    guess = _guess(signals, drivelines, shifts, design)
+    best, notes = choose(signals, drivelines, design.loss_law, guess)
+    told = conclude(best, signals, drivelines, found.friction, design.sensors)
     warnings = (*told.warnings, *notes, *_disagreements(told, found))
     return replace(told, warnings=warnings), best
 

@@ -72,7 +72,7 @@ def loads_of(shifts: Sequence[IntegralShift]) -> tuple[float, ...]:
 def _with_own_loads(
     shifts: Sequence[IntegralShift],
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray] | None:
-    """The same with a load for each shift, of which the mean is told; None where one may do."""
+    """Combine the shifts with one load each and report the mean load; None if one load suffices."""
     if len(shifts) == 1 or not all(LOAD in shift.ids for shift in shifts):
         return None
     own = [

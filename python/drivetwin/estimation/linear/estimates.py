@@ -153,9 +153,9 @@ def _better_by_design(
 
 
 def _impossible(name: str, value: float, prior: PriorValue | None) -> Estimate | None:
-    """What stands for a value that physics excludes: the card's, else none; None for others.
+    """Replace a value that physics excludes by the card's value or by none; None for other values.
 
-    A fit of least squares that has no bounds may end there where the model does not hold.
+    Unbounded least squares may return such a value where the model does not hold.
     """
     spec = spec_of(name)
     if spec.lower <= value <= spec.upper:
@@ -167,7 +167,7 @@ def _impossible(name: str, value: float, prior: PriorValue | None) -> Estimate |
 
 
 def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
-    """What is known beforehand of a parameter itself, where anything is."""
+    """Prior of the parameter itself; None if the card has none."""
     known = drivelines[0].known.get(name)
     return design_of(name, drivelines[0]) if known is None else known
 
@@ -252,7 +252,7 @@ def _width(curve: FrictionCurve) -> float:
 def _warnings(
     shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: dict[str, str]
 ) -> tuple[str, ...]:
-    """What is told once, then what each shift brought along, then what several have in common."""
+    """Collect the warnings: general ones first, then those of each shift, then shared ones."""
     labels = labels_of(signals)
     noisy: dict[str, dict[str, float]] = {}
     trends: dict[str, LoadFit] = {}

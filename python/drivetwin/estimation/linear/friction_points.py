@@ -15,6 +15,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray, Span
+from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
 from drivetwin.estimation.linear.momentum_balance import FIRST_DRUM, MomentumFit, known
@@ -85,11 +86,9 @@ def stribeck_at(fit: FrictionFit, slip: FloatArray) -> FloatArray:
 
 def slip_of(signals: ShiftSignals, driveline: Driveline, time: FloatArray) -> FloatArray:
     """Slip of the on-coming element (eq. 15) [rad/s] at `time` (n,), over 11 samples' mean."""
-    box = np.ones(11) / 11.0
 
     def smooth(signal: Sampled) -> FloatArray:
-        padded = np.pad(signal.values, 5, mode="reflect", reflect_type="odd")
-        return np.interp(time, signal.time, np.convolve(padded, box, mode="valid"))
+        return np.interp(time, signal.time, compute_moving_mean(signal.values, 11))
 
     element = driveline.oncoming
     engine, output = smooth(signals.engine_speed), smooth(signals.output_speed)
@@ -104,7 +103,7 @@ def _filled(signals: ShiftSignals, driveline: Driveline, settings: FrictionSetti
     element = driveline.oncoming
     pressure = signals.pressures[element.name]
     limit = element.P0.value + 2.0 * element.P0.std + settings.fill_margin
-    smooth = np.convolve(pressure.values, np.ones(9) / 9.0, mode="same")
+    smooth = compute_moving_mean(pressure.values, 9)
     start, end = signals.shift.before[1], signals.shift.lockup_time
     inside = (pressure.time >= start) & (pressure.time <= end)
     below = pressure.time[inside & (smooth < limit)]

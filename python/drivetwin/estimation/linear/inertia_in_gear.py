@@ -19,9 +19,7 @@ from scipy.stats import t as student
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.display_units import in_units
-from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.data.prepare import sampled
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import GearData, Sampled
 from drivetwin.estimation.regression.modulating_functions import (
     Windows,
     hann_kernels,
@@ -30,10 +28,6 @@ from drivetwin.estimation.regression.modulating_functions import (
 )
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.shifts.coverage import parts_between
-from drivetwin.shifts.detect import held_spans
-from drivetwin.shifts.lockup_clutch import CLOSED, converter_slip, lock_ups
-from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 WIDTH = 1.6
 """Width of a window [s]: a Hann window so long passes a millionth of a 4 Hz oscillation's power."""
@@ -43,8 +37,6 @@ LEAST_FREEDOM = 6.0
 """Fewest independent windows beyond the three unknowns."""
 IDENTIFIED, WEAK = 0.25, 0.6
 """Half width of the 95 % interval over the value up to which it is identified, or weak."""
-SETTLED = 0.3
-"""Left out after a lock-up [s]."""
 BLOCKS = 8
 """Parts of the record that are left out in turn."""
 
@@ -67,39 +59,12 @@ class HeldGear:
     reason: str = ""
 
 
-def held_gears(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> tuple[HeldGear, ...]:
-    """What the gears before and between the shifts of a log tell, while the converter is closed.
-
-    Of a log without shifts the gears that it holds. Empty without an engine torque or an output
-    speed.
-    """
-    if not {"engine_torque", "output_speed"} <= log.channels.keys():
-        return ()
-    torque, speed = sampled(log["engine_torque"]), sampled(log["output_speed"])
-    if shifts:
-        spans = [(shifts[0].start_gear, shifts[0].before)]
-        spans += [(s.end_gear, (s.lockup_time + SETTLED, s.after[1])) for s in shifts]
-    else:
-        spans = held_spans(log, card)
+def held_gears(gears: Sequence[GearData]) -> tuple[HeldGear, ...]:
+    """Estimate the total inertia from each engaged gear."""
     return tuple(
-        held_gear(gear, card.ratio(gear), _closed(log, card, span), torque, speed)
-        for gear, span in spans
+        held_gear(one.gear, one.ratio, one.span, one.engine_torque, one.output_speed)
+        for one in gears
     )
-
-
-def _closed(log: ShiftLog, card: VehicleCard, span: Span) -> Span:
-    """The last part of `span` with the converter's lock-up clutch closed, empty if there is none.
-
-    Where nothing tells of the clutch, the gearbox is taken to have none.
-    """
-    closings = lock_ups(log, card)
-    for closing in reversed(closings):
-        start, end = max(span[0], closing.time + SETTLED), min(span[1], closing.end)
-        if end > start:
-            return start, end
-    slip = converter_slip(log, card, span)
-    open_all_along = bool(closings) or (slip is not None and abs(slip) > CLOSED)
-    return (span[1], span[1]) if open_all_along else span
 
 
 def held_gear(gear: str, ratio: float, span: Span, torque: Sampled, speed: Sampled) -> HeldGear:

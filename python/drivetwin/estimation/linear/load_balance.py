@@ -70,7 +70,7 @@ class LoadFit:
 
 
 def are_one(differences: FloatArray, covariance: FloatArray) -> bool:
-    """Whether loads may be one that differ by `differences` (m,) with `covariance` (m, m)."""
+    """Test if loads with the `differences` (m,) of covariance (m, m) fit one load."""
     scale = np.sqrt(np.diag(covariance))
     inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
     unit = differences / scale
@@ -78,7 +78,7 @@ def are_one(differences: FloatArray, covariance: FloatArray) -> bool:
 
 
 def different_loads(loads: Sequence[float]) -> list[str]:
-    """What is said of the loads of the shifts [N m]; nothing of one load, which is empty."""
+    """Describe the loads of the shifts [N m]; an empty text for a single common load."""
     if not loads:
         return []
     return [
@@ -88,7 +88,7 @@ def different_loads(loads: Sequence[float]) -> list[str]:
 
 
 def load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
-    """Where eq. 11 is used: throughout with a wheel speed, else away from the shift."""
+    """Return the spans for eq. 11: all with a wheel speed, else those away from the shift."""
     shift = signals.shift
     if signals.wheel_speed is not None:
         return ((shift.before[0], shift.after[1]),)

@@ -62,7 +62,7 @@ class DelayScan:
     best: float | None
 
     def tells(self, std: float) -> bool:
-        """Whether the engine torque moves enough to show its age, to `std` [s]."""
+        """Return True if the engine torque varies enough to estimate its delay to `std` [s]."""
         return std < DELAY_STD_MAX and float(np.ptp(self.q)) > DELAY_Q_MIN
 
 
@@ -211,7 +211,7 @@ def rounding_error(torque: Sampled, step: float) -> float:
 def _priors(
     signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
 ) -> dict[str, PriorValue]:
-    """What is known of the parameters beforehand, by name."""
+    """Build the priors of the parameters, by name."""
     rounding = rounding_error(signals.engine_torque, signals.torque_resolution)
     found = {"te_delay": settings.delay_prior, "te_rounding": PriorValue(0.0, rounding)}
     if driveline.J_out is not None:

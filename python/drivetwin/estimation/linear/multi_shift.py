@@ -11,14 +11,13 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import tell
 from drivetwin.channels.pressure_roles import pressed_element
-from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
+from drivetwin.estimation.data.shift_data import DesignData, Driveline, Sampled, ShiftSignals
 from drivetwin.estimation.linear.estimates import conclude
 from drivetwin.estimation.linear.friction_points import stribeck_at
 from drivetwin.estimation.linear.load_balance import growing_from
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
 from drivetwin.estimation.result.estimate_set import Conclusions, with_systematic_band
 from drivetwin.vehicle.spec import SensorTolerance, middle_of
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 def systematic_std(
@@ -41,7 +40,7 @@ def systematic_std(
 
 
 def disturbed(signals: ShiftSignals, role: str, error: SensorTolerance) -> ShiftSignals:
-    """The same signals with one sensor reading too much, or values that are older, by `error`."""
+    """Copy the signals with the gain, offset or delay `error` applied to one sensor."""
 
     def changed(s: Sampled) -> Sampled:
         values = s.values * (1.0 + error.gain) + error.offset
@@ -69,14 +68,14 @@ def disturbed(signals: ShiftSignals, role: str, error: SensorTolerance) -> Shift
 
 
 def integral_method(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], card: VehicleCard
+    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], design: DesignData
 ) -> tuple[Conclusions, tuple[IntegralShift, ...]]:
-    """What the noise lets the method conclude, and its stages on each shift.
+    """Estimate the parameters by the integral method, with the stages of each shift.
 
-    Raises IdentificationError where a shift does not carry it.
+    Raises IdentificationError if a shift does not support the method.
     """
-    start, shifts = middle_of(card.J_prime_range), []
-    load_at = growing_from(signals, card.final_drive)
+    start, shifts = middle_of(design.J_prime_range), []
+    load_at = growing_from(signals, design.final_drive)
     for k, (s, d) in enumerate(zip(signals, drivelines, strict=True)):
         tell(k / len(signals))
         shifts.append(identify_shift(s, d, start, load_at))
@@ -87,14 +86,14 @@ def with_tolerances(
     shifts: Sequence[IntegralShift],
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[Driveline],
-    card: VehicleCard,
+    design: DesignData,
 ) -> Conclusions:
     """The conclusions with the card's sensor tolerances counted.
 
     Each tolerance takes the whole method again on each shift, so this is left to those who show
     the outcome.
     """
-    parameters, bands = _systematic(signals, drivelines, shifts, card)
+    parameters, bands = _systematic(signals, drivelines, shifts, design)
     found = conclude(shifts, signals, drivelines, parameters)
     friction = {
         name: with_systematic_band(curve, bands[name]) if name in bands else curve
@@ -107,7 +106,7 @@ def _systematic(
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[Driveline],
     shifts: Sequence[IntegralShift],
-    card: VehicleCard,
+    design: DesignData,
 ) -> tuple[dict[str, float], Mapping[str, FloatArray]]:
     """Standard deviations from the card's sensor tolerances: by parameter id, and of μ by element.
 
@@ -116,9 +115,9 @@ def _systematic(
     """
     parameters: dict[str, float] = {}
     bands: dict[str, FloatArray] = {}
-    if not card.sensors:
+    if not design.sensors:
         return parameters, bands
-    start = middle_of(card.J_prime_range)
+    start = middle_of(design.J_prime_range)
     for k, (s, d, base) in enumerate(zip(signals, drivelines, shifts, strict=True)):
         tell(k / len(signals))
 
@@ -131,7 +130,7 @@ def _systematic(
             fit = base.friction if run.friction is None else run.friction
             return np.append(told, stribeck_at(fit, base.friction.curve.slip))
 
-        std = systematic_std(values, s, card.sensors)
+        std = systematic_std(values, s, design.sensors)
         for name, value in zip(base.ids, std[: len(base.ids)], strict=True):
             parameters[name] = max(parameters.get(name, 0.0), float(value))
         if base.friction is not None:

@@ -14,9 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from drivetwin._util.arrays import FloatArray, Span
-from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.prepare import sampled
 from drivetwin.estimation.data.shift_data import Sampled
 from drivetwin.estimation.linear.ringdown import BAND, FASTEST
 from drivetwin.shifts.coverage import parts_between
@@ -86,11 +84,13 @@ class _Decay:
         )
 
 
-def after_shift(log: ShiftLog, shift: Shift) -> Resonance | str:
-    """Resonance in the gear that a shift ends in, from the input speed, or why there is none."""
-    role = "input_speed" if "input_speed" in log else "engine_speed"
+def after_shift(speed: Sampled, shift: Shift) -> Resonance | str:
+    """Estimate the resonance in the gear that a shift ends in from the input speed [rad/s].
+
+    Returns the reason if there is none.
+    """
     try:
-        return resonance(sampled(log[role]), shift.lockup_time, shift.after[1])
+        return resonance(speed, shift.lockup_time, shift.after[1])
     except IdentificationError as refusal:
         return refusal.what
 

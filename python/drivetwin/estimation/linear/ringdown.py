@@ -59,11 +59,11 @@ RATIOS = np.logspace(-3.0, 8.0, 45)
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """What a fit leaves: `residual` (n,), in which `explained` (n, p) has no part, and `sigma`, the
-    least white noise of a sample [N m].
+    """Residual of a least-squares fit.
 
-    `response` (n, m) is that to unit torques at m knots, `known` (m,) the variance there of what
-    is known to be unknown [N²m²].
+    `residual` (n,) is orthogonal to `explained` (n, p). `sigma` [N m] is the smallest white noise
+    of a sample. `response` (n, m) is the response to unit torques at m knots, and `known` (m,) is
+    the stated variance of the unmeasured torque there [N²m²].
     """
 
     residual: FloatArray
@@ -191,11 +191,11 @@ class Drive:
 
 @dataclass(frozen=True, eq=False)
 class _Push:
-    """What the engine torque does to a stiff shaft's T_o [N m], at the instants fitted (n,).
+    """Contribution of the engine torque to T_o of a stiff shaft [N m], at the fitted instants (n,).
 
-    `sure` is that without jitter, less its first value; `jitter` (n, 1), or (n, 0) where there is
-    none. `density` [N²m²s] is the power density of the noise that is left in `sure`, should the
-    jitter be the sensor's.
+    `sure` is that contribution without jitter, less its first value. `jitter` is (n, 1), or (n, 0)
+    without jitter. `density` [N²m²s] is the power density of the noise that remains in `sure` if
+    the jitter is sensor noise.
     """
 
     sure: FloatArray
@@ -396,7 +396,7 @@ def _share(basis: FloatArray, values: FloatArray) -> float:
 
 
 def _without(basis: FloatArray, values: FloatArray) -> FloatArray:
-    """What the columns of `basis` (n, m) cannot explain of `values` (n,)."""
+    """Residual of `values` (n,) after projection on the columns of `basis` (n, m)."""
     q, _ = np.linalg.qr(basis)
     return np.asarray(values - q @ (q.T @ values), dtype=float)
 

@@ -21,13 +21,13 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import in_units
 from drivetwin._util.progress import part
-from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.errors import IdentificationError, InputError, Where
+from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
 from drivetwin.estimation.artifacts import Evidence
-from drivetwin.estimation.data.prepare import driveline_behind, tolerances_of
+from drivetwin.estimation.data.select_shifts import balanced
+from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import Shifts, identify
+from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.estimates import conclude
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START
@@ -42,7 +42,6 @@ from drivetwin.estimation.result.multi_log import FAR, LogShare, Several
 from drivetwin.estimation.result.prior_conflict import outside_ranges, without_gain
 from drivetwin.parameters import log_of
 from drivetwin.vehicle.spec import SensorTolerance
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 ALONE = 0.6
 """Share of the time that the fits of single logs take."""
@@ -50,43 +49,39 @@ NAMED = 3
 """How many differences an error names at most."""
 
 
-def identify_several(
-    logs: Sequence[ShiftLog], card: VehicleCard, shifts: Sequence[Shifts]
-) -> Identification:
+def identify_several(logs: Sequence[PreparedLog]) -> Identification:
     """Identify one driveline from two or more logs, by the likelihood of all their shifts.
 
     `evidence.several` holds the logs; ids of what a log has of its own end in its number.
-    Raises InputError for logs that cannot be joined (the same twice, channels that do not fit),
-    IdentificationError where one log alone, or all together, cannot be fitted, and what `identify`
-    raises.
+    Raises IdentificationError if one log alone, or all together, cannot be fitted.
     """
-    _refuse_unlike(logs)
-    alone = []
-    for k, (log, found) in enumerate(zip(logs, shifts, strict=True)):
+    alone, fitted = [], []
+    for k, log in enumerate(logs):
         with part(ALONE * k / len(logs), ALONE * (k + 1) / len(logs), f"log {k + 1} alone"):
-            alone.append(_by_itself(log, card, found))
-    signals = [replace(s, log=k) for k, one in enumerate(alone, 1) for s in one.evidence.signals]
-    drivelines = [driveline_behind(card, s) for s in signals]
+            fitted.append(balanced(log) if log.scale_known else log)
+            alone.append(_by_itself(fitted[-1]))
+    design = logs[0].design
+    signals = [replace(s, log=k) for k, log in enumerate(fitted, 1) for s in log.signals]
+    drivelines = [driveline for log in fitted for driveline in log.drivelines]
     with part(ALONE, 0.95, "all logs together"):
         try:
             _refuse_apart(alone)
-            fit, notes = choose(signals, drivelines, card.loss_law, start_of(alone))
+            fit, notes = choose(signals, drivelines, design.loss_law, start_of(alone))
         except IdentificationError as fault:
             raise IdentificationError(
                 f"each of {len(logs)} logs can be explained, but not all by one set of parameters: "
                 f"alone they tell {'; '.join(farthest(alone)) or fault.what}",
                 "leave out the log of another vehicle, payload or temperature",
             ) from fault
-    tolerances = common_tolerances(logs, alone, card)
-    told = conclude(fit, signals, drivelines, pooled_curves(alone), tolerances)
+    told = conclude(fit, signals, drivelines, pooled_curves(alone), common_tolerances(logs))
     tested = consistency(fit, signals, told.friction)
     shares = tuple(
         _share(k, log, one, fit) for k, (log, one) in enumerate(zip(logs, alone, strict=True), 1)
     )
     read = [f"{Path(log.source).name}: {text}" for log in logs for text in log.warnings]
     is_open = any(s.torque_of_speeds is not None for s in signals)
-    ranges = () if is_open else outside_ranges(told.estimates, card)
-    estimates, gains = without_gain(told.estimates, card.loss_law)
+    ranges = () if is_open else outside_ranges(told.estimates, design)
+    estimates, gains = without_gain(told.estimates, design.loss_law)
     warnings = (*read, *told.warnings, *notes, *gains, *ranges)
     told = replace(told, estimates=estimates, warnings=warnings)
     several = Several(shares, tested)
@@ -101,52 +96,19 @@ def identify_several(
     return replace(_joined(alone, told, several), evidence=evidence)
 
 
-def common_tolerances(
-    logs: Sequence[ShiftLog], alone: Sequence[Identification], card: VehicleCard
-) -> dict[str, SensorTolerance]:
-    """Tolerances by role: of the sensors, which are the same in all logs, with the largest age."""
+def common_tolerances(logs: Sequence[PreparedLog]) -> dict[str, SensorTolerance]:
+    """Return the tolerances by role; all logs have the same sensors, the largest age counts."""
     found: dict[str, SensorTolerance] = {}
-    for log, one in zip(logs, alone, strict=True):
-        for role, own in tolerances_of(log, card, one.evidence.signals[0].shift).items():
+    for log in logs:
+        for role, own in log.design.sensors.items():
             known = found.get(role, own)
             found[role] = replace(known, age=max(known.age, own.age))
     return found
 
 
-def _refuse_unlike(logs: Sequence[ShiftLog]) -> None:
-    """Raise InputError where logs cannot stand in one fit."""
-    for k, one in enumerate(logs):
-        for other in logs[:k]:
-            if _same(one, other):
-                raise InputError(
-                    f"the same recording as {other.source}: counted twice, its noise would seem "
-                    "smaller than it is",
-                    "name each log once",
-                    Where(file=one.source),
-                )
-    without = [log.source for log in logs if "output_torque" not in log]
-    if without and len(without) < len(logs):
-        raise InputError(
-            f"{', '.join(without)} without an output torque among logs that have one: the former "
-            "tell all torques over η, the latter tell them as they are",
-            "map the sensor as `output_torque`, or identify the two kinds apart",
-            Where(file=without[0]),
-        )
-
-
-def _same(one: ShiftLog, other: ShiftLog) -> bool:
-    """Return whether two logs are the same recording, even in two formats."""
-    if one.sha256 == other.sha256:
-        return True
-    common = [role for role in one.channels if role in other]
-    return bool(common) and all(
-        np.array_equal(one[role].values, other[role].values) for role in common
-    )
-
-
-def _by_itself(log: ShiftLog, card: VehicleCard, shifts: Shifts) -> Identification:
-    """The log alone. Raises IdentificationError where the likelihood does not carry it."""
-    found = identify(log, card, shifts)
+def _by_itself(log: PreparedLog) -> Identification:
+    """Identify a log alone. Raises IdentificationError if the likelihood does not carry it."""
+    found = identify(log)
     if found.method is not Method.LIKELIHOOD:
         raise IdentificationError(
             f"the likelihood does not explain this log by itself: {found.warnings[0]}",
@@ -229,7 +191,7 @@ def farthest(alone: Sequence[Identification]) -> list[str]:
     return [text for _, text in sorted(found, reverse=True)[:NAMED]]
 
 
-def _share(number: int, log: ShiftLog, alone: Identification, fit: LikelihoodFit) -> LogShare:
+def _share(number: int, log: PreparedLog, alone: Identification, fit: LikelihoodFit) -> LogShare:
     mine = next(part for part in fit.problem.parts if part.structure.log == number)
     return LogShare(
         number, log.source, log.sha256, alone.shifts, alone.estimates, mine.structure.mean_speed

@@ -21,8 +21,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.prepare import driveline_behind
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
+from drivetwin.estimation.data.shift_data import Driveline, ShiftData
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of
 from drivetwin.estimation.likelihood.objective import Part, Problem
 from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW
@@ -36,7 +35,6 @@ from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.validation import Bound
 from drivetwin.estimation.result.verdict import root_of
 from drivetwin.simulation.dual_clutch import State
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 @dataclass(frozen=True)
@@ -71,15 +69,16 @@ class Expected:
 
 
 def expected(
-    fit: LikelihoodFit, held: Sequence[ShiftSignals], card: VehicleCard, seed: int = 0
+    fit: LikelihoodFit, shifts: Sequence[ShiftData], seed: int = 0
 ) -> tuple[Expected, ...]:
-    """Predict each shift `held` out of one log from `fit`.
+    """Predict held-out shifts of one log from `fit`.
 
     The signals' `log` is their number in the fit, or one that it does not have. Raises
     IdentificationError where the stretch before the shift cannot be simulated.
     """
-    drivelines = [driveline_behind(card, s) for s in held]
-    problem, point = problem_of(held, drivelines, card.loss_law, _known(fit, drivelines))
+    held, drivelines = [one.signals for one in shifts], [one.driveline for one in shifts]
+    law = drivelines[0].loss_law
+    problem, point = problem_of(held, drivelines, law, _known(fit, drivelines))
     problem = problem.of_kinds(fit.problem.kinds)
     unseen = _unseen(fit, problem, point)
     before = _before(

@@ -62,7 +62,7 @@ class Prior:
         return cls(mean, precision)
 
     def held(self, index: int, value: float) -> Prior:
-        """The same prior with one parameter fixed at `value`."""
+        """Copy the prior with one parameter fixed at `value`."""
         mean, precision = self.mean.copy(), self.precision.copy()
         mean[index] = value
         precision[index, :] = precision[:, index] = 0.0

@@ -24,7 +24,7 @@ Z95 = 1.959963984540054
 
 
 class Verdict(StrEnum):
-    """What may be concluded about a parameter; DESIGN: the value is the card's, not the log's."""
+    """Identifiability verdict of a parameter; DESIGN: the value is from the card, not the log."""
 
     IDENTIFIED = "identified"
     WEAK = "weak"
@@ -105,7 +105,7 @@ class FrictionCurve:
 
     @property
     def symbol(self) -> str:
-        """What the curve is, in a formula."""
+        """Symbol of the curve in a formula."""
         return "μ/η" if self.over_eta else "μ"
 
     def times(self, eta: float, std: float = 0.0) -> FrictionCurve:
@@ -152,7 +152,7 @@ class LoadLaw:
         return replace(self, aero=eta * self.aero, std=spread, over_eta=False)
 
     def road_load(self, Tv_over_if: float, i_f: float) -> RoadLoad:
-        """The same law in the model's terms."""
+        """Convert the law to the parameters of the model."""
         constant = i_f * Tv_over_if - self.aero * self.mean_speed**2
         return RoadLoad(constant=constant, aero=self.aero)
 

@@ -18,9 +18,9 @@ from drivetwin.shifts.shift import shift_labels
 
 @dataclass(frozen=True, eq=False)
 class Conclusions:
-    """What the pipeline puts into the Identification.
+    """Estimates and notes that the pipeline adds to the Identification.
 
-    `loads` are those of the shifts at the output shaft [N m] where they differ; else empty.
+    `loads` are the loads of the shifts at the output shaft [N m] if they differ, else empty.
     """
 
     estimates: dict[str, Estimate]
@@ -33,7 +33,7 @@ class Conclusions:
 
 
 def _low_gear_note(signals: ShiftSignals, gear: str) -> str:
-    """What to say where the engine torque stands still in the lower gear; empty otherwise."""
+    """Return a note if the engine torque is constant in the lower gear; empty otherwise."""
     torque = signals.engine_torque.within(signals.shift.before).values
     moving, level = float(np.std(torque)), abs(float(np.mean(torque)))
     if moving > 0.03 * level:
@@ -46,7 +46,7 @@ def _low_gear_note(signals: ShiftSignals, gear: str) -> str:
 
 
 def growth_told(aero: float, std: float, mean_speed: float) -> str:
-    """What is said of a load that grows with speed, by AERO and its standard deviation."""
+    """Describe a load that grows with speed, from AERO and its standard deviation."""
     return (
         "the load grows with the square of the speed "
         f"({in_units(aero, 'N*m*s^2/rad^2', Z95 * std)} at the wheel); "
@@ -55,7 +55,7 @@ def growth_told(aero: float, std: float, mean_speed: float) -> str:
 
 
 def labels_of(signals: Sequence[ShiftSignals]) -> list[str]:
-    """What the shifts are called: by gears, and by lock-up where a log has the same shift twice."""
+    """Return the labels of the shifts: gears, and the lock-up time if a gear change repeats."""
     labels: list[str] = []
     for log, group in groupby(signals, key=lambda one: one.log):
         names = shift_labels([one.shift for one in group], to="-")

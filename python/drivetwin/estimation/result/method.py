@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class Method(StrEnum):
-    """Which estimator family answers."""
+    """Estimator family."""
 
     PAPER = "paper"
     INTEGRAL = "integral"

@@ -15,14 +15,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import in_units
-from drivetwin.estimation.data.shift_data import Driveline
+from drivetwin.estimation.data.shift_data import DesignData, Driveline
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.prior_update import CONTRADICTS, without_prior
 from drivetwin.estimation.result.verdict import doubted
 from drivetwin.parameters import OVER_ETA, spec_of
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 def design_of(name: str, driveline: Driveline) -> PriorValue | None:
@@ -118,17 +117,17 @@ def held_against(
     return told
 
 
-def outside_ranges(estimates: Mapping[str, Estimate], card: VehicleCard) -> tuple[str, ...]:
+def outside_ranges(estimates: Mapping[str, Estimate], design: DesignData) -> tuple[str, ...]:
     """What is said of inertias whose whole interval lies outside the card's design range."""
-    ranges = {"J_prime": card.J_prime_range, "J_vehicle": card.J_vehicle_range}
+    ranges = {"J_prime": design.J_prime_range, "J_vehicle": design.J_vehicle_range}
     texts = []
     for name, one in estimates.items():
-        design = None if name.endswith(OVER_ETA) else ranges.get(spec_of(name).stem)
-        if design is None or one.value is None or one.verdict is Verdict.DESIGN:
+        limits = None if name.endswith(OVER_ETA) else ranges.get(spec_of(name).stem)
+        if limits is None or one.value is None or one.verdict is Verdict.DESIGN:
             continue
         low, high = one.ci95_total or (one.value, one.value)
-        if high < design[0] or low > design[1]:
-            text = outside(name, one.value, design)
+        if high < limits[0] or low > limits[1]:
+            text = outside(name, one.value, limits)
             texts.append(f"{text}: correct the range, or check ratios, gains and units of the log")
     return tuple(texts)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What is known of a parameter beforehand, brought into a linear estimate or taken out of one.
+"""Update of a linear estimate with prior knowledge, and its inverse (prior removal).
 
-The estimates and their covariance are a normal distribution; a known value ± σ is one more
-measurement of one of them, σ = 0 an exact one. The others follow by their correlation.
+The estimates and their covariance are a normal distribution. A prior value ± σ is one more
+measurement of one parameter; σ = 0 fixes it. The other parameters follow by their correlation.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ noise levels are estimates themselves, and an effect of a tenth of the noise is 
 
 
 class Outcome(StrEnum):
-    """What may be said of a prediction."""
+    """Assessment of a prediction."""
 
     ALLOWED = "as noise allows"
     WORSE = "worse than noise"

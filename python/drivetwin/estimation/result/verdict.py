@@ -47,18 +47,18 @@ _EXPERIMENT = {
 
 
 def experiment_for(parameter_id: str) -> str:
-    """What to record so that a parameter becomes known better."""
+    """Return the experiment that would narrow the interval of a parameter."""
     return _EXPERIMENT[spec_of(parameter_id).stem]
 
 
 def sensors_decide(std_noise: float, std_systematic: float | None) -> bool:
-    """Whether an interval comes from the sensors' tolerances, so that no experiment narrows it."""
+    """Return True if sensor tolerances dominate an interval, so that no experiment narrows it."""
     systematic = std_systematic or 0.0
     return systematic > SENSORS * float(np.hypot(std_noise, systematic))
 
 
 def advice_for(parameter_id: str, std_noise: float, std_systematic: float | None) -> str:
-    """What would narrow the interval of a parameter: an experiment, or better sensors."""
+    """Return advice on narrowing an interval: an experiment or better sensors."""
     if sensors_decide(std_noise, std_systematic):
         return CALIBRATE
     return experiment_for(parameter_id)

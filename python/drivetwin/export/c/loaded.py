@@ -109,7 +109,7 @@ def _row(y: Any) -> list[float]:
 
 @dataclass(frozen=True)
 class Estimates:
-    """What the observer tells at one instant, SI; pairs are off-going, on-coming element."""
+    """Estimates of the observer at one instant, SI; pairs are off-going, on-coming element."""
 
     output_torque: float
     output_torque_std: float

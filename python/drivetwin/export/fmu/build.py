@@ -57,8 +57,8 @@ class BuildOptions:
 def build_fmu(subject: Subject, path: Path, options: BuildOptions | None = None) -> None:
     """Write the FMU of a twin to `path`; the same twin gives the same bytes.
 
-    Raises InputError for a model that C cannot hold and for a platform that the version does not
-    know, CompilerError, MissingExtraError, OSError.
+    Raises InputError for a model that C cannot represent and for a platform that the FMI version
+    does not support, CompilerError, MissingExtraError, OSError.
     """
     options = options or BuildOptions()
     _check_platforms(options)
@@ -90,7 +90,7 @@ def identifier(name: str) -> str:
 
 
 _LONGEST_IDENTIFIER = 63
-"""What C99 tells apart; file names may have 255 bytes, paths in archives on Windows some less."""
+"""Significant characters of a C99 identifier; file names and archive paths may be longer."""
 
 
 def _sources(subject: Subject, options: BuildOptions) -> tuple[Header, dict[str, bytes]]:

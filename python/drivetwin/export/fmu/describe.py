@@ -17,7 +17,7 @@ from drivetwin.export.parameters.xml_text import document
 
 @dataclass(frozen=True)
 class Header:
-    """What the description says of the FMU as a whole; times in s."""
+    """Attributes of the whole FMU in its description; times in s."""
 
     name: str
     identifier: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What travels with the FMU: its parameter set, a measured shift and the result it gives.
+"""Files packed with the FMU: parameter set, a measured shift and its reference result.
 
 The layout is that of FMI-LS-REF 1.0: files below `extra/org.fmi-standard.fmi-ls-ref`, listed with
 their roles in a manifest.
@@ -48,7 +48,7 @@ class Experiment:
     step: float
 
     def digest(self) -> bytes:
-        """What tells this experiment from others."""
+        """Hash that identifies this experiment."""
         label = f"{self.name} {self.step!r}".encode()
         return hashlib.sha256(label + self.time.tobytes() + self.inputs.tobytes()).digest()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The measured shift that travels with an export, and the model that starts where it starts."""
+"""Measured shift packed with an export, and the model with the same initial state."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Units as FMI declares them: base units, and what engineers want to read."""
+"""Unit definitions of FMI: base units and display units."""
 
 from __future__ import annotations
 

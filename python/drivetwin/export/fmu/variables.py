@@ -34,7 +34,7 @@ ENUMERATIONS = {
 
 
 class Role(StrEnum):
-    """What a variable is for: causality and variability of FMI at once."""
+    """Purpose of a variable; determines its FMI causality and variability."""
 
     INPUT = "input"
     OUTPUT = "output"

@@ -32,7 +32,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Part:
-    """What one element of a network becomes: declarations and equations.
+    """Declarations and equations of one network element.
 
     `helpers` names the models it takes that the Standard Library lacks; `rest` is the expression
     that is zero while a friction element does not slip.

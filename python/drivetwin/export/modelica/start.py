@@ -16,7 +16,7 @@ _COMPLIANT = ("spring_damper", "backlash")
 
 
 class _Independent:
-    """Rows over the nodes, of which only those count that say something new."""
+    """Linearly independent rows over the nodes; dependent rows are dropped."""
 
     def __init__(self, rows: Iterable[FloatArray], size: int) -> None:
         self._rows = np.zeros((0, size))
@@ -24,7 +24,7 @@ class _Independent:
             self.takes(row)
 
     def takes(self, row: FloatArray) -> bool:
-        """Add a row unless those before imply it; tell whether it was added."""
+        """Add a row if it is independent of the earlier ones; return True if it was added."""
         joined = np.vstack([self._rows, row])
         if int(np.linalg.matrix_rank(joined)) == self._rows.shape[0]:
             return False
@@ -78,7 +78,7 @@ def _slip(element: Element) -> tuple[tuple[str, float], ...]:
 
 
 def _constraints(element: Element) -> Iterator[tuple[tuple[str, float], ...]]:
-    """What an element makes proportional, as coefficients of node speeds that add up to zero."""
+    """Kinematic constraints of an element: coefficients of node speeds whose sum is zero."""
     match element["type"]:
         case "gear":
             yield (element["a"], 1.0), (element["b"], -element["ratio"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Words of the Modelica language: identifiers, numbers, strings, matrices."""
+"""Tokens of the Modelica language: identifiers, numbers, strings, matrices."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What a parameter file holds: named numbers and curves with units, whatever the format.
+"""Format-independent contents of a parameter file: named numbers and curves with units.
 
-A format writes a `ParameterSet` and reads it back unchanged, once `legal` has respelled what the
-format cannot hold.
+A format writes a `ParameterSet` and reads it back unchanged, after `legal` has respelled the names
+and texts that the format does not allow.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Axis:
-    """Breakpoints of a curve, increasing, at least one; `name` says of which quantity."""
+    """Breakpoints of a curve, increasing, at least one; `name` is their quantity."""
 
     name: str
     points: tuple[float, ...]
@@ -48,7 +48,7 @@ class Curve:
 class ParameterSet:
     """Contents of a parameter file.
 
-    `notes` are lines for people (provenance, what the log could not tell); they are written as
+    `notes` are lines for people (provenance, unidentified parameters); they are written as
     comments and not read back. `skipped` names what a file holds beyond numbers and curves.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whose names a parameter file uses."""
+"""Naming schemes of parameter files."""
 
 from __future__ import annotations
 

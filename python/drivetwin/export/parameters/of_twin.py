@@ -34,7 +34,7 @@ DESIGN_FIELDS = {
     "peak": ("1", "static over kinetic capacity at zero slip"),
     "drum": ("kg*m^2", "inertia that turns with the slip"),
 }
-"""Fields of a shift element that the card knows: unit and meaning."""
+"""Fields of a shift element on the card: unit and meaning."""
 LAW_FIELDS = {
     "mu_c": ("1", "friction coefficient at large slip"),
     "mu_s": ("1", "friction coefficient at zero slip"),
@@ -49,8 +49,8 @@ def parameters_of(
 ) -> ParameterSet:
     """All numbers of a twin that are known, and μ over slip of its elements.
 
-    What the log could not tell is named in the notes and has no entry. A `converter` map, which no
-    shift with the lock-up clutch engaged tells, comes from a powertrain file.
+    Unidentified parameters have no entry and are listed in the notes. A `converter` map comes from
+    a powertrain file, because it is not identifiable with the lock-up clutch engaged.
     """
     from drivetwin.export.parameters.simscape import simscape
 
@@ -97,7 +97,7 @@ def _told(estimate: Estimate) -> str:
 
 
 def _load(twin: Twin) -> Iterator[Scalar]:
-    """How the load grows with speed, where the log showed that it does."""
+    """Speed-dependent load terms, if they were estimated."""
     if (law := twin.load_law) is not None:
         over = ", over η" if law.over_eta else ""
         text = f"load torque at the wheel per speed squared, from mean_speed on{over}"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Clutches, shaft and converter under the names that Simscape Driveline models use.
 
-Which variable belongs into which field of which block: docs/reference/parameter-files.md.
+The mapping of variables to block fields is in docs/reference/parameter-files.md.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ _CLUTCH_FIELDS = ("gain", "P0", "peak", "mu_c", "mu_s", "v_s", "mu_v")
 
 
 def simscape(own: ParameterSet, elements: tuple[str, ...]) -> ParameterSet:
-    """The same set for Simscape blocks: each clutch of `elements` as a Disc Friction Clutch.
+    """Convert a set to Simscape blocks: each clutch of `elements` as a Disc Friction Clutch.
 
-    Only the product of surfaces, de-rating, area and radius is known of a clutch: it stands in the
-    piston area, with one surface and an effective radius of 1 m. The static coefficient is
+    Only the product of surfaces, de-rating, area and radius is known of a clutch. It is written
+    as the piston area, with one surface and an effective radius of 1 m. The static coefficient is
     peak · μ(0).
     """
     consumed = {f"{field}.{name}" for field in _CLUTCH_FIELDS for name in elements}

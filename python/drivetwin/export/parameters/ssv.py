@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """System structure parameter values (SSP 1.0, .ssv), as FMPy, OMSimulator and Dymola read it.
 
-The format knows scalars only. A curve `mu.B3` over `slip` is written as `mu.B3[1]`, `mu.B3[2]` …
+The format supports scalars only. A curve `mu.B3` over `slip` is written as `mu.B3[1]`, `mu.B3[2]` …
 and `mu.B3.slip[1]`, `mu.B3.slip[2]` …, in the structured naming of FMI.
 """
 

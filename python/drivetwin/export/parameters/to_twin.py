@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Values from a parameter file back into a twin, as a calibration tool has left them."""
+"""Update a twin with the values of a parameter file, e.g. from a calibration tool."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ _KINDS = {Scalar: "number", Curve: "curve"}
 class Update:
     """The twin with the values of a file.
 
-    `changed` names what differed, `idle` what differed and no simulation depends on, so that it
-    stays the twin's own; `unknown` what the twin does not know.
+    `changed` names the entries that differ and were updated. `idle` names those that differ but
+    affect no simulation, and were not updated. `unknown` names those that the twin does not have.
     """
 
     twin: Twin
@@ -43,7 +43,7 @@ class Update:
 def updated(twin: Twin, parameters: ParameterSet) -> Update:
     """Give a twin the values of a file that differ from its own, under drivetwin's own names.
 
-    What changes counts as a design value without interval. A parameter that the log could not tell
+    What changes counts as a design value without interval. An unidentified parameter
     may be given. Raises InputError where both a friction curve and the numbers of its law changed,
     where a name is given twice, in another unit than the twin's or as a curve instead of a number,
     and for a ratio or a stiffness of zero.
@@ -98,7 +98,7 @@ def _known(
 
 
 def _check(name: str, own: Scalar | Curve | None, given: Scalar | Curve) -> None:
-    """Refuse a value that would be read as something else than it says, or that is divided by."""
+    """Raise InputError for a value of another kind or unit, or a divisor of zero."""
     kind = Curve if isinstance(own, Curve) else Scalar
     if not isinstance(given, kind):
         raise InputError(

@@ -38,9 +38,9 @@ def base_units(unit: str) -> dict[str, int] | None:
 
 
 def is_same_unit(stated: str, expected: str) -> bool:
-    """Whether a unit that a file states is `expected`; one it does not state, `1`, is taken to be.
+    """Return True if the unit in a file is `expected`; a missing unit, `1`, is accepted.
 
-    Other spellings count where they are made of the same base units, as `Pa` and `N/m^2`.
+    Units with equal base units are the same, e.g. `Pa` and `N/m^2`.
     """
     if stated in ("1", expected):
         return True

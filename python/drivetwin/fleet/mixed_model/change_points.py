@@ -80,7 +80,7 @@ def _within(
 def _largest(
     unit: int, reading: FloatArray, values: FloatArray, variance: FloatArray
 ) -> Step | None:
-    """The step that explains most, beside a level and a drift of the unit's own."""
+    """Find the most significant step, in addition to the unit's own level and drift."""
     places = [int(k) for k in _splits(reading.size) if reading[k] > reading[k - 1]]
     if not places or reading[-1] == reading[0]:
         return None

@@ -33,7 +33,7 @@ _KNOWN_SHARE = 0.8
 _LOGS_PER_UNIT = 4.0
 """Logs per unit on average from which units may differ in their drift."""
 _ALIKE = 0.98
-"""Correlation of two fields beyond which their effects cannot be told apart."""
+"""Correlation of two fields beyond which their effects are not separable."""
 _ROUNDS = 5
 _MIXED = (
     "logs identified with {} different settings are taken together (card, channel mapping, method "
@@ -99,7 +99,7 @@ class _Data:
 
 
 def estimate(seen: Observed, known: Mapping[str, LogFacts]) -> JointEstimate | None:
-    """Estimate one parameter; None where there are too few logs."""
+    """Estimate one parameter; None if there are too few logs."""
     data = _data(seen, known)
     if data is None:
         return None
@@ -117,8 +117,10 @@ def estimate(seen: Observed, known: Mapping[str, LogFacts]) -> JointEstimate | N
 
 @dataclass(frozen=True, eq=False)
 class _Settled:
-    """What the conclusions are drawn from: groups are units, or what became of them after a step
-    at the reading `since`; `sound` (n,) tells the logs that took part.
+    """Basis of the conclusions.
+
+    The groups are units; a unit is divided at a step, which lies at the reading `since`. `sound`
+    (n,) is the mask of the logs that took part.
     """
 
     data: _Data
@@ -156,7 +158,7 @@ def _data(seen: Observed, known: Mapping[str, LogFacts]) -> _Data | None:
 
 
 def _usable_fields(names: Sequence[str], readings: FloatArray) -> tuple[list[int], tuple[str, ...]]:
-    """Fields that vary, each told apart from those before it; and what was left out."""
+    """Select the fields that vary and are separable from earlier ones; also return the rejects."""
     used: list[int] = []
     notes = []
     for k, name in enumerate(names):
@@ -285,7 +287,7 @@ def _drifts(data: _Data, found: MixedFit) -> tuple[Drift, ...]:
 
 
 def _units(end: _Settled) -> tuple[UnitValue, ...]:
-    """Deviations of units, and of what became of them."""
+    """Collect the deviations of the units, before and after changes."""
     if not end.fit.sigma.size:
         return ()
     deviation = end.fit.deviation[:, 0]

@@ -4,7 +4,7 @@
     y_ij = x_ij·β + z_ij·b_i + e_ij,   b_i ~ N(0, diag(σ²)),   e_ij ~ N(0, d_ij)
 
 i counts units, j the logs of one. d is the variance that a log states of itself, all scaled down
-where the logs scatter less than they say, with a common variance added where they scatter more.
+if the logs scatter less than they state, with a common variance added if they scatter more.
 Restricted likelihood after Harville, J. Am. Stat. Assoc. 72 (1977) 320; intervals of σ from its
 profile. Per unit only q × q matrices occur (Woodbury), so that the cost is linear in the logs.
 """
@@ -29,8 +29,10 @@ _SMALLEST, _LARGEST = 1e-3, 1e3
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """What is known: `y` (n,) with its stated standard deviations `std` (n,), the unit of each
-    (n,) as a number from 0, fixed effects `x` (n, p) and random ones `z` (n, q).
+    """Data of the mixed model.
+
+    `y` (n,) are the values, with stated standard deviations `std` (n,). The unit of each is a
+    number (n,) from 0. `x` (n, p) are the fixed effects and `z` (n, q) the random effects.
     """
 
     y: FloatArray
@@ -41,7 +43,7 @@ class Observations:
 
     @property
     def units(self) -> int:
-        """How many units there are."""
+        """Number of units."""
         return int(self.unit.max()) + 1
 
 
@@ -204,7 +206,7 @@ def _minimum(likelihood: _Likelihood) -> FloatArray:
 
 
 def _profile(likelihood: _Likelihood, best: FloatArray, place: int) -> tuple[float, float]:
-    """Where the deviance, least over all else, is 3.84 above its minimum: a 95 % interval of σ."""
+    """Find where the profile deviance is 3.84 above its minimum: a 95 % interval of σ."""
     others = [k for k in range(best.size) if k != place]
     bounds = [_bounds(best.size - 1)[k] for k in others]
     lowest = likelihood.deviance(best)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The estimates of one parameter over a fleet, with what is known of each log."""
+"""The estimates of one parameter over a fleet, with the facts of each log."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from drivetwin.fleet.store import Store
 
 @dataclass(frozen=True)
 class LogFacts:
-    """What is known of a log: a file of it, its unit, its fields, channel means included, and the
-    hash of the settings it was identified with.
+    """Facts of a log: a file of it, its unit and its fields.
+
+    The fields include the channel means. The settings hash is that of the identification.
     """
 
     path: str
@@ -32,7 +33,7 @@ class LogFacts:
 class Observed:
     """One parameter of the vehicles that one rule reads: `value` (n,) and `std` (n,) by log.
 
-    They are what the log alone says. `left_out` counts logs that tell no value of it.
+    The values exclude design priors. `left_out` counts the logs without a value.
     """
 
     parameter: str
@@ -63,7 +64,7 @@ def facts(store: Store) -> dict[str, tuple[str, LogFacts]]:
 def observed(store: Store, known: Mapping[str, tuple[str, LogFacts]]) -> list[Observed]:
     """All parameters with a value in some log, by rule, in the order of the first log.
 
-    Values that are the card's own are not counted: they say nothing of the fleet. Without any
+    Fixed values of the card are omitted, because they contain no data of the fleet. Without any
     stated error, as the paper's method leaves it, all logs count alike.
     """
     import pyarrow.compute as pc

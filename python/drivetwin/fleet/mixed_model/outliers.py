@@ -36,7 +36,7 @@ def unit_limit(count: int) -> float:
 
 
 def roughly_sound(values: FloatArray, unit: IntArray) -> NDArray[np.bool_]:
-    """Which of the values (n,) may take part in a first fit: not far from their unit's middle."""
+    """Return the mask of the values (n,) near their unit's median, usable in a first fit."""
     middles = np.array([np.median(values[unit == k]) for k in range(int(unit.max()) + 1)])
     away = np.abs(values - middles[unit])
     scale = _TO_SIGMA * float(np.median(away))
@@ -44,9 +44,9 @@ def roughly_sound(values: FloatArray, unit: IntArray) -> NDArray[np.bool_]:
 
 
 def unit_scores(deviation: FloatArray) -> FloatArray:
-    """How many robust standard deviations each unit's deviation (units,) is from the middle.
+    """Return the robust z-score (units,) of each unit's deviation.
 
-    NaN where there are too few units to tell.
+    NaN if there are too few units.
     """
     away = deviation - np.median(deviation)
     scale = _TO_SIGMA * float(np.median(np.abs(away)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Why a log is an outlier: what else is odd about it."""
+"""Explanations of outlying logs: other unusual properties of the same log."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _side(outlier: Outlier) -> str:
 
 
 def output_fits(store: Store) -> dict[str, float]:
-    """How well the simulation fits the output torque [%], by log; only those that have one."""
+    """Return the fit of the output torque [%] by log, for the logs that have one."""
     import pyarrow.compute as pc
 
     rows = store.rows(RowKind.FIT)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What the log alone says of friction and fill pressure, without the card's design value.
+"""Estimates of friction and fill pressure without the card's design prior.
 
-An estimate that leans on a design prior leans the same way in every log: averaged over a fleet the
-prior would count as often as there are logs and hide ageing. For joint estimates it is taken out.
+A design prior pulls the estimate of every log in the same direction: averaged over a fleet it would
+count once for each log and hide ageing. It is therefore removed before joint estimation.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def free_friction(
 ) -> FreeFriction | None:
     """Friction at `slip` [rad/s] and P0 of an element without the card's prior of P0.
 
-    None where the method leaves no covariance of the two, or the log says nothing of P0 itself.
+    None if the method yields no covariance of the two, or the log has no data on P0 itself.
     """
     posterior = _posterior(found, element)
     if posterior is None:

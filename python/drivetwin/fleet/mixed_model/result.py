@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a joint estimate of one parameter says; SI, fields in the unit of their name."""
+"""Joint estimate of one parameter; SI, fields in the unit of their name."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class JointEstimate:
-    """One parameter over the units that one rule reads.
+    """Joint estimate of one parameter over the units of one rule.
 
     `value` is shared by all units, at the fields' references; `spread` (1 σ) how much units differ.
     `excess` is the scatter of the logs over what they state. `left_out` logs tell nothing of it.

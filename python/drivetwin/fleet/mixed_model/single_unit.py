@@ -18,7 +18,7 @@ _MAKE_THEM = " `drivetwin fleet … --reports` writes a report of each, which is
 
 
 def singles(store: Store, folder: Path) -> Section:
-    """Logs that are done, the poorest fits first; `folder` is where the page will stand."""
+    """Build the table of done logs, poorest fits first; `folder` is the folder of the page."""
     fits = output_fits(store)
     known = facts(store)
     done = [log for log, _ in store.index.done() if log in known]
@@ -49,11 +49,11 @@ def _row(fact: LogFacts, fields: list[str], fit: float | None, href: str) -> tup
 
 
 def single(store: Store, log: str, folder: Path) -> str:
-    """Link from a page in `folder` to the report of a single log; empty where there is none."""
+    """Return the link from a page in `folder` to the report of a log; empty without a report."""
     report = store.report(log)
     return Path(os.path.relpath(report, folder)).as_posix() if report.is_file() else ""
 
 
 def cut(count: int) -> str:
-    """What a caption says of a table that would be longer."""
+    """Return the caption of a truncated table."""
     return f", the first {MOST_ROWS} of {count:,}" if count > MOST_ROWS else ""

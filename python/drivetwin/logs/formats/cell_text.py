@@ -42,7 +42,7 @@ class Numbers:
 
 
 def is_number(cell: str, decimal: str = ".") -> bool:
-    """Tell whether a cell is a number with this decimal sign."""
+    """Return True if a cell is a number with this decimal sign."""
     pattern = _NUMBER if decimal == "." else _COMMA_NUMBER
     return pattern.fullmatch(cell.strip()) is not None
 
@@ -71,12 +71,12 @@ def decimal_sign(rows: Sequence[Sequence[str]], file: str) -> str:
 
 
 def _may_group(commas: Iterable[str]) -> bool:
-    """Whether no number among cells with commas shows that a comma is a decimal one."""
+    """Return True if every comma in the cells may be a thousands separator."""
     return all(_THOUSANDS.fullmatch(cell.strip()) for cell in commas if is_number(cell, ","))
 
 
 def _grouped(column: Sequence[str]) -> tuple[str, str] | None:
-    """A number with comma and a whole one without, of a column whose commas may group thousands."""
+    """Return a number with comma and one without from a column whose commas may group thousands."""
     commas = [cell for cell in column if "," in cell]
     example = next((cell.strip() for cell in commas if is_number(cell, ",")), None)
     if example is None or not _may_group(commas):

@@ -190,9 +190,9 @@ def _table(text: str, time: TimeColumn, file: str) -> _Table:
 
 
 def _names_in_comments(lines: Sequence[str], delimiter: str, first: str) -> list[tuple[int, str]]:
-    """The comment lines with names, and perhaps units below, of a table that starts with numbers.
+    """Find the comment lines with names, and units if present, above a table without a header.
 
-    They split into as many fields as the `first` line; units are told by their spelling.
+    They split into as many fields as the `first` line; units are detected by their spelling.
     """
     with contextlib.suppress(csv.Error):
         fields = [cell.strip() for cell in _fields(first, delimiter)]
@@ -262,7 +262,7 @@ def _names_line(
 
 
 def _names_time(row: Sequence[str], time: TimeColumn) -> bool:
-    """Whether a row has a name for time."""
+    """Return True if a row contains a name for time."""
     names = (name_and_unit(cell.strip())[0] for cell in row)
     return any(is_time_name(name) if time.source is None else name == time.source for name in names)
 
@@ -280,16 +280,16 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 
 def _may_be_names(row: Sequence[str], usual: int, last_empty: bool) -> bool:
-    """Whether a row is as wide as the others but for a separator at the line's end.
+    """Return True if a row has the usual width, except for a separator at the line's end.
 
-    `last_empty`: the others of the `usual` width have one.
+    `last_empty`: the rows of the `usual` width end in such a separator.
     """
     ends = len(row) == usual + 1 and not row[-1].strip()
     return len(row) > 1 and (len(row) == usual or ends or (len(row) == usual - 1 and last_empty))
 
 
 def _is_data(line: str, delimiter: str) -> bool:
-    """Whether a line holds several fields and starts with a number or a clock."""
+    """Return True if a line has several fields and starts with a number or a clock time."""
     cells = line.split() if delimiter == _BLANKS else line.split(delimiter)
     first = cells[0].strip()
     return len(cells) > 1 and (is_number(first) or is_number(first, ",") or is_clock(first))
@@ -368,22 +368,22 @@ def _time_columns(
 
 
 def _units_in(row: Sequence[str]) -> tuple[int, int]:
-    """How many units a row below the names holds: first those that tell more than `-` does.
+    """Count the units in a row below the names: physical units first, then all units.
 
-    A tool fills a row of comments with `-` where there are none.
+    Some tools fill a row of comments with `-`, so `-` alone is weak evidence of a row of units.
     """
     return sum(map(_tells, row)), sum(map(is_unit, row))
 
 
 def _tells(cell: str) -> bool:
-    """Whether a cell holds a unit that is not that of a plain number."""
+    """Return True if a cell is a unit other than that of a dimensionless number."""
     return is_unit(cell) and lookup(cell) != lookup("-")
 
 
 def _unit(beside: str | None, under: str) -> str | None:
     """Unit of a column from its name and the row below, where a comment or a type may stand.
 
-    What is no unit, or says that there is none, as `-`, leaves the name its unit.
+    If the row below has no unit, or a placeholder such as `-`, the unit in the name is used.
     """
     tells = _tells(under)
     return under if tells or (beside is None and under) else beside
@@ -392,7 +392,7 @@ def _unit(beside: str | None, under: str) -> str | None:
 def _clock(
     cells: Sequence[str], dates: Sequence[str] | None, lines: Sequence[int], where: Where
 ) -> FloatArray:
-    """Seconds (n,) since the first row of a column that shows a clock."""
+    """Convert a column of clock times to seconds (n,) since the first row."""
     seconds, count = clock_seconds(cells, dates)
     if count < seconds.size:
         remedy = "export time as seconds since the start of the recording"
@@ -430,7 +430,7 @@ def _several_stamps(
     time: TimeColumn,
     file: str,
 ) -> tuple[dict[int, _Stamps], tuple[str, ...]]:
-    """Stamps of each of several time columns, from one origin, and what is told of them.
+    """Return the stamps of each of several time columns, from a common origin, and warnings.
 
     A shorter one ends in blanks or NaN; no value may stand beside these.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which reader a file needs, told by its first bytes and not by its name."""
+"""Detection of the file format from the first bytes; the file name is not used."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def check_blocks(path: Path) -> None:
 
 
 def is_version4(head: bytes) -> bool:
-    """Tell whether a file that starts with `head` is one of version 4, which has no mark."""
+    """Return True if a file that starts with `head` is one of version 4, which has no mark."""
     variable = _variable4(head[:_HEAD4])
     return variable is not None and head[_HEAD4:][: variable[0]].find(b"\0") == variable[0] - 1
 
@@ -101,7 +101,7 @@ def _elements(file: BinaryIO, order: str) -> Iterator[tuple[int, int]]:
 
 
 def _sound(file: BinaryIO, length: int) -> bool:
-    """Whether `length` bytes are one whole compressed stream."""
+    """Return True if the next `length` bytes are one complete compressed stream."""
     stream = zlib.decompressobj()
     try:
         while length > 0 and (chunk := file.read(min(length, _CHUNK))):
@@ -115,7 +115,7 @@ def _sound(file: BinaryIO, length: int) -> bool:
 
 
 def _ordered(file: BinaryIO, end: int, order: str, depth: int = 0) -> bool:
-    """Whether a matrix up to `end` consists of whole parts of known types, first its flags."""
+    """Return True if a matrix up to `end` consists of complete elements of known types."""
     kinds: list[int] = []
     flags = 0
     while (place := file.tell()) < end:
@@ -140,9 +140,9 @@ def _ordered(file: BinaryIO, end: int, order: str, depth: int = 0) -> bool:
 
 
 def _complete(kinds: list[int], flags: int) -> bool:
-    """Whether an array has the parts that its class and its complex flag announce.
+    """Return True if an array has all elements required by its class and complex flag.
 
-    Flags, sizes, name, then the numbers; other classes hold matrices, which SciPy checks itself.
+    The order is flags, sizes, name, numbers. SciPy itself checks classes that contain matrices.
     """
     announced = _NUMBERS.get(flags & 0xFF)
     if announced is None:

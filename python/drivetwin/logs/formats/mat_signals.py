@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which variables of a MATLAB workspace are signals, and which is the time of each."""
+"""Detection of signals in a MATLAB workspace and of the time vector of each."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _DEPTH = 12
 
 @dataclass(eq=False)
 class Signals:
-    """What was found: channels, and by name what holds no signal and why."""
+    """Result of the search: channels, and the reason for each variable without a signal."""
 
     channels: list[RawChannel] = field(default_factory=list)
     unreadable: dict[str, str] = field(default_factory=dict)
@@ -53,7 +53,7 @@ class _Search:
         self.found = Signals()
 
     def struct(self, tree: Mapping[str, Any], prefix: str, depth: int) -> None:
-        """Read the signals among the fields of one struct, then those of the structs in it."""
+        """Read the signals among the fields of a struct, then the signals of nested structs."""
         if depth > _DEPTH:
             self.found.unreadable[prefix] = "structs are nested too deep"
             return
@@ -198,7 +198,7 @@ class _Search:
             self.found.channels.append(RawChannel(name, unit, time * factor, values))
 
     def _told(self, name: str, value: Any) -> None:
-        """Say why a variable is none of the above, unless it is a text or a single number."""
+        """Record why a variable is no signal, unless it is a text or a single number."""
         if isinstance(value, np.ndarray) and value.dtype.kind == "c" and value.size > 1:
             self.found.unreadable[name] = "complex numbers: export their real part"
         elif isinstance(value, np.ndarray) and value.ndim > 1:
@@ -219,8 +219,8 @@ def _vector(value: Any) -> FloatArray | None:
 def _columns(value: Any, times: Sequence[FloatArray]) -> list[FloatArray]:
     """The columns of a matrix with a row for each sample of one of `times`, as Simulink writes.
 
-    None where rows and columns cannot be told apart, and where the first column only grows: it may
-    be a time of its own.
+    Returns None for a square matrix, and for a matrix whose first column is increasing (a possible
+    time vector).
     """
     sizes = [time.size for time in times]
     matrix = isinstance(value, np.ndarray) and value.dtype.kind in "iufb" and value.ndim == 2
@@ -262,5 +262,5 @@ def _field_unit(tree: Mapping[str, Any]) -> str | None:
 
 
 def _own_unit(tree: Mapping[str, Any]) -> str | None:
-    """What a struct itself names as unit."""
+    """Return the unit stated in the struct itself."""
     return next((text for key in _UNIT_FIELDS if (text := _text(tree.get(key)))), None)

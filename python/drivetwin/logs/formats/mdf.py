@@ -145,9 +145,9 @@ class MdfRecording:
         self.warnings = (*self.warnings, *origin_told(self.origin))
 
     def _has_time(self, number: int, group: Any, name: str) -> bool:
-        """Whether a group is recorded over time; its stamps and their unit are known then.
+        """Return True if a group is recorded over time; store its time channel and time unit.
 
-        By the standard they are seconds; a unit that says otherwise is believed, and told.
+        The standard unit is the second. Another stated unit is used, with a warning.
         """
         master = _time_channel(group, self._mdf.masters_db.get(number))
         if master is None:
@@ -209,14 +209,14 @@ class MdfRecording:
         return origin_of([*first, *starts]) if origin_of(first) else 0.0
 
     def _starts(self) -> Iterator[float]:
-        """First stamp [s] of each group with records; one that is damaged is told when read."""
+        """Yield the first stamp [s] of each group; damaged groups fail later, when loaded."""
         for number, factor in self._factors.items():
             with contextlib.suppress(Exception):
                 first = self._mdf.get_master(number, record_offset=0, record_count=1)
                 yield from np.asarray(first, dtype=np.float64) * factor
 
     def _time(self, group: int) -> FloatArray:
-        """Stamps [s] of a group; those of the last one stay in memory for its other channels."""
+        """Return the stamps [s] of a group; the stamps of the last group are cached."""
         if self._stamps is None or self._stamps[0] != group:
             master = np.asarray(self._mdf.get_master(group), dtype=np.float64)
             self._stamps = (group, since(master * self._factors[group], self.origin))
@@ -225,8 +225,8 @@ class MdfRecording:
     def _samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:
         """Values with the conversion of the file, the recorder's marks for invalid ones, a note.
 
-        A text among numbers, such as `not available`, is no number. Where all are texts their codes
-        are the values, and the note tells them.
+        A text among numbers, such as `not available`, becomes NaN. If all values are texts, their
+        codes are returned, and the note lists the texts.
         """
         wanted = {
             "group": place.group,
@@ -319,7 +319,7 @@ def _group_name(block: Any) -> str:
 
 
 def _holds_numbers(conversion: Any) -> bool:
-    """Whether some codes of a table of texts stand for numbers."""
+    """Return True if a value-to-text conversion also has numeric values."""
     blocks = getattr(conversion, "referenced_blocks", None) or {}
     return any(hasattr(block, "convert") for block in blocks.values())
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a channel must satisfy before anything is computed from it."""
+"""Plausibility checks of a single channel before it is used."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from drivetwin.logs.quality.outliers import (
     stale,
     stuck,
 )
-from drivetwin.logs.quality.update_raster import find_raster, fresh_samples
+from drivetwin.logs.quality.update_raster import find_raster
 
 MIN_SAMPLES = 10
 """Fewer samples cannot show a shift."""
@@ -182,7 +182,7 @@ def _at_rest(channel: Channel) -> list[str]:
     """Words for an engine torque that stays at one number where chance would have moved it."""
     if channel.role != "engine_torque":
         return []
-    fresh = fresh_samples(replace(channel, held=find_raster(channel) is not None))
+    fresh = replace(channel, held=find_raster(channel) is not None).updates
     span = longest_rest(fresh.time, fresh.values)
     if span is None:
         return []
@@ -206,7 +206,7 @@ def _coarse(channel: Channel) -> list[str]:
 
 
 def _switched(values: FloatArray) -> bool:
-    """Whether a signal knows two numbers only, as the pressure of a valve that is on or off."""
+    """Return True if a signal has only two values, such as the pressure of an on/off valve."""
     return bool(np.all((values == values.min()) | (values == values.max())))
 
 
@@ -221,7 +221,7 @@ def _spikes(channel: Channel) -> Damage | None:
 
 
 def _pulses(channel: Channel) -> Damage | None:
-    """Of a measured torque: an engine's may be cut that shortly, in the number that it sends."""
+    """Find glitches of a measured torque. Engine torque is excluded: short cuts may be genuine."""
     if channel.role != "output_torque":
         return None
     return _of_updates(channel, lambda fresh: pulses(fresh.time, fresh.values))
@@ -243,9 +243,9 @@ def _beyond(channel: Channel) -> Damage | None:
 
 
 def _of_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> Damage | None:
-    """What `look` finds in the fresh values of a channel, with the samples that repeat them."""
+    """Apply `look` to the updated samples of a channel; include the samples that repeat them."""
     held = find_raster(channel) is not None
-    fresh = fresh_samples(replace(channel, held=held))
+    fresh = replace(channel, held=held).updates
     found = look(fresh)
     if found is None or not held:
         return found
@@ -254,7 +254,7 @@ def _of_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> D
 
 
 def _stale(channel: Channel) -> Damage | None:
-    """Values that a logger shows on while their messages are lost."""
+    """Find values that a logger repeats while messages are lost."""
     if channel.quantity in AUXILIARY:
         return None
     return _of_updates(channel, lambda fresh: stale(fresh.time, fresh.values))
@@ -265,12 +265,12 @@ def _clipped(channel: Channel) -> Damage | None:
 
 
 def _measured(channel: Channel) -> bool:
-    """Whether a sensor's noise is expected in a channel."""
+    """Return True if a channel is expected to have sensor noise."""
     return channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
 
 
 def _without(channel: Channel, damage: Damage | None, warnings: list[str]) -> Channel:
-    """Leave the damaged samples out and say so."""
+    """Drop the damaged samples and add a warning."""
     if damage is None:
         return channel
     warnings.append(f"channel {channel.source_name!r}: {damage.text}")
@@ -300,9 +300,9 @@ def check_order(time: FloatArray, where: Where) -> None:
 
 
 def _time_remedy(time: FloatArray, backward: NDArray[np.intp]) -> str:
-    """What to do about stamps that run backward; a counter that starts again goes on from there.
+    """Suggest a remedy for stamps that decrease, for example after a counter reset.
 
-    Where many repeat the one before and none lies behind it, they were rounded.
+    Many repeated stamps without a decreasing one are a result of rounding.
     """
     later = np.minimum(backward + MIN_SAMPLES, time.size - 1)
     if backward.size <= MAX_WRAPS and np.all(time[later] < time[backward]):

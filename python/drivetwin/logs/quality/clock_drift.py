@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Time stamps written as a clock: `12:34:56.789` or `1:34:56 PM`, a date beside or before it."""
+"""Time stamps written as a clock: `12:34:56.789` or `1:34:56 PM`, with an optional date."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _ZONE = re.compile(r"(Z|[+-]\d{2}:?\d{2})$")
 
 
 def is_clock(cell: str) -> bool:
-    """Tell whether a cell is a clock time, with or without a date before it."""
+    """Return True if a cell is a clock time, with or without a date before it."""
     return _parse(cell, "") is not None
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the channels of one log must satisfy together: one clock, speeds that fit the gearing."""
+"""Consistency checks between channels of a log: common clock, speeds, gear ratios, torques."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from drivetwin.channels.roles import AUXILIARY, quantity_of
 from drivetwin.channels.shiftlog import Channel, open_ends
 from drivetwin.errors import PlausibilityError, TimeError, Where
 from drivetwin.logs.quality.time_alignment import SIGNIFICANT, speed_ratio
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 STARTS_APART = 0.05
@@ -62,7 +61,7 @@ def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
 
 
 def partly_recorded(channels: Mapping[str, Channel]) -> list[str]:
-    """Tell which channels start later or end earlier than the log."""
+    """Return a warning for the channels that start later or end earlier than the log."""
     measured = [one for role, one in channels.items() if quantity_of(role) not in AUXILIARY]
     if not measured:
         return []
@@ -73,7 +72,7 @@ def partly_recorded(channels: Mapping[str, Channel]) -> list[str]:
     return [
         f"channel {channel.source_name!r}: no samples from {low:.3f} s to {high:.3f} s"
         for channel in measured
-        for low, high in open_ends(fresh_samples(channel).time, whole)
+        for low, high in open_ends(channel.updates.time, whole)
         if high - low > STARTS_APART
     ]
 
@@ -116,7 +115,7 @@ def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str)
 
 
 def final_drive_held(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
-    """Tell where output and wheel speed are not in the ratio of the final drive."""
+    """Return a warning if the ratio of output and wheel speed is not the final drive."""
     if "output_speed" not in channels or "wheel_speed" not in channels:
         return []
     outlet, wheel, final = channels["output_speed"], channels["wheel_speed"], card.final_drive
@@ -150,7 +149,7 @@ def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
 
 
 def torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
-    """Tell where output and engine torque do not fit the ratio of the gear that is held."""
+    """Return a warning if output and engine torque do not match the ratio of the engaged gear."""
     roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
     if not all(role in channels for role in roles):
         return []

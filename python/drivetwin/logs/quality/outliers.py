@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Damaged samples of one channel: found, left out, told. Nothing is put in their place."""
+"""Detection of damaged samples of a channel. They are dropped and reported, not replaced."""
 
 from __future__ import annotations
 
@@ -242,7 +242,7 @@ def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | 
 def stale(time: FloatArray, values: FloatArray) -> Damage | None:
     """Updates (n,) that repeat the one before while the signal moves on and then catches up.
 
-    So a logger shows messages that were lost. Where the signal turns or rests a repeat may be true.
+    Lost messages cause such repeats. Where the signal turns or rests, a repeat may be genuine.
     """
     steps = np.diff(values)
     mask = np.zeros(values.size, np.bool_)
@@ -270,7 +270,7 @@ def stale(time: FloatArray, values: FloatArray) -> Damage | None:
 
 
 def _restless(steps: FloatArray, usual: float) -> bool:
-    """Tell whether successive steps are as large as usual and turn as noise does."""
+    """Return True if successive steps are as large as usual and turn as noise does."""
     turns = np.count_nonzero(np.diff(np.sign(steps)))
     return bool(turns >= _RESTLESS and np.median(np.abs(steps)) > _ALIVE * usual)
 
@@ -312,8 +312,8 @@ def staircase(values: FloatArray) -> float:
 def _noise(codes: FloatArray) -> float:
     """Standard deviation of the noise before rounding to whole `codes` (n,), in their unit.
 
-    To and fro between two neighbours tells nothing, since the true value may lie between them; to
-    and fro over three codes or more does, wherever it lies.
+    Alternation between two adjacent codes is no evidence of noise, since the true value may lie
+    between them. Alternation over three or more codes is.
     """
     steps = np.round(np.diff(codes))
     turns = steps[1:] * steps[:-1] < 0.0
@@ -369,9 +369,9 @@ def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damag
 def _are_put_in(
     time: FloatArray, values: FloatArray, found: Sequence[tuple[int, int]], largest: float
 ) -> bool:
-    """Whether all stretches are one number each, short, and in the midst of others.
+    """Return True if each stretch is constant, short, and surrounded by other values.
 
-    At the ends of the log they must exceed the `largest` of the others by more.
+    At the ends of the log, a larger margin over `largest`, the largest other value, is required.
     """
     return all(
         ((start > 0 and end < values.size) or abs(values[start]) > _BEYOND_AT_END * largest)
@@ -382,10 +382,10 @@ def _are_put_in(
 
 
 def _may_be_commanded(values: FloatArray, run: tuple[int, int], possible: float) -> bool:
-    """Whether a stretch of one number is a pulse that fills a clutch, or cut off by the log's ends.
+    """Return True if a constant stretch may be a clutch fill pulse or is cut off by the log's ends.
 
-    A fill pulse comes from rest and leaves the pressure higher; where a number stands for no value,
-    the signal is in the end where its own course has brought it.
+    A fill pulse starts from rest and ends at a higher pressure. After an invalid-value code the
+    signal continues its previous course.
     """
     start, end = run
     if not 0.0 < values[start] <= possible:

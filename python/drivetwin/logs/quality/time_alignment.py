@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Delay and clock drift between speed channels, where physics ties them together, and their ratio.
+"""Delay, clock drift and ratio of speed channels that are coupled by a gear.
 
-In a gear ω_in = i·ω_out at every instant, so what differs in time with the acceleration is a delay.
-It is told, with the mapping line that cures it, and never applied unasked.
+In a gear ω_in = i·ω_out at every instant, so an error in proportion to the acceleration is a
+delay. A warning suggests the mapping line that corrects it; no delay is applied automatically.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from drivetwin.channels.shiftlog import Channel, FloatArray
-from drivetwin.logs.quality.update_raster import fresh_samples
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 GRID = 0.01
@@ -42,9 +41,9 @@ _LEAST_DELAY = 5e-3
 
 @dataclass(frozen=True)
 class Delay:
-    """How much later [s] one channel's stamps are than another's, in the middle of the log.
+    """Delay [s] of a channel relative to another in the middle of the log.
 
-    `drift` [s/s] is how the delay grows, zero where that was not asked; the `sigma`s are one
+    `drift` [s/s] is the rate of change of the delay, zero if not estimated; the `sigma`s are one
     standard deviation; `span` [s] of the data in gear.
     """
 
@@ -67,8 +66,8 @@ def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> De
     """Return how late `slower` is against `faster` where their ratio is one of `ratios`.
 
     Least squares of ω_f - i·ω_s = δ_g·ω_s + i·(τ + d·t)·dω_s/dt over all samples in gear g: the
-    ratio may be off by δ_g, so only changes of acceleration tell the delay. None where there is too
-    little time in gear or no such change.
+    ratio may be off by δ_g, so only changes of acceleration identify the delay. Returns None if
+    there is too little time in gear or no such change.
     """
     start = max(faster.time[0], slower.time[0])
     end = min(faster.time[-1], slower.time[-1])
@@ -169,17 +168,17 @@ def least_squares(design: FloatArray, target: FloatArray) -> Fit | None:
 
 
 def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
-    """Tell delays and drifts of speed channels against the input speed that are beyond doubt."""
+    """Return warnings for significant delays and drifts of speeds against the input speed."""
     if "input_speed" not in channels:
         return []
-    inlet = fresh_samples(channels["input_speed"])
+    inlet = channels["input_speed"].updates
     texts: list[str] = []
     if "output_speed" in channels:
-        outlet = fresh_samples(channels["output_speed"])
+        outlet = channels["output_speed"].updates
         found = speed_delay(inlet, outlet, [gear.ratio for gear in card.gears])
         texts += _told(found, outlet, inlet)
     if "engine_speed" in channels:
-        engine = fresh_samples(channels["engine_speed"])
+        engine = channels["engine_speed"].updates
         found = speed_delay(engine, inlet, [card.i_in])
         turned = None if found is None else replace(found, value=-found.value, drift=-found.drift)
         texts += _told(turned, engine, inlet)
@@ -187,10 +186,10 @@ def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[s
 
 
 def beyond_doubt(delay: Delay, one: Channel, other: Channel) -> bool:
-    """Whether a delay is more than noise and the sampling of both channels explain together.
+    """Return True if a delay exceeds the effects of noise and sampling of both channels.
 
-    A sample may be the mean over its period, as encoders on a bus send it, and is then half of it
-    late without any clock being wrong.
+    Encoders on a bus may send the mean over a period. Such a sample is half a period late although
+    all clocks are right.
     """
     by_sampling = 0.5 * max(one.step, other.step)
     beyond = abs(delay.value) - by_sampling

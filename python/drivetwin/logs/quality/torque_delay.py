@@ -23,7 +23,6 @@ from drivetwin.logs.quality.time_alignment import (
     least_squares,
     means,
 )
-from drivetwin.logs.quality.update_raster import fresh_samples
 
 SLOW = 1.0
 """Averaging [s] whose result is taken off both sides: a load that changes slowly goes with it."""
@@ -87,15 +86,15 @@ def _delay(fit: Fit) -> Delay | None:
 
 
 def torque_warnings(channels: Mapping[str, Channel]) -> list[str]:
-    """Tell a delay between output torque and speeds that is beyond doubt.
+    """Return warnings for a significant delay between output torque and speeds.
 
-    One against all speeds that there are is the torque's, else the speed's. Of a value that is
-    repeated until the next one comes, the first counts.
+    A delay against all speeds is attributed to the torque, else to the speed. Only the first sample
+    of a repeated value is used.
     """
     if "output_torque" not in channels:
         return []
-    torque = fresh_samples(channels["output_torque"])
-    speeds = [fresh_samples(channels[role]) for role in SPEEDS if role in channels]
+    torque = channels["output_torque"].updates
+    speeds = [channels[role].updates for role in SPEEDS if role in channels]
     found = [(speed, delay) for speed in speeds if (delay := torque_delay(torque, speed))]
     late = [(speed, one.value) for speed, one in found if beyond_doubt(one, torque, speed)]
     if not late:

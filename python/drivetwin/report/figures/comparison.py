@@ -114,7 +114,7 @@ def trial_figure(trial: Trial, order: Sequence[str]) -> go.Figure:
 
 
 def trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
-    """What `trial_figure` shows, from top to bottom; `order` are all candidates."""
+    """Return the panels of `trial_figure` from top to bottom; `order` lists all candidates."""
     first = next(iter(trial.runs.values()))
     panels = []
     for name, (title, display, weight) in OUTPUTS.items():

@@ -36,7 +36,7 @@ def motion_figure(run: DriveRun) -> go.Figure:
 
 
 def motion_panels(run: DriveRun) -> list[Panel]:
-    """What `motion_figure` shows, from top to bottom."""
+    """Return the panels of `motion_figure` from top to bottom."""
     time = run.time
     return [
         Panel("speed", RPM, _speeds(run, slice(None)), weight=1.3),
@@ -61,7 +61,7 @@ def shift_figure(run: DriveRun, maneuver: Maneuver) -> go.Figure:
 
 
 def maneuver_panels(run: DriveRun, maneuver: Maneuver) -> list[Panel]:
-    """What `shift_figure` shows, from top to bottom."""
+    """Return the panels of `shift_figure` from top to bottom."""
     action = maneuver.action
     first, last = np.searchsorted(run.time, (action.start - _BEFORE, action.end + _AFTER))
     inside = slice(int(first), int(last))

@@ -57,7 +57,7 @@ def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
 
 
 def band(curve: FrictionCurve, colour: str, **options: Any) -> go.Scatter:
-    """Area between the bounds of a curve, as far as they are known; empty where they are not."""
+    """Area between the bounds of a curve; empty if the curve has no bounds."""
     known = np.isfinite(curve.mu_lo) & np.isfinite(curve.mu_hi)
     slip = curve.slip[known]
     return go.Scatter(

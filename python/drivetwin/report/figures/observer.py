@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Observed torques with their 95 % bands, over what a sensor shows where the log has one."""
+"""Observed torques with their 95 % bands, over the measured torque if the log has one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BAND_FILL, BAND_EDGE = "rgba(213,94,0,0.28)", "rgba(213,94,0,0.6)"
 
 
 def observer_panels(one: Observation, log: ShiftLog) -> list[Panel]:
-    """A panel for each torque; the output torque of the log is drawn beside where there is one."""
+    """Build a panel for each torque; add the measured output torque if the log has one."""
     panels = []
     for name, band in one.bands.items():
         curves = _curves(one.time, band)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How narrowly each parameter is known: relative intervals side by side, and correlations."""
+"""Parameter precision: relative confidence intervals side by side, and correlations."""
 
 from __future__ import annotations
 
@@ -62,14 +62,14 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
 
 
 def half_width_percent(value: float | None, std: float | None) -> float | None:
-    """Half width of the 95 % interval in per cent of the value; None where it has none."""
+    """Return the half width of the 95 % interval in per cent of the value; None if undefined."""
     return 196.0 * abs(std / value) if value and std else None
 
 
 def correlation_figure(ids: Sequence[str], correlation: FloatArray) -> go.Figure:
-    """Correlation matrix (n, n) of the estimates; pairs near ±1 cannot be told apart well.
+    """Correlation matrix (n, n) of the estimates; pairs near ±1 are hard to separate.
 
-    A parameter that is known from design correlates with none and is left out.
+    A fixed parameter has no correlation and is omitted.
     """
     shown = np.count_nonzero(correlation, axis=0) > 1
     ids = [one for one, kept in zip(ids, shown, strict=True) if kept]

@@ -32,7 +32,7 @@ QUANTITIES: dict[Quantity, tuple[str, Display]] = {
     Quantity.TEMPERATURE: ("temperature", Display("K")),
     Quantity.STATE: ("state", Display("–")),
 }
-"""What the axis of a quantity says, and its unit."""
+"""Axis title and unit of each quantity."""
 _COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 
 
@@ -56,7 +56,7 @@ def log_figure(log: ShiftLog, shifts: Sequence[Shift] = ()) -> go.Figure:
 
 
 def log_panels(log: ShiftLog) -> list[Panel]:
-    """What `log_figure` shows: one panel for each quantity that the log holds."""
+    """Return the panels of `log_figure`: one panel for each quantity in the log."""
     panels = []
     for quantity, (title, display) in QUANTITIES.items():
         channels = [one for one in log.channels.values() if one.quantity is quantity]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the fit leaves over, in standard deviations of what noise would leave, over time."""
+"""Fit residuals over time, normalised by their expected standard deviation."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def residual_figure(
 
 
 def residual_panels(residuals: Mapping[str, tuple[FloatArray, FloatArray]]) -> list[Panel]:
-    """What `residual_figure` shows, from top to bottom."""
+    """Return the panels of `residual_figure` from top to bottom."""
     panels = []
     for name, (time, white) in residuals.items():
         middle, means = block_means(time, white)

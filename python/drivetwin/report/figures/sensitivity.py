@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What errors of gain, offset and age of each sensor do to each result."""
+"""Sensitivity of each result to gain, offset and delay errors of each sensor."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ def _shown(found: Sensitivity) -> FloatArray:
 
 
 def _is_time(result_id: str) -> bool:
-    """Whether a result is a time, whose value may be zero: its change is told in ms."""
+    """Return True if a result is a time. A time may be zero, so its change is given in ms."""
     return spec_of(result_id).unit == "s"
 
 
 def _percent(change: FloatArray, value: float) -> FloatArray:
-    """Change (e,) in per cent of the value; of a value of 0 there is none, but where none is."""
+    """Convert a change (e,) to per cent of the value; undefined for 0 unless the change is 0."""
     if value == 0.0:
         return np.where(change == 0.0, 0.0, np.nan)
     return 100.0 * change / abs(value)

@@ -25,7 +25,7 @@ def shift_phases(log: ShiftLog, shift: Shift) -> go.Figure:
 
 
 def shift_panels(log: ShiftLog, shift: Shift) -> list[Panel]:
-    """What `shift_phases` shows, from top to bottom."""
+    """Return the panels of `shift_phases` from top to bottom."""
     pressures = [
         _curve(f"{shift.offgoing} (off-going)", log.pressure(shift.offgoing), COMPARED),
         _curve(f"{shift.oncoming} (on-coming)", log.pressure(shift.oncoming), SECOND),

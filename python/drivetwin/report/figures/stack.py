@@ -28,7 +28,7 @@ _MARGIN = 0.06
 _LEAST_SPAN = 0.04
 """Smallest span of a y axis in shares of its largest value: what hardly moves stays quiet."""
 _FINE = 500.0
-"""Time [s] below which single precision tells apart what lies 0.03 ms apart."""
+"""Time [s] below which single precision resolves 0.03 ms."""
 _ZOOMS = {"torque": "torque phase", "inertia": "inertia phase", "after": "lock-up"}
 
 

@@ -17,7 +17,7 @@ OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
     "input_speed": ("input speed", RPM, 1.1),
     "output_speed": ("output speed", RPM, 1.1),
 }
-"""Compared signals: what their axis says, their unit, the height of their panel."""
+"""Compared signals: axis title, unit and panel height."""
 
 
 def validation_figure(validation: Validation) -> go.Figure:
@@ -26,7 +26,7 @@ def validation_figure(validation: Validation) -> go.Figure:
 
 
 def validation_panels(validation: Validation) -> list[Panel]:
-    """What `validation_figure` shows, from top to bottom."""
+    """Return the panels of `validation_figure` from top to bottom."""
     shift = validation.shift
     torque = validation.engine_torque
     pressures = [

@@ -26,7 +26,7 @@ class WlseLabels:
 
 
 def wlse_figure(fit: GridFit, labels: WlseLabels) -> go.Figure:
-    """Scatter with the fitted line at the best grid value; RMS error over the grid beside it."""
+    """Scatter with the fitted line at the best grid value; RMS error over the grid next to it."""
     figure = make_subplots(cols=2, column_widths=[0.62, 0.38], horizontal_spacing=0.12)
     first = fit.rows[0].value
     inside = fit.weights >= 1.0

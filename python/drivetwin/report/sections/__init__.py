@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What the report says, in reading order; each module turns results into blocks of one kind."""
+"""Sections of the report in reading order; each module converts results to blocks of one kind."""

@@ -14,7 +14,7 @@ from drivetwin.shifts.shift import Shift
 
 
 class Tone(StrEnum):
-    """How a cell, tile or note is coloured."""
+    """Colour class of a cell, tile or note."""
 
     PLAIN = "plain"
     GOOD = "good"
@@ -107,7 +107,7 @@ class Section:
 
     @property
     def short(self) -> bool:
-        """Whether it holds no figure over time, and on paper may share a page."""
+        """True if the section has no figure over time and may share a printed page."""
         return not any(isinstance(one, FigureBlock) for one in self.blocks)
 
 

@@ -34,7 +34,7 @@ from drivetwin.shifts.shift import Shift
 
 
 def agreement_section(candidates: Sequence[Candidate]) -> Section:
-    """Parameters side by side: who says what, and whether they can be the same."""
+    """Build the section that compares the parameters and tests their agreement."""
     found = agreements(candidates)
     judged = [one for one in found if one.agrees is not None]
     differing = [one for one in judged if not one.agrees]
@@ -109,7 +109,7 @@ def _parameter_table(candidates: Sequence[Candidate], found: Sequence[Agreement]
 
 
 def value_cell(one: Estimate | None, display: Display) -> Cell:
-    """A value with its total 95 % half width below; a dash where there is none."""
+    """Format a value with its total 95 % half width below; a dash without a value."""
     if one is None or one.value is None:
         return Cell("–", number=True, note="" if one is None else one.verdict.value)
     half = None if one.std_total is None else Z95 * one.std_total * display.factor
@@ -213,7 +213,7 @@ def _trial_table(trial: Trial, shift: Shift) -> TableBlock:
 
 
 def origin_section(candidates: Sequence[Candidate]) -> Section:
-    """Which files stand behind each candidate."""
+    """List the source files of each candidate."""
     rows = [
         cells(one.name, one.method, one.version, file, digest)
         for one in candidates

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What cannot be told from a log, and which experiment would tell."""
+"""Identifiability: parameters that a log cannot determine, and experiments that would help."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _LEAST_KNOWN = 5
 
 
 def limits_section(found: Identification) -> Section:
-    """What the log cannot tell, and which experiment would help."""
+    """Build the section on parameters that the log cannot determine, and helpful experiments."""
     suggestions = found.evidence.suggestions
     narrower = _suggested(suggestions, found) if suggestions else _least_known(found)
     blocks: list[Block] = [*_remarks(found), *narrower]
@@ -63,7 +63,7 @@ def limits_section(found: Identification) -> Section:
 
 
 def _remarks(found: Identification) -> Iterator[TableBlock]:
-    """One row for each reason that stands behind verdicts."""
+    """Build a table with one row for each reason of a verdict."""
     remarked: dict[tuple[Verdict, str], list[str]] = {}
     for one in found.estimates.values():
         if one.reason:
@@ -85,7 +85,7 @@ def _remarks(found: Identification) -> Iterator[TableBlock]:
 
 
 def _suggested(suggestions: Sequence[Suggestion], found: Identification) -> Iterator[TableBlock]:
-    """What each open or least known parameter would gain by the best experiment, simulated."""
+    """Tabulate the simulated gain of the best experiment for each uncertain parameter."""
     rows = []
     for one in suggestions:
         display = display_of(found.estimates[one.parameter].unit)

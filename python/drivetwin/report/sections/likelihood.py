@@ -36,7 +36,7 @@ from drivetwin.shifts.shift import shift_labels
 
 
 def likelihood_sections(found: Identification) -> list[Section]:
-    """How well the fit explains the log, and its sensitivity to each sensor; empty without one."""
+    """Build the sections on goodness of fit and sensor sensitivity; empty without a fit."""
     fit = found.evidence.likelihood
     if fit is None:
         return []
@@ -72,7 +72,7 @@ def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
 
 
 def _labels(signals: Sequence[ShiftSignals]) -> list[str]:
-    """The shifts, and their logs where there are several."""
+    """List the shifts, with their logs if there are several."""
     labels = []
     for log, group in groupby(signals, key=lambda one: one.log):
         names = shift_labels([one.shift for one in group])
@@ -111,7 +111,7 @@ def _test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> TableBlo
 
 
 def _correlation(size: float | None) -> Cell:
-    """Correlation with one input; a dash where the shift does not have that input."""
+    """Format the correlation with one input; a dash if the shift lacks that input."""
     if size is None:
         return Cell("–", number=True)
     return _judged(f"{size:+.1f}".replace("-", "−"), good=abs(size) <= SIGNIFICANT)

@@ -97,7 +97,7 @@ def _headline(found: Identification) -> str:
 
 
 def _answer(found: Identification) -> str:
-    """The answer in a word, with what stands against a plain yes."""
+    """Return the one-word answer, with the objections to a plain yes."""
     count, (passed, tests) = _verdicts(found), residual_score(found)
     against = []
     if not found.fit:
@@ -231,7 +231,7 @@ def fit_table(found: Identification) -> TableBlock:
 
 
 def fit_cell(fit: SignalFit | None, display: Display) -> Cell:
-    """Fit % with the error in its unit below; a dash where there is none."""
+    """Format the fit in % with the error in its unit below; a dash without a fit."""
     if fit is None:
         return Cell("–", number=True)
     note = f"{significant(fit.rmse * display.factor, 3)} {display.label}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The end of the report: what was assumed, where it all came from."""
+"""Last sections of the report: assumptions and provenance."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ _Kind = TypeVar("_Kind")
 
 @dataclass(frozen=True)
 class _Stages(Generic[_Kind]):
-    """One method's stages on one shift; `by` says which method, and of several shifts which."""
+    """One method's stages on one shift; `by` names the method and, of several shifts, which."""
 
     by: str
     stages: _Kind
@@ -105,7 +105,7 @@ def evidence_sections(found: Identification) -> list[Section]:
 
 
 def _stages(found: Identification, stages: Sequence[_Kind], method: str) -> list[_Stages[_Kind]]:
-    """Evidence of one method, each with the shift it is of where there are several."""
+    """Collect the stage results of one method, with the shift names if there are several."""
     names = [f"Shift {name}, {method}" for name in shift_labels(found.shifts)]
     if len(stages) < 2 or len(stages) != len(names):
         names = [method[0].upper() + method[1:]] * len(stages)
@@ -142,7 +142,7 @@ def _load_blocks(found: Identification, shifts: Iterable[_Stages[IntegralShift]]
 
 
 def _grid_blocks(by: str, fit: GridFit, doubt: str | None, labels: WlseLabels) -> list[Block]:
-    """Figure and table of a grid search; a doubt about it stands between the two."""
+    """Build figure and table of a grid search, with any doubt about it between the two."""
     text = (
         f"{by}, weighted least squares (Fig. 6): samples whose own quotient lies in the plausible "
         "range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise in the "

@@ -23,7 +23,8 @@ from drivetwin.report.sections.blocks import (
     cells,
     link_of,
 )
-from drivetwin.shifts.shift import Shift, ShiftKind, shift_labels
+from drivetwin.shifts.shift import Shift, shift_labels
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 _TORQUE_PHASE = {
     ShiftKind.POWER_ON_UP: "the on-coming element takes over torque, the output torque dips",
@@ -45,12 +46,11 @@ OF_SPEEDS = (
 
 
 def phase_key(kind: ShiftKind) -> str:
-    """What the numbers of the four phases stand for in a shift of this kind."""
-    up = kind in (ShiftKind.POWER_ON_UP, ShiftKind.POWER_OFF_UP)
+    """Describe the numbers of the four phases in a shift of this kind."""
     return (
         f"1 gear held before the shift · 2 torque phase: {_TORQUE_PHASE[kind]} · 3 inertia phase: "
-        f"the input speed {'falls' if up else 'rises'} to that of the new gear · 4 new gear "
-        "locked, lock-up oscillation."
+        f"the input speed {'falls' if kind.is_up else 'rises'} to that of the new gear · "
+        "4 new gear locked, lock-up oscillation."
     )
 
 

@@ -43,7 +43,7 @@ _TOGETHER = "together"
 
 
 def several_section(found: Identification, several: Several) -> Section:
-    """What each log tells alone beside what they tell together, and whether they agree."""
+    """Compare the estimates of each log with the joint estimate, and test their agreement."""
     tested = several.consistency
     tone = Tone.GOOD if tested.agree else Tone.DOUBTFUL
     word = "agree" if tested.agree else "disagree"
@@ -108,7 +108,7 @@ def _log_table(found: Identification, several: Several) -> TableBlock:
 
 
 def _numbered(plain: str, own: dict[str, tuple[str, int]]) -> str:
-    """The first id that stands for `plain` in one of the logs."""
+    """Return the first log-specific id of the parameter `plain`."""
     return next(key for key, (name, number) in own.items() if name == plain and number)
 
 
@@ -154,7 +154,7 @@ def _shared_table(
 
 
 def held_out_section(found: Identification, held: Sequence[HeldOut]) -> Section:
-    """Every shift that was predicted: its fit beside the fitted ones, and what noise allows."""
+    """Compare the fit of each predicted shift with the fitted shifts and the noise limit."""
     tiles = [
         Tile(one.name, _torque_fit(one), _TONES[one.outcome], one.outcome.value) for one in held
     ]

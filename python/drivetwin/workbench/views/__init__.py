@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What the workbench shows: one file for each view, each with its layout and its callbacks."""
+"""Views of the workbench: one file for each view, with its layout and its callbacks."""

@@ -6,29 +6,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from dash import ALL, Dash, Input, Output, State, html
+from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin.report.figures.recording import log_figure
 from drivetwin.workbench.mapping import Entry, Row, roles_of, rows_of, unit_names
 from drivetwin.workbench.sandboxed_parse import Opened
-from drivetwin.workbench.session import Sessions
-from drivetwin.workbench.views.widgets import (
-    Topic,
-    acted,
-    announce,
-    button,
-    choice,
-    due_id,
-    field,
-    graph,
-    hint,
-    notes,
-    row,
-    table,
-    tell_read,
-    told,
-)
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.views import widgets as ui
 
 _SIGNS = {"+": "as recorded", "-": "reversed"}
 
@@ -36,7 +21,7 @@ _SIGNS = {"+": "as recorded", "-": "reversed"}
 def layout() -> list[Component]:
     """The table of columns, and the channels as read."""
     return [
-        hint(
+        ui.hint(
             "Every column of the file with the role that it is proposed for. Correct role, unit or "
             "sign and apply: the log is then read again. An empty role leaves a column aside."
         ),
@@ -45,34 +30,25 @@ def layout() -> list[Component]:
     ]
 
 
-def register(app: Dash, sessions: Sessions) -> None:
+def register(page: ui.Page) -> None:
     """Showing and correcting the mapping."""
 
-    @app.callback(
-        Output("channels-content", "children"),
-        Input(due_id("channels"), "data"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @told
-    def show(_: int, key: str) -> list[Component]:
+    @page.callback(Output("channels-content", "children"), Input(ui.due_id("channels"), "data"))
+    def show(session: Session, _: int) -> list[Component]:
         """Columns, faults and the channels over time."""
-        opened = sessions.get(key).work.opened
-        return [hint("No log is open.")] if opened is None else _content(opened)
+        opened = session.work.opened
+        return [ui.hint("No log is open.")] if opened is None else _content(opened)
 
-    @app.callback(
+    @page.callback(
         Input("apply-mapping", "n_clicks"),
-        State("session", "data"),
         State({"part": "role", "column": ALL}, "data-value"),
         State({"part": "unit", "column": ALL}, "value"),
         State({"part": "sign", "column": ALL}, "data-value"),
-        running=[(Output("apply-mapping", "disabled"), True, False)],
-        prevent_initial_call=True,
+        busy="apply-mapping",
     )
-    @acted
     def apply(
+        session: Session,
         clicks: int | None,
-        key: str,
         roles: Sequence[str],
         units: Sequence[str | None],
         signs: Sequence[str],
@@ -80,7 +56,6 @@ def register(app: Dash, sessions: Sessions) -> None:
         """Read the log with the mapping as it stands in the table."""
         if not clicks:
             return
-        session = sessions.get(key)
         session.correct(
             [
                 Entry(role, unit or "", sign == "-")
@@ -88,8 +63,8 @@ def register(app: Dash, sessions: Sessions) -> None:
             ]
         )
         opened = session.work.require_opened()
-        announce(Topic.LOG)
-        tell_read("The log is read as mapped", opened.fault, len(session.work.shifts))
+        ui.announce(ui.Topic.LOG)
+        ui.tell_read("The log is read as mapped", opened.fault, len(session.work.shifts))
 
 
 def _content(opened: Opened) -> list[Component]:
@@ -97,14 +72,14 @@ def _content(opened: Opened) -> list[Component]:
     rows = [_row(number, one, roles) for number, one in enumerate(rows_of(opened.survey))]
     head = ("column", "unit in the file", "Hz", "least", "greatest", "gaps", "role", "unit", "sign")
     content = [
-        notes("The log cannot be read as mapped", [opened.fault] if opened.fault else []),
-        notes("About the columns", opened.survey.notes),
-        table(head, rows, name="mapping"),
-        row(button("Apply the mapping", "apply-mapping", main=True)),
+        ui.notes("The log cannot be read as mapped", [opened.fault] if opened.fault else []),
+        ui.notes("About the columns", opened.survey.notes),
+        ui.table(head, rows, name="mapping"),
+        ui.row(ui.button("Apply the mapping", "apply-mapping", main=True)),
     ]
     if opened.log is not None:
         figure = log_figure(opened.log)
-        content.append(graph("channels-plot", "All channels over time", figure))
+        content.append(ui.graph("channels-plot", "All channels over time", figure))
     return content
 
 
@@ -123,8 +98,8 @@ def _row(number: int, one: Row, roles: dict[str, str]) -> list[Any]:
         _number(low),
         _number(high),
         str(column.gaps) if column.gaps else "–",
-        choice(part("role"), f"role of {name}", roles, one.role, hidden_label=True),
-        field(
+        ui.choice(part("role"), f"role of {name}", roles, one.role, hidden_label=True),
+        ui.field(
             part("unit"),
             f"unit of {name}",
             hidden_label=True,
@@ -133,7 +108,7 @@ def _row(number: int, one: Row, roles: dict[str, str]) -> list[Any]:
             list="unit-names",
             size="8",
         ),
-        choice(
+        ui.choice(
             part("sign"), f"sign of {name}", _SIGNS, "-" if one.reversed else "+", hidden_label=True
         ),
     ]

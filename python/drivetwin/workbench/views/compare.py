@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dash import Dash, Input, Output, State, html
+from dash import Input, Output, html
 from dash.development.base_component import Component
 
 from drivetwin.report.comparison import trials_of
@@ -15,57 +15,48 @@ from drivetwin.report.sections.comparison import (
     friction_overlay_section,
     trial_sections,
 )
-from drivetwin.workbench.session import Sessions
+from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Work
+from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.blocks import shown
-from drivetwin.workbench.views.widgets import button, due_id, hint, notes, told
 
 
 def layout() -> list[Component]:
     """Filled when there are results."""
     return [
-        hint(
+        ui.hint(
             "Parameters with intervals, simulation over measurement and friction of every method "
             "that has answered. Identify with all three methods to fill this view."
         ),
-        button("Simulate and draw all methods", "draw-comparison"),
+        ui.button("Simulate and draw all methods", "draw-comparison"),
         html.Div(id="compare-content"),
     ]
 
 
-def register(app: Dash, sessions: Sessions) -> None:
+def register(page: ui.Page) -> None:
     """Drawing on demand: the figures of three methods take seconds."""
 
-    @app.callback(
-        Output("compare-content", "children"),
-        Input(due_id("compare"), "data"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @told
-    def tables(_: int, key: str) -> list[Component]:
+    @page.callback(Output("compare-content", "children"), Input(ui.due_id("compare"), "data"))
+    def tables(session: Session, _: int) -> list[Component]:
         """The parameters side by side, as soon as there are two results."""
-        work = sessions.get(key).work
+        work = session.work
         refusals = [
-            notes(f"The {method.value} method found nothing", [text])
+            ui.notes(f"The {method.value} method found nothing", [text])
             for method, text in work.refusals.items()
         ]
         candidates = _candidates(work)
         if len(candidates) < 2:
-            return [*refusals, hint("There are no two results to compare yet.")]
+            return [*refusals, ui.hint("There are no two results to compare yet.")]
         return [*refusals, *shown(agreement_section(candidates), "agree")]
 
-    @app.callback(
+    @page.callback(
         Output("compare-content", "children", allow_duplicate=True),
         Input("draw-comparison", "n_clicks"),
-        State("session", "data"),
-        running=[(Output("draw-comparison", "disabled"), True, False)],
-        prevent_initial_call=True,
+        busy="draw-comparison",
     )
-    @told
-    def draw(_: int, key: str) -> list[Component]:
+    def draw(session: Session, _: int) -> list[Component]:
         """All of it: agreement, every shift by every method, friction."""
-        work = sessions.get(key).work
+        work = session.work
         candidates = _candidates(work)
         log = work.require_log()
         work.require_outcome()

@@ -6,13 +6,13 @@ from __future__ import annotations
 import base64
 from typing import Any
 
-from dash import ALL, Dash, Input, Output, State, ctx, dcc, html, no_update
+from dash import ALL, Input, Output, ctx, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.export.targets import Target
 from drivetwin.workbench.exports import Record, produce
-from drivetwin.workbench.session import Sessions
-from drivetwin.workbench.views.widgets import hint, tell, told
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.views import widgets as ui
 
 TARGETS = {
     Target.C: ("C sources", "C99 model of the shift for a controller, as an archive"),
@@ -36,7 +36,7 @@ RECORDS = {
 def layout() -> list[Component]:
     """Two groups of buttons."""
     return [
-        hint(
+        ui.hint(
             "What is exported is the result shown under Model, as identified: sliders do not "
             "change it."
         ),
@@ -63,23 +63,16 @@ def _group(entries: dict[str, tuple[str, str]]) -> Component:
     )
 
 
-def register(app: Dash, sessions: Sessions) -> None:
-    """Making the file that is asked for."""
+def register(page: ui.Page) -> None:
+    """Register the callback that writes the requested file."""
 
-    @app.callback(
-        Output("download", "data"),
-        Input({"export": ALL}, "n_clicks"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @told
-    def hand_over(clicks: list[int | None], key: str) -> Any:
-        """Write the file and let the browser keep it."""
+    @page.callback(Output("download", "data"), Input({"export": ALL}, "n_clicks"))
+    def hand_over(session: Session, clicks: list[int | None]) -> Any:
+        """Write the file and send it to the browser."""
         if not isinstance(ctx.triggered_id, dict) or not any(clicks):
             return no_update
-        session = sessions.get(key)
         product = produce(session.work, _wanted(ctx.triggered_id["export"]), session.scratch)
-        tell(f"{product.name}: {len(product.content) / 1e3:.0f} kB")
+        ui.tell(f"{product.name}: {len(product.content) / 1e3:.0f} kB")
         content = base64.b64encode(product.content).decode()
         return {"content": content, "filename": product.name, "base64": True}
 

@@ -3,107 +3,80 @@
 
 from __future__ import annotations
 
-from dash import Dash, Input, Output, State, dcc, html, no_update
+from dash import Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin._util.display_units import NM, RPM, significant
 from drivetwin.gearbox import Gearbox, builtin_gearboxes
 from drivetwin.workbench.gearboxes import ReducedShift, gears_of, members_of, reduced, shifts_of
-from drivetwin.workbench.session import Sessions
-from drivetwin.workbench.views.widgets import (
-    Content,
-    Topic,
-    acted,
-    announce,
-    button,
-    choice,
-    due_id,
-    field,
-    hint,
-    row,
-    table,
-    told,
-    upload_button,
-)
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.views import widgets as ui
 
 _ROUND_OFF = 1e-12
 _FIRST = "three-set-4000cr"
 
 
 def layout() -> list[Component]:
-    """Which gearbox, and what it is."""
+    """Return the controls for choosing a gearbox, and its description."""
     names = builtin_gearboxes()
     return [
-        hint(
+        ui.hint(
             "A built-in gearbox, or a gearbox card of the folder. Ratios are computed from the "
             "members; a shift is reduced to two speeds, and the error of that is told."
         ),
-        row(
-            choice("gearbox-builtin", "Built-in", {"": "–", **{n: n for n in names}}, _FIRST),
+        ui.row(
+            ui.choice("gearbox-builtin", "Built-in", {"": "–", **{n: n for n in names}}, _FIRST),
             html.Div(
-                field("gearbox-path", "or gearbox card", type="text", list="card-names"),
+                ui.field("gearbox-path", "or gearbox card", type="text", list="card-names"),
                 className="wide",
             ),
-            upload_button("Upload a card…", "gearbox", "gearbox-upload"),
-            button("Show", "show-gearbox", main=True),
+            ui.upload_button("Upload a card…", "gearbox", "gearbox-upload"),
+            ui.button("Show", "show-gearbox", main=True),
         ),
         dcc.Store(id="gearbox-upload"),
         html.Div(id="gearbox-content"),
     ]
 
 
-def register(app: Dash, sessions: Sessions) -> None:
+def register(page: ui.Page) -> None:
     """Choosing a gearbox and a shift of it."""
 
-    @app.callback(
+    @page.callback(
         Input("show-gearbox", "n_clicks"),
         Input("gearbox-upload", "data"),
         State("gearbox-builtin", "data-value"),
         State("gearbox-path", "value"),
-        State("session", "data"),
-        prevent_initial_call=True,
     )
-    @acted
     def choose(
-        _: int, upload: dict[str, str] | None, builtin: str, path: str | None, key: str
+        session: Session, _: int, upload: dict[str, str] | None, builtin: str, path: str | None
     ) -> None:
         """Load a card: the one typed, else the upload, else the built-in one."""
-        session = sessions.get(key)
         if path:
             session.open_gearbox(session.in_folder(path))
         elif upload is not None:
             session.open_gearbox(session.uploaded(upload["key"]))
         else:
             session.open_gearbox(builtin)
-        announce(Topic.GEARBOX)
+        ui.announce(ui.Topic.GEARBOX)
 
-    @app.callback(
-        Output("gearbox-content", "children"),
-        Input(due_id("gearbox"), "data"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @told
-    def show(_: int, key: str) -> list[Component]:
+    @page.callback(Output("gearbox-content", "children"), Input(ui.due_id("gearbox"), "data"))
+    def show(session: Session, _: int) -> list[Component]:
         """All of the gearbox."""
-        box = sessions.get(key).gearbox
+        box = session.gearbox
         return [] if box is None else _content(box)
 
-    @app.callback(
-        Output("reduction", "children"),
-        Input("gearbox-shift", "data-value"),
-        State("session", "data"),
+    @page.callback(
+        Output("reduction", "children"), Input("gearbox-shift", "data-value"), initially=True
     )
-    @told
-    def reduce(shift: str | None, key: str) -> object:
+    def reduce(session: Session, shift: str | None) -> object:
         """One shift as a dual clutch."""
-        box = sessions.get(key).gearbox
+        box = session.gearbox
         return no_update if box is None or shift is None else _reduction(reduced(box, shift))
 
 
 def _content(box: Gearbox) -> list[Component]:
     gears = gears_of(box)
-    application: list[list[Content]] = [
+    application: list[list[ui.Content]] = [
         [
             one.name,
             *(
@@ -116,7 +89,7 @@ def _content(box: Gearbox) -> list[Component]:
         ]
         for one in gears
     ]
-    members: list[list[Content]] = [
+    members: list[list[ui.Content]] = [
         [
             one.name,
             _right(f"{one.inertia:.4g}" if one.inertia else "–"),
@@ -124,32 +97,36 @@ def _content(box: Gearbox) -> list[Component]:
         ]
         for one in members_of(box)
     ]
-    sets: list[list[Content]] = [
+    sets: list[list[ui.Content]] = [
         [one.name, one.sun, one.ring, one.carrier, _right(f"{one.z:.4g}")] for one in box.sets
     ]
     shifts = {name: name for name in shifts_of(box)}
     head = ("gear", *box.elements, "ratio", "published", "difference")
     return [
         html.H3(box.name),
-        hint(box.source),
-        table(head, application, "Application table: ● is engaged.", "application"),
+        ui.hint(box.source),
+        ui.table(head, application, "Application table: ● is engaged.", "application"),
         html.H3("Reduction of a shift"),
-        row(choice("gearbox-shift", "Shift", shifts, next(iter(shifts)))),
+        ui.row(ui.choice("gearbox-shift", "Shift", shifts, next(iter(shifts)))),
         html.Div(id="reduction"),
         html.H3("Members"),
-        *([table(("set", "sun", "ring", "carrier", "z"), sets, "Planetary sets.")] if sets else []),
-        table(("member", "inertia [kg·m²]", "joined by"), members),
+        *(
+            [ui.table(("set", "sun", "ring", "carrier", "z"), sets, "Planetary sets.")]
+            if sets
+            else []
+        ),
+        ui.table(("member", "inertia [kg·m²]", "joined by"), members),
     ]
 
 
 def _reduction(found: ReducedShift) -> list[Component]:
     one = found.reduction
-    elements: list[list[Content]] = [
+    elements: list[list[ui.Content]] = [
         [each.element, role, *(_right(f"{x:.4f}") for x in (each.i_c, each.i_out, each.ratio))]
         for role, each in (("off-going", one.off_going), ("on-coming", one.on_coming))
     ]
     elements += [[name, "engaged throughout", "", "", ""] for name in one.common]
-    members: list[list[Content]] = [
+    members: list[list[ui.Content]] = [
         [
             each.member,
             _right(f"{each.inertia:.4g}"),
@@ -157,16 +134,16 @@ def _reduction(found: ReducedShift) -> list[Component]:
         ]
         for each in one.members
     ]
-    mass: list[list[Content]] = [
+    mass: list[list[ui.Content]] = [
         ["ω_in", _right(_number(one.M11)), _right(_number(one.M12))],
         ["ω_out", _right(_number(one.M12)), _right(_number(one.M22))],
     ]
     return [
-        hint(one.condition()),
-        table(("element", "", "i_c", "i_out", "i_c·i_out"), elements,
+        ui.hint(one.condition()),
+        ui.table(("element", "", "i_c", "i_out", "i_c·i_out"), elements,
               "slip = ω_in/i_c − i_out·ω_out (eq. 15)"),
-        table(("mass matrix [kg·m²]", "ω_in", "ω_out"), mass),
-        table(("member", "inertia [kg·m²]", "a", "b", "to M12"), members,
+        ui.table(("mass matrix [kg·m²]", "ω_in", "ω_out"), mass),
+        ui.table(("member", "inertia [kg·m²]", "a", "b", "to M12"), members,
               "Members that move: ω = a·ω_in − b·ω_out."),
         _error(found),
     ]  # fmt: skip
@@ -174,10 +151,10 @@ def _reduction(found: ReducedShift) -> list[Component]:
 
 def _error(found: ReducedShift) -> Component:
     if found.reduction.exact:
-        return hint("Nothing couples the two shafts: the reduced form makes no error.")
+        return ui.hint("Nothing couples the two shafts: the reduced form makes no error.")
     if found.estimated is None or found.simulated is None:
-        return hint(f"The error of leaving M12 out is not told: {found.reason}")
-    rows: list[list[Content]] = [
+        return ui.hint(f"The error of leaving M12 out is not told: {found.reason}")
+    rows: list[list[ui.Content]] = [
         [
             label,
             *(
@@ -192,11 +169,11 @@ def _error(found: ReducedShift) -> Component:
         )
     ]
     caption = "Largest error over the reference shift of the card without M12."
-    return table(("signal", "estimated", "simulated"), rows, caption)
+    return ui.table(("signal", "estimated", "simulated"), rows, caption)
 
 
 def _number(value: float) -> str:
-    """Four digits; what is round-off beside 1 is nothing."""
+    """Format a number to four digits; round-off relative to 1 becomes zero."""
     return "0" if abs(value) < _ROUND_OFF else f"{value:.4g}"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from dash import Dash, Input, Output, State, dcc, html, no_update
+from dash import Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.estimation.result.estimate import Verdict
@@ -13,25 +13,11 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.parameters import trust_section
 from drivetwin.workbench.locks import LockKind
-from drivetwin.workbench.session import Sessions
+from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Work
+from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.blocks import shown
 from drivetwin.workbench.views.log import facts_line
-from drivetwin.workbench.views.widgets import (
-    Topic,
-    acted,
-    announce,
-    button,
-    choice,
-    due_id,
-    hint,
-    notes,
-    row,
-    table,
-    tell,
-    told,
-    topic_id,
-)
 
 _UP_TO = {
     "likelihood": "paper, integral and likelihood",
@@ -45,14 +31,14 @@ _POLL = 300
 def layout() -> list[Component]:
     """Run, cancel, progress, outcome."""
     return [
-        hint(
+        ui.hint(
             "Runs in a process of its own; the page stays free. The integral and the likelihood "
             "method take phases and locks as set; the paper's procedure knows no locks."
         ),
-        row(
-            choice("methods", "Methods", _UP_TO, "likelihood"),
-            button("Identify", "identify", main=True),
-            button("Cancel", "cancel", disabled=True),
+        ui.row(
+            ui.choice("methods", "Methods", _UP_TO, "likelihood"),
+            ui.button("Identify", "identify", main=True),
+            ui.button("Cancel", "cancel", disabled=True),
         ),
         html.Div(
             [
@@ -73,93 +59,73 @@ def layout() -> list[Component]:
     ]
 
 
-def register(app: Dash, sessions: Sessions) -> None:
+def register(page: ui.Page) -> None:
     """Starting, following and stopping the job."""
-    _register_buttons(app, sessions)
-    _register_progress(app, sessions)
+    _register_buttons(page)
+    _register_progress(page)
 
 
-def _register_buttons(app: Dash, sessions: Sessions) -> None:
-    @app.callback(
-        Input("identify", "n_clicks"),
-        State("session", "data"),
-        State("methods", "data-value"),
-        prevent_initial_call=True,
-    )
-    @acted
-    def start(_: int, key: str, up_to: str) -> None:
+def _register_buttons(page: ui.Page) -> None:
+    @page.callback(Input("identify", "n_clicks"), State("methods", "data-value"))
+    def start(session: Session, _: int, up_to: str) -> None:
         """Begin the identification."""
         order = list(Method)
-        sessions.get(key).identify(order[: order.index(Method(up_to)) + 1])
-        tell("")
-        announce(Topic.RESULTS)
+        session.identify(order[: order.index(Method(up_to)) + 1])
+        ui.tell("")
+        ui.announce(ui.Topic.RESULTS)
 
-    @app.callback(Input("cancel", "n_clicks"), State("session", "data"), prevent_initial_call=True)
-    @acted
-    def cancel(_: int, key: str) -> None:
+    @page.callback(Input("cancel", "n_clicks"))
+    def cancel(session: Session, _: int) -> None:
         """Stop it."""
-        sessions.get(key).cancel()
-        tell("The identification was cancelled")
-        announce(Topic.RESULTS)
+        session.cancel()
+        ui.tell("The identification was cancelled")
+        ui.announce(ui.Topic.RESULTS)
 
 
-def _register_progress(app: Dash, sessions: Sessions) -> None:
-    @app.callback(
+def _register_progress(page: ui.Page) -> None:
+    @page.callback(
         Output("progress", "value"),
         Output("progress-text", "children"),
         Input("tick", "n_intervals"),
-        State("session", "data"),
-        prevent_initial_call=True,
     )
-    @told
-    def follow(_: int, key: str) -> tuple[object, object]:
+    def follow(session: Session, _: int) -> tuple[object, object]:
         """Take in results as they come."""
-        session = sessions.get(key)
         try:
             if session.poll():
-                announce(Topic.RESULTS)
+                ui.announce(ui.Topic.RESULTS)
         except Exception:
-            announce(Topic.RESULTS)
+            ui.announce(ui.Topic.RESULTS)
             raise
         job = session.job
         if job is None:
             return no_update, no_update
         return f"{job.share:.3f}", f"{job.text or 'starting'} · {job.elapsed:.0f} s"
 
-    @app.callback(
+    @page.callback(
         Output("tick", "disabled"),
         Output("progress-box", "hidden"),
         Output("identify", "disabled"),
         Output("cancel", "disabled"),
-        Input(topic_id(Topic.RESULTS), "data"),
-        State("session", "data"),
-        prevent_initial_call=True,
+        Input(ui.topic_id(ui.Topic.RESULTS), "data"),
     )
-    @told
-    def follow_on(_: int, key: str) -> tuple[bool, bool, bool, bool]:
+    def follow_on(session: Session, _: int) -> tuple[bool, bool, bool, bool]:
         """Look at the job for as long as there is one."""
-        busy = sessions.get(key).job is not None
+        busy = session.job is not None
         return not busy, not busy, busy, not busy
 
-    @app.callback(
-        Output("identify-content", "children"),
-        Input(due_id("identify"), "data"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @told
-    def show(_: str, key: str) -> list[Component]:
-        """What is known so far."""
-        return _content(sessions.get(key).work)
+    @page.callback(Output("identify-content", "children"), Input(ui.due_id("identify"), "data"))
+    def show(session: Session, _: str) -> list[Component]:
+        """Render the present results."""
+        return _content(session.work)
 
 
 def _content(work: Work) -> list[Component]:
     content: list[Component] = [_before(work)]
     for text in dict.fromkeys(work.refusals.values()):
         methods = [method.value for method, why in work.refusals.items() if why == text]
-        content.append(notes(f"Nothing found by: {', '.join(methods)} method", [text]))
+        content.append(ui.notes(f"Nothing found by: {', '.join(methods)} method", [text]))
     if work.ended:
-        content.append(notes("The identification ended early", [work.ended]))
+        content.append(ui.notes("The identification ended early", [work.ended]))
     if work.method is None:
         return content
     outcome = work.results[work.method]
@@ -167,15 +133,15 @@ def _content(work: Work) -> list[Component]:
         count = Counter(one.verdict for one in outcome.twin.parameters.values())
         told = {verdict.value: str(count[verdict]) for verdict in Verdict if count[verdict]}
         content.append(facts_line({"method": outcome.twin.method.value, **told}))
-        content.append(hint("From the saved workspace; identify again for evidence and report."))
+        content.append(ui.hint("From the saved workspace; identify again for evidence and report."))
     else:
         content += shown(trust_section(outcome.found), "trust")
-    content.append(notes("Assumptions", outcome.twin.assumptions, "plain"))
+    content.append(ui.notes("Assumptions", outcome.twin.assumptions, "plain"))
     return content
 
 
 def _before(work: Work) -> Component:
-    """What the next run takes as given."""
+    """Describe the inputs of the next run."""
     rows = []
     for index, times in work.moves.items():
         shift = work.shifts[index]
@@ -187,4 +153,4 @@ def _before(work: Work) -> Component:
         rows.append((parameter_label(name), f"{lock.kind.value}: {text}"))
     if not rows:
         return html.Div()
-    return table(("set by hand", ""), rows, "Beside the vehicle card, the next run takes")
+    return ui.table(("set by hand", ""), rows, "Beside the vehicle card, the next run takes")

@@ -5,28 +5,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from dash import Dash, Input, Output, State, dcc, html
+from dash import Input, Output, State, dcc, html
 from dash.development.base_component import Component
 
 from drivetwin.logs.formats.detect import SUFFIXES
 from drivetwin.workbench.sandboxed_parse import Opened
-from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
-from drivetwin.workbench.views.widgets import (
-    Topic,
-    acted,
-    announce,
-    button,
-    due_id,
-    field,
-    hint,
-    notes,
-    row,
-    table,
-    tell_read,
-    told,
-    upload_button,
-)
+from drivetwin.workbench.views import widgets as ui
 
 _CARDS = (".toml",)
 _UPLOADED = "uploaded: "
@@ -36,22 +22,22 @@ _SHIFT_HEAD = ("shift", "kind", "elements", "starts", "locks")
 def layout() -> list[Component]:
     """Two files, by path or upload, and what they hold."""
     return [
-        hint(
+        ui.hint(
             "A recording with at least one gear shift, and the vehicle card that says what is "
             "known from design. Paths are inside the folder that the workbench was started in."
         ),
-        row(
-            html.Div(field("log-path", "Log", type="text", list="log-names"), className="wide"),
-            upload_button("Upload a log…", "log", "log-upload"),
+        ui.row(
+            html.Div(ui.field("log-path", "Log", type="text", list="log-names"), className="wide"),
+            ui.upload_button("Upload a log…", "log", "log-upload"),
         ),
-        row(
+        ui.row(
             html.Div(
-                field("card-path", "Vehicle card", type="text", list="card-names"),
+                ui.field("card-path", "Vehicle card", type="text", list="card-names"),
                 className="wide",
             ),
-            upload_button("Upload a card…", "card", "card-upload"),
+            ui.upload_button("Upload a card…", "card", "card-upload"),
         ),
-        row(button("Open", "open", main=True)),
+        ui.row(ui.button("Open", "open", main=True)),
         html.Datalist(id="log-names"),
         html.Datalist(id="card-names"),
         dcc.Store(id="log-upload"),
@@ -60,55 +46,47 @@ def layout() -> list[Component]:
     ]
 
 
-def register(app: Dash, sessions: Sessions) -> None:
+def register(page: ui.Page) -> None:
     """Opening, and what is shown of it."""
 
     for name in ("log", "card"):
 
-        @app.callback(
+        @page.app.callback(
             Output(f"{name}-path", "value", allow_duplicate=True),
             Input(f"{name}-upload", "data"),
             prevent_initial_call=True,
         )
         def arrived(upload: dict[str, str]) -> str:
-            """An upload stands in the field of its path."""
+            """Put the name of an upload into the path field."""
             return _UPLOADED + upload["name"]
 
-    @app.callback(
+    @page.callback(
         Input("open", "n_clicks"),
-        State("session", "data"),
         State("log-path", "value"),
         State("card-path", "value"),
         State("log-upload", "data"),
         State("card-upload", "data"),
-        running=[(Output("open", "disabled"), True, False)],
-        prevent_initial_call=True,
+        busy="open",
     )
-    @acted
     def open_files(
-        _: int, key: str, log: str | None, card: str | None, log_up: Any, card_up: Any
+        session: Session, _: int, log: str | None, card: str | None, log_up: Any, card_up: Any
     ) -> None:
         """Read log and card."""
-        session = sessions.get(key)
         session.open(_source(session, log, log_up), _source(session, card, card_up))
         opened = session.work.require_opened()
-        announce(Topic.LOG)
-        tell_read(f"{log} is open", opened.fault, len(session.work.shifts))
+        ui.announce(ui.Topic.LOG)
+        ui.tell_read(f"{log} is open", opened.fault, len(session.work.shifts))
 
-    @app.callback(
+    @page.callback(
         Output("log-content", "children"),
         Output("log-path", "value"),
         Output("card-path", "value"),
         Output("log-names", "children"),
         Output("card-names", "children"),
-        Input(due_id("log"), "data"),
-        State("session", "data"),
-        prevent_initial_call=True,
+        Input(ui.due_id("log"), "data"),
     )
-    @told
-    def show(_: int, key: str) -> tuple[Any, ...]:
-        """What is open."""
-        session = sessions.get(key)
+    def show(session: Session, _: int) -> tuple[Any, ...]:
+        """Render the open log."""
         work, folder = session.work, session.folder
         content = [] if work.opened is None else _content(work.opened)
         names = [
@@ -133,8 +111,8 @@ def _shown(source: Source | None) -> str:
 def _content(opened: Opened) -> list[Component]:
     if opened.log is None or opened.found is None:
         return [
-            notes("The log cannot be read as mapped", [opened.fault]),
-            hint("Correct the mapping under Channels."),
+            ui.notes("The log cannot be read as mapped", [opened.fault]),
+            ui.hint("Correct the mapping under Channels."),
         ]
     log, found = opened.log, opened.found
     first = min(float(one.time[0]) for one in log.channels.values())
@@ -159,9 +137,9 @@ def _content(opened: Opened) -> list[Component]:
     refused = [f"{r.time[0]:.2f} s to {r.time[1]:.2f} s: {r.reason}" for r in found.rejected]
     return [
         facts_line(facts),
-        *([table(_SHIFT_HEAD, shifts, "Shifts of the log")] if shifts else []),
-        notes("About the log", log.warnings),
-        notes(
+        *([ui.table(_SHIFT_HEAD, shifts, "Shifts of the log")] if shifts else []),
+        ui.notes("About the log", log.warnings),
+        ui.notes(
             "Not used" if shifts else "No usable shift", refused, "plain" if shifts else "doubtful"
         ),
     ]

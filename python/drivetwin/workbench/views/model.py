@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dash import ALL, MATCH, Dash, Input, Output, Patch, State, ctx, html, no_update
+from dash import ALL, MATCH, Input, Output, Patch, State, ctx, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin._util.display_units import display_of, with_uncertainty
@@ -20,24 +20,9 @@ from drivetwin.report.labels import parameter_label
 from drivetwin.report.sections.parameters import TONES
 from drivetwin.shifts.shift import shift_labels
 from drivetwin.workbench.locks import Lock, LockKind, lockable, typed
-from drivetwin.workbench.session import Live, Session, Sessions
+from drivetwin.workbench.session import Live, Session
 from drivetwin.workbench.session_state import Work
-from drivetwin.workbench.views.widgets import (
-    Topic,
-    acted,
-    announce,
-    badge,
-    button,
-    choice,
-    due_id,
-    field,
-    graph,
-    hint,
-    row,
-    table,
-    tell,
-    told,
-)
+from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.what_if import Slider, changes_of, display_for, sliders_of
 
 _KINDS = {kind.value: kind.value for kind in LockKind}
@@ -53,13 +38,13 @@ _BOTH = """(a, b) => {
 def layout() -> list[Component]:
     """Filled when there is a twin."""
     return [
-        hint(
+        ui.hint(
             "Move a parameter: the simulation is driven by the measured engine torque and "
             "pressures again. The dotted curve is the model as identified."
         ),
         html.Div(id="model-content"),
         html.H3("Parameters and locks"),
-        hint(
+        ui.hint(
             "free: the log alone decides. prior: value ± one standard deviation counts as a "
             "measurement. fixed: taken as known. Locks count from the next identification on."
         ),
@@ -67,64 +52,46 @@ def layout() -> list[Component]:
     ]
 
 
-def register(app: Dash, sessions: Sessions) -> None:
+def register(page: ui.Page) -> None:
     """Sliders and locks."""
-    _register_bench(app, sessions)
-    _register_sliders(app, sessions)
-    _register_locks(app, sessions)
+    _register_bench(page)
+    _register_sliders(page)
+    _register_locks(page)
 
 
-def _register_bench(app: Dash, sessions: Sessions) -> None:
-    @app.callback(
-        Output("model-content", "children"),
-        Input(due_id("model"), "data"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @told
-    def show(_: int, key: str) -> list[Component]:
-        """Sliders beside the figure."""
-        session = sessions.get(key)
+def _register_bench(page: ui.Page) -> None:
+    @page.callback(Output("model-content", "children"), Input(ui.due_id("model"), "data"))
+    def show(session: Session, _: int) -> list[Component]:
+        """Render the sliders next to the figure."""
         if session.work.method is None or not session.work.shifts:
-            return [hint("Nothing is identified yet.")]
+            return [ui.hint("Nothing is identified yet.")]
         try:
             live = session.simulation()
         except MissingParameterError as incomplete:
-            return [_choices(session.work), hint(str(incomplete))]
+            return [_choices(session.work), ui.hint(str(incomplete))]
         return _bench(session, live)
 
-    @app.callback(
-        Input("reset-sliders", "n_clicks"), State("session", "data"), prevent_initial_call=True
-    )
-    @acted
-    def reset(clicks: int | None, key: str) -> None:
+    @page.callback(Input("reset-sliders", "n_clicks"))
+    def reset(session: Session, clicks: int | None) -> None:
         """Back to what was identified."""
         if clicks:
-            session = sessions.get(key)
             session.choose_method(session.work.require_outcome().method)
-            announce(Topic.LIVE)
+            ui.announce(ui.Topic.LIVE)
 
-    @app.callback(
-        Input("model-method", "data-value"),
-        Input("model-shift", "data-value"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @acted
-    def choose(method: str | None, shift: str | None, key: str) -> None:
+    @page.callback(Input("model-method", "data-value"), Input("model-shift", "data-value"))
+    def choose(session: Session, method: str | None, shift: str | None) -> None:
         """Another result or shift."""
-        session = sessions.get(key)
         work = session.work
         if method is not None and Method(method) is not work.method:
             session.choose_method(Method(method))
-            announce(Topic.LIVE)
+            ui.announce(ui.Topic.LIVE)
         if shift is not None and int(shift) != work.shift:
             session.choose_shift(int(shift))
-            announce(Topic.PHASES)
+            ui.announce(ui.Topic.PHASES)
 
 
-def _register_sliders(app: Dash, sessions: Sessions) -> None:
-    app.clientside_callback(  # type: ignore[no-untyped-call]
+def _register_sliders(page: ui.Page) -> None:
+    page.app.clientside_callback(  # type: ignore[no-untyped-call]
         _BOTH,
         Output({"part": "range", "id": MATCH}, "value"),
         Output({"part": "number", "id": MATCH}, "value"),
@@ -133,21 +100,17 @@ def _register_sliders(app: Dash, sessions: Sessions) -> None:
         prevent_initial_call=True,
     )
 
-    @app.callback(
+    @page.callback(
         Output("model-plot", "figure"),
         Output("model-fit", "children"),
         Input({"part": "range", "id": ALL}, "value"),
         State({"part": "range", "id": ALL}, "id"),
-        State("session", "data"),
-        prevent_initial_call=True,
     )
-    @told
     def slide(
-        values: Sequence[float | str | None], ids: Sequence[dict[str, str]], key: str
+        session: Session, values: Sequence[float | str | None], ids: Sequence[dict[str, str]]
     ) -> tuple[Any, Any]:
-        """Simulate with the parameters as they stand."""
+        """Simulate with the parameters of the sliders."""
         begun = time.perf_counter()
-        session = sessions.get(key)
         positions = {
             one["id"]: float(value) for one, value in zip(ids, values, strict=True)
             if value is not None
@@ -165,47 +128,37 @@ def _register_sliders(app: Dash, sessions: Sessions) -> None:
         return patch, _fit(session.simulation(), f"simulated and compared in {spent:.0f} ms")
 
 
-def _register_locks(app: Dash, sessions: Sessions) -> None:
-    @app.callback(
-        Output("locks-content", "children"),
-        Input(due_id("model"), "data"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @told
-    def show(_: int, key: str) -> list[Component]:
+def _register_locks(page: ui.Page) -> None:
+    @page.callback(Output("locks-content", "children"), Input(ui.due_id("model"), "data"))
+    def show(session: Session, _: int) -> list[Component]:
         """One row for each parameter."""
-        work = sessions.get(key).work
-        return _locks(work) if work.shifts else [hint("No shift is open.")]
+        work = session.work
+        return _locks(work) if work.shifts else [ui.hint("No shift is open.")]
 
-    @app.callback(
+    @page.callback(
         Input({"lock": "kind", "id": ALL}, "data-value"),
         Input({"lock": "value", "id": ALL}, "value"),
         Input({"lock": "std", "id": ALL}, "value"),
         State({"lock": "kind", "id": ALL}, "id"),
-        State("session", "data"),
-        prevent_initial_call=True,
     )
-    @acted
     def lock(
+        session: Session,
         kinds: Sequence[str],
         values: Sequence[float | None],
         stds: Sequence[float | None],
         ids: Sequence[dict[str, str]],
-        key: str,
     ) -> None:
         """A lock was changed by hand."""
-        session = sessions.get(key)
         if not isinstance(ctx.triggered_id, dict):
             return
         name = ctx.triggered_id["id"]
         place = [one["id"] for one in ids].index(name)
         wanted = typed(name, LockKind(kinds[place]), values[place], stds[place])
         if _same(wanted, session.work.lock_of(name)):
-            tell("")
+            ui.tell("")
             return
         session.set_lock(name, wanted)
-        tell(f"{parameter_label(name)} is {wanted.kind.value} from the next identification on")
+        ui.tell(f"{parameter_label(name)} is {wanted.kind.value} from the next identification on")
 
 
 def _same(one: Lock, other: Lock) -> bool:
@@ -219,10 +172,10 @@ def _choices(work: Work) -> Component:
     methods = {method.value: method.value for method in work.results}
     shifts = {str(k): name for k, name in enumerate(shift_labels(work.shifts))}
     shown = work.require_outcome().method.value
-    return row(
-        choice("model-method", "Result", methods, shown),
-        choice("model-shift", "Shift", shifts, str(work.shift)),
-        button("As identified", "reset-sliders"),
+    return ui.row(
+        ui.choice("model-method", "Result", methods, shown),
+        ui.choice("model-shift", "Shift", shifts, str(work.shift)),
+        ui.button("As identified", "reset-sliders"),
     )
 
 
@@ -237,7 +190,7 @@ def _bench(session: Session, live: Live) -> list[Component]:
                 html.Div(
                     [
                         html.Div(_fit(live, ""), id="model-fit"),
-                        graph("model-plot", "Simulation over measurement", live.figure),
+                        ui.graph("model-plot", "Simulation over measurement", live.figure),
                     ]
                 ),
             ],
@@ -254,14 +207,14 @@ def _slider(one: Slider, changes: Mapping[str, float]) -> Component:
     return html.Div(
         [
             html.Div([one.label, html.Small(one.unit)], className="name"),
-            field(
+            ui.field(
                 {"part": "range", "id": one.id},
                 f"{one.label}, slider",
                 hidden_label=True,
                 type="range",
                 **limits,
             ),
-            field(
+            ui.field(
                 {"part": "number", "id": one.id},
                 f"{one.label}, number in {one.unit}",
                 hidden_label=True,
@@ -284,10 +237,10 @@ def _fit(live: Live, remark: str) -> list[Component]:
         )
         for name in live.present.fit
     ]
-    parts = [table(("fit over the whole shift", "now", "as identified"), rows)]
+    parts = [ui.table(("fit over the whole shift", "now", "as identified"), rows)]
     status = live.present.status
     text = remark if status == "completed" else f"the simulation ended early: {status}"
-    return [*parts, hint(text)]
+    return [*parts, ui.hint(text)]
 
 
 def _percent(run: Validation, name: str) -> str:
@@ -297,11 +250,11 @@ def _percent(run: Validation, name: str) -> str:
 def _locks(work: Work) -> list[Component]:
     names = list(work.require_twin().parameters) if work.method else _usual_ids(work)
     head = ("parameter", "value", "± 95 %", "unit", "verdict", "lock", "at", "± std")
-    return [table(head, [_lock_row(work, name) for name in names], name="locks")]
+    return [ui.table(head, [_lock_row(work, name) for name in names], name="locks")]
 
 
 def _usual_ids(work: Work) -> list[str]:
-    """What can be locked before anything is identified."""
+    """List the parameters that can be fixed before an identification."""
     gears = dict.fromkeys(g for s in work.shifts for g in (s.start_gear, s.end_gear))
     elements = dict.fromkeys(e for s in work.shifts for e in (s.offgoing, s.oncoming))
     return [
@@ -323,7 +276,7 @@ def _lock_row(work: Work, name: str) -> list[Any]:
         value, width = with_uncertainty(estimate.value * display.factor, half)
     verdict: Any = ""
     if estimate is not None:
-        verdict = badge(estimate.verdict.value, TONES[estimate.verdict].value)
+        verdict = ui.badge(estimate.verdict.value, TONES[estimate.verdict].value)
     label = html.Div([parameter_label(name), html.Small(spec.meaning)])
     cells: list[Any] = [
         label,
@@ -345,7 +298,7 @@ def _lock_controls(work: Work, name: str, told_value: float | None) -> list[Comp
 
     def number(part: str, text: str, value: float | None) -> Component:
         shown = None if value is None else float(f"{value * factor:.6g}")
-        return field(
+        return ui.field(
             {"lock": part, "id": name},
             f"{text} of {label}",
             hidden_label=True,
@@ -356,7 +309,7 @@ def _lock_controls(work: Work, name: str, told_value: float | None) -> list[Comp
         )
 
     return [
-        choice(
+        ui.choice(
             {"lock": "kind", "id": name}, f"lock of {label}", _KINDS, lock.kind, hidden_label=True
         ),
         number("value", "locked value", at),

@@ -22,12 +22,20 @@ from drivetwin.workbench.views import (
     phases,
     workspace,
 )
-from drivetwin.workbench.views.widgets import Topic, announce, attributes, due_id, told, topic_id
+from drivetwin.workbench.views.widgets import (
+    Page,
+    Topic,
+    announce,
+    attributes,
+    due_id,
+    told,
+    topic_id,
+)
 
 
 @dataclass(frozen=True)
 class Start:
-    """What a session begins with: files that were named on the command line."""
+    """Files named on the command line, opened when a session begins."""
 
     log: Source | None = None
     card: Source | None = None
@@ -93,7 +101,7 @@ def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
     _enter(app, sessions, start)
     _show_status(app, sessions)
     for _, view in VIEWS.values():
-        view.register(app, sessions)
+        view.register(Page(app, sessions))
 
 
 def _layout() -> Component:
@@ -191,7 +199,7 @@ def _show_status(app: Dash, sessions: Sessions) -> None:
         prevent_initial_call=True,
     )
     def status(_log: int, _results: int, key: str | None) -> list[Component | str]:
-        """One line that says what is open and what is known."""
+        """Format the status line: open files and available results."""
         if key not in sessions:
             return []
         work = sessions.get(key).work

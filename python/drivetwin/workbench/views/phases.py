@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from dash import ALL, Dash, Input, Output, State, html
+from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin._util.display_units import display_of, significant
@@ -14,30 +14,15 @@ from drivetwin.report.sections.summary import phase_key
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift, shift_labels
 from drivetwin.workbench.phases import LABELS, dragged, phase_figure, shown_times, typed
-from drivetwin.workbench.session import Sessions
+from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Work
-from drivetwin.workbench.views.widgets import (
-    Topic,
-    acted,
-    announce,
-    button,
-    choice,
-    due_id,
-    field,
-    graph,
-    hint,
-    notes,
-    row,
-    table,
-    tell,
-    told,
-)
+from drivetwin.workbench.views import widgets as ui
 
 
 def layout() -> list[Component]:
     """The figure and the times."""
     return [
-        hint(
+        ui.hint(
             "Drag a dashed line to move a phase boundary, or type its time. What is set by hand "
             "counts for the next identification."
         ),
@@ -45,95 +30,68 @@ def layout() -> list[Component]:
     ]
 
 
-def register(app: Dash, sessions: Sessions) -> None:
+def register(page: ui.Page) -> None:
     """Moving boundaries."""
-    _register_figure(app, sessions)
-    _register_fields(app, sessions)
+    _register_figure(page)
+    _register_fields(page)
 
 
-def _register_figure(app: Dash, sessions: Sessions) -> None:
-    @app.callback(
-        Output("phases-content", "children"),
-        Input(due_id("phases"), "data"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @told
-    def show(_: int, key: str) -> list[Component]:
+def _register_figure(page: ui.Page) -> None:
+    @page.callback(Output("phases-content", "children"), Input(ui.due_id("phases"), "data"))
+    def show(session: Session, _: int) -> list[Component]:
         """The shift that is chosen."""
-        work = sessions.get(key).work
-        return _content(work) if work.shifts else [hint("No shift is open.")]
+        work = session.work
+        return _content(work) if work.shifts else [ui.hint("No shift is open.")]
 
-    @app.callback(
-        Input("phases-plot", "relayoutData"),
-        State("session", "data"),
-        prevent_initial_call=True,
-    )
-    @acted
-    def drag(change: dict[str, Any] | None, key: str) -> None:
+    @page.callback(Input("phases-plot", "relayoutData"))
+    def drag(session: Session, change: dict[str, Any] | None) -> None:
         """A line was dragged."""
-        session = sessions.get(key)
         work = session.work
         if not change or not any(name.startswith("shapes[") for name in change):
             return
         moves = dragged(phase_figure(work.require_log(), work.require_shift()), change)
-        announce(Topic.PHASES)
+        ui.announce(ui.Topic.PHASES)
         if moves:
             session.move(work.shift, moves)
-            tell("; ".join(f"{LABELS[one]} at {time:.4f} s" for one, time in moves.items()))
+            ui.tell("; ".join(f"{LABELS[one]} at {time:.4f} s" for one, time in moves.items()))
 
 
-def _register_fields(app: Dash, sessions: Sessions) -> None:
-    @app.callback(
-        Input("apply-phases", "n_clicks"),
-        State("session", "data"),
-        State({"boundary": ALL}, "value"),
-        prevent_initial_call=True,
-    )
-    @acted
-    def apply(clicks: int | None, key: str, times: Sequence[float | None]) -> None:
+def _register_fields(page: ui.Page) -> None:
+    @page.callback(Input("apply-phases", "n_clicks"), State({"boundary": ALL}, "value"))
+    def apply(session: Session, clicks: int | None, times: Sequence[float | None]) -> None:
         """Times were typed."""
         if not clicks:
             return
-        session = sessions.get(key)
         changes = typed(session.work.require_shift(), times)
         if not changes:
-            tell("No time was changed")
+            ui.tell("No time was changed")
             return
         session.move(session.work.shift, changes)
-        announce(Topic.PHASES)
-        tell("The phases are set")
+        ui.announce(ui.Topic.PHASES)
+        ui.tell("The phases are set")
 
-    @app.callback(
-        Input("reset-phases", "n_clicks"), State("session", "data"), prevent_initial_call=True
-    )
-    @acted
-    def reset(clicks: int | None, key: str) -> None:
+    @page.callback(Input("reset-phases", "n_clicks"))
+    def reset(session: Session, clicks: int | None) -> None:
         """Back to what was detected."""
         if not clicks:
             return
-        session = sessions.get(key)
         session.move(session.work.shift, {})
-        announce(Topic.PHASES)
-        tell("The phases are as detected")
+        ui.announce(ui.Topic.PHASES)
+        ui.tell("The phases are as detected")
 
-    @app.callback(
-        Input("phases-shift", "data-value"), State("session", "data"), prevent_initial_call=True
-    )
-    @acted
-    def choose(shift: str | None, key: str) -> None:
+    @page.callback(Input("phases-shift", "data-value"))
+    def choose(session: Session, shift: str | None) -> None:
         """Another shift of the log."""
-        session = sessions.get(key)
         if shift is not None and int(shift) != session.work.shift:
             session.choose_shift(int(shift))
-            announce(Topic.PHASES)
+            ui.announce(ui.Topic.PHASES)
 
 
 def _content(work: Work) -> list[Component]:
     shift = work.require_shift()
     names = {str(k): name for k, name in enumerate(shift_labels(work.shifts))}
     fields = [
-        field(
+        ui.field(
             {"boundary": one.value},
             f"{LABELS[one]} [s]",
             type="number",
@@ -143,19 +101,19 @@ def _content(work: Work) -> list[Component]:
         for one, time in shown_times(shift).items()
     ]
     return [
-        row(choice("phases-shift", "Shift", names, str(work.shift)), *fields),
-        row(
-            button("Apply times", "apply-phases", main=True),
-            button("As detected", "reset-phases"),
+        ui.row(ui.choice("phases-shift", "Shift", names, str(work.shift)), *fields),
+        ui.row(
+            ui.button("Apply times", "apply-phases", main=True),
+            ui.button("As detected", "reset-phases"),
         ),
-        graph(
+        ui.graph(
             "phases-plot",
             "The shift over time with its phases",
             phase_figure(work.require_log(), shift),
             edits={"shapePosition": True},
         ),
-        hint(phase_key(shift.kind)),
-        notes("About this shift", shift.warnings),
+        ui.hint(phase_key(shift.kind)),
+        ui.notes("About this shift", shift.warnings),
         _quality(shift),
     ]
 
@@ -166,4 +124,4 @@ def _quality(shift: Shift) -> Component:
         display = display_of(QUALITY_UNITS[name])
         text = f"{significant(value * display.factor, 3)} {display.label}"
         rows.append((name.replace("_", " "), text))
-    return table(("figure", "value"), rows, "Shift quality")
+    return ui.table(("figure", "value"), rows, "Shift quality")

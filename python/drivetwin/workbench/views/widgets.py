@@ -10,15 +10,18 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 import plotly.graph_objects as go
-from dash import dcc, html, no_update, set_props
+from dash import Dash, Output, State, dcc, html, no_update, set_props
+from dash.dependencies import DashDependency
 from dash.development.base_component import Component
 
 from drivetwin.errors import DrivetwinError, Where
+from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.uploads import LIMITS
 
 P = ParamSpec("P")
@@ -86,8 +89,8 @@ def tell_read(how: str, fault: str, shifts: int) -> None:
         tell(f"{how}, but holds no usable shift: the view Log says why", fault=True)
 
 
-def told(callback: Callable[P, R]) -> Callable[P, R]:
-    """A callback whose faults become the message of the page; it then changes nothing."""
+def told(callback: Callable[P, R], unchanged: object = no_update) -> Callable[P, R]:
+    """Return the callback with its errors as the message of the page, and `unchanged` then."""
 
     @functools.wraps(callback)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -95,26 +98,46 @@ def told(callback: Callable[P, R]) -> Callable[P, R]:
             return callback(*args, **kwargs)
         except (DrivetwinError, OSError) as fault:
             tell(_words(fault), fault=True)
-            return cast(R, no_update)
+            return cast(R, unchanged)
 
     return guarded
 
 
-def acted(callback: Callable[P, None]) -> Callable[P, None]:
-    """The same for a callback without outputs."""
+@dataclass(frozen=True)
+class Page:
+    """The application, and the sessions on which its callbacks act."""
 
-    @functools.wraps(callback)
-    def guarded(*args: P.args, **kwargs: P.kwargs) -> None:
-        try:
-            callback(*args, **kwargs)
-        except (DrivetwinError, OSError) as fault:
-            tell(_words(fault), fault=True)
+    app: Dash
+    sessions: Sessions
 
-    return guarded
+    def callback(
+        self, *arguments: DashDependency, busy: str = "", initially: bool = False
+    ) -> Callable[[Callable[..., R]], Callable[..., R]]:
+        """Register a function of the tab's session and of the values of `arguments`.
+
+        Its errors become the message of the page. The button `busy` is disabled while it runs.
+        """
+        silent = not any(isinstance(one, Output) for one in arguments)
+        running = [(Output(busy, "disabled"), True, False)] if busy else None
+
+        def register(callback: Callable[..., R]) -> Callable[..., R]:
+            def act(*values: Any) -> R:
+                *given, key = values
+                return callback(self.sessions.get(key), *given)
+
+            self.app.callback(
+                *arguments,
+                State("session", "data"),
+                running=running,
+                prevent_initial_call=not initially,
+            )(told(act, None if silent else no_update))
+            return callback
+
+        return register
 
 
 def _words(fault: DrivetwinError | OSError) -> str:
-    """A typed error, or what the system refuses, as it is told; files by their names alone."""
+    """Format a typed error or an OS error as a message; files without their folders."""
     if isinstance(fault, DrivetwinError):
         return str(fault)
     where = Where(file=None if fault.filename is None else Path(fault.filename).name)
@@ -151,7 +174,7 @@ def button(text: str, id: Id, *, main: bool = False, **options: Any) -> Componen
 
 
 def upload_button(text: str, purpose: str, target: str) -> Component:
-    """A button that lets the browser send a file; the store `target` then holds key and name."""
+    """Build a button that uploads a file; the store `target` then holds key and name."""
     return html.Button(
         text,
         type="button",
@@ -177,7 +200,7 @@ def table(
 
 
 def notes(title: str, texts: Iterable[str], tone: str = "doubtful") -> Component:
-    """A list of sentences under a heading; nothing where there are none."""
+    """Build a list of sentences under a heading; empty without sentences."""
     items = [html.Li(text) for text in dict.fromkeys(texts)]
     if not items:
         return html.Div()
@@ -200,7 +223,7 @@ def hint(text: str) -> Component:
 
 
 def graph(id: str, label: str, figure: go.Figure, **config: Any) -> Component:
-    """A figure; `label` says to a screen reader what it is."""
+    """Build a figure; `label` is its description for screen readers."""
     options: Any = {
         "displaylogo": False,
         "responsive": True,

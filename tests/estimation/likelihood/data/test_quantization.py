@@ -9,13 +9,13 @@ import pytest
 
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.data.quantization import rounding_of
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import find_shifts
 from drivetwin.vehicle.card import load_card
 
@@ -48,7 +48,7 @@ def test_what_noise_dithers_leaves_nothing(step: float, noise: float) -> None:
 def test_intervals_hold_where_the_engine_torque_has_no_noise_but_its_rounding(
     tmp_path: Path,
 ) -> None:
-    exact = paper_steps()
+    exact = load_scenario("paper_steps")
     sensors = tuple(
         replace(one, noise=0.0, resolution=STEP) if one.quantity == "engine_torque" else one
         for one in exact.sensors
@@ -67,7 +67,7 @@ def test_intervals_hold_where_the_engine_torque_has_no_noise_but_its_rounding(
 
 
 def test_intervals_hold_where_pressures_have_no_noise_but_their_rounding(tmp_path: Path) -> None:
-    exact = paper_steps()
+    exact = load_scenario("paper_steps")
     still = {name: replace(one, vibration=None) for name, one in exact.actuators.items()}
     sensors = tuple(
         replace(one, noise=0.0, resolution=COARSE) if one.quantity == "pressure" else one

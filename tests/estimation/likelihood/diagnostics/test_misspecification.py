@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.diagnostics.misspecification import late_torque, left_out
 from drivetwin.estimation.likelihood.estimates import conclude
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
@@ -24,7 +24,7 @@ from tests.support.shared_results import shared
 @shared
 def _with_delay(delay: float, role: str = "output_torque") -> tuple[Bench, LikelihoodFit]:
     """A log with one sensor late, and its fit."""
-    base = paper_steps()
+    base = load_scenario("paper_steps")
     sensors = [replace(one, delay=delay) if one.role == role else one for one in base.sensors]
     made = record_bench(replace(base, sensors=tuple(sensors)), 0, Knowledge())
     posed, start = problem(made)
@@ -90,7 +90,7 @@ def test_a_late_pressure_is_told() -> None:
 
 
 def test_friction_of_another_shape_is_told_and_its_band_holds_the_truth() -> None:
-    base = paper_steps()
+    base = load_scenario("paper_steps")
     (leaving, coming) = base.model.elements
     assert isinstance(coming.friction, Stribeck)
     slip = np.linspace(0.0, 200.0, 401)

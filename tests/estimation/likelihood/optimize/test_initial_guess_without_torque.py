@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from drivetwin.dyno.files import card_text
-from drivetwin.dyno.scenarios import paper
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.estimation.data.shift_data import DesignData, Sampled
 from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque import (
     guess_without_torque,
 )
@@ -23,8 +23,13 @@ NOISY = 4.0
 """Noise of the speeds, a multiple of the scenario's."""
 
 
+def _design(file: Path) -> DesignData:
+    card = load_card(file)
+    return DesignData(card.loss_law, card.final_drive, card.J_prime_range, card.J_vehicle_range)
+
+
 def test_noise_of_the_speeds_does_not_make_the_vehicle_light(tmp_path: Path) -> None:
-    scenario = paper()
+    scenario = load_scenario("paper")
     loud = tuple(
         replace(one, noise=NOISY * one.noise) if one.role.endswith("speed") else one
         for one in scenario.sensors
@@ -33,21 +38,19 @@ def test_noise_of_the_speeds_does_not_make_the_vehicle_light(tmp_path: Path) -> 
     file = tmp_path / "card.toml"
     file.write_text(card_text(scenario), encoding="utf-8")
     signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
-    guess = guess_without_torque(signals, made.driveline, load_card(file))
+    guess = guess_without_torque(signals, made.driveline, _design(file))
     eta = scenario.model.eta
     assert guess["J_vehicle"] == pytest.approx(made.truth["J_vehicle"] / eta, rel=0.1)
     assert guess["Tv_over_if"] == pytest.approx(made.truth["Tv_over_if"] / eta, rel=0.1)
 
 
 def test_a_gear_held_too_briefly_leaves_the_start_to_the_other(tmp_path: Path) -> None:
-    scenario = paper()
+    scenario = load_scenario("paper")
     made = record_bench(scenario, 0, Knowledge())
     file = tmp_path / "card.toml"
     file.write_text(card_text(scenario), encoding="utf-8")
     shift = made.signals.shift
     brief = replace(shift, before=(shift.before[1] - 0.08, shift.before[1]))
-    guess = guess_without_torque(
-        replace(made.signals, shift=brief), made.driveline, load_card(file)
-    )
+    guess = guess_without_torque(replace(made.signals, shift=brief), made.driveline, _design(file))
     assert guess["eta"] == PLAUSIBLE_ETA.value
     assert guess["J_vehicle"] == pytest.approx(made.truth["J_vehicle"], rel=0.5)

@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenarios import SCENARIOS
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.optimize import multistart as fitting
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, Hopeless, fit, nearest
@@ -59,7 +59,7 @@ def test_a_wrong_start_is_brought_in_by_stages() -> None:
 
 def test_a_minimum_is_one_over_unknowns_and_inputs_alike() -> None:
     """B3 slips at twice the noise of its pressure above P0, B2 waits at its own."""
-    base = SCENARIOS[ScenarioName.POWER_ON_DOWN]()
+    base = load_scenario(ScenarioName.POWER_ON_DOWN)
     low = base.model.elements[1].P0 + 1.2e4
     programs = {
         "B3": Program(((2.15, 1.4e6), (2.20, low), (2.70, low), (2.75, 0.0))),

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.estimates import conclude
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import nearest
@@ -26,7 +26,7 @@ LAWS: tuple[LossLaw, ...] = ("paper", "dissipative")
 @cache
 def _made(law: LossLaw) -> Bench:
     """A log whose lock-up oscillation reverses the torque through the gears."""
-    base = paper_steps()
+    base = load_scenario("paper_steps")
     return record_bench(replace(base, model=replace(base.model, loss_law=law)), 0, Knowledge())
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Quantity
-from drivetwin.dyno.scenarios import paper_steps, throttle_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import Sampled
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.noise.residual_covariance import Whiteness
@@ -41,12 +41,12 @@ AS_READ = 2
 
 @cache
 def _posed() -> Problem:
-    return problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))[0]
+    return problem(record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH))[0]
 
 
 @shared
 def _fit(kinds: frozenset[str]) -> LikelihoodFit:
-    _, start = problem(record_bench(throttle_steps(), UNDECIDED, ROUGH))
+    _, start = problem(record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH))
     found = nearest(_posed().of_kinds(kinds), start)
     assert found is not None
     return found
@@ -65,7 +65,7 @@ def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> N
     told, doubts = averaged_over_kinds(_posed(), _fit(MEANS))
     value, std = _age(told)
     assert all(abs(age - value) < 1.96 * std for age in ages)
-    truth = record_bench(throttle_steps(), UNDECIDED, ROUGH).truth["te_delay"]
+    truth = record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH).truth["te_delay"]
     assert abs(truth - value) < 1.96 * std
     assert len(doubts) == 1
     assert doubts[0].endswith("output torque")
@@ -81,7 +81,7 @@ def test_it_does_not_matter_from_which_kind_one_comes() -> None:
 
 
 def test_a_clear_log_is_left_as_it_is() -> None:
-    posed, start = problem(record_bench(paper_steps(), 0, ROUGH))
+    posed, start = problem(record_bench(load_scenario("paper_steps"), 0, ROUGH))
     fit = nearest(posed, start)
     assert fit is not None
     told, doubts = averaged_over_kinds(posed, fit)
@@ -125,7 +125,7 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
 @shared
 def _without_torque() -> tuple[Problem, Point, LikelihoodFit]:
     """A problem of samples without an output torque, where its search starts, and its minimum."""
-    made = record_bench(throttle_steps(), 0, ROUGH)
+    made = record_bench(load_scenario("throttle_steps"), 0, ROUGH)
     signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
     eta = made.truth["eta"]
     scaled = ("J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -173,7 +173,7 @@ def test_from_far_off_signals_are_taken_as_read() -> None:
     assert MULTI_START.far_chi2 < normal.cost / posed.size < MULTI_START.direct_chi2
     assert of_signals._promising(weighted, far, normal)  # wrong: there are samples alone
     likely, other = likely_kinds(
-        posed, far, [record_bench(throttle_steps(), 0, ROUGH).signals.shift]
+        posed, far, [record_bench(load_scenario("throttle_steps"), 0, ROUGH).signals.shift]
     )
     assert likely.kinds == frozenset()
     assert other.kinds == frozenset(SPEEDS)
@@ -181,7 +181,7 @@ def test_from_far_off_signals_are_taken_as_read() -> None:
 
 def test_from_far_off_the_lower_gear_tells_kinds() -> None:
     """Speeds that a bus sends as means over 10 ms, with pedal steps, from a poor start."""
-    base = throttle_steps()
+    base = load_scenario("throttle_steps")
     sensors = [
         replace(one, rate=100.0, window=0.01) if one.quantity is Quantity.SPEED else one
         for one in base.sensors
@@ -218,7 +218,7 @@ def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
 def _at_50_hertz(window: float) -> tuple[Problem, LikelihoodFit]:
     """A problem of outputs every 20 ms that are means over the `window` [s], and its minimum with
     the kinds that an expansion tells."""
-    base = throttle_steps()
+    base = load_scenario("throttle_steps")
     sensors = [
         replace(one, rate=50.0, window=window)
         if one.quantity is Quantity.SPEED or one.role == "output_torque"

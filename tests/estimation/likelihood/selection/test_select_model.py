@@ -12,7 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.scenarios import paper_steps, throttle_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import Sampled
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, spread_of
@@ -48,7 +48,7 @@ def _deviation(fit: LikelihoodFit, name: str, truth: float) -> float:
 
 
 def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
-    base = throttle_steps()
+    base = load_scenario("throttle_steps")
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
     made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     fit, notes = _chosen(made)
@@ -60,7 +60,7 @@ def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
 
 
 def test_a_growing_load_that_is_left_out_is_allowed_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    base = throttle_steps()
+    base = load_scenario("throttle_steps")
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
     made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     monkeypatch.setattr(aero_load, "grows", lambda *_: False)
@@ -76,7 +76,7 @@ def test_a_growing_load_that_is_left_out_is_allowed_for(monkeypatch: pytest.Monk
 def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    made = record_bench(paper_steps(), 0, Knowledge())
+    made = record_bench(load_scenario("paper_steps"), 0, Knowledge())
     monkeypatch.setattr(
         select_model, "SELECTION", replace(select_model.SELECTION, max_restricted_work=0.0)
     )
@@ -96,7 +96,7 @@ def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search
 @pytest.mark.parametrize("rate", [100.0, 500.0, 1000.0])
 @pytest.mark.parametrize("means", [True, False])
 def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
-    made = record_bench(_sent(paper_steps(), rate, means), 0, Knowledge())
+    made = record_bench(_sent(load_scenario("paper_steps"), rate, means), 0, Knowledge())
     fit, notes = _chosen(made)
     assert any("means over their period" in note for note in notes) == means
     assert fit.problem.kinds == (frozenset(SPEEDS) if means else frozenset())
@@ -108,7 +108,7 @@ def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
 
 
 def test_without_an_output_torque_speeds_are_told_apart_all_the_same() -> None:
-    made = record_bench(_sent(paper_steps(), 100.0, True), 0, Knowledge(J_out=0.1))
+    made = record_bench(_sent(load_scenario("paper_steps"), 100.0, True), 0, Knowledge(J_out=0.1))
     nothing = Sampled(np.empty(0), np.empty(0))
     fit, _ = _chosen(replace(made, signals=replace(made.signals, output_torque=nothing)))
     assert fit.problem.kinds == frozenset(SPEEDS)
@@ -116,7 +116,7 @@ def test_without_an_output_torque_speeds_are_told_apart_all_the_same() -> None:
 
 
 def test_an_engine_torque_that_comes_rarely_is_taken_for_a_curve() -> None:
-    base = paper_steps()
+    base = load_scenario("paper_steps")
     time = np.arange(0.0, base.duration, 2e-3)
     smooth = uniform_filter1d(uniform_filter1d(base.engine_torque.at(time), 25), 25)
     pedal = Program(tuple(zip(time.tolist(), smooth.tolist(), strict=True)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.scenarios import paper_steps
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, nearest
 from drivetwin.estimation.likelihood.priors import problem_of
@@ -24,7 +24,7 @@ PRESSURE = "B2.P0"
 
 def _lingering(above: float) -> Scenario:
     """`paper_steps` with the off-going element held so far `above` its P0 [Pa] while it slips."""
-    base = paper_steps()
+    base = load_scenario("paper_steps")
     (one, _), actuator = base.model.elements, base.actuators["B2"]
     held = one.P0 + above
     knots = tuple((time, max(value, held)) for time, value in actuator.command.knots)
@@ -61,7 +61,7 @@ def test_the_lower_of_two_minima_about_p0_is_taken() -> None:
 
 
 def test_an_element_that_just_lets_go_is_not_looked_at_again() -> None:
-    made = record_bench(paper_steps(), 0, ROUGH)
+    made = record_bench(load_scenario("paper_steps"), 0, ROUGH)
     law = made.run.scenario.model.loss_law
     problem, start = problem_of([made.signals], [made.driveline], law, truth_of(made))
     one = nearest(problem, start)

@@ -13,7 +13,7 @@ from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 SHARED = ROOT.parent / "shared" / "j1939"
 RPM = np.pi / 30.0
 

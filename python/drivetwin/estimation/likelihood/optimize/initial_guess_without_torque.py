@@ -17,14 +17,13 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.segments import MomentumSettings
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
+from drivetwin.estimation.data.shift_data import DesignData, Driveline, ShiftSignals
 from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW, TYPICAL_MODE
 from drivetwin.estimation.likelihood.priors import PLAUSIBLE_ETA
 from drivetwin.estimation.linear.ringdown import pencil_start
 from drivetwin.estimation.paper.wlse import whole
 from drivetwin.simulation.dual_clutch import in_series
 from drivetwin.vehicle.spec import middle_of
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 @dataclass(frozen=True)
@@ -43,13 +42,13 @@ GUESS = TorqueFreeGuessSettings()
 
 
 def guess_without_torque(
-    signals: ShiftSignals, driveline: Driveline, card: VehicleCard
+    signals: ShiftSignals, driveline: Driveline, design: DesignData
 ) -> dict[str, float]:
     """Compute an initial value of every unknown from speeds and engine torque of one shift.
 
     With an output torque η is a plausible one, and the ratios stand for what they are ratios of.
     """
-    inertia = _inertias(signals, driveline, card)
+    inertia = _inertias(signals, driveline, design)
     J_e, J_vehicle, load = inertia
     J_out = 0.0 if driveline.J_out is None else driveline.J_out.value
     J4, J5 = J_e * driveline.i_after**2 + J_out, J_vehicle / driveline.i_f**2
@@ -74,7 +73,7 @@ def guess_without_torque(
 
 
 def _inertias(
-    signals: ShiftSignals, driveline: Driveline, card: VehicleCard
+    signals: ShiftSignals, driveline: Driveline, design: DesignData
 ) -> tuple[float, float, float]:
     """Estimate (Je/η, J_v/η, T_v/i_f/η) over both gears.
 
@@ -82,7 +81,7 @@ def _inertias(
     of the slopes would make the vehicle too light by least squares; the slopes that the torque lets
     expect are their instruments.
     """
-    J_e = middle_of(card.J_prime_range)
+    J_e = middle_of(design.J_prime_range)
     shift, age = signals.shift, MomentumSettings().delay_prior.value
     spans = ((shift.before, driveline.i_before), (shift.after, driveline.i_after))
     ratios, slopes, torques = [], [], []
@@ -94,7 +93,7 @@ def _inertias(
     every = (np.concatenate(each) for each in (ratios, slopes, torques))
     ratio, slope, torque = whole(*every)
     target, seen = torque - J_e * slope, np.column_stack([slope / ratio**2, 1.0 / ratio])
-    limits = np.array(card.J_vehicle_range) / driveline.i_f**2
+    limits = np.array(design.J_vehicle_range) / driveline.i_f**2
     found = np.linalg.lstsq(seen, target, rcond=None)[0]
     for _ in range(GUESS.iterations):
         expected = (torque - found[1] / ratio) / (J_e * ratio**2 + found[0])

@@ -54,7 +54,7 @@ _Row = tuple[float, int, bool, bytes, str]
 
 
 def is_asc(head: bytes) -> bool:
-    """Tell whether the first bytes of a file are an ASC log."""
+    """Return True if the first bytes of a file are an ASC log."""
     return _IS_ASC.search(head) is not None
 
 
@@ -104,7 +104,7 @@ def _rows(data: bytes, base: int) -> Iterator[_Row]:
 
 
 def _payload(digits: bytes, base: int) -> bytes:
-    """The bytes; those before the first that is more than a byte."""
+    """Parse the payload bytes; stop before the first number that exceeds one byte."""
     if base == 16:
         return bytes.fromhex(digits.decode())
     numbers = [int(one) for one in digits.split()]
@@ -113,5 +113,5 @@ def _payload(digits: bytes, base: int) -> bytes:
 
 
 def _number(digits: bytes, base: int) -> int:
-    """The number, -1 for letters in a decimal log."""
+    """Parse a number; -1 if a decimal log contains letters."""
     return -1 if base == 10 and not digits.isdigit() else int(digits, base)

@@ -36,7 +36,7 @@ _BACKWARD, _ENOUGH = 0.1, 100
 
 
 def is_candump(head: bytes) -> bool:
-    """Tell whether the first bytes of a file are candump text."""
+    """Return True if the first bytes of a file are candump text."""
     lines = [line for line in head.splitlines()[:60] if line.strip()]
     forms = (_LINE, _OTHER, _BARE)
     fitting = sum(any(form.match(line) for form in forms) for line in lines)

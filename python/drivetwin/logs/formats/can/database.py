@@ -130,9 +130,9 @@ def _floats(data: Bytes, signal: Signal) -> FloatArray:
 def admitted(
     data: Bytes, length: NDArray[np.uint8] | NDArray[np.intp], signal: Signal
 ) -> NDArray[np.bool_]:
-    """Tell for each payload (n,) whether it is long enough and its multiplexer fits the signal.
+    """Select the payloads (n,) that are long enough and whose multiplexer selects the signal.
 
-    A multiplexer may be multiplexed itself, and then is in some payloads only.
+    A multiplexer may itself be multiplexed; then only some payloads contain it.
     """
     there: NDArray[np.bool_] = np.asarray(length >= signal.end)
     if signal.selector is not None:

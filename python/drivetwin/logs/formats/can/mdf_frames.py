@@ -21,7 +21,7 @@ _LENGTHS = np.array([*range(9), 12, 16, 20, 24, 32, 48, 64], np.uint8)
 
 
 def holds_frames(group: Any) -> bool:
-    """Tell whether a group of a file holds raw frames and no signals."""
+    """Return True if a group of a file holds raw frames and no signals."""
     return any(str(channel.name).partition(".")[0] in _RECORDS for channel in group.channels)
 
 

@@ -20,7 +20,7 @@ from drivetwin.logs.raw import Recording
 
 
 def is_bus_text(head: bytes) -> bool:
-    """Tell whether the first bytes of a file are a bus log in text form."""
+    """Return True if the first bytes of a file are a bus log in text form."""
     return is_candump(head) or is_asc(head)
 
 

@@ -81,7 +81,7 @@ class BusRecording:
         self.columns: Sequence[Column] = tuple(_marked(entry) for entry in self._entries)
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
-        """Decode one signal; see `Recording`. Codes that are no values are left out and told."""
+        """Decode one signal; see `Recording`. Codes that are no values are dropped and noted."""
         return self._entries[index].decode().within(window)
 
     def _decode(self, track: Track, signal: Signal) -> RawChannel:
@@ -160,7 +160,7 @@ class BusRecording:
         return torque.net_torque(actual, friction)
 
     def _reference(self, tracks: Sequence[Track], options: BusOptions) -> tuple[float | None, str]:
-        """Reference torque [N·m] and where it is from; without one, what to do."""
+        """Return the reference torque [N·m] and its source; without one, a remedy."""
         if options.reference_torque is not None:
             return options.reference_torque, (
                 f"reference torque {options.reference_torque:g} N·m as the mapping states"
@@ -182,7 +182,7 @@ class BusRecording:
 
 
 def _marked(entry: _Entry) -> Column:
-    """The column, marked where a sender never fills the signal, or hardly ever speaks."""
+    """Build the column; mark signals that are never available, and senders with few frames."""
     try:
         return replace(entry.column, empty=entry.decode().time.size < MIN_SAMPLES)
     except DamagedChannelError:
@@ -203,7 +203,7 @@ def _source(track: Track) -> tuple[int | None, int]:
 
 
 def _with_aside(tracks: Sequence[Track]) -> list[Track]:
-    """Mark messages of a strange sender where engine or transmission itself sends the same."""
+    """Mark messages of other senders if the engine or transmission also sends the message."""
     own = (ENGINE, TRANSMISSION)
     told = {(one.message.name, one.bus) for one in tracks if one.sender in own}
     return [

@@ -17,7 +17,7 @@ _FIRST_SPECIAL, _ERROR = 0xFB, 0xFE
 
 @dataclass(frozen=True, eq=False)
 class CodeCheck:
-    """Which codes are values (n,), and how many are not, by their meaning."""
+    """Mask of the codes that are values (n,), and counts of the other codes by meaning."""
 
     valid: NDArray[np.bool_]
     absent: int
@@ -26,7 +26,7 @@ class CodeCheck:
 
     @property
     def note(self) -> str | None:
-        """What was left out, in words; None if nothing was."""
+        """Description of the dropped codes; None if no code was dropped."""
         named = (
             (self.absent, "not available"),
             (self.error, "marked as error"),

@@ -29,7 +29,7 @@ def torque_name(name: str) -> str:
 
 
 def in_newton_metres(percent: RawChannel, reference: float, note: str) -> RawChannel:
-    """Return a percent torque as torque; `note` says where the `reference` [N·m] is from."""
+    """Return a percent torque as torque; `note` names the source of the `reference` [N·m]."""
     return RawChannel(
         torque_name(percent.name),
         UNIT,
@@ -41,7 +41,7 @@ def in_newton_metres(percent: RawChannel, reference: float, note: str) -> RawCha
 
 
 def with_fraction(actual: RawChannel, fraction: RawChannel) -> RawChannel:
-    """Add the fraction of a percent, which travels in the same message, where it is sent."""
+    """Add the fraction of a percent from the same message, where the message contains it."""
     part = np.zeros(actual.time.size)
     index = np.clip(np.searchsorted(fraction.time, actual.time), 0, max(0, fraction.time.size - 1))
     if fraction.time.size:

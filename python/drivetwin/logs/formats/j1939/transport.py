@@ -84,7 +84,7 @@ class _Assembly:
         self._last: dict[tuple[int, int, int, int], tuple[bytes, float]] = {}
 
     def repeated(self, place: tuple[int, int, int, int], payload: bytes, time: float) -> bool:
-        """Whether a frame is the last of its `place`, told twice by a gateway or a logger.
+        """Return True if a frame repeats the last one of its `place` (gateway or logger echo).
 
         A `place` is (bus, sender, receiver, group).
         """

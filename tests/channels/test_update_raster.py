@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
-from drivetwin.logs.quality.update_raster import find_raster, fresh_samples, shown_late
+from drivetwin.logs.quality.update_raster import find_raster, shown_late
 
 STEP = 1e-3
 
@@ -39,7 +39,7 @@ def test_every_update_is_found_and_no_other_sample(
 ) -> None:
     phase = data.draw(st.integers(0, period - 1))
     updates = wave(150, rounding)
-    fresh = fresh_samples(channel(hold(updates, period, phase)))
+    fresh = channel(hold(updates, period, phase)).updates
     first = 0 if phase == 0 else 1
     expected = (np.arange(first, 150) * period - phase) * STEP
     assert fresh.time == pytest.approx(expected)
@@ -50,7 +50,7 @@ def test_every_update_is_found_and_no_other_sample(
 def test_updates_that_repeat_the_value_are_fresh_too() -> None:
     updates = np.repeat(wave(40, 1.0), 3)  # two of three updates change nothing
     updates[::17] += 5.0
-    fresh = fresh_samples(channel(hold(updates, 10)))
+    fresh = channel(hold(updates, 10)).updates
     assert fresh.time == pytest.approx(np.arange(120) * 0.01)
 
 
@@ -65,7 +65,7 @@ def test_message_jitter_of_a_sample_does_not_hide_the_raster() -> None:
     rng = np.random.default_rng(7)
     at = np.arange(200) * 10 + np.concatenate(([0], rng.integers(0, 2, 199)))
     values = np.repeat(wave(200, 0.01), np.diff(np.append(at, 2000)))
-    assert_within_a_sample(fresh_samples(channel(values)).time, at * STEP)
+    assert_within_a_sample(channel(values).updates.time, at * STEP)
 
 
 @given(st.integers(0, 1000), st.integers(10, 50), st.sampled_from([0.01, 11.0]))
@@ -77,7 +77,7 @@ def test_messages_that_jitter_by_several_samples_of_the_table_are_updates(
     updates = wave(200, rounding)
     late = rng.integers(0, period // 5 + 1, 200)
     shown = np.searchsorted(period * np.arange(200) + late, np.arange(200 * period), "right")
-    fresh = fresh_samples(channel(updates[np.maximum(shown - 1, 0)]))
+    fresh = channel(updates[np.maximum(shown - 1, 0)]).updates
     assert abs(fresh.values.size - 200) <= 2
     near = np.abs(fresh.time[:, None] - STEP * (period * np.arange(200) + late)).argmin(axis=1)
     assert np.mean(fresh.values == updates[near]) > 0.97
@@ -103,13 +103,13 @@ def test_stairs_of_a_rounded_ramp_are_no_updates() -> None:
     rate = 1.0 + 0.1 * np.sin(np.linspace(0.0, 30.0, 6000))
     ramp = np.cumsum(rate) / 20.0  # a stair about every 20 samples
     stairs = channel(np.round(ramp), Quantity.SPEED)
-    assert fresh_samples(stairs).values.size == 6000
+    assert stairs.updates.values.size == 6000
 
 
 def test_clock_drift_does_not_add_up() -> None:
     at = np.ceil(np.arange(1000) * 10.004).astype(int)
     values = np.repeat(wave(1000, 0.01), np.diff(np.append(at, at[-1] + 10)))
-    assert_within_a_sample(fresh_samples(channel(values)).time, at * STEP)
+    assert_within_a_sample(channel(values).updates.time, at * STEP)
 
 
 @pytest.mark.parametrize("rounding", [0.01, 1.0, 25.0])
@@ -131,14 +131,14 @@ def test_constants_and_states_are_not_held() -> None:
 
 def test_a_channel_that_is_not_held_stays_as_it_is() -> None:
     every = channel(np.random.default_rng(2).normal(size=100))
-    assert fresh_samples(every) is every
+    assert every.updates is every
 
 
 def test_a_hole_brings_no_update_and_hides_none() -> None:
     """Samples missing from the table: what changed in the hole has no stamp."""
     whole = channel(hold(wave(150, 1.0), 10))
     keep = (whole.time < 0.4535) | (whole.time > 0.5365)
-    fresh = fresh_samples(replace(whole, time=whole.time[keep], values=whole.values[keep]))
+    fresh = replace(whole, time=whole.time[keep], values=whole.values[keep]).updates
     expected = np.arange(150) * 0.01
     assert fresh.time == pytest.approx(expected[(expected < 0.4535) | (expected > 0.5365)])
     assert find_raster(whole) is not None
@@ -161,7 +161,7 @@ def test_updates_between_the_samples_of_a_table_are_found(
 ) -> None:
     period, step = 1e-3 * rates[0], 1e-3 * rates[1]
     held, at = between(period, step, 300, rounding)
-    fresh = fresh_samples(held)
+    fresh = held.updates
     assert np.abs(np.diff(fresh.time) - period).max() < 0.01 * period
     near = np.abs(fresh.time[:, None] - at).argmin(axis=1)
     assert np.all(np.diff(near) == 1)
@@ -185,7 +185,7 @@ def test_a_gap_makes_no_two_updates_of_one(first: int, length: int) -> None:
     keep[first : first + length] = False
     part = replace(held, time=held.time[keep], values=held.values[keep])
     if part.time.size > 100:
-        assert np.all(np.diff(fresh_samples(part).time) > 0.5 * 10e-3)
+        assert np.all(np.diff(part.updates.time) > 0.5 * 10e-3)
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.logs.quality.update_raster import find_raster, fresh_samples
-from tests.logs.quality.test_update_raster import STEP, channel, hold, wave
+from drivetwin.logs.quality.update_raster import find_raster
+from tests.channels.test_update_raster import STEP, channel, hold, wave
 
 
 @given(st.integers(0, 1000), st.integers(2, 5), st.floats(0.1, 0.8))
@@ -19,7 +19,7 @@ def test_messages_whose_stamps_jitter(seed: int, repeats: int, jitter: float) ->
     updates = wave(200, 0.01)
     held = channel(hold(updates, repeats))
     late = jitter * STEP * np.random.default_rng(seed).uniform(0.0, 1.0, held.time.size)
-    fresh = fresh_samples(replace(held, time=held.time + late))
+    fresh = replace(held, time=held.time + late).updates
     assert fresh.values.tolist() == updates.tolist()
     assert fresh.time == pytest.approx((held.time + late)[::repeats])
 
@@ -30,7 +30,7 @@ def test_messages_of_which_some_are_lost(seed: int, repeats: int, share: float) 
     whole = channel(hold(wave(300, 0.01), repeats))
     keep = rng.random(whole.time.size) > share
     time = (whole.time + 0.05 * STEP * rng.uniform(size=whole.time.size))[keep]
-    fresh = fresh_samples(replace(whole, time=time, values=whole.values[keep]))
+    fresh = replace(whole, time=time, values=whole.values[keep]).updates
     there = set(whole.values[keep].tolist())
     assert len(there & set(fresh.values.tolist())) > 0.9 * len(there)
     assert fresh.time.size < 1.1 * 300  # hardly a repeated value counts as an update
@@ -41,7 +41,7 @@ def test_a_pause_of_years_brings_no_update() -> None:
     held = channel(hold(wave(100, 0.01), 3))
     late = 0.4 * STEP * rng.uniform(size=held.time.size)
     time = held.time + late + np.where(np.arange(held.time.size) < 150, 0.0, 1e9)
-    fresh = fresh_samples(replace(held, time=time))
+    fresh = replace(held, time=time).updates
     assert fresh.values.tolist() == wave(100, 0.01).tolist()
 
 
@@ -61,6 +61,6 @@ def test_messages_whose_jitter_a_table_of_even_stamps_shows(seed: int) -> None:
     at[7], at[8], at[9] = 73, 77, 93
     shown = np.searchsorted(at, np.arange(3000), "right") - 1
     held = channel(updates[np.maximum(shown, 0)])
-    fresh = fresh_samples(held)
+    fresh = held.updates
     assert abs(fresh.values.size - 300) < 10
     assert set(updates[1:].tolist()) <= set(fresh.values.tolist())

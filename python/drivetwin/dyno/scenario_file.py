@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: MIT
+"""Built-in scenarios, read from the TOML files in `scenarios/`.
+
+All numbers are in SI. A file with `base` overrides parts of another scenario: tables are merged key
+by key, other values replace those of the base. Elements that no gear of the scenario uses are
+dropped. Keys are the fields of `Scenario` and of the classes that it holds, and:
+
+- `engine_torque`: knots (time, torque), or steps through `levels` every `dwell` seconds from
+  `first` on, once more where `again` states other times, followed by the knots in `then`.
+- `brakes` hold a gear of overall `ratio` against ground, `clutches` connect it directly.
+- `driveline.output_load`: constant load at the gearbox output [N m].
+- `gearbox`: built-in card of a whole gearbox in place of brakes and clutches. `drum_inertia` is
+  that of each member in `drums`; `inertias` replaces those of other members.
+- `sensors`: noise is one standard deviation; speeds have the order of the log's columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from drivetwin._util.toml import read_toml
+from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.shiftlog import Quantity
+from drivetwin.dyno.actuators import Actuator, Fill, Program, Vibration
+from drivetwin.dyno.converter import OpenConverter
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.plant import Plant, Surroundings, form_of, plant_of
+from drivetwin.dyno.scenario import HeldGear, Scenario, TorqueReduction
+from drivetwin.dyno.sensors import Sensor
+from drivetwin.errors import InputError, Where
+from drivetwin.gearbox import load_gearbox
+from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck
+from drivetwin.vehicle.converter import ConverterTable
+
+Table = Mapping[str, Any]
+
+_FOLDER = Path(__file__).parent / "scenarios"
+_STEP_TIME = 0.06
+"""Time [s] in which the engine torque goes to its next level."""
+_SPEED_COLUMNS = {
+    "input_speed": "SpdIn",
+    "output_speed": "SpdOut",
+    "wheel_speed": "SpdWhl",
+    "engine_speed": "SpdEng",
+}
+
+
+def load_scenario(name: str, drum: float | None = None) -> Scenario:
+    """Return the built-in scenario `name`; `drum` [kg m^2] is the inertia of each brake drum.
+
+    Raises InputError for an unknown name, and for a drum that is negative or stated for a scenario
+    without a whole gearbox.
+    """
+    if name not in list(ScenarioName):
+        raise InputError(f"no built-in scenario {name!r}", f"give one of {', '.join(ScenarioName)}")
+    table = _read_table(name)
+    if drum is not None:
+        with_drums = [each for each in ScenarioName if "gearbox" in _read_table(each)]
+        if name not in with_drums or not drum >= 0.0:
+            raise InputError(
+                f"a drum of {drum:g} kg·m² in scenario {name}",
+                f"state a drum of 0 or more in one of {', '.join(with_drums)}",
+                Where(key="drum"),
+            )
+        table = _merge(table, {"gearbox": {"drum_inertia": drum}})
+    return _build_scenario(name, table)
+
+
+@cache
+def _read_table(name: str) -> Table:
+    """Return the table of a scenario merged with that of its base."""
+    table = read_toml(_FOLDER / f"{name}.toml", InputError)
+    base = table.pop("base", None)
+    return table if base is None else _merge(_read_table(base), table)
+
+
+def _merge(base: Table, changes: Table) -> dict[str, Any]:
+    """Return `base` with `changes`: tables key by key, everything else replaced."""
+    merged = dict(base)
+    for key, value in changes.items():
+        old = merged.get(key)
+        merged[key] = (
+            _merge(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+        )
+    return merged
+
+
+def _build_scenario(name: str, table: Table) -> Scenario:
+    gears = tuple(HeldGear(*each) for each in table["gears"])
+    elements = [gear.element for gear in gears]
+    plant = (
+        _build_plant(table["gearbox"], [gear.name for gear in gears])
+        if "gearbox" in table
+        else None
+    )
+    return Scenario(
+        name=name,
+        model=_build_model(table, elements, plant),
+        gears=gears,
+        engine_torque=_build_torque(table["engine_torque"]),
+        actuators=_build_actuators(table, elements),
+        sensors=_build_sensors(table["sensors"], elements),
+        reductions=tuple(TorqueReduction(**each) for each in table.get("reductions", ())),
+        plant=plant,
+        converter=_build_converter(table["converter"]) if "converter" in table else None,
+        duration=table["duration"],
+        engine_speed=table["engine_speed"],
+        J_prime_range=tuple(table["J_prime_range"]),
+        J_vehicle_range=tuple(table["J_vehicle_range"]),
+        one_clutch=table.get("one_clutch", False),
+    )
+
+
+def _build_plant(table: Table, gears: Sequence[str]) -> Plant:
+    """Return the gearbox of a card with the stated inertias."""
+    box = load_gearbox(table["card"])
+    drums = {member: float(table["drum_inertia"]) for member in table["drums"]}
+    return plant_of(
+        replace(box, inertias={**box.inertias, **drums, **table["inertias"]}), tuple(gears)
+    )
+
+
+def _build_model(table: Table, elements: Sequence[str], plant: Plant | None) -> DualClutch:
+    """Return the dual-clutch model, for a whole gearbox that of its `plant`."""
+    stated = dict(table["driveline"])
+    output_load = stated.pop("output_load")
+    if plant is not None:
+        drive = plant.gearbox.require_drive()
+        around = Surroundings(
+            J1=drive.engine_inertia,
+            eta=stated["eta"],
+            i_f=drive.i_f,
+            J_v=drive.vehicle_inertia,
+            k_o=drive.k_o,
+            c_o=drive.c_o,
+            load=RoadLoad(constant=output_load * drive.i_f),
+        )
+        return form_of(plant, around)
+    brakes, clutches = table.get("brakes", {}), table.get("clutches", {})
+    return DualClutch(
+        loss_law="paper",
+        load=RoadLoad(constant=output_load * stated["i_f"]),
+        elements=tuple(
+            _build_element(name, element, brake=name in brakes)
+            for name, element in {**brakes, **clutches}.items()
+            if name in elements
+        ),
+        **stated,
+    )
+
+
+def _build_element(name: str, table: Table, *, brake: bool) -> ShiftElement:
+    """Return the element of a gear with overall `ratio` i; a brake has i_c = i - 1."""
+    ratio = table["ratio"]
+    i_c = ratio - 1.0 if brake else 1.0
+    friction = Stribeck(**table["friction"])
+    return ShiftElement(name, i_c, ratio / i_c, table["gain"], table["P0"], friction)
+
+
+def _build_torque(table: Table | list[list[float]]) -> Program:
+    """Return the engine torque over time: knots, or steps between levels."""
+    if isinstance(table, list):
+        return Program(_build_knots(table))
+    knots = _build_steps(table["first"], table["dwell"], table["levels"])
+    if "again" in table:
+        knots += _build_steps(levels=table["levels"], **table["again"])[1:]
+    return Program((*knots, *_build_knots(table.get("then", []))))
+
+
+def _build_knots(rows: list[list[float]]) -> tuple[tuple[float, float], ...]:
+    return tuple((time, value) for time, value in rows)
+
+
+def _build_steps(first: float, dwell: float, levels: list[float]) -> list[tuple[float, float]]:
+    """Return knots that go to the next of `levels` [N m] every `dwell` seconds from `first` on."""
+    knots = [(0.0, levels[0])]
+    for index, (old, new) in enumerate(pairwise(levels)):
+        start = first + index * dwell
+        knots += [(start, old), (start + _STEP_TIME, new)]
+    return knots
+
+
+def _build_actuators(table: Table, elements: Sequence[str]) -> dict[str, Actuator]:
+    times = dict(table["actuator"])
+    fill = Fill(**times.pop("fill")) if "fill" in times else None
+    stated = [dict(each) for each in table.get("vibrations", ())]
+    vibrations = {each.pop("element"): Vibration(**each) for each in stated}
+    return {
+        name: Actuator(
+            Program(_build_knots(rows)), vibration=vibrations.get(name), fill=fill, **times
+        )
+        for name, rows in table["pressures"].items()
+        if name in elements
+    }
+
+
+def _build_sensors(table: Table, elements: Sequence[str]) -> tuple[Sensor, ...]:
+    """Return the engine torque over CAN every 10 ms and the logger's 1 kHz channels."""
+    noise, pressure, torque = table["pressure_noise"], Quantity.PRESSURE, Quantity.TORQUE
+    return (
+        Sensor("engine_torque", torque, "EngTrq", "Nm", 100.0, **table["engine_torque"]),
+        *(
+            Sensor(pressure_role(name), pressure, column, "bar", 1000.0, noise, 10.0)
+            for name, column in table["pressure_columns"].items()
+            if name in elements
+        ),
+        Sensor("output_torque", torque, "TrqOut", "Nm", 1000.0, table["output_torque_noise"], 0.01),
+        *(
+            Sensor(role, Quantity.SPEED, _SPEED_COLUMNS[role], "rpm", 1000.0, speed_noise, 1e-4)
+            for role, speed_noise in table["speed_noise"].items()
+        ),
+    )
+
+
+def _build_converter(table: Table) -> OpenConverter:
+    curves = {key: value for key, value in table.items() if key != "engine_inertia"}
+    return OpenConverter(ConverterTable(**curves).spec(), table["engine_inertia"])

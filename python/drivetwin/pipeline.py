@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+"""Identification from logs, a vehicle card and detected shifts: prepare, then estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from drivetwin._util.progress import part
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.data.compare_logs import require_compatible
+from drivetwin.estimation.data.prepare import DetectedShifts, prepare
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identify import identify as identify_prepared
+from drivetwin.estimation.multi_log.fit import identify_several
+from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+
+def identify(
+    log: ShiftLog, card: VehicleCard, shifts: DetectedShifts, method: Method = DEFAULT_METHOD
+) -> Identification:
+    """Identify the driveline from all usable shifts of a log.
+
+    Parameters
+    ----------
+    log, card : the channels of a recording and the design data of its vehicle
+    shifts : result of `find_shifts`
+    method : estimator of the reported values; the results of all stages are in `evidence`
+
+    Raises
+    ------
+    NoShiftError
+        Without a usable shift.
+    MissingChannelError
+        For a missing channel.
+    DamagedChannelError
+        If the inputs of the only shift have gaps; of several such shifts are rejected.
+    IdentificationError
+        If the data cannot carry the method.
+    """
+    return identify_prepared(prepare(log, card, shifts), method)
+
+
+def identify_jointly(
+    logs: Sequence[ShiftLog], card: VehicleCard, shifts: Sequence[DetectedShifts]
+) -> Identification:
+    """Identify one driveline from two or more logs, by the likelihood of all their shifts.
+
+    Raises InputError for logs that cannot be joined (the same twice, channels that do not fit),
+    IdentificationError if one log alone, or all together, cannot be fitted, and what `identify`
+    raises.
+    """
+    require_compatible(logs)
+    with part(0.0, 0.05, "preparing the logs"):
+        prepared = [prepare(log, card, found) for log, found in zip(logs, shifts, strict=True)]
+    with part(0.05, 1.0):
+        return identify_several(prepared)
