@@ -92,14 +92,7 @@ def _fmi2(header: Header, variables: Sequence[Variable]) -> ET.Element:
 
 
 def _scalar_variable(parent: ET.Element, variable: Variable) -> None:
-    about = {
-        "name": variable.name,
-        "valueReference": str(variable.reference),
-        "description": variable.meaning,
-        "causality": variable.role.causality,
-        "variability": variable.role.variability(variable.kind),
-    }
-    item = ET.SubElement(parent, "ScalarVariable", {**about, **_initial(variable)})
+    item = ET.SubElement(parent, "ScalarVariable", _build_attributes(variable))
     if variable.kind in ENUMERATIONS:
         typed = {"declaredType": variable.kind.value, **_start(variable)}
         ET.SubElement(item, "Enumeration", typed)
@@ -132,20 +125,21 @@ def _fmi3(header: Header, variables: Sequence[Variable]) -> ET.Element:
 
 def _variable3(parent: ET.Element, variable: Variable) -> None:
     tag = {Kind.REAL: "Float64", Kind.INTEGER: "Int32"}.get(variable.kind, "Enumeration")
-    about = {
+    typed = {"declaredType": variable.kind.value} if tag == "Enumeration" else _quantity(variable)
+    ET.SubElement(parent, tag, {**_build_attributes(variable), **typed, **_start(variable)})
+
+
+def _build_attributes(variable: Variable) -> dict[str, str]:
+    """Attributes that a variable has in both versions."""
+    attributes = {
         "name": variable.name,
         "valueReference": str(variable.reference),
         "description": variable.meaning,
         "causality": variable.role.causality,
         "variability": variable.role.variability(variable.kind),
     }
-    typed = {"declaredType": variable.kind.value} if tag == "Enumeration" else _quantity(variable)
-    ET.SubElement(parent, tag, {**about, **_initial(variable), **typed, **_start(variable)})
-
-
-def _initial(variable: Variable) -> dict[str, str]:
     initial = {"parameter": "exact", "output": "calculated"}.get(variable.role.causality)
-    return {} if initial is None else {"initial": initial}
+    return attributes if initial is None else {**attributes, "initial": initial}
 
 
 def _quantity(variable: Variable) -> dict[str, str]:

@@ -67,13 +67,7 @@ def evidence_sections(found: Identification) -> list[Section]:
             "agree with one η and one J′.",
             [
                 *_momentum_blocks(integral),
-                *(
-                    block
-                    for one in paper
-                    for block in _grid_blocks(
-                        one.by, one.stages.inertia, one.stages.doubts.get("eta"), INERTIA_LABELS
-                    )
-                ),
+                *(b for one in paper for b in _grid_blocks(one, "inertia", "eta", INERTIA_LABELS)),
             ],
         ),
         Section(
@@ -82,13 +76,7 @@ def evidence_sections(found: Identification) -> list[Section]:
             "Eq. 11: T_o − T_v/i_f = (J3/i_f)·ω_w′.",
             [
                 *_load_blocks(found, integral),
-                *(
-                    block
-                    for one in paper
-                    for block in _grid_blocks(
-                        one.by, one.stages.load, one.stages.doubts.get("J_vehicle"), LOAD_LABELS
-                    )
-                ),
+                *(b for one in paper for b in _grid_blocks(one, "load", "J_vehicle", LOAD_LABELS)),
             ],
         ),
         Section(
@@ -96,10 +84,7 @@ def evidence_sections(found: Identification) -> list[Section]:
             "Output shaft from the lock-up oscillation",
             "After lock-up the inertias on both sides of the output shaft swing against each "
             "other; frequency and decay give stiffness and damping (eqs. 12–14).",
-            [
-                *_ring_blocks([*integral, *paper]),
-                *_refusals([*integral, *paper], "shaft"),
-            ],
+            [*_ring_blocks([*integral, *paper]), *_refusals([*integral, *paper], "shaft")],
         ),
     ]
 
@@ -141,12 +126,16 @@ def _load_blocks(found: Identification, shifts: Iterable[_Stages[IntegralShift]]
     ]
 
 
-def _grid_blocks(by: str, fit: GridFit, doubt: str | None, labels: WlseLabels) -> list[Block]:
+def _grid_blocks(
+    one: _Stages[PaperShift], stage: str, parameter: str, labels: WlseLabels
+) -> list[Block]:
     """Build figure and table of a grid search, with any doubt about it between the two."""
+    fit: GridFit = getattr(one.stages, stage)
+    doubt = one.stages.doubts.get(parameter)
     text = (
-        f"{by}, weighted least squares (Fig. 6): samples whose own quotient lies in the plausible "
-        "range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise in the "
-        "differenced speed biases it."
+        f"{one.by}, weighted least squares (Fig. 6): samples whose own quotient lies in the "
+        "plausible range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise "
+        "in the differenced speed biases it."
     )
     blocks: list[Block] = [FigureBlock(wlse_figure(fit, labels), text)]
     if doubt:
