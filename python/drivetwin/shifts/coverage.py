@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The part of a shift over which all that drives it was recorded, and that one load holds for.
+"""Trimming of a shift to the span in which all its inputs were recorded.
 
-A gap in the engine torque or in a pressure cannot drive a model, so the
-gears held before and after the shift are cut at it, and a shift with a gap inside is refused. A
-pressure counts only while an element may slip: one that stays above or below P0 on both sides of
-its gap, while the speeds are those of an engaged gear, is ignored. An input that starts
-after the gear before the shift, or ends before the gear after it, has a gap there. With an
-open converter the turbine torque drives the gearbox and is checked in the same way.
+A gap in the engine torque or in a pressure cannot drive a model, so the gears before and after the
+shift are cut at it, and a shift with a gap inside is rejected. A pressure gap matters only while an
+element may slip. It is ignored if the pressure stays above or below P0 on both sides and the speeds
+are those of an engaged gear. An input that starts after the gear before the shift, or ends before
+the gear after it, has a gap there. So does the engine torque while the converter is open, because
+it does not drive the gearbox then.
 """
 
 from __future__ import annotations

@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
+from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.estimation.data.load_stationarity import own_load
+from drivetwin.estimation.data.prepare import sampled
 from drivetwin.estimation.data.select_shifts import MOST, chosen
 from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.shifts.shift import Shift
+from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import make_card
@@ -43,16 +45,27 @@ def drive(braked: tuple[float, float] = BRAKED) -> tuple[FloatArray, FloatArray,
     return time, *noisy
 
 
-def log(torque: FloatArray | None = None, wheel: FloatArray | None = None) -> ShiftLog:
-    """A log of the `drive`, or of another torque and speed at its times."""
+def channels(
+    torque: FloatArray | None = None, wheel: FloatArray | None = None
+) -> tuple[Sampled, Sampled]:
+    """Output torque and wheel speed of the `drive`, or others at its times."""
     time, *braked = drive()
-    torque = braked[0] if torque is None else torque
-    wheel = braked[1] if wheel is None else wheel
-    channels = [
-        Channel("output_torque", Quantity.TORQUE, time, torque, "T_o", "N*m"),
-        Channel("wheel_speed", Quantity.SPEED, time, wheel, "n_w", "rad/s"),
-    ]
-    return ShiftLog({one.role: one for one in channels}, "made", "")
+    values = (
+        braked[0] if torque is None else torque,
+        braked[1] if wheel is None else wheel,
+    )
+    roles = ("output_torque", Quantity.TORQUE), ("wheel_speed", Quantity.SPEED)
+    torque_, wheel_ = (
+        sampled(Channel(role, quantity, time, column, role, ""))
+        for (role, quantity), column in zip(roles, values, strict=True)
+    )
+    return torque_, wheel_
+
+
+def choose(
+    given: tuple[Sampled, Sampled] | None, shifts: Sequence[Shift]
+) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
+    return chosen(given, CARD.final_drive, shifts)
 
 
 def test_a_brake_leaves_much_of_the_vehicles_balance() -> None:
@@ -81,13 +94,13 @@ def test_a_brake_that_looks_like_inertia_is_seen_against_the_other_shifts() -> N
     assert alone is not None
     assert alone.left < 1.5
     spans = [shift(20.0), shift(43.0), shift(60.0), shift(75.0)]
-    kept, refused = chosen(log(torque, wheel), CARD, spans)
+    kept, refused = choose(channels(torque, wheel), spans)
     assert kept == (spans[0], *spans[2:])
     assert "load is not constant" in refused[0].reason
 
 
 def test_a_braked_shift_is_left_out_where_others_do_without() -> None:
-    kept, refused = chosen(log(), CARD, (shift(20.0), shift(43.0), shift(60.0)))
+    kept, refused = choose(channels(), (shift(20.0), shift(43.0), shift(60.0)))
     assert kept == (shift(20.0), shift(60.0))
     (one,) = refused
     assert one.time[0] == pytest.approx(42.4)
@@ -95,14 +108,14 @@ def test_a_braked_shift_is_left_out_where_others_do_without() -> None:
 
 
 def test_what_is_alone_or_alike_stays() -> None:
-    assert chosen(log(), CARD, (shift(43.0),)) == ((shift(43.0),), ())
+    assert choose(channels(), (shift(43.0),)) == ((shift(43.0),), ())
     both = (shift(43.0), shift(43.5))
-    assert chosen(log(), CARD, both) == (both, ())
+    assert choose(channels(), both) == (both, ())
 
 
 def test_a_shift_that_tells_nothing_of_its_load_is_left_out() -> None:
     brief = replace(shift(80.0), before=(79.95, 79.96), after=(80.0, 80.2))
-    kept, (one,) = chosen(log(), CARD, (shift(20.0), brief))
+    kept, (one,) = choose(channels(), (shift(20.0), brief))
     assert kept == (shift(20.0),)
     assert "tell nothing of its load" in one.reason
 
@@ -110,7 +123,7 @@ def test_a_shift_that_tells_nothing_of_its_load_is_left_out() -> None:
 def test_no_more_shifts_than_tell_something_new() -> None:
     usual = [shift(50.0 + 5.0 * k) for k in range(MOST + 5)]
     rare = replace(shift(150.0), kind=ShiftKind.POWER_OFF_UP)
-    kept, refused = chosen(log(), CARD, (*usual, rare))
+    kept, refused = choose(channels(), (*usual, rare))
     assert len(kept) == MOST
     assert rare in kept
     assert list(kept) == sorted(kept, key=lambda one: one.lockup_time)
@@ -119,7 +132,6 @@ def test_no_more_shifts_than_tell_something_new() -> None:
 
 
 def test_without_an_output_torque_the_first_of_each_kind_are_taken() -> None:
-    bare = ShiftLog({}, "made", "")
     usual = tuple(shift(50.0 + 5.0 * k) for k in range(MOST + 1))
-    kept, _ = chosen(bare, CARD, usual)
+    kept, _ = choose(None, usual)
     assert kept == usual[:MOST]
