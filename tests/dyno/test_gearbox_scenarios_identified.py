@@ -64,7 +64,7 @@ def test_truth_lies_in_the_intervals_where_the_card_states_the_drums(tmp_path: P
 def test_intervals_cover_where_the_card_states_the_drums(tmp_path: Path) -> None:
     held: dict[str, list[bool]] = {}
     for seed in range(COARSE):
-        bench = run(scenario_of(ScenarioName.GEARBOX), seed)
+        bench = run(load_scenario(ScenarioName.GEARBOX), seed)
         found = identified(bench, tmp_path, Method.LIKELIHOOD, drums=True)
         for name, true in bench.truth.parameters.items():
             if (interval := found.estimates[name].ci95_total) is not None:

@@ -9,7 +9,7 @@ from enum import Enum
 from types import SimpleNamespace
 from typing import Any
 
-from drivetwin.export.c.write import model_sources
+from drivetwin.export.c.write import read_model_sources
 
 _CONSTANT = re.compile(r"#define DT_(\w+) (\d+)\b")
 _STRUCTURE = re.compile(r"typedef struct \{(.*?)\} dt_(\w+);", re.DOTALL)
@@ -26,7 +26,7 @@ class Precision(Enum):
 
 def read_layout(precision: Precision) -> SimpleNamespace:
     """Return the ctypes class of every structure by its name without `dt_`."""
-    sources = model_sources()
+    sources = read_model_sources()
     text = _COMMENT.sub("", "".join(sources[f"dt_{n}.h"].decode() for n in ("model", "observer")))
     sizes = {f"DT_{name}": int(value) for name, value in _CONSTANT.findall(text)}
     types: dict[str, Any] = {"dt_real": precision.value, "uint64_t": ctypes.c_uint64}
