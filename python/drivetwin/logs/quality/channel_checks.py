@@ -48,8 +48,7 @@ TYPICAL_STEP = (1e-4, 0.2)
 """Sample interval [s] that a proposed unit of time must lead to."""
 
 COARSE = 0.03
-"""Resolution as a share of the largest number from which a channel counts as coarse; engines on a
-bus have 1 % of their reference torque."""
+"""Resolution, as a share of the largest number, of a coarse channel; CAN engine torque has 1 %."""
 
 MAX_AT_LIMIT = 0.1
 """Share of samples at the largest number above which an engine torque may be saturated, ..."""
@@ -64,15 +63,13 @@ LEAST_SUCTION = BAR
 MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
 """Speed change [rad/s] and rate [rad/s2] that no wheel shows between samples."""
 OF_A_MOTOR = 1e4
-"""The same rate of the other shafts: 300 N m turn an electric motor of 0.04 kg m2 with 7500 rad/s2,
-and what little turns between it and a soft shaft follows at lock-up."""
+"""Rate [rad/s2] of the other shafts: 300 N m accelerate a motor of 0.04 kg m2 at 7500 rad/s2."""
 
 WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
 """An overflow jumps by this share of the range, and by so many usual steps."""
 
 WRAP_STEP = 15e-3
-"""Interval of samples [s] from which an output torque may do the same: at lock-up it falls within a
-quarter of a period of the shaft, and swings back."""
+"""Sample interval [s] from which output torque may do so: at lock-up it falls in a quarter period."""
 
 WRAP_BESIDE, WRAP_DRIFT = 5, 0.02
 """So many samples before and after an overflow move against the jump by this share at least."""
