@@ -69,7 +69,7 @@ WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
 """An overflow jumps by this share of the range, and by so many usual steps."""
 
 WRAP_STEP = 15e-3
-"""Sample interval [s] from which output torque may do so: at lock-up it falls in a quarter period."""
+"""Sample interval [s] from which output torque may do so: it falls in a quarter period."""
 
 WRAP_BESIDE, WRAP_DRIFT = 5, 0.02
 """So many samples before and after an overflow move against the jump by this share at least."""
